@@ -1,0 +1,1 @@
+"""A ROS 2 relay that matches messages by time, told how by a YAML file."""

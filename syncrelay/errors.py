@@ -1,0 +1,13 @@
+"""What the user can mend: where it is, what was found, what was expected. Anything else is our bug."""
+
+
+class SyncRelayError(Exception):
+    """Base of every error that a user can cause; its text is shown as it stands."""
+
+
+class TypeImportError(SyncRelayError):
+    """A message type that exists by name could not be imported."""
+
+
+class RosUnavailableError(SyncRelayError):
+    """ROS cannot be used here: rclpy, its middleware or its environment is missing."""

@@ -1,0 +1,49 @@
+"""The values that go into the engine and come out of it."""
+
+from enum import Enum
+from typing import Any, NamedTuple, TypeAlias
+
+
+class DropReason(Enum):
+    """Why a message left without a set. Each unmatched message has exactly one."""
+
+    LATE = "late"
+    DUPLICATE = "duplicate"
+    OVERFLOW = "overflow"
+    SUPERSEDED = "superseded"
+    TOO_FAR = "too_far"
+    EXPIRED = "expired"
+    TIME_JUMP = "time_jump"
+    UNSTAMPED = "unstamped"
+    MALFORMED = "malformed"
+    THINNED = "thinned"
+    SHUTDOWN = "shutdown"
+
+
+class Message(NamedTuple):
+    """One message of one input: index from 0, stamp in nanoseconds, a payload that the engine never opens."""
+
+    input: int
+    stamp: int
+    payload: Any
+
+
+class Match(NamedTuple):
+    """A set: one message per input in input order, None where an optional one is missing.
+
+    `stamp` is the common stamp in nanoseconds that the group's restamping gives the set; None leaves each
+    message its own.
+    """
+
+    messages: tuple[Message | None, ...]
+    stamp: int | None = None
+
+
+class Drop(NamedTuple):
+    """A message that leaves unmatched."""
+
+    message: Message
+    reason: DropReason
+
+
+Outcome: TypeAlias = Match | Drop
