@@ -1,0 +1,59 @@
+"""Stamps in serialized messages: read and patched in place of decoding.
+
+A payload is a message as DDS carries it: four bytes of encapsulation header (DDSI-RTPS 2.5, 10.2), then the
+fields. Where the first field is a std_msgs/Header, its stamp stands first: int32 seconds and uint32
+nanoseconds, in the byte order that the encapsulation names. Plain CDR and plain XCDR2 lay it out alike.
+"""
+
+from struct import Struct
+from typing import Final, TypeAlias
+
+Payload: TypeAlias = bytes | bytearray | memoryview
+
+_NS_PER_SECOND: Final = 1_000_000_000
+_STAMP_AT: Final = 4
+_STAMP_END: Final = 12
+_MIN_SECONDS: Final = -(2**31)
+_MAX_SECONDS: Final = 2**31 - 1
+_BIG_ENDIAN: Final = Struct(">iI")
+_LITTLE_ENDIAN: Final = Struct("<iI")
+# The second byte of the encapsulation header; the first is 0 for all of them.
+_STAMP_LAYOUTS: Final = {
+    0x00: _BIG_ENDIAN,  # CDR_BE
+    0x01: _LITTLE_ENDIAN,  # CDR_LE
+    0x06: _BIG_ENDIAN,  # CDR2_BE
+    0x07: _LITTLE_ENDIAN,  # CDR2_LE
+}
+_UNPACK_STAMP: Final = {kind: layout.unpack_from for kind, layout in _STAMP_LAYOUTS.items()}
+
+
+def read_stamp(payload: Payload) -> int | None:
+    """Return the stamp of the leading Header in nanoseconds, or None if the payload is malformed.
+
+    Malformed: shorter than its stamp, an encapsulation that is neither plain CDR nor plain XCDR2, or a
+    nanosecond part of a second or more. Negative seconds are valid (builtin_interfaces/Time).
+    """
+    if len(payload) < _STAMP_END or payload[0]:
+        return None
+    unpack = _UNPACK_STAMP.get(payload[1])
+    if unpack is None:
+        return None
+    seconds, nanoseconds = unpack(payload, _STAMP_AT)
+    if nanoseconds >= _NS_PER_SECOND:
+        return None
+    return int(seconds * _NS_PER_SECOND + nanoseconds)
+
+
+def patch_stamp(payload: Payload, stamp: int) -> bytes:
+    """Return the payload with the stamp of its leading Header set to `stamp` nanoseconds.
+
+    Raises ValueError where `read_stamp` would give None, and for a stamp whose seconds don't fit an int32.
+    """
+    if read_stamp(payload) is None:
+        raise ValueError("the payload has no stamp to patch")
+    seconds, nanoseconds = divmod(stamp, _NS_PER_SECOND)
+    if not _MIN_SECONDS <= seconds <= _MAX_SECONDS:
+        raise ValueError(f"a stamp of {stamp} ns does not fit builtin_interfaces/Time")
+    whole = memoryview(payload)
+    stamp_bytes = _STAMP_LAYOUTS[payload[1]].pack(seconds, nanoseconds)
+    return b"".join((whole[:_STAMP_AT], stamp_bytes, whole[_STAMP_END:]))
