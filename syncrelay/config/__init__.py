@@ -1,0 +1,28 @@
+"""The file: read with positions, checked as a whole, and turned into what the relay is told."""
+
+from syncrelay.config.errors import ConfigError
+from syncrelay.config.load import load, load_text
+from syncrelay.config.models import NodeConfig, StampField, StampSource
+from syncrelay.config.problems import Problem, Severity, Span
+from syncrelay.config.qos import AUTO, QosOverrides, QosPreset
+from syncrelay.config.render import render
+from syncrelay.config.resolved import Config, GroupConfig, TopicConfig
+
+__all__ = [
+    "AUTO",
+    "Config",
+    "ConfigError",
+    "GroupConfig",
+    "NodeConfig",
+    "Problem",
+    "QosOverrides",
+    "QosPreset",
+    "Severity",
+    "Span",
+    "StampField",
+    "StampSource",
+    "TopicConfig",
+    "load",
+    "load_text",
+    "render",
+]

@@ -1,0 +1,110 @@
+"""What single keys can't tell: names that meet, topics that groups share, a restamp that names no input."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from syncrelay.config.document import Document, MappingNode, SequenceNode
+from syncrelay.config.drafts import GroupDraft, TopicDraft
+from syncrelay.config.problems import Path, Problem
+from syncrelay.config.wording import did_you_mean, quoted
+
+_RESTAMP_WORDS = ("none", "earliest", "latest")
+
+
+def check_between(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
+    """Yield what is wrong between the keys of a file, types aside."""
+    yield from _too_few(groups, document)
+    for group in groups:
+        yield from _repeated_inputs(group, document)
+        yield from _restamp(group, document)
+    yield from _shared_topics(groups, document)
+    yield from _outputs(groups, document)
+
+
+def _too_few(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
+    node = document.find(("groups",))
+    if isinstance(node, MappingNode) and not node.entries:
+        yield _at(document, ("groups",), "expected one group or more, found none", code="too_few")
+    for group in groups:
+        path = (*group.path, "topics")
+        topics = document.find(path)
+        if isinstance(topics, SequenceNode) and len(topics.items) < 2:  # noqa: PLR2004  one has nothing to match
+            count = "none" if not topics.items else "one"
+            yield _at(
+                document, path, f"expected 2 topics or more, found {count}", code="too_few", at_key=True
+            )
+
+
+def _repeated_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]:
+    first: dict[str, TopicDraft] = {}
+    for topic in group.topics:
+        if topic.topic is None:
+            continue
+        if topic.topic in first:
+            line = document.value_span((*first[topic.topic].path, "topic")).line
+            text = f"{quoted(topic.topic)} is in this group twice, first in line {line}"
+            yield _at(document, (*topic.path, "topic"), text, code="repeated_topic")
+        first.setdefault(topic.topic, topic)
+
+
+def _restamp(group: GroupDraft, document: Document) -> Iterator[Problem]:
+    inputs = [topic.topic for topic in group.topics if topic.topic]
+    if group.restamp in _RESTAMP_WORDS or group.restamp_topic in inputs:
+        return
+    hint = did_you_mean(group.restamp, (*_RESTAMP_WORDS, *inputs))
+    text = f"{quoted(group.restamp)} is not an input of this group, nor none, earliest or latest{hint}"
+    yield _at(document, (*group.path, "restamp"), text, code="bad_value")
+
+
+def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
+    first: dict[str, TopicDraft] = {}
+    for topic in _topics(groups):
+        if topic.topic is None:
+            continue
+        other = first.setdefault(topic.topic, topic)
+        if other is topic:
+            continue
+        if topic.type and other.type and topic.type != other.type:
+            line = document.value_span((*other.path, "type")).line
+            text = f"{quoted(topic.topic)} is {quoted(other.type)} in line {line}, and one topic has one type"
+            yield _at(document, (*topic.path, "type"), text, code="conflict")
+        if topic.qos != other.qos:
+            yield _qos_conflict(topic, other, document)
+
+
+def _qos_conflict(topic: TopicDraft, other: TopicDraft, document: Document) -> Problem:
+    own = (*topic.path, "qos")
+    path = own if document.find(own) else (*topic.path, "topic")
+    line = document.value_span(
+        (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
+    ).line
+    text = f"{quoted(str(topic.topic))} has another `qos` in line {line}: it is subscribed once, write the same in both"
+    return _at(document, path, text, code="conflict")
+
+
+def _outputs(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
+    inputs = {topic.topic: topic for topic in reversed(list(_topics(groups))) if topic.topic}
+    outputs: dict[str, TopicDraft] = {}
+    for topic in _topics(groups):
+        if topic.output is None:
+            continue
+        name = quoted(topic.output)
+        what = f"the output {name}" if topic.has_own_output else f"the default output {name}"
+        if topic.output in inputs:
+            line = document.value_span((*inputs[topic.output].path, "topic")).line
+            text = f"{what} is an input too (line {line}): its messages would come back, give it another `output`"
+            yield _at(document, topic.output_path, text, code="loop")
+        elif topic.output in outputs:
+            line = document.value_span(outputs[topic.output].output_path).line
+            text = f"{what} is taken by line {line}, give it another `output`"
+            yield _at(document, topic.output_path, text, code="repeated_output")
+        outputs.setdefault(topic.output, topic)
+
+
+def _topics(groups: Iterable[GroupDraft]) -> Iterator[TopicDraft]:
+    for group in groups:
+        yield from group.topics
+
+
+def _at(document: Document, path: Path, text: str, *, code: str, at_key: bool = False) -> Problem:
+    span = document.key_span(path) if at_key else document.value_span(path)
+    return document.problem(path, text, code=code, span=span)

@@ -1,0 +1,186 @@
+"""From YAML's events to a Document, in one pass without recursion, within bounds that no real file meets.
+
+On PyYAML's events and not its loader, because the loader keeps the last of two equal keys in silence, reads YAML
+1.1 scalars, recurses once per level and builds an alias bomb before anyone can object.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import yaml
+
+from syncrelay.config.document import Document, Entry, MappingNode, Node, ScalarNode, SequenceNode
+from syncrelay.config.errors import ConfigError
+from syncrelay.config.problems import Path, Problem, Span, dotted
+from syncrelay.config.scalars import Scalar, read_plain
+from syncrelay.config.source import Source
+from syncrelay.config.substitution import substitute
+from syncrelay.config.syntax import in_words
+from syncrelay.config.wording import quoted
+
+_LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+# A file that uses every key is 7 levels deep.
+_DEEPEST: Final = 50
+# Values after following every alias: a thousand groups are a tenth of it.
+_MOST_VALUES: Final = 200_000
+
+
+def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[Problem]]:
+    """Return the tree of a file and what is wrong with single keys and values of it.
+
+    Raises ConfigError where no tree can be made.
+    """
+    composer = _Composer(source, environ)
+    try:
+        for event in yaml.parse(source.text, Loader=_LOADER):
+            composer.take(event)
+    except yaml.MarkedYAMLError as error:
+        text, span = in_words(error, source.lines)
+        raise ConfigError([source.problem(text, span=span, code="yaml")]) from error
+    if composer.root is None:
+        raise ConfigError([source.problem(_EMPTY, span=None, code="empty")])
+    return Document(source.name, source.lines, composer.root), composer.problems
+
+
+_EMPTY = "the file is empty, expected at least `version: 1` and `groups:`"
+
+
+@dataclass(slots=True)
+class _Open:
+    """A mapping or list whose end has not come yet. `key` is a mapping's key that waits for its value."""
+
+    node: MappingNode | SequenceNode
+    anchor: str | None
+    step: str | int = 0
+    key: Span | None = None
+    duplicates: list[Span] = field(default_factory=list)
+
+
+class _Composer:
+    def __init__(self, source: Source, environ: Mapping[str, str]) -> None:
+        self.root: Node | None = None
+        self.problems: list[Problem] = []
+        self._source = source
+        self._environ = environ
+        self._open: list[_Open] = []
+        self._anchors: dict[str, Node] = {}
+
+    def take(self, event: yaml.Event) -> None:
+        match event:
+            case yaml.DocumentStartEvent() if self.root is not None:
+                raise self._refusal("a second document begins here, expected one per file", self._span(event))
+            case yaml.ScalarEvent():
+                self._scalar(event)
+            case yaml.AliasEvent():
+                self._alias(event)
+            case yaml.MappingStartEvent():
+                self._begin(MappingNode(self._span(event)), event)
+            case yaml.SequenceStartEvent():
+                self._begin(SequenceNode(self._span(event)), event)
+            case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
+                self._end()
+
+    def _begin(self, node: MappingNode | SequenceNode, event: Any) -> None:
+        self._check_tag(event)
+        if self._awaits_key():
+            what = "mapping" if isinstance(node, MappingNode) else "list"
+            raise self._refusal(
+                f"a {what} cannot be a key; a text that begins with a bracket needs quotes", node.span
+            )
+        if len(self._open) == _DEEPEST:
+            raise self._refusal(f"more than {_DEEPEST} levels of nesting", node.span)
+        self._open.append(_Open(node, event.anchor))
+
+    def _end(self) -> None:
+        ended = self._open.pop()
+        self._place(ended.node, ended.anchor)
+
+    def _scalar(self, event: yaml.ScalarEvent) -> None:
+        self._check_tag(event)
+        span = self._span(event)
+        if self._awaits_key():
+            self._key(event.value, span)
+            return
+        self._place(self._value(event, span), event.anchor)
+
+    def _key(self, key: str, span: Span) -> None:
+        top = self._open[-1]
+        top.step, top.key = key, span
+        assert isinstance(top.node, MappingNode)  # noqa: S101  only a mapping awaits a key
+        if key == "<<":
+            text = "merge keys are not part of YAML 1.2: repeat the keys, or put them under `defaults`"
+            self._report(text, span, code="merge_key")
+        elif key in top.node.entries:
+            first = top.node.entries[key].key.line
+            self._report(f"the key is here twice, first in line {first}", span, code="duplicate_key")
+
+    def _value(self, event: yaml.ScalarEvent, span: Span) -> ScalarNode:
+        try:
+            return ScalarNode(span, self._resolved(event))
+        except ValueError as error:
+            self._report(str(error), span, code="substitution")
+            return ScalarNode(span, None, readable=False)
+
+    def _resolved(self, event: yaml.ScalarEvent) -> Scalar:
+        written: str = event.value
+        text = substitute(written, self._environ) if "$" in written else written
+        is_plain = event.implicit[0]
+        if not is_plain or (written and not text):
+            return text
+        return read_plain(text)
+
+    def _alias(self, event: yaml.AliasEvent) -> None:
+        span, name = self._span(event), str(event.anchor)
+        if any(container.anchor == name for container in self._open):
+            raise self._refusal(f"{quoted('*' + name)} stands inside what it repeats", span)
+        target = self._anchors.get(name)
+        if target is None:
+            raise self._refusal(f"{quoted('*' + name)} repeats nothing: no `&{name}` above", span)
+        if self._awaits_key():
+            raise self._refusal("an alias cannot be a key", span)
+        self._place(target, None)
+        if sum(container.node.size for container in self._open) > _MOST_VALUES:
+            raise self._refusal(f"with every alias followed the file has over {_MOST_VALUES} values", span)
+
+    def _place(self, node: Node, anchor: str | None) -> None:
+        if anchor:
+            self._anchors[anchor] = node
+        if not self._open:
+            self.root = node
+            return
+        top = self._open[-1]
+        top.node.size += node.size
+        if isinstance(top.node, SequenceNode):
+            top.node.items.append(node)
+            top.step = len(top.node.items)
+            return
+        assert top.key is not None  # noqa: S101  a value follows its key
+        if top.step != "<<":
+            top.node.entries.setdefault(str(top.step), Entry(top.key, node))
+        top.key = None
+
+    def _awaits_key(self) -> bool:
+        return (
+            bool(self._open) and isinstance(self._open[-1].node, MappingNode) and self._open[-1].key is None
+        )
+
+    def _check_tag(self, event: Any) -> None:
+        if event.tag is not None:
+            raise self._refusal(f"tags such as {quoted(event.tag)} are not supported", self._span(event))
+
+    def _report(self, text: str, span: Span, *, code: str) -> None:
+        self.problems.append(self._source.problem(text, path=dotted(self._path()), span=span, code=code))
+
+    def _refusal(self, text: str, span: Span) -> ConfigError:
+        return ConfigError([self._source.problem(text, span=span, code="yaml")])
+
+    def _path(self) -> Path:
+        return tuple(container.step for container in self._open)
+
+    def _span(self, event: Any) -> Span:
+        start, end = event.start_mark, event.end_mark
+        width = end.column - start.column if end.line == start.line else 0
+        if width < 1 or isinstance(event, yaml.CollectionStartEvent):
+            width = len(self._source.line(start.line + 1)) - start.column
+        return Span(start.line + 1, start.column + 1, max(1, width))

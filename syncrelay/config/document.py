@@ -1,0 +1,133 @@
+"""A YAML file as a tree in which every key and value knows where it stands."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
+
+from syncrelay.config.problems import Path, Problem, Severity, Span, dotted
+from syncrelay.config.scalars import Scalar
+
+
+@dataclass(slots=True)
+class ScalarNode:
+    """A value. `readable` is false where a problem has been reported in its place."""
+
+    span: Span
+    value: Scalar
+    readable: bool = True
+    size: int = 1
+
+
+class Entry(NamedTuple):
+    """A key's place and its value."""
+
+    key: Span
+    value: "Node"
+
+
+@dataclass(slots=True)
+class MappingNode:
+    """Keys in the order of the file. `size` counts the values below, through aliases too."""
+
+    span: Span
+    entries: dict[str, Entry] = field(default_factory=dict)
+    size: int = 1
+
+
+@dataclass(slots=True)
+class SequenceNode:
+    """A list. `size` counts the values below, through aliases too."""
+
+    span: Span
+    items: "list[Node]" = field(default_factory=list)
+    size: int = 1
+
+
+Node: TypeAlias = ScalarNode | MappingNode | SequenceNode
+
+
+@dataclass(slots=True)
+class Document:
+    """A file's name, lines and tree."""
+
+    name: str
+    lines: tuple[str, ...]
+    root: Node
+
+    def problem(
+        self, path: Path, text: str, *, code: str, span: Span, severity: Severity = Severity.ERROR
+    ) -> Problem:
+        """Return a problem of this file at a span."""
+        return Problem(
+            file=self.name,
+            path=dotted(path),
+            text=text,
+            code=code,
+            span=span,
+            source=self.lines[span.line - 1] if span.line <= len(self.lines) else "",
+            severity=severity,
+        )
+
+    def key_span(self, path: Path) -> Span:
+        """Return where the last key of a path stands; for a list item, the item."""
+        *parents, last = path
+        parent = self.node(tuple(parents))
+        if isinstance(parent, MappingNode) and isinstance(last, str) and last in parent.entries:
+            return parent.entries[last].key
+        return self.node(path).span
+
+    def value_span(self, path: Path) -> Span:
+        """Return where the value of a path stands."""
+        return self.node(path).span
+
+    def find(self, path: Path) -> Node | None:
+        """Return the node at a path, or None."""
+        node: Node | None = self.root
+        for step in path:
+            node = _step(node, step) if node is not None else None
+        return node
+
+    def node(self, path: Path) -> Node:
+        """Return the node at a path, or the deepest above it that exists."""
+        node = self.root
+        for step in path:
+            below = _step(node, step)
+            if below is None:
+                break
+            node = below
+        return node
+
+
+def _step(node: Node, step: str | int) -> Node | None:
+    match node:
+        case MappingNode():
+            entry = node.entries.get(str(step))
+            return entry.value if entry else None
+        case SequenceNode() if isinstance(step, int) and step < len(node.items):
+            return node.items[step]
+        case _:
+            return None
+
+
+def plain(node: Node) -> Any:
+    """Return the tree as dicts, tuples and scalars."""
+    match node:
+        case ScalarNode():
+            return node.value
+        case SequenceNode():
+            return tuple(plain(item) for item in node.items)
+        case MappingNode():
+            return {key: plain(entry.value) for key, entry in node.entries.items()}
+
+
+def mappings(node: Node) -> Iterator[tuple[Path, MappingNode]]:
+    """Yield every mapping of a mapping's or list's direct values, with its key or index."""
+    match node:
+        case MappingNode():
+            for key, entry in node.entries.items():
+                if isinstance(entry.value, MappingNode):
+                    yield (key,), entry.value
+        case SequenceNode():
+            for index, item in enumerate(node.items):
+                if isinstance(item, MappingNode):
+                    yield (index,), item

@@ -1,0 +1,120 @@
+"""A file's groups and topics as far as they can be read: checks between them don't wait for every key to be right."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from syncrelay.config.document import Document, MappingNode, SequenceNode, mappings, plain
+from syncrelay.config.names import (
+    check_namespace,
+    check_node_name,
+    check_output_prefix,
+    check_topic_name,
+    default_output,
+    expand,
+)
+from syncrelay.config.problems import Path
+from syncrelay.config.typenames import check_type_name
+
+
+@dataclass(frozen=True, slots=True)
+class TopicDraft:
+    """A topic. Names are absolute; what is missing or wrong is None."""
+
+    path: Path
+    topic: str | None
+    type: str | None
+    output: str | None
+    has_own_output: bool
+    qos: Any
+    stamp: Any
+
+    @property
+    def output_path(self) -> Path:
+        """The key that the output's name comes from."""
+        return (*self.path, "output" if self.has_own_output else "topic")
+
+
+@dataclass(frozen=True, slots=True)
+class GroupDraft:
+    """A group with those of its topics that are mappings. `restamp_topic` is absolute, and None if it is a word."""
+
+    path: Path
+    restamp: str
+    restamp_topic: str | None
+    topics: tuple[TopicDraft, ...]
+
+    @property
+    def name(self) -> str:
+        """The group's name."""
+        return str(self.path[-1])
+
+
+def drafts(document: Document) -> tuple[GroupDraft, ...]:
+    """Return what can be read of a file's groups."""
+    absolute = _absolute_names(document)
+    groups = document.find(("groups",))
+    if groups is None:
+        return ()
+    return tuple(_group(("groups", *step), node, absolute) for step, node in mappings(groups))
+
+
+def _group(path: Path, node: MappingNode, absolute: Callable[[str], str]) -> GroupDraft:
+    prefix = (
+        _checked(check_output_prefix, _value(node, "output_prefix"))
+        if "output_prefix" in node.entries
+        else None
+    )
+    restamp = _value(node, "restamp")
+    restamp = restamp if isinstance(restamp, str) else "none"
+    restamp_topic = None if restamp in ("none", "earliest", "latest") else _checked(check_topic_name, restamp)
+    topics = node.entries["topics"].value if "topics" in node.entries else None
+    return GroupDraft(
+        path=path,
+        restamp=restamp,
+        restamp_topic=absolute(restamp_topic) if restamp_topic else None,
+        topics=tuple(
+            _topic((*path, "topics", *step), topic, prefix=prefix or f"/{path[-1]}", absolute=absolute)
+            for step, topic in (mappings(topics) if isinstance(topics, SequenceNode) else ())
+        ),
+    )
+
+
+def _topic(path: Path, node: MappingNode, *, prefix: str, absolute: Callable[[str], str]) -> TopicDraft:
+    topic = _checked(check_topic_name, _value(node, "topic"))
+    has_own_output = "output" in node.entries
+    if has_own_output:
+        output = _checked(check_topic_name, _value(node, "output"))
+    else:
+        output = default_output(topic, prefix=prefix) if topic else None
+    return TopicDraft(
+        path=path,
+        topic=absolute(topic) if topic else None,
+        type=_checked(check_type_name, _value(node, "type")),
+        output=absolute(output) if output else None,
+        has_own_output=has_own_output,
+        qos=_value(node, "qos") or "auto",
+        stamp=_value(node, "stamp") or "header",
+    )
+
+
+def _absolute_names(document: Document) -> Callable[[str], str]:
+    node = document.find(("node",))
+    own = node if isinstance(node, MappingNode) else MappingNode(document.root.span)
+    name = _checked(check_node_name, _value(own, "name")) or "syncrelay"
+    namespace = _checked(check_namespace, _value(own, "namespace")) or ""
+    return lambda topic: expand(topic, node=name, namespace=namespace)
+
+
+def _value(node: MappingNode, key: str) -> Any:
+    entry = node.entries.get(key)
+    return plain(entry.value) if entry else None
+
+
+def _checked(check: Callable[[str], str], value: Any) -> str | None:
+    if not isinstance(value, str):
+        return None
+    try:
+        return check(value)
+    except ValueError:
+        return None

@@ -1,0 +1,76 @@
+"""Message types as the ament index knows them: read from files, nothing is imported.
+
+The index is a folder `share/ament_index/resource_index` in every prefix of AMENT_PREFIX_PATH. The ROS wheels leave
+that variable unset and put the index into the Python environment's own prefix.
+"""
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final, Self
+
+from syncrelay.config.msgfile import Field, parse_fields
+
+_INDEX: Final = Path("share/ament_index/resource_index")
+
+
+@dataclass(frozen=True)
+class Interfaces:
+    """The installed interfaces below some prefixes, of which earlier ones hide later ones."""
+
+    prefixes: tuple[Path, ...]
+
+    @classmethod
+    def find(cls, environ: Mapping[str, str]) -> Self | None:
+        """Return what the environment has installed; None where there is no index at all."""
+        listed = environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+        prefixes = [Path(entry) for entry in (*listed, sys.prefix) if entry]
+        indexed = tuple(dict.fromkeys(prefix for prefix in prefixes if (prefix / _INDEX).is_dir()))
+        return cls(indexed) if indexed else None
+
+    @cached_property
+    def packages(self) -> Mapping[str, Path]:
+        """Every package that defines interfaces, with its prefix."""
+        return self._resources("rosidl_interfaces")
+
+    @cached_property
+    def other_packages(self) -> frozenset[str]:
+        """Every installed package that defines none."""
+        return frozenset(self._resources("packages")) - frozenset(self.packages)
+
+    def types(self, package: str) -> tuple[str, ...]:
+        """Return a package's types in full (`pkg/msg/Name`, `pkg/srv/Name`, `pkg/action/Name`)."""
+        prefix = self.packages[package]
+        listed = (prefix / _INDEX / "rosidl_interfaces" / package).read_text(
+            encoding="utf-8", errors="replace"
+        )
+        return tuple(
+            sorted({f"{package}/{line.rpartition('.')[0]}" for line in listed.split() if "." in line})
+        )
+
+    def fields(self, type_name: str) -> tuple[Field, ...] | None:
+        """Return the fields of an installed message type; None where its .msg file cannot be read."""
+        package = type_name.partition("/")[0]
+        prefix = self.packages.get(package)
+        if prefix is None:
+            return None
+        try:
+            text = (prefix / "share" / f"{type_name}.msg").read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return None
+        return parse_fields(text, package=package)
+
+    def _resources(self, kind: str) -> dict[str, Path]:
+        found: dict[str, Path] = {}
+        for prefix in self.prefixes:
+            for name in _names_in(prefix / _INDEX / kind):
+                found.setdefault(name, prefix)
+        return found
+
+
+def _names_in(folder: Path) -> Iterator[str]:
+    if folder.is_dir():
+        yield from sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))

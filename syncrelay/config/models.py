@@ -1,0 +1,120 @@
+"""What a file may say. The JSON Schema and the errors come from these models and nowhere else."""
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
+
+from syncrelay.config.keys import Duration, Keys, SignedDuration, TopicName, tag_of_mapping
+from syncrelay.config.names import check_namespace, check_node_name, check_output_prefix
+from syncrelay.config.qos import AUTO, Qos
+from syncrelay.config.typenames import check_type_name
+
+
+class NodeConfig(Keys):
+    """The ROS node. Remaps and parameters behind --ros-args still win."""
+
+    name: Annotated[str, AfterValidator(check_node_name)] = Field(
+        default="syncrelay", description="Name of the node.", examples=["syncrelay"]
+    )
+    namespace: Annotated[str, AfterValidator(check_namespace)] = Field(
+        default="",
+        description="Namespace of the node; relative topic names and `~/` names stand in it. Empty is the root.",
+        examples=["/robot1"],
+    )
+    use_sim_time: bool = Field(
+        default=False,
+        description="Take the time from /clock, as with a simulation or a bag played with --clock.",
+    )
+
+
+class StampField(Keys):
+    """A stamp in a field of its own."""
+
+    field: str = Field(
+        pattern=r"^[A-Za-z]\w*(\.[A-Za-z]\w*)*$",
+        description="Path of a builtin_interfaces/msg/Time in the message, fields joined by dots.",
+        examples=["status.stamp"],
+    )
+
+
+StampSource: TypeAlias = Literal["header", "receive"] | StampField
+
+
+class Topic(Keys):
+    """An input, and the output that its messages leave on."""
+
+    topic: TopicName = Field(description="Name of the input topic.", examples=["/camera/image_raw"])
+    type: Annotated[str, BeforeValidator(check_type_name)] = Field(
+        description="Message type in full, package/msg/Name.", examples=["sensor_msgs/msg/Image"]
+    )
+    output: TopicName | None = Field(
+        default=None,
+        description="Name of the output topic. Default: the group's output_prefix followed by the input's name.",
+        examples=["/fused/image"],
+    )
+    qos: Qos = Field(
+        default=AUTO,
+        description=(
+            "QoS of input and output: `auto` matches the publishers, a name is one of rclpy's presets, and a mapping"
+            " holds rosbag2's override keys, of which those not given stay `auto`. Default: auto."
+        ),
+        examples=["auto", "sensor_data", {"reliability": "best_effort", "depth": 5}],
+    )
+    offset: SignedDuration = Field(
+        default=0,
+        description=(
+            "Added to the stamp for matching only, for a sensor whose clock is off: -12ms for one that is 12 ms"
+            " ahead. A number is seconds, a text has a unit (ns, us, ms, s, min). Default: 0."
+        ),
+        examples=["-12ms"],
+    )
+    stamp: Annotated[
+        Annotated[Literal["header", "receive"], Tag("<name>")] | Annotated[StampField, Tag("<mapping>")],
+        Discriminator(tag_of_mapping),
+    ] = Field(
+        default="header",
+        description=(
+            "Where a message's stamp is: `header` (the std_msgs/Header that the message begins with), `receive` (the"
+            " time of its arrival here) or a field, as in {field: status.stamp}. Default: header."
+        ),
+        examples=["header", "receive", {"field": "status.stamp"}],
+    )
+
+
+class PacedTopic(Topic):
+    """An input of a policy that knows the least time between two messages."""
+
+    min_period: Duration = Field(
+        default=0,
+        description=(
+            "Least time between two messages of this input: with it a set can leave before the next message comes."
+            " Too large a value gives worse sets. A number is seconds, a text has a unit (ns, us, ms, s, min)."
+            " Default: 0, nothing known."
+        ),
+        examples=["9ms"],
+    )
+
+
+class Group(Keys):
+    """Keys that the groups of every policy have."""
+
+    queue_size: int = Field(
+        default=10,
+        ge=1,
+        le=1_000_000,
+        description="Messages kept per input while they wait for a match. Default: 10.",
+        examples=[10],
+    )
+    restamp: str = Field(
+        default="none",
+        description=(
+            "Stamp of all messages of a set as they leave: `none` (each keeps its own), `earliest` or `latest` of the"
+            " set, or the name of an input topic, whose stamp all get. Default: none."
+        ),
+        examples=["none", "earliest", "latest", "/lidar/points"],
+    )
+    output_prefix: Annotated[str, AfterValidator(check_output_prefix)] | None = Field(
+        default=None,
+        description="What default output names begin with. Default: / and the group's name.",
+        examples=["/fused"],
+    )

@@ -1,0 +1,96 @@
+"""The rules of ROS for names, as rcl and rmw check them (rcl_validate_topic_name, rmw_validate_full_topic_name)."""
+
+import re
+from typing import Final
+
+from syncrelay.config.wording import describe, quoted
+
+# RMW_TOPIC_MAX_NAME_LENGTH and RMW_NODE_NAME_MAX_NAME_LENGTH.
+_LONGEST_TOPIC: Final = 247
+_LONGEST_NODE: Final = 255
+_TOKEN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_/]")
+
+
+def check_topic_name(name: object) -> str:
+    """Return a topic name, absolute, relative or private (`~/`); raises ValueError saying what is wrong."""
+    if not isinstance(name, str):
+        raise ValueError(f"expected a topic name such as /camera/image_raw, found {describe(name)}")  # noqa: TRY004
+    if not name:
+        raise ValueError("a topic name is empty")
+    if "{" in name or "}" in name:
+        raise ValueError(
+            f"{quoted(name)}: substitutions such as {{ns}} are not filled in here, write a relative name instead"
+        )
+    if name == "~" or (name.startswith("~") and not name.startswith("~/")):
+        raise ValueError(
+            f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points"
+        )
+    _check_tokens(name.removeprefix("~/").removeprefix("/"), whole=name, kind="topic name")
+    if len(name) > _LONGEST_TOPIC:
+        raise ValueError(f"a topic name of {len(name)} characters, at most {_LONGEST_TOPIC} are allowed")
+    return name
+
+
+def check_namespace(name: str) -> str:
+    """Return a node's namespace, empty or `/` for the root; raises ValueError saying what is wrong."""
+    if name not in ("", "/"):
+        _check_tokens(name.removeprefix("/"), whole=name, kind="namespace")
+    return name
+
+
+def check_output_prefix(prefix: str) -> str:
+    """Return what default output names begin with; raises ValueError saying what is wrong."""
+    return prefix if prefix in ("", "/", "~") else check_topic_name(prefix)
+
+
+def check_node_name(name: str) -> str:
+    """Return a node's name; raises ValueError saying what is wrong."""
+    if "/" in name:
+        raise ValueError(f"a node name has no `/`, found {quoted(name)}; `namespace` is a key of its own")
+    _check_tokens(name, whole=name, kind="node name")
+    if len(name) > _LONGEST_NODE:
+        raise ValueError(f"a node name of {len(name)} characters, at most {_LONGEST_NODE} are allowed")
+    return name
+
+
+def check_group_name(name: str) -> str:
+    """Return a group's name: one token of a topic name; raises ValueError saying what is wrong."""
+    if not _TOKEN.fullmatch(name):
+        raise ValueError(
+            f"a group name has letters, digits and `_`, and no digit first, found {quoted(name)}:"
+            " it becomes part of topic names"
+        )
+    return name
+
+
+def expand(name: str, *, node: str, namespace: str) -> str:
+    """Return the absolute name that a node gives to a topic, before any remapping."""
+    root = namespace.strip("/")
+    if name.startswith("/"):
+        return name
+    if name.startswith("~"):
+        return "/" + "/".join(part for part in (root, node, name[1:].strip("/")) if part)
+    return f"/{root}/{name}" if root else f"/{name}"
+
+
+def default_output(topic: str, *, prefix: str) -> str:
+    """Return the output name of an input: the prefix, then the input's name."""
+    return f"{prefix.rstrip('/')}/{topic.removeprefix('~').removeprefix('/')}" if prefix else topic
+
+
+def _check_tokens(tokens: str, *, whole: str, kind: str) -> None:
+    unallowed = _NOT_ALLOWED.search(tokens)
+    if unallowed is not None:
+        raise ValueError(
+            f"a {kind} has letters, digits, `_` and `/` only, found {quoted(unallowed.group())} in {quoted(whole)}"
+        )
+    for token in tokens.split("/"):
+        if not token:
+            raise ValueError(
+                f"a {kind} has one `/` between its parts and none at the end, found {quoted(whole)}"
+            )
+        if token[0].isdigit():
+            raise ValueError(
+                f"no part of a {kind} begins with a digit, found {quoted(token)} in {quoted(whole)}"
+            )

@@ -1,0 +1,86 @@
+"""Problems as text: where, what, and the line itself with the token underlined."""
+
+import unicodedata
+from collections.abc import Sequence
+from typing import Final
+
+from syncrelay.config.problems import Problem, Severity, Span
+
+_MOST_SHOWN: Final = 100
+_TAB_WIDTH: Final = 4
+# A longer line is cut to a window round its token.
+_LONGEST_LINE: Final = 100
+_LEAD: Final = 30
+_BOLD, _RED, _BLUE, _RESET = "\033[1m", "\033[31m", "\033[34m", "\033[0m"
+
+
+def render(problems: Sequence[Problem], *, colour: bool = False) -> str:
+    """Return one block of text per problem, without a newline at the end."""
+    blocks = [_block(problem, colour=colour) for problem in problems[:_MOST_SHOWN]]
+    unshown = len(problems) - _MOST_SHOWN
+    if unshown > 0:
+        blocks.append(f"... and {unshown} more")
+    return "\n".join(blocks)
+
+
+def where(problem: Problem) -> str:
+    """Return `file:line:column`, or the file alone if it is meant as a whole."""
+    if problem.span is None:
+        return problem.file
+    return f"{problem.file}:{problem.span.line}:{problem.span.column}"
+
+
+def _block(problem: Problem, *, colour: bool) -> str:
+    bold, reset = (_BOLD, _RESET) if colour else ("", "")
+    prefix = "note: " if problem.severity is Severity.NOTE else ""
+    path = f"{problem.path}: " if problem.path else ""
+    head = f"{bold}{where(problem)}:{reset} {prefix}{bold}{path}{reset}{problem.text}"
+    if problem.span is None or not problem.source.strip():
+        return head
+    return f"{head}\n{_excerpt(problem.source, problem.span, colour=colour)}"
+
+
+def _excerpt(source: str, span: Span, *, colour: bool) -> str:
+    start = span.column - 1
+    end = min(start + span.width, len(source))
+    first = 0
+    if len(source) > _LONGEST_LINE:
+        first = max(0, start - _LEAD)
+    before = ("…" if first else "") + _shown(source[first:start])
+    token = _shown(source[start:end])
+    after = _shown(source[end : max(end, first + _LONGEST_LINE)])
+    if len(token) > _LONGEST_LINE:
+        token, after = token[:_LONGEST_LINE] + "…", ""
+    elif len(source) > max(end, first + _LONGEST_LINE):
+        after += "…"
+    number = f"{span.line:>5} | "
+    gutter = " " * 5 + " | "
+    underline = " " * _columns(before) + "^" * max(1, _columns(token))
+    if colour:
+        number, gutter = f"{_BLUE}{number}{_RESET}", f"{_BLUE}{gutter}{_RESET}"
+        underline = f"{_RED}{underline}{_RESET}"
+    return f"{number}{before}{token}{after}".rstrip() + f"\n{gutter}{underline}"
+
+
+def _shown(text: str) -> str:
+    """Replace what would move the cursor or hide in a terminal."""
+    return "".join(_shown_character(character) for character in text)
+
+
+def _shown_character(character: str) -> str:
+    if character == "\t":
+        return " " * _TAB_WIDTH
+    if unicodedata.category(character) in ("Cc", "Cf", "Cs"):
+        return "\N{REPLACEMENT CHARACTER}"
+    return character
+
+
+def _columns(text: str) -> int:
+    """Return how many columns of a terminal a text takes."""
+    return sum(_width(character) for character in text)
+
+
+def _width(character: str) -> int:
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1

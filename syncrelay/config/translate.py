@@ -1,0 +1,196 @@
+"""pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+from syncrelay.config.document import Document, MappingNode, ScalarNode
+from syncrelay.config.file import (
+    GROUP_MODEL_OF,
+    Defaults,
+    File,
+    GroupOfAnyPolicy,
+    TopicOfAnyPolicy,
+    topic_model,
+)
+from syncrelay.config.models import NodeConfig, StampField
+from syncrelay.config.problems import Path, Problem
+from syncrelay.config.qos import QosOverrides
+from syncrelay.config.wording import describe, did_you_mean, nearest, one_of
+
+_LEVELS: Final[dict[str, type[BaseModel]]] = {
+    "the file": File,
+    "`node`": NodeConfig,
+    "a group": GroupOfAnyPolicy,
+    "a topic": TopicOfAnyPolicy,
+    "a topic's `qos`": QosOverrides,
+}
+_EXPECTED: Final = {
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "string_type": "text",
+    "tuple_type": "a list",
+    "dict_type": "a mapping",
+    "model_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "finite_number": "a finite number",
+}
+_WHAT_IS_MISSING: Final = {
+    "groups": "expected one group or more",
+    "topics": "expected a list of 2 or more topics",
+    "policy": f"expected {one_of(GROUP_MODEL_OF)}",
+    "version": "expected `version: 1`",
+}
+# What YAML 1.1 and other formats take for a truth value.
+_TRUTH_WORDS: Final = ("yes", "no", "on", "off", "true", "false")
+
+
+def translate(errors: Sequence[ErrorDetails], document: Document) -> list[Problem]:
+    """Return a problem for every error, but none for what only follows from another problem."""
+    misspelt = set(_meant_keys(errors))
+    problems = []
+    for error in errors:
+        path = _path(error)
+        if error["type"] == "missing" and path in misspelt:
+            continue
+        node = document.node(path)
+        if isinstance(node, ScalarNode) and not node.readable:
+            continue
+        problems.append(_problem(error, path, document))
+    return problems
+
+
+def _problem(error: ErrorDetails, path: Path, document: Document) -> Problem:
+    match error["type"]:
+        case "extra_forbidden":
+            text = _unknown_key(error, path)
+            return document.problem(path, text, code="unknown_key", span=document.key_span(path))
+        case "missing":
+            text = f"missing, {_what_is_missing(path)}"
+            return document.problem(path, text, code="missing_key", span=_owner_span(path, document))
+        case kind if kind in _EXPECTED:
+            text = f"expected {_EXPECTED[kind]}, {_found(error['input'], kind)}"
+            return document.problem(path, text, code="wrong_type", span=document.value_span(path))
+        case kind:
+            at_key = error["loc"][-1] == "[key]"
+            span = document.key_span(path) if at_key else document.value_span(path)
+            return document.problem(path, _bad_value(error), code="bad_value", span=span)
+
+
+def _bad_value(error: ErrorDetails) -> str:
+    found = error["input"]
+    context: dict[str, Any] = error.get("ctx", {})
+    match error["type"]:
+        case "value_error":
+            return str(context["error"])
+        case "greater_than_equal":
+            return f"expected {context['ge']} or more, found {describe(found)}"
+        case "less_than_equal":
+            return f"expected {context['le']} or less, found {describe(found)}"
+        case "literal_error":
+            return _no_such_word(found, context["expected"])
+        case _:
+            return f"{error['msg'][0].lower()}{error['msg'][1:]}, found {describe(found)}"
+
+
+def _no_such_word(found: object, expected: str) -> str:
+    words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
+    if isinstance(found, str) and nearest(found, words):
+        return f"unknown value{did_you_mean(found, words)}"
+    return f"expected {one_of(words)}, found {describe(found)}"
+
+
+def _found(value: object, kind: str) -> str:
+    found = f"found {describe(value)}"
+    if not isinstance(value, str):
+        return found
+    if kind == "bool_type" and value.lower() in _TRUTH_WORDS:
+        return f"{found}, which is no truth value in YAML 1.2"
+    if kind in ("int_type", "float_type") and value.strip().isdecimal():
+        return f"{found}: write it without quotes"
+    return found
+
+
+def _unknown_key(error: ErrorDetails, path: Path) -> str:
+    key = str(path[-1])
+    model = _model(error["loc"][:-1])
+    for policy, group in GROUP_MODEL_OF.items():
+        other = (
+            topic_model(group)
+            if issubclass(model, tuple(map(topic_model, GROUP_MODEL_OF.values())))
+            else group
+        )
+        if key in other.model_fields and model in (
+            *GROUP_MODEL_OF.values(),
+            *map(topic_model, GROUP_MODEL_OF.values()),
+        ):
+            return f"unknown key here, only {policy} has it"
+    for level, owner in _LEVELS.items():
+        if key in owner.model_fields and owner is not model:
+            return f"unknown key here, `{key}` is a key of {level}"
+    found = did_you_mean(key, model.model_fields)
+    return f"unknown key{found}" if found else f"unknown key, expected {one_of(model.model_fields)}"
+
+
+def _model(loc: tuple[str | int, ...]) -> type[BaseModel]:
+    """Return the model whose keys stand at a place of pydantic's."""
+    match loc:
+        case ():
+            return File
+        case ("node",):
+            return NodeConfig
+        case ("defaults",):
+            return Defaults
+        case (*_, "qos", "<mapping>"):
+            return QosOverrides
+        case (*_, "stamp", "<mapping>"):
+            return StampField
+        case ("groups", _, str(tag)):
+            return GROUP_MODEL_OF.get(tag.strip("<>"), GroupOfAnyPolicy)
+        case ("groups", _, str(tag), "topics", _):
+            group = GROUP_MODEL_OF.get(tag.strip("<>"))
+            return topic_model(group) if group else TopicOfAnyPolicy
+    raise AssertionError(f"no model at {loc}")
+
+
+def _meant_keys(errors: Sequence[ErrorDetails]) -> Iterator[Path]:
+    """Yield the paths of missing keys that stand there misspelt."""
+    for error in errors:
+        if error["type"] == "extra_forbidden":
+            *parents, key = _path(error)
+            meant = nearest(str(key), _model(error["loc"][:-1]).model_fields)
+            if meant:
+                yield (*parents, meant)
+
+
+def _what_is_missing(path: Path) -> str:
+    key = str(path[-1])
+    if key in _WHAT_IS_MISSING:
+        return _WHAT_IS_MISSING[key]
+    models: tuple[type[BaseModel], ...] = (*GROUP_MODEL_OF.values(), TopicOfAnyPolicy, StampField)
+    for model in models:
+        info = model.model_fields.get(key)
+        if info is not None and info.examples:
+            return f"expected for example `{key}: {info.examples[0]}`"
+    return "expected"
+
+
+def _owner_span(path: Path, document: Document) -> Any:
+    owner = path[:-1]
+    if owner and isinstance(owner[-1], str):
+        return document.key_span(owner)
+    node = document.node(owner)
+    if isinstance(node, MappingNode) and node.entries:
+        return next(iter(node.entries.values())).key
+    return node.span
+
+
+def _path(error: ErrorDetails) -> Path:
+    return tuple(step for step in error["loc"] if not _is_tag(step))
+
+
+def _is_tag(step: str | int) -> bool:
+    return isinstance(step, str) and (step == "[key]" or (step.startswith("<") and step.endswith(">")))

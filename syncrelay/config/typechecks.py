@@ -1,0 +1,138 @@
+"""Checks of message types against what is installed, importing nothing."""
+
+from collections.abc import Iterator, Sequence
+
+from syncrelay.config.document import Document
+from syncrelay.config.drafts import GroupDraft, TopicDraft
+from syncrelay.config.interfaces import Interfaces
+from syncrelay.config.msgfile import HEADER, TIME, Field
+from syncrelay.config.problems import Path, Problem, Severity
+from syncrelay.config.wording import did_you_mean, nearest, one_of, quoted
+
+
+def check_types(
+    groups: Sequence[GroupDraft], document: Document, interfaces: Interfaces
+) -> Iterator[Problem]:
+    """Yield types that aren't installed and stamps that aren't in them, and as notes what could not be checked."""
+    for group in groups:
+        for topic in group.topics:
+            yield from _check_topic(topic, document, interfaces)
+        yield from _check_restamp(group, document, interfaces)
+
+
+def _check_topic(topic: TopicDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+    if topic.type is None:
+        return
+    fault = _not_installed(topic.type, interfaces)
+    path = (*topic.path, "type")
+    if fault is not None:
+        text, code = fault
+        yield document.problem(path, text, code=code, span=document.value_span(path))
+        return
+    fields = interfaces.fields(topic.type)
+    if fields is None:
+        text = f"{quoted(topic.type)} is installed without its .msg file, so its stamp was not checked"
+        yield document.problem(
+            path, text, code="not_checked", span=document.value_span(path), severity=Severity.NOTE
+        )
+        return
+    if topic.stamp == "header" and not _begins_with_header(fields):
+        yield _no_header(topic, fields, document, interfaces)
+    if isinstance(topic.stamp, dict) and isinstance(topic.stamp.get("field"), str):
+        yield from _check_field(topic, document, interfaces)
+
+
+def _not_installed(type_name: str, interfaces: Interfaces) -> tuple[str, str] | None:
+    package = type_name.partition("/")[0]
+    if package not in interfaces.packages:
+        if package in interfaces.other_packages:
+            return f"the package {quoted(package)} defines no messages", "unknown_type"
+        hint = did_you_mean(package, interfaces.packages)
+        return f"the package {quoted(package)} is not installed here, or not sourced{hint}", "package_missing"
+    types = interfaces.types(package)
+    if type_name in types:
+        return None
+    messages = [name for name in types if name.startswith(f"{package}/msg/")]
+    name = type_name.rpartition("/")[2]
+    for kind, word in (("srv", "a service"), ("action", "an action")):
+        if f"{package}/{kind}/{name}" in types:
+            return f"{quoted(name)} is {word} of {package}, expected a message type", "unknown_type"
+    close = nearest(type_name, messages) or nearest(type_name, _same_name_elsewhere(name, interfaces))
+    hint = f", did you mean `{close}`?" if close else ""
+    return f"the package {package} has no message {quoted(name)}{hint}", "unknown_type"
+
+
+def _same_name_elsewhere(name: str, interfaces: Interfaces) -> Iterator[str]:
+    for package in interfaces.packages:
+        if f"{package}/msg/{name}" in interfaces.types(package):
+            yield f"{package}/msg/{name}"
+
+
+def _begins_with_header(fields: Sequence[Field]) -> bool:
+    return bool(fields) and fields[0].type == HEADER and not fields[0].is_array
+
+
+def _no_header(
+    topic: TopicDraft, fields: Sequence[Field], document: Document, interfaces: Interfaces
+) -> Problem:
+    times = list(_time_paths(fields, interfaces))
+    own = f", or `stamp: {{field: {times[0]}}}`" if times else ""
+    text = (
+        f"{quoted(str(topic.type))} does not begin with a std_msgs/msg/Header, where the stamp is looked for:"
+        f" write `stamp: receive` to go by arrival{own}"
+    )
+    has_stamp = document.find((*topic.path, "stamp")) is not None
+    path = (*topic.path, "stamp" if has_stamp else "type")
+    return document.problem(path, text, code="no_header", span=document.value_span(path))
+
+
+def _time_paths(fields: Sequence[Field], interfaces: Interfaces, *, depth: int = 3) -> Iterator[str]:
+    """Yield the paths of all times in a message, nearest to its top first."""
+    singles = [field for field in fields if not field.is_array]
+    yield from (field.name for field in singles if field.type == TIME)
+    for field in singles if depth else ():
+        below = interfaces.fields(field.type) if field.type != TIME else None
+        yield from (f"{field.name}.{path}" for path in _time_paths(below or (), interfaces, depth=depth - 1))
+
+
+def _check_field(topic: TopicDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+    path = (*topic.path, "stamp", "field")
+    text = _field_fault(str(topic.type), topic.stamp["field"].split("."), interfaces)
+    if text is not None:
+        yield document.problem(path, text, code="no_such_field", span=document.value_span(path))
+
+
+def _field_fault(type_name: str, steps: Sequence[str], interfaces: Interfaces) -> str | None:
+    """Follow a path of fields; say where it ends before it reaches a time. A type without .msg file is believed."""
+    first, *rest = steps
+    fields = interfaces.fields(type_name)
+    if fields is None:
+        return None if "/" in type_name else f"{type_name} has no fields, so no {quoted(first)}"
+    by_name = {field.name: field for field in fields}
+    field = by_name.get(first)
+    if field is None:
+        hint = did_you_mean(first, by_name) or f", it has {one_of(by_name)}"
+        return f"{type_name} has no field {quoted(first)}{hint}"
+    if field.is_array:
+        return f"{quoted(first)} of {type_name} is an array, expected one {TIME}"
+    if rest:
+        return _field_fault(field.type, rest, interfaces)
+    if field.type == TIME:
+        return None
+    return f"{quoted(first)} of {type_name} is {field.type}, expected {TIME}{_times_below(field, interfaces)}"
+
+
+def _times_below(field: Field, interfaces: Interfaces) -> str:
+    below = next(_time_paths(interfaces.fields(field.type) or (), interfaces), None)
+    return f", did you mean `{field.name}.{below}`?" if below else ""
+
+
+def _check_restamp(group: GroupDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+    if group.restamp == "none" or not group.topics:
+        return
+    known = [interfaces.fields(topic.type) if topic.type else None for topic in group.topics]
+    if any(fields is None or _begins_with_header(fields) for fields in known):
+        return
+    path: Path = (*group.path, "restamp")
+    text = "no type of this group begins with a std_msgs/msg/Header, so there is no stamp to set"
+    yield document.problem(path, text, code="no_header", span=document.value_span(path))

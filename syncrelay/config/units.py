@@ -1,0 +1,78 @@
+"""Durations as people write them, to nanoseconds."""
+
+import math
+import re
+from decimal import Decimal
+from typing import Final
+
+from syncrelay.config.wording import describe, quoted
+
+NS_PER_UNIT: Final = {
+    "ns": 1,
+    "us": 1_000,
+    "µs": 1_000,
+    "ms": 1_000_000,
+    "s": 1_000_000_000,
+    "min": 60_000_000_000,
+}
+MAX_NS: Final = 2**63 - 1
+_UNITS = "ns, us, ms, s or min"
+# What other programs call the units.
+_MEANT = {
+    "nsec": "ns",
+    "usec": "us",
+    "msec": "ms",
+    "millis": "ms",
+    "milliseconds": "ms",
+    "sec": "s",
+    "secs": "s",
+    "second": "s",
+    "seconds": "s",
+    "m": "min",
+    "mins": "min",
+    "minute": "min",
+    "minutes": "min",
+}
+_DURATION = re.compile(
+    r"([+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?)\s*([^\W\d_]*)"
+)
+
+
+def parse_duration(value: object) -> int:
+    """Return the nanoseconds of a number of seconds or of a text with a unit, such as 20ms.
+
+    Rounded to the nearest nanosecond. Raises ValueError saying what to write instead.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"expected a duration such as 20ms, found {describe(value)}")  # noqa: TRY004
+    if isinstance(value, str):
+        return _whole_ns(*_number_and_unit(value), found=value)
+    if not math.isfinite(value):
+        raise ValueError(f"expected a duration such as 20ms, found {describe(value)}")
+    # repr gives the digits that were written, where the float itself is a little off.
+    return _whole_ns(Decimal(repr(value)), NS_PER_UNIT["s"], found=f"{value} s")
+
+
+def _number_and_unit(text: str) -> tuple[Decimal, int]:
+    matched = _DURATION.fullmatch(text.strip())
+    if matched is None:
+        raise ValueError(f"expected a duration such as 20ms, found {describe(text)}")
+    number, unit = matched.groups()
+    if not unit:
+        raise ValueError(
+            f"the text {quoted(text)} has no unit: write {number}ms, or {number} without quotes for seconds"
+        )
+    known = NS_PER_UNIT.get(unit.replace("μ", "µ"))
+    if known is None:
+        lowered = unit.lower()
+        meant = lowered if lowered in NS_PER_UNIT else _MEANT.get(lowered)
+        hint = f", did you mean `{number}{meant}`?" if meant else f", expected {_UNITS}"
+        raise ValueError(f"unknown unit {quoted(unit)}{hint}")
+    return Decimal(number), known
+
+
+def _whole_ns(number: Decimal, unit_ns: int, *, found: str) -> int:
+    nanoseconds = number * unit_ns
+    if abs(nanoseconds) > MAX_NS:
+        raise ValueError(f"{quoted(found)} is out of range, at most 292 years")
+    return round(nanoseconds)

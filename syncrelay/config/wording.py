@@ -1,0 +1,54 @@
+"""How errors speak: the nearest word, what a value is, a list of choices."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+_LONGEST_QUOTE = 60
+
+
+def nearest(word: str, candidates: Iterable[str]) -> str | None:
+    """Return the candidate most like `word`, whatever its case; None if none is alike."""
+    by_lower: dict[str, str] = {}
+    for candidate in candidates:
+        by_lower.setdefault(candidate.lower(), candidate)
+    found = get_close_matches(word[:_LONGEST_QUOTE].lower(), by_lower, n=1, cutoff=0.6)
+    return by_lower[found[0]] if found else None
+
+
+def did_you_mean(word: str, candidates: Iterable[str]) -> str:
+    """Return `, did you mean ...?` for the nearest candidate, or nothing."""
+    found = nearest(word, candidates)
+    return f", did you mean `{found}`?" if found else ""
+
+
+def quoted(text: str) -> str:
+    """Return the text in backticks, on one line and cut to a length that can be read."""
+    line = text.replace("\n", "\\n").replace("\r", "\\r").replace("\t", "\\t")
+    if len(line) > _LONGEST_QUOTE:
+        line = line[: _LONGEST_QUOTE - 1] + "…"
+    return f"`{line}`"
+
+
+def describe(value: object) -> str:
+    """Say what a value of the file is: the number `5`, the text `abc`, a list."""
+    match value:
+        case None:
+            return "nothing"
+        case bool():
+            return f"`{str(value).lower()}`"
+        case int() | float():
+            return f"the number {quoted(str(value))}"
+        case str():
+            return f"the text {quoted(value)}" if value else "an empty text"
+        case list() | tuple():
+            return "a list"
+        case _:
+            return "a mapping"
+
+
+def one_of(words: Iterable[str]) -> str:
+    """Return `a`, `a or b`, `a, b or c`."""
+    listed = list(words)
+    if len(listed) == 1:
+        return listed[0]
+    return f"{', '.join(listed[:-1])} or {listed[-1]}"
