@@ -11,3 +11,7 @@ class TypeImportError(SyncRelayError):
 
 class RosUnavailableError(SyncRelayError):
     """ROS cannot be used here: rclpy, its middleware or its environment is missing."""
+
+
+class UsageError(SyncRelayError):
+    """The command line asks for something that is not there."""

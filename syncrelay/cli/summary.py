@@ -1,0 +1,20 @@
+"""What became of every message, in words: the last thing a relay and the demo say."""
+
+from collections.abc import Iterator
+
+from syncrelay.ros.snapshot import InputSnapshot, RelaySnapshot
+
+
+def summarize(snapshot: RelaySnapshot) -> Iterator[str]:
+    """A line per group and one per input below it."""
+    for group in snapshot.groups:
+        yield f"{group.name}: {group.sets} {'set' if group.sets == 1 else 'sets'}"
+        for each in group.inputs:
+            yield f"{group.name}:   {each.topic}: {_fates(each)}"
+
+
+def _fates(each: InputSnapshot) -> str:
+    counts = each.counts
+    text = f"{counts.fed} received, {counts.matched} in sets, {sum(counts.dropped.values())} dropped"
+    reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
+    return f"{text} ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})" if reasons else text

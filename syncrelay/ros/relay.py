@@ -1,0 +1,229 @@
+"""The node: subscribes to what the file names as it appears, and keeps its groups at work."""
+
+import logging
+import threading
+import time
+from collections.abc import Collection, Sequence
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Any, Self
+
+import rclpy
+from rclpy.clock import JumpThreshold
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.signals import SignalHandlerOptions
+
+from syncrelay.config import Config
+from syncrelay.errors import RosUnavailableError, UsageError
+from syncrelay.ros.environment import log_arguments
+from syncrelay.ros.group import GroupRelay
+from syncrelay.ros.inputs import Wiring, wire
+from syncrelay.ros.logs import RosoutHandler
+from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
+from syncrelay.sync import DropReason
+
+_LOG = logging.getLogger("syncrelay")
+
+# The graph is looked at this often while something is missing, so that a rig that starts loses little ...
+_EAGER_LOOK_S = 0.1
+# ... and this often when all is there.
+_LOOK_S = 1.0
+# Discovery takes a few tenths of a second: before that, everything would be reported as missing.
+_GRACE_S = 2.0
+# What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
+_CLOCK_JUMP = Duration(nanoseconds=-1_000_000_000)
+# How long an end may take to see that reliable subscribers have what was published.
+_ACKNOWLEDGE = Duration(nanoseconds=300_000_000)
+
+
+class Relay:
+    """A node that relays the groups of a file; a context manager that runs its receive thread.
+
+    Made on the main thread, whose turns at `step` look at the graph. Data flows on a thread of its own;
+    parameters and the clock are served on a third.
+    """
+
+    def __init__(self, config: Config, *, groups: Collection[str] | None = None, ros_args: Sequence[str] = ()) -> None:
+        """Join the ROS graph; `groups` are the names of those to run, None for all of them."""
+        self._context = _init(config, ros_args)
+        self.node = rclpy.create_node(config.node.name, namespace=config.node.namespace, context=self._context)
+        self._rosout = RosoutHandler(self.node.get_logger())
+        _LOG.addHandler(self._rosout)
+        self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
+        chosen = [group for group in config.groups if groups is None or group.name in groups]
+        self._loop = ReceiveLoop(self._context, now=self._now, deadline=self._deadline, expire=self._expire)
+        self._groups = [GroupRelay(group, now=self._now) for group in chosen]
+        self._wirings = wire(self._groups, node=self.node, loop=self._loop)
+        self._inputs = list(dict.fromkeys(each for wiring in self._wirings for each in wiring.inputs))
+        self._announced: dict[str, str] = {}
+        self._started = time.monotonic()
+        self._wake = threading.Event()
+        self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
+        self._services = SingleThreadedExecutor(context=self._context)
+        self._services.add_node(self.node)
+        self._receiving: Future[None] | None = None
+        self._jump_handle: Any = None
+
+    def __enter__(self) -> Self:
+        self._receiving = self._threads.submit(self._loop.run)
+        self._receiving.add_done_callback(lambda _: self._wake.set())
+        self._threads.submit(self._serve)
+        if self._sim_time:
+            self._follow_clock()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def wake(self) -> None:
+        """Have `step` return at once. Safe in a signal handler."""
+        self._wake.set()
+
+    def step(self, timeout_s: float = _LOOK_S) -> None:
+        """Look at the graph, then rest until the next look is due, `timeout_s` at most, or until `wake`.
+
+        Raises what the receive thread raised, if it did.
+        """
+        if self._receiving is not None and self._receiving.done():
+            self._receiving.result()
+        missing = [topic_input for topic_input in self._inputs if not topic_input.look()]
+        self._announce()
+        self._wake.wait(min(timeout_s, _EAGER_LOOK_S if missing else _LOOK_S))
+
+    def snapshot(self) -> RelaySnapshot:
+        """What is known of all groups, taken between two messages. Any thread."""
+        try:
+            return self._loop.call(self._snapshot).result()
+        except CancelledError:
+            return self._snapshot()
+
+    def drain(self) -> RelaySnapshot:
+        """Take in what has arrived, let go of what is buffered, stop receiving; what became of it all."""
+        if self._receiving is not None:
+            self._loop.stop()
+            self._receiving.result()
+            self._receiving = None
+            for group in self._groups:
+                group.flush(DropReason.SHUTDOWN)
+            for topic_input in self._inputs:
+                topic_input.wait_until_acknowledged(_ACKNOWLEDGE)
+        return self._snapshot()
+
+    def close(self) -> None:
+        """Drain, then leave the ROS graph."""
+        self.drain()
+        if self._jump_handle is not None:
+            self._jump_handle.unregister()
+        self._services.shutdown()
+        self._threads.shutdown()
+        self._loop.close()
+        _LOG.removeHandler(self._rosout)
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def _serve(self) -> None:
+        try:
+            self._services.spin()
+        except ExternalShutdownException:
+            return
+
+    def _follow_clock(self) -> None:
+        clock = self.node.get_clock()
+        forward = Duration(nanoseconds=1)
+        threshold = JumpThreshold(min_forward=forward, min_backward=_CLOCK_JUMP, on_clock_change=True)
+
+        def changed(jump: Any) -> None:
+            if jump.delta <= _CLOCK_JUMP:
+                self._loop.call(self._flush_jump)
+            elif any(group.engine.next_deadline() is not None for group in self._groups):
+                self._loop.call(lambda: self._expire(self._now()))
+
+        self._jump_handle = clock.create_jump_callback(threshold, post_callback=changed)
+
+    def _flush_jump(self) -> None:
+        _LOG.warning("the clock jumped back: everything buffered is dropped as time_jump")
+        for group in self._groups:
+            group.flush(DropReason.TIME_JUMP)
+
+    def _now(self) -> int:
+        """Nanoseconds of a clock that only measures waiting: ROS time if simulated, else one that never jumps."""
+        return int(self.node.get_clock().now().nanoseconds) if self._sim_time else time.monotonic_ns()
+
+    def _deadline(self) -> int | None:
+        # Simulated time does not pass while we sleep: its ticks call expire instead.
+        if self._sim_time:
+            return None
+        deadlines = (group.engine.next_deadline() for group in self._groups)
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+    def _expire(self, now: int) -> None:
+        for group in self._groups:
+            group.expire(now)
+
+    def _snapshot(self) -> RelaySnapshot:
+        return RelaySnapshot(tuple(_describe(wiring) for wiring in self._wirings))
+
+    def _announce(self) -> None:
+        """Say once what each group waits for, and once that it runs."""
+        for wiring in self._wirings:
+            name, waiting_for = wiring.group.config.name, wiring.waiting_for
+            if waiting_for and time.monotonic() - self._started < _GRACE_S:
+                continue
+            text = f"waiting for {waiting_for}" if waiting_for else f"running: {_flow(wiring.group)}"
+            if self._announced.get(name) != text:
+                self._announced[name] = text
+                _LOG.info("%s: %s", name, text, extra={"group": name})
+
+
+def _flow(group: GroupRelay) -> str:
+    return ", ".join(f"{topic.topic} -> {topic.output}" for topic in group.config.topics)
+
+
+def _describe(wiring: Wiring) -> GroupSnapshot:
+    group = wiring.group
+    inputs = zip(group.config.topics, wiring.inputs, group.engine.counts(), strict=True)
+    return GroupSnapshot(
+        name=group.config.name,
+        inputs=tuple(
+            InputSnapshot(
+                topic=topic.topic,
+                output=topic.output,
+                counts=counts,
+                publishers=topic_input.publishers,
+                subscribed=topic_input.subscribed,
+            )
+            for topic, topic_input, counts in inputs
+        ),
+        sets=group.engine.sets,
+        recent=tuple(group.recent),
+        waiting_for=wiring.waiting_for,
+    )
+
+
+def _init(config: Config, ros_args: Sequence[str]) -> Context:
+    """Start rclpy in a context of its own.
+
+    Raises UsageError where it does not take the arguments, RosUnavailableError where it does not start without.
+    """
+    # The file's wish stands before the command line's, which so has the last word. Our own log is on stderr:
+    # the same lines from rcl would double it.
+    simulated = ["-p", "use_sim_time:=true"] if config.node.use_sim_time else []
+    ours = ["--ros-args", "--disable-stdout-logs", *log_arguments(), *simulated, "--"]
+    context = Context()
+    try:
+        rclpy.init(
+            args=[*ours, "--ros-args", *ros_args],
+            context=context,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except (_rclpy.RCLError, _rclpy.UnknownROSArgsError) as error:
+        if ros_args:
+            raise UsageError(f"ROS does not take --ros-args {' '.join(ros_args)}: {error}") from error
+        raise RosUnavailableError(f"rclpy does not start: {error}") from error
+    return context

@@ -1,0 +1,59 @@
+"""Message types by name, and where in a payload the stamp of a type is found."""
+
+import importlib
+from collections.abc import Callable
+from operator import attrgetter
+from typing import Any, TypeAlias
+
+from rclpy.serialization import deserialize_message
+
+from syncrelay.cdr import read_stamp
+from syncrelay.config import StampField, StampSource
+from syncrelay.errors import TypeImportError
+
+StampReader: TypeAlias = Callable[[bytes], int | None]
+"""From a payload to its stamp in nanoseconds; None where none can be read."""
+
+_SECOND_NS = 1_000_000_000
+
+
+def import_type(name: str) -> Any:
+    """Import the class of a full type name, `pkg/msg/Name`; raises TypeImportError saying what failed."""
+    package, kind, message = name.split("/")
+    try:
+        module = importlib.import_module(f"{package}.{kind}")
+        message_type = getattr(module, message)
+        # The C support library is loaded here, not at import: a broken package shows only now.
+        message_type.__class__.__import_type_support__()
+    except (ImportError, AttributeError, OSError) as error:
+        raise TypeImportError(
+            f"{name} cannot be imported: {error}\n"
+            f"  Is the package {package} built for this Python and sourced in this shell?"
+        ) from error
+    return message_type
+
+
+def begins_with_header(message_type: Any) -> bool:
+    """Whether payloads of a type begin with a std_msgs/Header, whose stamp is at a fixed place."""
+    fields = message_type.get_fields_and_field_types()
+    return bool(fields) and next(iter(fields.values())) == "std_msgs/Header"
+
+
+def stamp_reader(source: StampSource, message_type: Any) -> StampReader | None:
+    """How to read the stamp that the file asks for; None for the receive time, which no payload holds."""
+    if isinstance(source, StampField):
+        return _field_reader(message_type, source.field)
+    return read_stamp if source == "header" else None
+
+
+def _field_reader(message_type: Any, path: str) -> StampReader:
+    field = attrgetter(path)
+
+    def read(payload: bytes) -> int | None:
+        try:
+            time = field(deserialize_message(payload, message_type))
+        except Exception:  # noqa: BLE001  the middleware raises several, bare RuntimeError among them
+            return None
+        return int(time.sec) * _SECOND_NS + int(time.nanosec)
+
+    return read
