@@ -1,0 +1,24 @@
+"""The command line: the only place that exits. Imports nothing slow, so that a signal is heard from the start."""
+
+import sys
+from collections.abc import Sequence
+
+from syncrelay.cli.stop import StopRequest
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code; arguments default to those of the process."""
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    stop = StopRequest()
+    if _runs_until_stopped(words):
+        stop.install()
+    # Only now: what follows is imported with the signals in hand.
+    from syncrelay.cli.boundary import guarded
+    from syncrelay.cli.dispatch import dispatch
+
+    return guarded(lambda: dispatch(words, stop=stop))
+
+
+def _runs_until_stopped(words: Sequence[str]) -> bool:
+    """Tell the relay, which has options and no command, and the demo from commands that end by themselves."""
+    return bool(words) and (words[0].startswith("-") or words[0] == "demo")

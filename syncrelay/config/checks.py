@@ -29,9 +29,7 @@ def _too_few(groups: Sequence[GroupDraft], document: Document) -> Iterator[Probl
         topics = document.find(path)
         if isinstance(topics, SequenceNode) and len(topics.items) < 2:  # noqa: PLR2004  one has nothing to match
             count = "none" if not topics.items else "one"
-            yield _at(
-                document, path, f"expected 2 topics or more, found {count}", code="too_few", at_key=True
-            )
+            yield _at(document, path, f"expected 2 topics or more, found {count}", code="too_few", at_key=True)
 
 
 def _repeated_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]:

@@ -85,9 +85,7 @@ class _Composer:
         self._check_tag(event)
         if self._awaits_key():
             what = "mapping" if isinstance(node, MappingNode) else "list"
-            raise self._refusal(
-                f"a {what} cannot be a key; a text that begins with a bracket needs quotes", node.span
-            )
+            raise self._refusal(f"a {what} cannot be a key; a text that begins with a bracket needs quotes", node.span)
         if len(self._open) == _DEEPEST:
             raise self._refusal(f"more than {_DEEPEST} levels of nesting", node.span)
         self._open.append(_Open(node, event.anchor))
@@ -161,9 +159,7 @@ class _Composer:
         top.key = None
 
     def _awaits_key(self) -> bool:
-        return (
-            bool(self._open) and isinstance(self._open[-1].node, MappingNode) and self._open[-1].key is None
-        )
+        return bool(self._open) and isinstance(self._open[-1].node, MappingNode) and self._open[-1].key is None
 
     def _check_tag(self, event: Any) -> None:
         if event.tag is not None:

@@ -54,9 +54,7 @@ class Document:
     lines: tuple[str, ...]
     root: Node
 
-    def problem(
-        self, path: Path, text: str, *, code: str, span: Span, severity: Severity = Severity.ERROR
-    ) -> Problem:
+    def problem(self, path: Path, text: str, *, code: str, span: Span, severity: Severity = Severity.ERROR) -> Problem:
         """Return a problem of this file at a span."""
         return Problem(
             file=self.name,

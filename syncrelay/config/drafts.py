@@ -60,11 +60,7 @@ def drafts(document: Document) -> tuple[GroupDraft, ...]:
 
 
 def _group(path: Path, node: MappingNode, absolute: Callable[[str], str]) -> GroupDraft:
-    prefix = (
-        _checked(check_output_prefix, _value(node, "output_prefix"))
-        if "output_prefix" in node.entries
-        else None
-    )
+    prefix = _checked(check_output_prefix, _value(node, "output_prefix")) if "output_prefix" in node.entries else None
     restamp = _value(node, "restamp")
     restamp = restamp if isinstance(restamp, str) else "none"
     restamp_topic = None if restamp in ("none", "earliest", "latest") else _checked(check_topic_name, restamp)

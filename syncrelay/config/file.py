@@ -40,9 +40,7 @@ def _optional(annotation: Any, info: FieldInfo) -> tuple[Any, FieldInfo]:
 _POLICY: Final = "How the messages of a group are matched."
 _PolicyName: Any = Literal[tuple(GROUP_MODEL_OF)]
 _GROUP_KEYS: Final[dict[str, Any]] = {
-    name: _optional(*key)
-    for name, key in _every_key(GROUP_MODELS).items()
-    if name not in ("policy", "topics")
+    name: _optional(*key) for name, key in _every_key(GROUP_MODELS).items() if name not in ("policy", "topics")
 }
 _TOPIC_KEYS: Final[dict[str, Any]] = dict(_every_key(topic_model(group) for group in GROUP_MODELS))
 
@@ -87,6 +85,7 @@ class FileKeys(Keys):
 
     version: Literal[1] = Field(description="Version of this format: 1.")
     node: NodeConfig = Field(default=NodeConfig(), description="The ROS node.")
+    defaults: Keys | None = None
     groups: dict[str, AnyGroup]
 
 
@@ -96,9 +95,7 @@ File: Final = create_model(
     defaults=(Defaults, Field(default=None)),
     groups=(
         _Groups,
-        Field(
-            description="Groups by name. The name stands in logs, diagnostics, metrics and default output names."
-        ),
+        Field(description="Groups by name. The name stands in logs, diagnostics, metrics and default output names."),
     ),
 )
 """FileKeys with the group's model chosen by its policy."""

@@ -10,18 +10,12 @@ def with_defaults(document: Document) -> Document:
     The keys keep their place, so a fault in one is shown where it was written.
     """
     root, defaults, groups = document.root, document.find(("defaults",)), document.find(("groups",))
-    if not (
-        isinstance(root, MappingNode)
-        and isinstance(defaults, MappingNode)
-        and isinstance(groups, MappingNode)
-    ):
+    if not (isinstance(root, MappingNode) and isinstance(defaults, MappingNode) and isinstance(groups, MappingNode)):
         return document
     filled = MappingNode(
         groups.span,
         {
-            name: Entry(group.key, _filled(group.value, defaults))
-            if isinstance(group.value, MappingNode)
-            else group
+            name: Entry(group.key, _filled(group.value, defaults)) if isinstance(group.value, MappingNode) else group
             for name, group in groups.entries.items()
         },
     )
@@ -33,7 +27,5 @@ def _filled(group: MappingNode, defaults: MappingNode) -> MappingNode:
     policy = (group.entries.get("policy") or defaults.entries.get("policy") or (None, None))[1]
     name = policy.value if isinstance(policy, ScalarNode) else None
     model = GROUP_MODEL_OF.get(str(name), GroupOfAnyPolicy)
-    own = {
-        key: entry for key, entry in defaults.entries.items() if key in model.model_fields and key != "topics"
-    }
+    own = {key: entry for key, entry in defaults.entries.items() if key in model.model_fields and key != "topics"}
     return MappingNode(group.span, own | group.entries)

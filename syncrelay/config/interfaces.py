@@ -44,12 +44,8 @@ class Interfaces:
     def types(self, package: str) -> tuple[str, ...]:
         """Return a package's types in full (`pkg/msg/Name`, `pkg/srv/Name`, `pkg/action/Name`)."""
         prefix = self.packages[package]
-        listed = (prefix / _INDEX / "rosidl_interfaces" / package).read_text(
-            encoding="utf-8", errors="replace"
-        )
-        return tuple(
-            sorted({f"{package}/{line.rpartition('.')[0]}" for line in listed.split() if "." in line})
-        )
+        listed = (prefix / _INDEX / "rosidl_interfaces" / package).read_text(encoding="utf-8", errors="replace")
+        return tuple(sorted({f"{package}/{line.rpartition('.')[0]}" for line in listed.split() if "." in line}))
 
     def fields(self, type_name: str) -> tuple[Field, ...] | None:
         """Return the fields of an installed message type; None where its .msg file cannot be read."""

@@ -44,9 +44,7 @@ def parse_fields(text: str, *, package: str) -> tuple[Field, ...]:
     for line in text.splitlines():
         found = _FIELD.match(line.partition("#")[0].strip())
         if found is not None and not found["rest"].startswith("="):
-            fields.append(
-                Field(found["name"], _full_name(found["type"], package), found["array"] is not None)
-            )
+            fields.append(Field(found["name"], _full_name(found["type"], package), found["array"] is not None))
     return tuple(fields)
 
 

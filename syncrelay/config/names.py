@@ -23,9 +23,7 @@ def check_topic_name(name: object) -> str:
             f"{quoted(name)}: substitutions such as {{ns}} are not filled in here, write a relative name instead"
         )
     if name == "~" or (name.startswith("~") and not name.startswith("~/")):
-        raise ValueError(
-            f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points"
-        )
+        raise ValueError(f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points")
     _check_tokens(name.removeprefix("~/").removeprefix("/"), whole=name, kind="topic name")
     if len(name) > _LONGEST_TOPIC:
         raise ValueError(f"a topic name of {len(name)} characters, at most {_LONGEST_TOPIC} are allowed")
@@ -87,10 +85,6 @@ def _check_tokens(tokens: str, *, whole: str, kind: str) -> None:
         )
     for token in tokens.split("/"):
         if not token:
-            raise ValueError(
-                f"a {kind} has one `/` between its parts and none at the end, found {quoted(whole)}"
-            )
+            raise ValueError(f"a {kind} has one `/` between its parts and none at the end, found {quoted(whole)}")
         if token[0].isdigit():
-            raise ValueError(
-                f"no part of a {kind} begins with a digit, found {quoted(token)} in {quoted(whole)}"
-            )
+            raise ValueError(f"no part of a {kind} begins with a digit, found {quoted(token)} in {quoted(whole)}")

@@ -118,11 +118,7 @@ def _unknown_key(error: ErrorDetails, path: Path) -> str:
     key = str(path[-1])
     model = _model(error["loc"][:-1])
     for policy, group in GROUP_MODEL_OF.items():
-        other = (
-            topic_model(group)
-            if issubclass(model, tuple(map(topic_model, GROUP_MODEL_OF.values())))
-            else group
-        )
+        other = topic_model(group) if issubclass(model, tuple(map(topic_model, GROUP_MODEL_OF.values()))) else group
         if key in other.model_fields and model in (
             *GROUP_MODEL_OF.values(),
             *map(topic_model, GROUP_MODEL_OF.values()),

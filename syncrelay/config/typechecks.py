@@ -10,9 +10,7 @@ from syncrelay.config.problems import Path, Problem, Severity
 from syncrelay.config.wording import did_you_mean, nearest, one_of, quoted
 
 
-def check_types(
-    groups: Sequence[GroupDraft], document: Document, interfaces: Interfaces
-) -> Iterator[Problem]:
+def check_types(groups: Sequence[GroupDraft], document: Document, interfaces: Interfaces) -> Iterator[Problem]:
     """Yield types that aren't installed and stamps that aren't in them, and as notes what could not be checked."""
     for group in groups:
         for topic in group.topics:
@@ -32,9 +30,7 @@ def _check_topic(topic: TopicDraft, document: Document, interfaces: Interfaces) 
     fields = interfaces.fields(topic.type)
     if fields is None:
         text = f"{quoted(topic.type)} is installed without its .msg file, so its stamp was not checked"
-        yield document.problem(
-            path, text, code="not_checked", span=document.value_span(path), severity=Severity.NOTE
-        )
+        yield document.problem(path, text, code="not_checked", span=document.value_span(path), severity=Severity.NOTE)
         return
     if topic.stamp == "header" and not _begins_with_header(fields):
         yield _no_header(topic, fields, document, interfaces)
@@ -72,9 +68,7 @@ def _begins_with_header(fields: Sequence[Field]) -> bool:
     return bool(fields) and fields[0].type == HEADER and not fields[0].is_array
 
 
-def _no_header(
-    topic: TopicDraft, fields: Sequence[Field], document: Document, interfaces: Interfaces
-) -> Problem:
+def _no_header(topic: TopicDraft, fields: Sequence[Field], document: Document, interfaces: Interfaces) -> Problem:
     times = list(_time_paths(fields, interfaces))
     own = f", or `stamp: {{field: {times[0]}}}`" if times else ""
     text = (

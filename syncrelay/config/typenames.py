@@ -25,6 +25,4 @@ def check_type_name(name: object) -> str:
     other = _SHORT.fullmatch(name) or _FOREIGN.fullmatch(name)
     if other is not None:
         raise ValueError(f"{quoted(name)} is not the full name, write `{other[1]}/msg/{other[2]}`")
-    raise ValueError(
-        f"{quoted(name)} is no message type, expected package/msg/Name such as sensor_msgs/msg/Image"
-    )
+    raise ValueError(f"{quoted(name)} is no message type, expected package/msg/Name such as sensor_msgs/msg/Image")

@@ -33,9 +33,7 @@ _MEANT = {
     "minute": "min",
     "minutes": "min",
 }
-_DURATION = re.compile(
-    r"([+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?)\s*([^\W\d_]*)"
-)
+_DURATION = re.compile(r"([+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,3})?)\s*([^\W\d_]*)")
 
 
 def parse_duration(value: object) -> int:

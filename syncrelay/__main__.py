@@ -1,0 +1,7 @@
+"""`python -m syncrelay`."""
+
+import sys
+
+from syncrelay.cli import main
+
+sys.exit(main())

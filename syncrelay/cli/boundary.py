@@ -1,0 +1,81 @@
+"""The one error boundary: what a command raises becomes text on stderr and an exit code."""
+
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from typing import Final
+
+from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
+
+DONE: Final = 0
+AT_FAULT: Final = 1
+"""The user's file or data is at fault, or a check found something."""
+USAGE: Final = 2
+ROS_UNAVAILABLE: Final = 69
+OUR_BUG: Final = 70
+INTERRUPTED: Final = 130
+
+
+def guarded(command: Callable[[], int]) -> int:
+    """Run a command and return its exit code, or that of the error it raised."""
+    try:
+        return _flushed(command())
+    except SyncRelayError as error:
+        say(_text(error))
+        return _code(error)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        _abandon_stdout()
+        return AT_FAULT
+    except Exception:  # noqa: BLE001  the boundary: everything else is our bug
+        say(traceback.format_exc())
+        say("syncrelay: this is a bug in syncrelay, please report it with the lines above and your file")
+        return OUR_BUG
+
+
+def say(text: str) -> None:
+    """Print talk on stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isatty
+    """Tell whether output may be coloured (https://no-color.org)."""
+    return is_terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def _flushed(code: int) -> int:
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _abandon_stdout()
+        say(f"syncrelay: standard output cannot be written: {error.strerror}")
+        return AT_FAULT
+    return code
+
+
+def _abandon_stdout() -> None:
+    """Keep the interpreter from flushing what nobody reads, with a traceback, as it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _text(error: SyncRelayError) -> str:
+    from syncrelay.config.errors import ConfigError
+    from syncrelay.config.render import render
+
+    if isinstance(error, ConfigError):
+        return render(error.problems, colour=wants_colour(sys.stderr.isatty()))
+    return f"syncrelay: {error}"
+
+
+def _code(error: SyncRelayError) -> int:
+    match error:
+        case UsageError():
+            return USAGE
+        case RosUnavailableError():
+            return ROS_UNAVAILABLE
+        case _:
+            return AT_FAULT

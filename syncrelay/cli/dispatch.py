@@ -1,0 +1,193 @@
+"""From the words of the command line to a command and its exit code."""
+
+import sys
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from syncrelay.cli.boundary import DONE, USAGE, say
+from syncrelay.cli.parser import Parser
+from syncrelay.cli.stop import StopRequest
+from syncrelay.errors import UsageError
+
+_USAGE: Final = """\
+usage: syncrelay --config FILE [option ...] [--ros-args ...]
+       syncrelay COMMAND ..."""
+_ABOUT: Final = "Matches ROS 2 messages by time, as a YAML file says, and republishes each matched set."
+_COMMANDS_HELP: Final = """\
+commands:
+  validate FILE...      check files and report everything that is wrong with them
+  schema                print the JSON Schema of the file, for editors
+  demo                  show it all on a simulated rig, without a robot
+  syncrelay COMMAND --help says more
+
+exit codes:
+  0 done, 1 the file or data is at fault, 2 wrong usage, 69 ROS cannot be used here, 70 a bug in syncrelay,
+  130 interrupted"""
+
+
+def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
+    """Run what the command line asks for; raises UsageError where it makes no sense."""
+    if not words:
+        say(f"{_USAGE}\n\n{_ABOUT}\n\n{_COMMANDS_HELP}")
+        return USAGE
+    first, *rest = words
+    if first == "help":
+        return _relay(["--help"], stop)
+    if first.startswith("-"):
+        return _relay(words, stop)
+    command = _COMMANDS.get(first)
+    if command is None:
+        raise UsageError(_unknown_command(first))
+    return command(rest, stop)
+
+
+def _relay(words: Sequence[str], stop: StopRequest) -> int:
+    parser = Parser("syncrelay", description=_ABOUT, usage=_USAGE.removeprefix("usage: "), epilog=_COMMANDS_HELP)
+    options = parser.add_argument_group("the relay")
+    options.add_argument("--config", metavar="FILE", help="relay what FILE says until Ctrl-C or SIGTERM")
+    options.add_argument(
+        "--group", metavar="NAME", action="append", default=[], help="relay this group only; may be repeated"
+    )
+    options.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="info",
+        metavar="LEVEL",
+        help="debug, info (default), warning or error",
+    )
+    options.add_argument(
+        "--log-format",
+        choices=("text", "json"),
+        default="text",
+        metavar="FORMAT",
+        help="text (default), or json: one object a line",
+    )
+    options.add_argument(
+        "--ros-args", action="store_true", help="what follows goes to ROS as it is, e.g. -r __ns:=/robot1"
+    )
+    _add_help(parser)
+    parser.add_argument("--version", action="store_true", help="print the version")
+    own, ros_args = _split_at_ros_args(words)
+    arguments = parser.read(own)
+    if arguments.help:
+        return _print(parser.format_help())
+    if arguments.version:
+        return _print(_version())
+    if arguments.config is None:
+        parser.error("--config FILE is missing")
+    from syncrelay.cli.run import run
+
+    return run(arguments.config, arguments.group, arguments.log_level, arguments.log_format, ros_args, stop=stop)
+
+
+def _validate(words: Sequence[str], _stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay validate",
+        description="Checks files without ROS: every error at once, each at its line, with the nearest valid word.\n"
+        "Message types are checked where ROS is installed. Exit code 1 if a file has an error.",
+    )
+    parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, - for standard input")
+    parser.add_argument(
+        "--format",
+        choices=("text", "json", "github"),
+        default="text",
+        metavar="FORMAT",
+        help="text (default), json, or github: annotations for a workflow",
+    )
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    arguments = parser.read(words)
+    from syncrelay.cli.validate import validate
+
+    return validate(arguments.files, arguments.format)
+
+
+def _schema(words: Sequence[str], _stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay schema",
+        description="Prints the JSON Schema (draft 7) of the file, with which editors complete and check it.",
+    )
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    parser.read(words)
+    from syncrelay.cli.schema import schema
+
+    return schema()
+
+
+def _demo(words: Sequence[str], stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay demo",
+        description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it.",
+    )
+    parser.add_argument("--seconds", metavar="N", type=_positive, help="end after N seconds, with a summary")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
+    parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays")
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    arguments = parser.read(words)
+    from syncrelay.cli.demo import demo
+
+    return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)
+
+
+_COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
+    "validate": _validate,
+    "schema": _schema,
+    "demo": _demo,
+}
+
+
+def _add_help(parser: Parser) -> None:
+    parser.add_argument("-h", "--help", action="store_true", help="print this help")
+
+
+def _asks_for_help(words: Sequence[str]) -> bool:
+    return "-h" in words or "--help" in words
+
+
+def _positive(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number < float("inf"):
+        raise ArgumentTypeError(f"expected a number above 0, found {text}")
+    return number
+
+
+def _split_at_ros_args(words: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
+    if "--ros-args" not in words:
+        return words, ()
+    at = list(words).index("--ros-args")
+    return words[:at], words[at + 1 :]
+
+
+def _unknown_command(word: str) -> str:
+    from syncrelay.config.wording import did_you_mean
+
+    if word.endswith((".yaml", ".yml")) or Path(word).is_file():
+        return (
+            f"{word} is not a command\n  syncrelay --config {word}     to relay what it says\n"
+            f"  syncrelay validate {word}     to check it"
+        )
+    return f"unknown command {word}{did_you_mean(word, _COMMANDS)}\n  syncrelay --help lists the commands"
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return f"syncrelay {version('syncrelay')}"
+    except PackageNotFoundError:
+        return "syncrelay (not installed)"
+
+
+def _print(text: str) -> int:
+    sys.stdout.write(text.rstrip("\n") + "\n")
+    return DONE

@@ -1,0 +1,12 @@
+"""`syncrelay schema`: the JSON Schema of the file."""
+
+import json
+
+from syncrelay.cli.boundary import DONE
+from syncrelay.config.schema import json_schema
+
+
+def schema() -> int:
+    """Print the JSON Schema (draft 7) of the file."""
+    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    return DONE

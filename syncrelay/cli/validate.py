@@ -1,0 +1,116 @@
+"""`syncrelay validate FILE...`: everything that is wrong with files."""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from syncrelay.cli.boundary import AT_FAULT, DONE, say, wants_colour
+from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a file came to: a config if it is in order, and its problems, notes among them."""
+
+    file: str
+    config: Config | None
+    problems: tuple[Problem, ...]
+
+
+def validate(files: Sequence[str], output_format: str) -> int:
+    """Check files and print what was found as `text`, `json` or `github`; 1 if any has an error."""
+    findings = [_check(file) for file in files]
+    _PRINT[output_format](findings)
+    return DONE if all(finding.config for finding in findings) else AT_FAULT
+
+
+def _check(file: str) -> Finding:
+    try:
+        config = load(file)
+    except ConfigError as error:
+        return Finding(file, None, error.problems)
+    return Finding(file, config, config.notes)
+
+
+def _print_text(findings: Sequence[Finding]) -> None:
+    for finding in findings:
+        if finding.config is None:
+            say(render(finding.problems, colour=wants_colour(sys.stderr.isatty())))
+            continue
+        print(_ok(finding.file, finding.config))
+        if finding.problems:
+            print(render(finding.problems, colour=wants_colour(sys.stdout.isatty())))
+
+
+def _print_json(findings: Sequence[Finding]) -> None:
+    print(json.dumps([_as_json(finding) for finding in findings], indent=2, ensure_ascii=False))
+
+
+def _print_github(findings: Sequence[Finding]) -> None:
+    for finding in findings:
+        for problem in finding.problems:
+            print(_workflow_command(problem))
+        if finding.config is not None:
+            print(_ok(finding.file, finding.config))
+
+
+_PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
+    "text": _print_text,
+    "json": _print_json,
+    "github": _print_github,
+}
+
+
+def _ok(file: str, config: Config) -> str:
+    n_topics = len({topic.topic for group in config.groups for topic in group.topics})
+    return f"{file}: ok, {_count(len(config.groups), 'group')}, {_count(n_topics, 'topic')}"
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def _as_json(finding: Finding) -> dict[str, Any]:
+    return {
+        "file": finding.file,
+        "ok": finding.config is not None,
+        "problems": [_problem_as_json(problem) for problem in finding.problems],
+    }
+
+
+def _problem_as_json(problem: Problem) -> dict[str, Any]:
+    span = problem.span
+    return {
+        "severity": problem.severity.value,
+        "code": problem.code,
+        "path": problem.path,
+        "message": problem.text,
+        "line": span.line if span else None,
+        "column": span.column if span else None,
+        "end_column": span.column + span.width if span else None,
+    }
+
+
+def _workflow_command(problem: Problem) -> str:
+    """Return a command that GitHub turns into an annotation (workflow commands: ::error, ::notice)."""
+    command = "error" if problem.severity is Severity.ERROR else "notice"
+    properties = {"file": problem.file}
+    if problem.span is not None:
+        properties |= {
+            "line": str(problem.span.line),
+            "col": str(problem.span.column),
+            "endColumn": str(problem.span.column + problem.span.width),
+        }
+    written = ",".join(f"{key}={_escaped_property(value)}" for key, value in properties.items())
+    text = f"{problem.path}: {problem.text}" if problem.path else problem.text
+    return f"::{command} {written}::{_escaped(text)}"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _escaped_property(text: str) -> str:
+    return _escaped(text).replace(":", "%3A").replace(",", "%2C")
