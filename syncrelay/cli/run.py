@@ -20,23 +20,18 @@ def run(
     Raises ConfigError for a faulty file, UsageError for a group that it lacks, RosUnavailableError where ROS
     cannot be used.
     """
-    # Imported step by step: each takes a tenth of a second or more, and a request to stop may come in any.
     from syncrelay.config import Severity, load
+    from syncrelay.ros.environment import require_rclpy
     from syncrelay.ros.logs import LOGGER, configure
 
     configure(log_level, log_format)
     config = load(config_path, package_missing=Severity.NOTE)
     _require_groups(groups, [group.name for group in config.groups], config_path)
-    if not stop.requested:
-        from syncrelay.ros.environment import require_rclpy
+    require_rclpy()
+    from syncrelay.cli.summary import summarize
+    from syncrelay.ros.relay import Relay
 
-        require_rclpy()
-    if not stop.requested:
-        from syncrelay.cli.summary import summarize
-        from syncrelay.ros.relay import Relay
-    if stop.requested:
-        LOGGER.info("stopped before it started")
-        return 0
+    stop.defer()
     with Relay(config, groups=groups or None, ros_args=ros_args) as relay:
         stop.wake_with(relay.wake)
         while not stop.requested:

@@ -1,25 +1,31 @@
 """SIGINT and SIGTERM as a request to end in order. Imports nothing slow: it must be there before all else."""
 
+import os
 import signal
 from collections.abc import Callable
 from types import FrameType
 
 
 class StopRequest:
-    """Remembers that the process was asked to end.
+    """Ends the process at once while there is nothing to lose, and is remembered from `defer` on.
 
     A signal that arrives while modules are still being imported would kill the process, or be lost where it is
-    PID 1; so this is installed first, and asked between the steps of the start.
+    PID 1: so this is installed before they are.
     """
 
     def __init__(self) -> None:
         self.requested = False
         self._wake: Callable[[], None] | None = None
+        self._deferred = False
 
     def install(self) -> None:
         """Take SIGINT and SIGTERM from here on."""
         signal.signal(signal.SIGINT, self._request)
         signal.signal(signal.SIGTERM, self._request)
+
+    def defer(self) -> None:
+        """From here on there is something to end in order: only remember the request."""
+        self._deferred = True
 
     def wake_with(self, wake: Callable[[], None]) -> None:
         """Have `wake` called when the request comes, at once if it has come already."""
@@ -31,3 +37,7 @@ class StopRequest:
         self.requested = True
         if self._wake is not None:
             self._wake()
+        elif not self._deferred:
+            os.write(2, b"syncrelay: stopped before it started\n")
+            # No exception: raised in the middle of an import, it could be swallowed there.
+            os._exit(0)
