@@ -1,0 +1,98 @@
+"""What a user reads where ROS cannot be used, in environments that really lack it: links to this one's packages."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_ROOT = Path(__file__).parents[2]
+_BASE = ["pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection", "yaml", "_yaml"]
+_RCLPY = [
+    "rclpy",
+    "rpyutils",
+    "ament_index_python",
+    "builtin_interfaces",
+    "rcl_interfaces",
+    "rosidl_parser",
+    "rosidl_pycommon",
+    "numpy",
+]
+
+_FILE = """\
+version: 1
+groups:
+  front:
+    policy: exact_time
+    topics:
+      - {topic: /a, type: sensor_msgs/msg/Imu}
+      - {topic: /b, type: sensor_msgs/msg/Imu}
+"""
+
+
+@pytest.fixture
+def relay_with(tmp_path):
+    """Run the relay where only the packages named are to be found, and give the finished process."""
+
+    def run(packages, **environ):
+        site = tmp_path / "site"
+        site.mkdir()
+        for package in packages:
+            origin = Path(importlib.util.find_spec(package).origin)
+            origin = origin.parent if origin.name.startswith("__init__") else origin
+            (site / origin.name).symlink_to(origin)
+        (tmp_path / "fusion.yaml").write_text(_FILE)
+        # -S: without the environment's own site-packages, and without the wheels' start-up hook.
+        return subprocess.run(
+            [sys.executable, "-S", "-m", "syncrelay", "--config", tmp_path / "fusion.yaml"],
+            env={"PYTHONPATH": f"{_ROOT}:{site}", "PATH": os.environ["PATH"], **environ},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+
+    return run
+
+
+def test_without_rclpy_the_relay_names_both_ways_to_it(relay_with):
+    run = relay_with(_BASE)
+    assert run.returncode == 69
+    assert "rclpy is not installed" in run.stderr
+    assert "pip install '.[ros]'" in run.stderr
+    assert "source /opt/ros" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_a_sourced_ros_for_another_python_is_named(relay_with):
+    run = relay_with(_BASE, ROS_DISTRO="jazzy")
+    assert run.returncode == 69
+    assert "ROS 2 jazzy is sourced, but Python" in run.stderr
+    assert "--system-site-packages" in run.stderr
+
+
+@pytest.mark.ros
+def test_rclpy_without_its_middleware_is_told_from_no_rclpy(relay_with):
+    run = relay_with([*_BASE, *_RCLPY])
+    assert run.returncode == 69
+    assert "rclpy is installed but cannot be imported: lib" in run.stderr
+    assert "middleware" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+@pytest.mark.ros
+def test_a_middleware_that_is_not_installed_is_named_beside_those_that_are(tmp_path):
+    (tmp_path / "fusion.yaml").write_text(_FILE)
+    run = subprocess.run(
+        [sys.executable, "-m", "syncrelay", "--config", tmp_path / "fusion.yaml"],
+        env={**os.environ, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.returncode == 69
+    assert "RMW_IMPLEMENTATION asks for rmw_cyclonedds_cpp" in run.stderr
+    assert "rmw_fastrtps_cpp" in run.stderr

@@ -1,0 +1,80 @@
+"""What the README shows is true: its files are in order, its commands exist, its error is the one that comes."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import load_text
+
+_ROOT = Path(__file__).parents[1]
+_README = (_ROOT / "README.md").read_text()
+_BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", _README, re.DOTALL | re.MULTILINE)
+_FILES = [text for kind, text in _BLOCKS if kind == "yaml" and text.startswith("version:")]
+_SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
+_INLINE = re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", _README)
+_COMMANDS = sorted({command for command in [*_SHOWN, *_INLINE] if command})
+
+
+@pytest.mark.parametrize("text", _FILES, ids=range(len(_FILES)))
+def test_every_file_that_the_readme_shows_is_in_order(text):
+    assert load_text(text).groups
+
+
+@pytest.mark.parametrize("command", _COMMANDS)
+def test_every_command_that_the_readme_shows_exists(command):
+    program, *words = command.split(" > ", maxsplit=1)[0].split()
+    check = {"make": _is_make_target, "pip": _is_known_install, "syncrelay": _is_syncrelay_command}[program]
+    assert check(words), command
+
+
+def _is_make_target(words):
+    targets = re.findall(r"^([\w-]+):", (_ROOT / "Makefile").read_text(), re.MULTILINE)
+    return words[0] in targets
+
+
+def _is_known_install(words):
+    return " ".join(words) in {"install .", "install '.[ros]'", "install '.[ros,test,lint]'"}
+
+
+def _is_syncrelay_command(words):
+    # The help of the command, or of the relay, which names every option that it takes.
+    command = [] if words[0].startswith("-") else [words[0]]
+    run = subprocess.run(
+        [sys.executable, "-m", "syncrelay", *command, "--help"], capture_output=True, text=True, check=False
+    )
+    options = [word for word in words if word.startswith("--")]
+    return run.returncode == 0 and all(option in run.stdout for option in options)
+
+
+def test_a_command_that_does_not_exist_would_be_noticed():
+    assert not _is_syncrelay_command(["--confg", "fusion.yaml"])
+    assert not _is_syncrelay_command(["validat", "fusion.yaml"])
+    assert not _is_make_target(["demos"])
+
+
+def test_the_error_that_the_readme_shows_is_the_one_that_comes(tmp_path):
+    shown = next(text for kind, text in _BLOCKS if kind == "text" and "slopp" in text)
+    (tmp_path / "fusion.yaml").write_text(_FILES[0].replace("slop:", "slopp:"))
+    run = subprocess.run(
+        [sys.executable, "-m", "syncrelay", "validate", "fusion.yaml"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 1
+    assert shown.strip() in run.stdout + run.stderr
+
+
+def test_every_link_to_a_file_of_ours_leads_somewhere():
+    targets = [target for target in re.findall(r"\]\(([^)#]+)\)", _README) if "://" not in target]
+    assert [target for target in targets if not (_ROOT / target).exists()] == []
+
+
+def test_the_launch_file_that_the_readme_shows_is_python():
+    for kind, text in _BLOCKS:
+        if kind == "python":
+            compile(text, "README.md", "exec")
