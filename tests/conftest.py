@@ -1,0 +1,46 @@
+"""What a machine lacks is skipped with the reason; what a test with ROS needs, it has for itself alone."""
+
+import importlib.util
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.ros.domain import claimed_domain
+from tests.ros.stage import Stage, running_stage
+
+_REAL_DATA = "SYNCRELAY_REAL_DATA"
+
+
+def pytest_configure() -> None:
+    named = os.environ.get(_REAL_DATA)
+    if named and not Path(named).is_dir():
+        raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("ros") and importlib.util.find_spec("rclpy") is None:
+        pytest.skip("rclpy is not installed: pip install '.[ros]', or source a ROS 2 installation")
+    if item.get_closest_marker("real_data") and not os.environ.get(_REAL_DATA):
+        pytest.skip(f"{_REAL_DATA} does not name the folder of the shared recordings")
+
+
+@pytest.fixture
+def real_data() -> Path:
+    """The folder of the shared recordings, for tests marked real_data."""
+    return Path(os.environ[_REAL_DATA])
+
+
+@pytest.fixture
+def ros_domain() -> Iterator[int]:
+    """A ROS domain id that nothing else on the machine uses."""
+    with claimed_domain() as domain:
+        yield domain
+
+
+@pytest.fixture
+def stage(tmp_path: Path, ros_domain: int) -> Iterator[Stage]:
+    """Starts players, relays and collectors on a domain of their own, and ends them all."""
+    with running_stage(tmp_path, ros_domain) as opened:
+        yield opened

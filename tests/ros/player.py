@@ -1,0 +1,86 @@
+"""A process with one raw publisher per topic. Run as `python -m tests.ros.player`.
+
+It takes commands on stdin, one a line, and answers each with a line on stdout when it is done:
+
+    match N             every publisher has at least N matched subscriptions
+    play SPEED FILE     the frames of FILE were published, paced by their times
+    acknowledge         all that was published is acknowledged by all subscriptions, which may take 3 s: only
+                        Fast DDS's periodic heartbeat asks for it
+
+It ends when stdin does.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from tests.ros import frames
+from tests.ros.message_types import import_type
+
+_POLL_S = 0.01
+_ACKNOWLEDGE = Duration(seconds=60)
+
+
+def main() -> None:
+    arguments = _parser().parse_args()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node("player")
+    profile = QoSProfile(
+        depth=arguments.depth,
+        reliability=ReliabilityPolicy[arguments.reliability.upper()],
+        durability=DurabilityPolicy[arguments.durability.upper()],
+    )
+    publishers = {
+        topic: node.create_publisher(import_type(type_name), topic, profile) for topic, type_name in arguments.topic
+    }
+    for line in sys.stdin:
+        command, *words = line.split(maxsplit=2)
+        if command == "match":
+            _match(publishers, int(words[0]))
+        elif command == "play":
+            _play(publishers, float(words[0]), Path(words[1].rstrip("\n")))
+        else:
+            _acknowledge(publishers)
+        print(command, flush=True)  # noqa: T201  the answer
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--topic", nargs=2, action="append", required=True, metavar=("NAME", "TYPE"))
+    parser.add_argument("--reliability", default="reliable")
+    parser.add_argument("--durability", default="volatile")
+    parser.add_argument("--depth", type=int, default=20_000)
+    return parser
+
+
+def _match(publishers: dict[str, Publisher], subscriptions: int) -> None:
+    while any(publisher.get_subscription_count() < subscriptions for publisher in publishers.values()):
+        time.sleep(_POLL_S)
+
+
+def _play(publishers: dict[str, Publisher], speed: float, path: Path) -> None:
+    recording = frames.read(path)
+    began = time.monotonic()
+    for frame in recording:
+        due = began + (frame.time - recording[0].time) / 1e9 / speed
+        time.sleep(max(0.0, due - time.monotonic()))
+        publishers[frame.topic].publish(frame.payload)
+
+
+def _acknowledge(publishers: dict[str, Publisher]) -> None:
+    for topic, publisher in publishers.items():
+        if not publisher.wait_for_all_acked(_ACKNOWLEDGE):
+            raise TimeoutError(f"{topic}: not all messages were acknowledged")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,185 @@
+"""A test's stage: player, relay and collector, each a process, on a ROS domain of their own."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import syncrelay
+from tests.ros import frames
+from tests.ros.frames import Frame
+from tests.ros.processes import DEADLINE_S, Process, ros_environment
+from tests.ros.shared_memory import Mapped, left_of
+
+_CHECKOUT = Path(__file__).parents[2]
+_PACKAGE = Path(syncrelay.__file__).parents[1]
+
+
+class Player:
+    """Publishes frames; every call returns when it is done."""
+
+    def __init__(self, process: Process, folder: Path) -> None:
+        self.process = process
+        self._folder = folder
+        self._plays = 0
+
+    def match(self, subscriptions: int = 1) -> None:
+        """Wait until every publisher has so many matched subscriptions at least."""
+        self.process.ask(f"match {subscriptions}")
+
+    def start(self, recording: Sequence[Frame], *, speed: float = 10) -> None:
+        """Begin to play at a multiple of the recording's own pace; `finish` waits for the end."""
+        self._plays += 1
+        path = self._folder / f"{self.process.name}-{self._plays}.frames"
+        frames.write(path, recording)
+        self.process.tell(f"play {speed} {path}")
+        self._span_s = (recording[-1].time - recording[0].time) / 1e9 / speed
+
+    def finish(self) -> None:
+        """Wait until all is published."""
+        self.process.wait_until(
+            lambda: self.process.stdout.count("play") == self._plays,
+            "the end of the recording",
+            deadline_s=self._span_s + DEADLINE_S,
+        )
+        self.process.answer()
+
+    def play(self, recording: Sequence[Frame], *, speed: float = 10) -> None:
+        self.start(recording, speed=speed)
+        self.finish()
+
+    def acknowledge(self) -> None:
+        """Wait until all subscriptions have all that was published."""
+        self.process.ask("acknowledge")
+
+
+class Collector:
+    """Subscribes, keeps what it gets, and says what the graph shows."""
+
+    def __init__(self, process: Process, output: Path) -> None:
+        self.process = process
+        self._output = output
+        self._read = 0
+        self._frames: list[Frame] = []
+
+    def payloads(self, topic: str) -> list[bytes]:
+        """All payloads of a topic so far, in the order of their arrival."""
+        self._read_on()
+        return [frame.payload for frame in self._frames if frame.topic == topic]
+
+    def count(self, topic: str) -> int:
+        return len(self.payloads(topic))
+
+    def wait_for(self, topic: str, count: int) -> list[bytes]:
+        """The payloads of a topic as soon as there are so many at least."""
+        self.process.wait_until(lambda: self.count(topic) >= count, f"message {count} of {topic}")
+        return self.payloads(topic)
+
+    def endpoints(self, topic: str, *, kind: str, node: str | None = None) -> list[dict[str, str]]:
+        """Publishers (`kind` publisher) or subscriptions of a topic, of one node if it is named."""
+        listed = json.loads(self.process.ask(f"endpoints {topic}"))
+        return [entry for entry in listed if entry["kind"] == kind and node in (None, entry["node"])]
+
+    def nodes(self) -> list[str]:
+        return list(json.loads(self.process.ask("nodes")))
+
+    def _read_on(self) -> None:
+        with self._output.open("rb") as file:
+            file.seek(self._read)
+            arrived, size = frames.parse(file.read())
+        self._frames += arrived
+        self._read += size
+
+
+class Stage:
+    """Starts the processes of one test on one domain."""
+
+    def __init__(self, folder: Path, domain: int) -> None:
+        self.folder, self.domain = folder, domain
+        self.environment = ros_environment(domain=domain, folder=folder, python_path=[_PACKAGE, _CHECKOUT])
+        self._processes: list[Process] = []
+        self._mapped: set[Mapped] = set()
+
+    def start(self, name: str, argv: Sequence[str], *, stdin: int = subprocess.DEVNULL) -> Process:
+        process = Process(
+            f"{name}-{len(self._processes)}",
+            argv,
+            environment=self.environment,
+            folder=self.folder,
+            stdin=stdin,
+        )
+        self._processes.append(process)
+        return process
+
+    def relay(self, config: str, *arguments: str) -> Process:
+        """The relay on a file with this text."""
+        path = self.folder / f"config-{len(self._processes)}.yaml"
+        path.write_text(config)
+        return self.start("relay", [sys.executable, "-m", "syncrelay", "--config", str(path), *arguments])
+
+    def player(
+        self,
+        topics: Mapping[str, str],
+        *,
+        reliability: str = "reliable",
+        durability: str = "volatile",
+    ) -> Player:
+        """A process that publishes on these topics, by name with their types."""
+        argv = _module("tests.ros.player", topics, reliability=reliability, durability=durability)
+        return Player(self.start("player", argv, stdin=subprocess.PIPE), self.folder)
+
+    def collector(
+        self,
+        topics: Mapping[str, str] | None = None,
+        *,
+        reliability: str = "reliable",
+        durability: str = "volatile",
+    ) -> Collector:
+        """A process that subscribes to these topics, by name with their types."""
+        output = self.folder / f"collected-{len(self._processes)}.frames"
+        output.touch()
+        argv = _module("tests.ros.collector", topics or {}, reliability=reliability, durability=durability)
+        return Collector(self.start("collector", [*argv, "--output", str(output)], stdin=subprocess.PIPE), output)
+
+    def note_shared_memory(self) -> None:
+        """Remember what our processes have mapped: of the dead, nothing tells it."""
+        for process in self._processes:
+            self._mapped |= process.shared_memory()
+
+    def left_in_shared_memory(self) -> set[Path]:
+        return left_of(self.domain, self._mapped)
+
+    def end(self) -> None:
+        """End all processes and remove what they left, as Fast DDS does after SIGKILL."""
+        self.note_shared_memory()
+        for process in self._processes:
+            process.ask_to_end()
+        for process in self._processes:
+            process.reap()
+            # pytest shows it beside a failure.
+            print(f"--- {process.name}\n{process.stderr}")  # noqa: T201
+        for path in self.left_in_shared_memory():
+            path.unlink(missing_ok=True)
+
+
+@contextmanager
+def running_stage(folder: Path, domain: int) -> Iterator[Stage]:
+    stage = Stage(folder, domain)
+    try:
+        yield stage
+    finally:
+        stage.end()
+
+
+def _module(name: str, topics: Mapping[str, str], *, reliability: str, durability: str) -> list[str]:
+    chosen = [word for topic, type_name in topics.items() for word in ("--topic", topic, type_name)]
+    return [
+        sys.executable,
+        "-m",
+        name,
+        *chosen,
+        f"--reliability={reliability}",
+        f"--durability={durability}",
+    ]

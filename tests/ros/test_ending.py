@@ -1,0 +1,102 @@
+"""SIGTERM and Control-C: an orderly end at any moment, with an account of every message."""
+
+import random
+import signal
+import subprocess
+
+import pytest
+
+from tests.ros import relaying
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import LOSSLESS, config, inputs
+from tests.ros.stage import Stage
+from tests.ros.streams import at, jittery, merged
+from tests.ros.summary import read_summary
+
+pytestmark = pytest.mark.ros
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_PAIR_OUT = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+_FRONT = {"policy": "exact_time", "topics": inputs(_PAIR, qos=LOSSLESS)}
+
+# From the first moment to well after the start: imports, joining the graph, waiting.
+_CHANCE = random.Random(5)
+_MOMENTS_S = [0.0, *(_CHANCE.uniform(0, 2.5) for _ in range(7))]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
+@pytest.mark.parametrize("moment_s", _MOMENTS_S, ids=lambda moment_s: f"{moment_s:.2f}s")
+def test_a_signal_at_any_moment_ends_it_in_order(stage: Stage, number: signal.Signals, moment_s: float):
+    relay = stage.relay(config({"front": _FRONT, "rear": {**_FRONT, "output_prefix": "/back"}}))
+    relay.wait_until(lambda: relay.handles(signal.SIGTERM), "its handler of signals")
+    with pytest.raises(subprocess.TimeoutExpired):
+        relay.wait(moment_s)
+    relay.send(number)
+    assert relay.wait() == 0
+    assert "Traceback" not in relay.stderr
+    assert set(read_summary(relay.stderr)) == {"front", "rear"} or "stopped before it started" in relay.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
+def test_a_second_signal_does_not_disturb_the_end(stage: Stage, number: signal.Signals):
+    relay = stage.relay(config({"front": _FRONT}))
+    relay.wait_for_log("front: waiting for")
+    relay.send(number)
+    relay.send(number)
+    assert relay.wait() == 0
+    assert "Traceback" not in relay.stderr
+
+
+def test_the_summary_accounts_for_every_message(stage: Stage):
+    collector = stage.collector(_PAIR_OUT)
+    relay = stage.relay(config({"front": _FRONT}))
+    player = stage.player(_PAIR)
+    recording = merged(at("/camera", 0, 10, 20, 30, 40), at("/lidar", 0, 20, 40))
+    first_sets = relaying.connect(player, collector, recording, _PAIR_OUT)
+    player.play(recording)
+    relaying.conclude(player, collector, recording, _PAIR_OUT)
+    player.play(at("/lidar", 10_000_000))
+    player.acknowledge()
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+    front = read_summary(relay.stderr)["front"]
+    assert front.sets == first_sets + 4
+    for topic in front.inputs.values():
+        assert topic.received == topic.matched + sum(topic.dropped.values())
+        assert topic.matched == front.sets
+    assert front.inputs["/camera"].dropped["superseded"] == 2
+    assert front.inputs["/lidar"].dropped["shutdown"] == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
+def test_it_ends_in_order_while_messages_pour_in(stage: Stage, number: signal.Signals):
+    recording = merged(
+        jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1),
+        jittery("/lidar", period_ms=5, jitter_ms=1, count=4000, seed=2),
+    )
+    collector = stage.collector(_PAIR_OUT)
+    relay = stage.relay(config({"front": _FRONT | {"policy": "approximate_time", "slop": "10ms"}}))
+    player = stage.player(_PAIR)
+    first_sets = relaying.connect(player, collector, recording, _PAIR_OUT)
+    player.start(recording, speed=1)
+    collector.wait_for("/front/camera", 200)
+    relay.send(number)
+    assert relay.wait() == 0
+    sets = read_summary(relay.stderr)["front"].sets - first_sets
+    assert sets > 100
+    for output in _PAIR_OUT:
+        collector.process.wait_until(
+            lambda output=output: len(relaying.within(recording, collector.payloads(output))) == sets,
+            f"all {sets} sets of the summary on {output}",
+        )
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
+def test_it_leaves_nothing_in_shared_memory(stage: Stage, number: signal.Signals):
+    relay = stage.relay(config({"front": _FRONT}))
+    relay.wait_for_log("front: waiting for")
+    stage.note_shared_memory()
+    assert stage.left_in_shared_memory()
+    relay.send(number)
+    assert relay.wait() == 0
+    assert stage.left_in_shared_memory() == set()

@@ -1,0 +1,108 @@
+"""The relay as a node among others: names, remaps, simulated time, and its talk."""
+
+import json
+import signal
+from collections.abc import Sequence
+
+import pytest
+
+from tests.ros import relaying
+from tests.ros.cdr_messages import CLOCK, NS_PER_SECOND, VECTOR, serialize, time
+from tests.ros.configs import LOSSLESS, config, inputs
+from tests.ros.frames import Frame
+from tests.ros.processes import Process
+from tests.ros.stage import Stage
+from tests.ros.streams import at, merged
+from tests.ros.summary import read_summary
+
+pytestmark = pytest.mark.ros
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_PAIR_OUT = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+_RECORDING = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+
+
+def _front(**keys) -> str:
+    return config({"front": {"policy": "exact_time", "topics": inputs(_PAIR, qos=LOSSLESS)}}, **keys)
+
+
+def _end(relay: Process) -> None:
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+
+
+@pytest.mark.parametrize(
+    ("node", "arguments", "full_name"),
+    [
+        ({}, [], "/syncrelay"),
+        ({"name": "fusion"}, [], "/fusion"),
+        ({"name": "fusion", "namespace": "/robot"}, [], "/robot/fusion"),
+        ({"name": "fusion", "namespace": "/robot"}, ["--ros-args", "-r", "__node:=other"], "/robot/other"),
+        ({"name": "fusion"}, ["--ros-args", "-r", "__ns:=/left"], "/left/fusion"),
+    ],
+)
+def test_the_node_is_named_by_the_file_and_the_command_line_has_the_last_word(
+    stage: Stage, node: dict[str, str], arguments: Sequence[str], full_name: str
+):
+    collector = stage.collector()
+    stage.relay(_front(node=node), *arguments)
+    collector.process.wait_until(lambda: full_name in collector.nodes(), full_name)
+
+
+def test_topics_can_be_remapped_from_the_command_line(stage: Stage):
+    recording = merged(at("/robot/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    aligned = {"/fused/camera": VECTOR, "/front/lidar": VECTOR}
+    remaps = ["-r", "/camera:=/robot/camera", "-r", "/front/camera:=/fused/camera"]
+    _, collector = relaying.relay(stage, _front(), recording, aligned, arguments=["--ros-args", *remaps])
+    expected = [(frame.payload, frame.payload) for frame in at("", 0, 10, 20)]
+    assert relaying.sets_within(recording, collector, aligned) == expected
+
+
+def _tick(seconds: int) -> Frame:
+    return Frame("/clock", CLOCK, 0, serialize(CLOCK, time(seconds * NS_PER_SECOND)))
+
+
+@pytest.mark.parametrize(
+    ("node", "arguments"),
+    [({"use_sim_time": True}, []), ({}, ["--ros-args", "-p", "use_sim_time:=true"])],
+    ids=["by_the_file", "by_the_command_line"],
+)
+def test_when_simulated_time_begins_again_what_is_buffered_is_dropped(
+    stage: Stage, node: dict[str, bool], arguments: Sequence[str]
+):
+    collector = stage.collector(_PAIR_OUT)
+    relay = stage.relay(_front(node=node), *arguments)
+    player = stage.player({**_PAIR, "/clock": CLOCK})
+    relaying.connect(player, collector, _RECORDING, _PAIR_OUT)
+    assert collector.endpoints("/clock", kind="subscription", node="/syncrelay")
+    player.play([_tick(100)])
+    # The pair comes out behind the camera's lone message, which by then must be in the buffer.
+    before = collector.count("/front/lidar")
+    player.play(at("/camera", 100) + at("/camera", 0) + at("/lidar", 0))
+    collector.wait_for("/front/lidar", before + 1)
+    player.play([_tick(50)])
+    relay.wait_for_log("jumped")
+    _end(relay)
+    assert read_summary(relay.stderr)["front"].inputs["/camera"].dropped == {"time_jump": 1}
+
+
+def test_json_logs_are_an_object_a_line(stage: Stage):
+    relay, _ = relaying.relay(stage, _front(), _RECORDING, _PAIR_OUT, arguments=["--log-format", "json"])
+    _end(relay)
+    lines = [json.loads(line) for line in relay.stderr.splitlines()]
+    assert all({"time", "level", "logger", "message"} <= line.keys() for line in lines)
+    assert any(line["message"].startswith("front: running") and line["group"] == "front" for line in lines)
+
+
+def test_the_log_level_leaves_out_what_is_below_it(stage: Stage):
+    arguments = ["--log-level", "error"]
+    relay, _ = relaying.relay(stage, _front(), _RECORDING, _PAIR_OUT, arguments=arguments)
+    _end(relay)
+    assert relay.stderr == ""
+
+
+def test_all_talk_is_on_stderr(stage: Stage):
+    relay, _ = relaying.relay(stage, _front(), _RECORDING, _PAIR_OUT)
+    _end(relay)
+    assert relay.stdout == ""
+    assert "front: running" in relay.stderr
