@@ -1,19 +1,27 @@
 """The engine: messages in, matched sets and drops out. No clock, thread, ROS or configuration in here."""
 
+from syncrelay.sync.approximate_epsilon_time import ApproximateEpsilonTime
 from syncrelay.sync.approximate_time import ApproximateTime
+from syncrelay.sync.approximate_time_eager import ApproximateTimeEager
 from syncrelay.sync.counts import InputCounts
+from syncrelay.sync.equal_key import EqualKey
 from syncrelay.sync.exact_time import ExactTime
 from syncrelay.sync.group import SyncGroup
+from syncrelay.sync.latest_time import LatestTime
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.restamp import Restamp
 
 __all__ = [
+    "ApproximateEpsilonTime",
     "ApproximateTime",
+    "ApproximateTimeEager",
     "Drop",
     "DropReason",
+    "EqualKey",
     "ExactTime",
     "InputCounts",
+    "LatestTime",
     "Match",
     "Message",
     "Outcome",

@@ -4,11 +4,14 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.optional import OptionalInputs
+from syncrelay.sync.policy import Policy, check_sizes, of_required
+from syncrelay.sync.queues import Losses
 
 _NO_PIVOT = -1
 
 
-class ApproximateTime:
+class ApproximateTime(Policy):
     """The set of least span around each pivot leaves as soon as no later message could better it.
 
     On messages that arrive in stamp order these are the sets of C++ message_filters' ApproximateTime at the
@@ -22,11 +25,13 @@ class ApproximateTime:
     """
 
     __slots__ = (
+        "_age_penalty",
         "_candidate_end",
         "_candidate_start",
         "_cursors",
         "_empty",
         "_heads",
+        "_losses",
         "_messages",
         "_min_periods",
         "_overflowed",
@@ -37,7 +42,9 @@ class ApproximateTime:
         "_scale",
         "_slop",
         "_stamps",
+        "closed",
         "n_inputs",
+        "opened",
     )
 
     def __init__(
@@ -50,8 +57,7 @@ class ApproximateTime:
         min_periods_ns: Sequence[int] | None = None,
     ) -> None:
         periods = (0,) * n_inputs if min_periods_ns is None else tuple(min_periods_ns)
-        if n_inputs < 1 or queue_size < 1:
-            raise ValueError(f"n_inputs {n_inputs} and queue_size {queue_size} must be 1 or more")
+        check_sizes(n_inputs, queue_size)
         if slop_ns < 0 or not 0 <= age_penalty < float("inf"):
             raise ValueError(f"slop_ns {slop_ns} and age_penalty {age_penalty} must be 0 or more")
         if len(periods) != n_inputs or min(periods) < 0:
@@ -59,18 +65,32 @@ class ApproximateTime:
         self.n_inputs = n_inputs
         self._queue_size = queue_size
         self._slop = slop_ns
+        self._age_penalty = age_penalty
         self._scale = (1.0 + age_penalty).as_integer_ratio()
         self._min_periods = periods
         self._stamps: list[list[int]] = [[] for _ in periods]
         self._messages: list[list[Message]] = [[] for _ in periods]
+        self._losses = Losses(n_inputs)
+        self.opened = 0
         self._reset()
 
-    def add(self, message: Message) -> Sequence[Outcome]:
-        """Take a message by its own input and stamp; give what leaves because of it, in order."""
-        return self.feed(message.input, message.stamp, message)
+    def narrowed(self, required: Sequence[bool]) -> tuple["ApproximateTime", OptionalInputs]:
+        policy = ApproximateTime(
+            n_inputs=sum(required),
+            queue_size=self._queue_size,
+            slop_ns=self._slop,
+            age_penalty=self._age_penalty,
+            min_periods_ns=of_required(self._min_periods, required),
+        )
+        stage = OptionalInputs(
+            required=required,
+            queue_size=self._queue_size,
+            slop_ns=self._slop,
+            min_periods_ns=self._min_periods,
+        )
+        return policy, stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
-        """Take a message to be matched at `place` and `stamp`; its own input and stamp are not looked at."""
         stamps = self._stamps[place]
         if stamps and stamp <= stamps[-1]:
             return self._feed_behind(place, stamp, message)
@@ -87,8 +107,12 @@ class ApproximateTime:
             return self._overflow(place, list(outcomes))
         return outcomes
 
+    def settle(self) -> Sequence[Outcome]:
+        outcomes: list[Outcome] = []
+        self._emit(outcomes)
+        return self._search(outcomes)
+
     def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop all that is buffered, input by input, oldest first, and be as new."""
         drops = [Drop(message, reason) for messages in self._messages for message in messages]
         for stamps, messages in zip(self._stamps, self._messages, strict=True):
             stamps.clear()
@@ -97,10 +121,14 @@ class ApproximateTime:
         return drops
 
     def buffered(self, place: int) -> int:
-        """How many messages of this input are in here and in no set yet."""
         return len(self._messages[place])
 
+    def needed_queue(self, place: int) -> int | None:
+        return self._losses.needed[place]
+
     def _reset(self) -> None:
+        self.closed = self.opened
+        self._losses.forget()
         self._overflowed = [False] * self.n_inputs
         self._heads = [0] * self.n_inputs
         self._cursors = [0] * self.n_inputs
@@ -138,7 +166,7 @@ class ApproximateTime:
 
     def _overflow(self, place: int, outcomes: list[Outcome]) -> list[Outcome]:
         outcomes.append(Drop(self._messages[place].pop(0), DropReason.OVERFLOW))
-        del self._stamps[place][0]
+        self._losses.lose(place, self._stamps[place].pop(0))
         self._overflowed[place] = True
         had_candidate = self._pivot != _NO_PIVOT
         self._forget_candidate()
@@ -155,6 +183,7 @@ class ApproximateTime:
             first = heads.index(start)
             if self._pivot == _NO_PIVOT:
                 if end - start > self._slop or self._overflowed[latest]:
+                    self._note_missed(start)
                     self._drop_head(first, outcomes)
                     continue
                 self._pivot = latest
@@ -172,6 +201,10 @@ class ApproximateTime:
                 heads[first] = stamps[cursor]
             if first == self._pivot or end >= self._proof_end or (self._empty and self._is_proved()):
                 self._emit(outcomes)
+        if self._pivot == _NO_PIVOT:
+            self.closed = self.opened
+        elif self.closed == self.opened:
+            self.opened += 1
         return outcomes
 
     def _latest_head(self, end: int) -> int:
@@ -180,6 +213,12 @@ class ApproximateTime:
         if True in self._overflowed:
             self._overflowed = [lost and place == latest for place, lost in enumerate(self._overflowed)]
         return latest
+
+    def _note_missed(self, start: int) -> None:
+        """See whether what would have matched the earliest head had overflowed."""
+        for place, head in enumerate(self._heads):
+            if head > start:
+                self._losses.miss(place, self._stamps[place], start, self._slop)
 
     def _drop_head(self, place: int, outcomes: list[Outcome]) -> None:
         stamps = self._stamps[place]
@@ -208,6 +247,7 @@ class ApproximateTime:
 
     def _emit(self, outcomes: list[Outcome]) -> None:
         outcomes.append(Match(tuple([messages.pop(0) for messages in self._messages])))
+        self.closed = self.opened
         for stamps in self._stamps:
             del stamps[0]
         self._forget_candidate()

@@ -1,16 +1,71 @@
 """Where every message of an input went: fed = matched + dropped + buffered, at any moment."""
 
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from syncrelay.sync.messages import DropReason
+from syncrelay.sync.messages import DropReason, Match, Outcome
 
 
 @dataclass(frozen=True, slots=True)
 class InputCounts:
-    """Messages of one input since the group was made. `dropped` holds only reasons that occurred."""
+    """Messages of one input since the group was made. `dropped` holds only reasons that occurred.
+
+    `needed_queue` is how long this input's queue should have been when a message of another input last found
+    that what it needed had overflowed; None if that never happened.
+    """
 
     fed: int
     matched: int
     dropped: Mapping[DropReason, int]
     buffered: int
+    needed_queue: int | None = None
+
+
+class Ledger:
+    """Counts what comes in and what leaves. A message that `repeats` in sets is counted once."""
+
+    __slots__ = ("_dropped", "_last", "_matched", "_repeats", "fed", "sets")
+
+    def __init__(self, n_inputs: int, *, repeats: bool) -> None:
+        self.fed = [0] * n_inputs
+        self.sets = 0
+        self._matched = [0] * n_inputs
+        self._dropped: list[dict[DropReason, int]] = [defaultdict(int) for _ in self.fed]
+        self._repeats = repeats
+        self._last: list[int | None] = [None] * n_inputs
+
+    def note(self, outcomes: Sequence[Outcome]) -> None:
+        """Count what leaves."""
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                self._note_set(outcome)
+            else:
+                self._dropped[outcome.message.input][outcome.reason] += 1
+
+    def forget(self) -> None:
+        """Take what comes from now on for new, whatever its stamps."""
+        self._last = [None] * len(self.fed)
+
+    def counts(self, buffered: Sequence[int], needed_queues: Sequence[int | None]) -> tuple[InputCounts, ...]:
+        """Give the counts of each input, with what its buffers hold now."""
+        rows = zip(self.fed, self._matched, self._dropped, buffered, needed_queues, strict=True)
+        return tuple(
+            InputCounts(fed, matched, dict(dropped), held, needed) for fed, matched, dropped, held, needed in rows
+        )
+
+    def _note_set(self, match: Match) -> None:
+        self.sets += 1
+        matched = self._matched
+        if self._repeats:
+            self._note_repeating_set(match)
+            return
+        for message in match.messages:
+            if message is not None:
+                matched[message.input] += 1
+
+    def _note_repeating_set(self, match: Match) -> None:
+        for message in match.messages:
+            if message is not None and message.stamp != self._last[message.input]:
+                self._last[message.input] = message.stamp
+                self._matched[message.input] += 1

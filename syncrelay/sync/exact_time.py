@@ -4,9 +4,12 @@ from bisect import bisect_left, insort
 from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.optional import OptionalInputs
+from syncrelay.sync.policy import Policy, check_sizes
+from syncrelay.sync.queues import Losses
 
 
-class ExactTime:
+class ExactTime(Policy):
     """Messages of equal stamps on all inputs are a set, and leave when the last of them is there.
 
     As C++ message_filters' ExactTime: what is older than a set that leaves is superseded, and `queue_size` is
@@ -14,27 +17,24 @@ class ExactTime:
     arrival.
     """
 
-    __slots__ = ("_order", "_queue_size", "_sets", "n_inputs")
+    __slots__ = ("_losses", "_order", "_queue_size", "_sets", "n_inputs")
 
     def __init__(self, *, n_inputs: int, queue_size: int) -> None:
-        if n_inputs < 1 or queue_size < 1:
-            raise ValueError(f"n_inputs {n_inputs} and queue_size {queue_size} must be 1 or more")
+        check_sizes(n_inputs, queue_size)
         self.n_inputs = n_inputs
         self._queue_size = queue_size
         self._sets: dict[int, list[Message | None]] = {}
         self._order: list[int] = []
+        self._losses = Losses(n_inputs)
 
-    def add(self, message: Message) -> Sequence[Outcome]:
-        """Take a message by its own input and stamp; give what leaves because of it, in order."""
-        return self.feed(message.input, message.stamp, message)
+    def narrowed(self, required: Sequence[bool]) -> tuple["ExactTime", OptionalInputs]:
+        stage = OptionalInputs(required=required, queue_size=self._queue_size, slop_ns=0)
+        return ExactTime(n_inputs=sum(required), queue_size=self._queue_size), stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
-        """Take a message to be matched at `place` and `stamp`; its own input and stamp are not looked at."""
         messages = self._sets.get(stamp)
         if messages is None:
-            messages = [None] * self.n_inputs
-            messages[place] = message
-            return self._open(stamp, messages)
+            return self._begin(place, stamp, message)
         replaced = messages[place]
         messages[place] = message
         if replaced is not None:
@@ -44,18 +44,22 @@ class ExactTime:
         return self._emit(stamp, messages)
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop all that is buffered, oldest first, and be as new."""
         drops = self._drop_oldest(len(self._order), reason)
         drops.sort(key=lambda drop: drop.message.input)
+        self._losses.forget()
         return drops
 
     def buffered(self, place: int) -> int:
-        """How many messages of this input are in here and in no set yet."""
         return sum(messages[place] is not None for messages in self._sets.values())
 
-    def _open(self, stamp: int, messages: list[Message | None]) -> Sequence[Outcome]:
-        order = self._order
+    def needed_queue(self, place: int) -> int | None:
+        return self._losses.needed[place]
+
+    def _begin(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
+        messages: list[Message | None] = [None] * self.n_inputs
+        messages[place] = message
         self._sets[stamp] = messages
+        order = self._order
         if not order or stamp > order[-1]:
             order.append(stamp)
         else:
@@ -63,15 +67,26 @@ class ExactTime:
         if self.n_inputs == 1:
             return self._emit(stamp, messages)
         if len(order) > self._queue_size:
-            return self._drop_oldest(1, DropReason.OVERFLOW)
+            return self._overflow(place, stamp)
         return ()
 
+    def _overflow(self, place: int, stamp: int) -> Sequence[Outcome]:
+        oldest = self._order[0]
+        if oldest == stamp:
+            for other in range(self.n_inputs):
+                if other != place:
+                    self._losses.miss(other, self._order[1:], stamp, 0)
+        else:
+            for other, message in enumerate(self._sets[oldest]):
+                if message is not None:
+                    self._losses.lose(other, oldest)
+        return self._drop_oldest(1, DropReason.OVERFLOW)
+
     def _emit(self, stamp: int, messages: list[Message | None]) -> list[Outcome]:
-        order = self._order
         outcomes: list[Outcome] = []
-        if order[0] != stamp:
-            outcomes += self._drop_oldest(bisect_left(order, stamp), DropReason.SUPERSEDED)
-        del order[0]
+        if self._order[0] != stamp:
+            outcomes += self._drop_oldest(bisect_left(self._order, stamp), DropReason.SUPERSEDED)
+        del self._order[0]
         del self._sets[stamp]
         outcomes.append(Match(tuple(messages)))
         return outcomes

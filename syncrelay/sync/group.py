@@ -1,37 +1,42 @@
 """A group: what all policies share."""
 
-from collections import defaultdict
 from collections.abc import Sequence
 
-from syncrelay.sync.counts import InputCounts
+from syncrelay.sync.arrivals import Arrivals
+from syncrelay.sync.counts import InputCounts, Ledger
+from syncrelay.sync.matching import Limited, Matching, Unlimited
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.restamp import Restamp, common_stamp
-
-JUMP_NS = 1_000_000_000
-"""A stamp that falls by more than this on one input is a looped recording or a reset clock, not lateness."""
-
-_NEVER = -(1 << 63)
+from syncrelay.sync.thinning import Thinning
 
 
 class SyncGroup:
-    """Runs one policy: feeds it what may be used, counts where every message went.
+    """Runs one policy: feeds it what may be used, lets go what has waited enough, counts where all went.
 
     Messages go in and come out with the stamps they carry; an input's offset counts for matching only.
-    Older than what its input last gave to a set, or as old: `late`. A stamp more than JUMP_NS below its
-    input's newest flushes the group, which then knows nothing of the time before.
+    - A message older than what its input last gave to a set, or of the same stamp, is `late`.
+    - A stamp more than a second below its input's newest flushes the group, which then knows nothing of the
+      time before (`time_jump`); what other inputs still send of that time is dropped for the same reason.
+    - Inputs that are not `required` never change which messages of the required ones go together. A set
+      leaves when it has what it can have of them, or `max_wait_ns` after it was complete but for them.
+    - `max_wait_ns` after its first complete set came together, the best one so far leaves. Without it, sets
+      of required inputs wait as long as the policy would have them wait.
+    - `restamp` gives sets a common stamp, of what they came in with. `every` and `min_set_period_ns` thin them.
+
+    `add` lets go first what was due before it: calling `expire` more often changes nothing.
     """
 
     __slots__ = (
-        "_dropped",
-        "_fed",
-        "_given",
-        "_matched",
+        "_arrivals",
+        "_by_stamp",
+        "_ledger",
+        "_matching",
         "_newest",
         "_offsets",
-        "_policy",
+        "_required",
         "_restamp",
-        "sets",
+        "_thinning",
     )
 
     def __init__(
@@ -42,103 +47,140 @@ class SyncGroup:
         max_wait_ns: int | None = None,
         offsets_ns: Sequence[int] | None = None,
         restamp: Restamp | int | None = None,
+        every: int = 1,
+        min_set_period_ns: int | None = None,
     ) -> None:
         n_inputs = policy.n_inputs
-        offsets = [0] * n_inputs if offsets_ns is None else list(offsets_ns)
-        if len(required) != n_inputs or len(offsets) != n_inputs:
-            raise ValueError(f"required and offsets_ns must be one a input, of {n_inputs}")
-        if not all(required) or max_wait_ns is not None:
-            raise NotImplementedError("optional inputs and max_wait come with issue 3")
-        self._policy = policy
+        offsets = (0,) * n_inputs if offsets_ns is None else tuple(offsets_ns)
+        if len(required) != n_inputs or len(offsets) != n_inputs or not any(required):
+            raise ValueError(f"required {required} and offsets_ns {offsets} must be {n_inputs}, one required")
+        if max_wait_ns is None and not all(required):
+            raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
+        if max_wait_ns is not None and max_wait_ns < 0:
+            raise ValueError(f"max_wait_ns {max_wait_ns} must be 0 or more")
+        if isinstance(restamp, int) and not 0 <= restamp < n_inputs:
+            raise ValueError(f"restamp {restamp} must be one of {n_inputs} inputs")
+        self._by_stamp = policy.by_stamp
+        self._required = [index for index, needed in enumerate(required) if needed]
         self._offsets = offsets
         self._restamp = restamp
-        self._fed = [0] * n_inputs
-        self._matched = [0] * n_inputs
-        self._dropped: list[dict[DropReason, int]] = [defaultdict(int) for _ in offsets]
-        self.sets = 0
-        self._forget()
+        self._ledger = Ledger(n_inputs, repeats=policy.repeats)
+        self._arrivals = Arrivals(offsets)
+        self._newest = self._arrivals.newest
+        self._thinning = None
+        if every != 1 or min_set_period_ns is not None:
+            self._thinning = Thinning(
+                n_inputs=n_inputs, repeats=policy.repeats, every=every, min_set_period_ns=min_set_period_ns
+            )
+        self._matching: Matching = Unlimited(policy, self._arrivals)
+        if max_wait_ns is not None:
+            self._matching = Limited(
+                policy, self._arrivals, required=required, max_wait_ns=max_wait_ns, offsets_ns=offsets
+            )
+
+    @property
+    def sets(self) -> int:
+        """How many sets have left."""
+        return self._ledger.sets
 
     def add(self, message: Message, *, now: int) -> Sequence[Outcome]:
         """Take a message that arrives at `now`; give what leaves because of it, in order."""
-        del now
-        place = message.input
+        index = message.input
         stamp = message.stamp
-        self._fed[place] += 1
-        if stamp <= self._newest[place]:
-            return self._add_behind(message)
-        self._newest[place] = stamp
-        outcomes = self._policy.feed(place, stamp + self._offsets[place], message)
-        return self._leave(outcomes) if outcomes else outcomes
+        self._ledger.fed[index] += 1
+        due = self._matching.due(now)
+        if stamp <= self._newest[index]:
+            outcomes = self._take_behind(message, now)
+        else:
+            self._newest[index] = stamp
+            outcomes = self._matching.feed(stamp + self._offsets[index], message, now)
+        if due:
+            outcomes = [*due, *outcomes]
+        return self._leave(outcomes, now) if outcomes else outcomes
 
     def reject(self, message: Message, reason: DropReason) -> Drop:
         """Count a message that cannot be fed: it has no readable stamp."""
-        self._fed[message.input] += 1
-        return self._drop(message, reason)
+        self._ledger.fed[message.input] += 1
+        drop = Drop(message, reason)
+        self._ledger.note((drop,))
+        return drop
 
     def next_deadline(self) -> int | None:
-        """When `expire` has something to do, in the time of `now`; None: not before the next message."""
-        return None
+        """When `expire` will have something to do, in the time of `now`; None: not before the next message."""
+        return self._matching.next_deadline()
 
     def expire(self, *, now: int) -> Sequence[Outcome]:
         """Give what leaves because it has waited long enough."""
-        del now
-        return ()
+        return self._leave(self._matching.due(now), now)
 
     def flush(self, reason: DropReason) -> Sequence[Drop]:
         """Drop all that is buffered and start afresh. The counts go on."""
-        drops = self._policy.flush(reason)
-        self._forget()
-        self._leave(drops)
+        drops = self._empty(reason)
+        self._arrivals.forget()
+        self._ledger.note(drops)
         return drops
 
     def counts(self) -> tuple[InputCounts, ...]:
         """Where the messages of each input went since the group was made."""
-        return tuple(
-            InputCounts(fed, matched, dict(dropped), self._policy.buffered(place))
-            for place, (fed, matched, dropped) in enumerate(
-                zip(self._fed, self._matched, self._dropped, strict=True)
-            )
-        )
+        inputs = range(len(self._offsets))
+        buffered = [self._matching.buffered(index) for index in inputs]
+        if self._thinning is not None:
+            buffered = [held + self._thinning.buffered(index) for index, held in enumerate(buffered)]
+        return self._ledger.counts(buffered, [self._matching.needed_queue(index) for index in inputs])
 
-    def _forget(self) -> None:
-        self._newest = [0] * self._policy.n_inputs
-        self._given = [_NEVER] * self._policy.n_inputs
-
-    def _add_behind(self, message: Message) -> Sequence[Outcome]:
-        """Take a message that is not newer than all before: unset, late, out of order or from a new time."""
-        place = message.input
-        stamp = message.stamp
-        drops: Sequence[Outcome] = ()
+    def _take_behind(self, message: Message, now: int) -> Sequence[Outcome]:
+        """Take a message that is not newer than all before: unset, late, out of order or of another time."""
+        index, stamp = message.input, message.stamp
         if stamp == 0:
-            return (self._drop(message, DropReason.UNSTAMPED),)
-        if stamp < self._newest[place] - JUMP_NS:
-            drops = self.flush(DropReason.TIME_JUMP)
-        if stamp <= self._given[place]:
-            return (self._drop(message, DropReason.LATE),)
-        self._newest[place] = max(stamp, self._newest[place])
-        outcomes = self._policy.feed(place, stamp + self._offsets[place], message)
-        return [*drops, *self._leave(outcomes)]
+            if self._by_stamp:
+                return (Drop(message, DropReason.UNSTAMPED),)
+            return self._matching.feed(stamp, message, now)
+        if self._arrivals.is_left_over(index, stamp):
+            return (Drop(message, DropReason.TIME_JUMP),)
+        drops: list[Drop] = []
+        if self._arrivals.has_fallen(index, stamp):
+            drops = self._empty(DropReason.TIME_JUMP)
+            self._arrivals.jump(index)
+        if self._arrivals.is_late(index, stamp, or_equal=self._by_stamp):
+            return (Drop(message, DropReason.LATE),)
+        self._newest[index] = max(stamp, self._newest[index])
+        return [*drops, *self._matching.feed(stamp + self._offsets[index], message, now)]
 
-    def _drop(self, message: Message, reason: DropReason) -> Drop:
-        self._dropped[message.input][reason] += 1
-        return Drop(message, reason)
+    def _empty(self, reason: DropReason) -> list[Drop]:
+        drops = self._matching.flush(reason)
+        if self._thinning is not None:
+            drops += self._thinning.flush(reason)
+        self._ledger.forget()
+        return drops
 
-    def _leave(self, outcomes: Sequence[Outcome]) -> Sequence[Outcome]:
-        """Count what leaves, and give sets their common stamp."""
-        for outcome in outcomes:
-            if isinstance(outcome, Drop):
-                self._dropped[outcome.message.input][outcome.reason] += 1
-                continue
-            self.sets += 1
-            for message in outcome.messages:
-                if message is not None:
-                    self._matched[message.input] += 1
-                    self._given[message.input] = message.stamp
+    def _leave(self, outcomes: Sequence[Outcome], now: int) -> Sequence[Outcome]:
+        """Thin, restamp and count what leaves."""
+        if self._thinning is not None:
+            outcomes = self._thinned(outcomes, self._thinning, now)
+        self._ledger.note(outcomes)
         if self._restamp is None:
             return outcomes
-        return [self._restamped(outcome) for outcome in outcomes]
+        return [
+            Match(outcome.messages, common_stamp(outcome.messages, self._restamp))
+            if isinstance(outcome, Match)
+            else outcome
+            for outcome in outcomes
+        ]
 
-    def _restamped(self, outcome: Outcome) -> Outcome:
-        if isinstance(outcome, Drop) or self._restamp is None:
-            return outcome
-        return Match(outcome.messages, common_stamp(outcome.messages, self._restamp))
+    def _thinned(self, outcomes: Sequence[Outcome], thinning: Thinning, now: int) -> list[Outcome]:
+        left: list[Outcome] = []
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                left += thinning.thin(outcome, self._moment(outcome.messages, now))
+            else:
+                left.append(outcome)
+        return left
+
+    def _moment(self, messages: Sequence[Message | None], now: int) -> int:
+        """Give a stamp that rises from set to set: the latest of the required inputs, `now` if none is set."""
+        stamps = [
+            message.stamp + self._offsets[message.input]
+            for message in messages
+            if message is not None and message.stamp and message.input in self._required
+        ]
+        return max(stamps, default=now)

@@ -4,28 +4,68 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from syncrelay.sync.messages import Drop, DropReason, Message, Outcome
+from syncrelay.sync.optional import OptionalInputs
 
 
 class Policy(Protocol):
     """Matches the messages of `n_inputs` inputs. Knows stamps and order of arrival, never a clock."""
 
-    @property
-    def n_inputs(self) -> int:
-        """How many inputs a set has."""
+    __slots__ = ()
+
+    by_stamp: bool = True
+    """Whether a stamp must be set, and two of one input that are equal mean the same message."""
+
+    repeats: bool = False
+    """Whether a message may be in more than one set."""
+
+    opened: int = 0
+    """How many waits began in here: for a better message or for a missing one."""
+
+    closed: int = 0
+    """How many waits ended, in the order in which they began."""
+
+    n_inputs: int
+    """How many inputs a set has."""
+
+    def narrowed(self, required: Sequence[bool]) -> tuple["Policy", OptionalInputs]:
+        """Give this rule, as new, for a group in which only some inputs are required.
+
+        Either a policy of the required inputs alone, places counted among them, and the stage in which the
+        optional ones join its sets; or a policy that deals with them itself, and a stage of none.
+        """
         ...
 
     def add(self, message: Message) -> Sequence[Outcome]:
         """Take a message by its own input and stamp; give what leaves because of it, in order."""
-        ...
+        return self.feed(message.input, message.stamp, message)
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         """Take a message to be matched at `place` and `stamp`; its own input and stamp are not looked at."""
         ...
+
+    def settle(self) -> Sequence[Outcome]:
+        """End the oldest wait: what it is for leaves as it is, as a set if it can be one."""
+        return ()
 
     def flush(self, reason: DropReason) -> list[Drop]:
         """Drop all that is buffered, input by input, oldest first, and be as new."""
         ...
 
     def buffered(self, place: int) -> int:
-        """How many messages of this input are in here and in no set yet."""
+        """How many messages of this input are in here and have been in no set."""
         ...
+
+    def needed_queue(self, place: int) -> int | None:
+        """How long this input's queue should have been when a message last missed what it had dropped."""
+        ...
+
+
+def check_sizes(n_inputs: int, queue_size: int) -> None:
+    """Raise ValueError for what no policy can be made of."""
+    if n_inputs < 1 or queue_size < 1:
+        raise ValueError(f"n_inputs {n_inputs} and queue_size {queue_size} must be 1 or more")
+
+
+def of_required(values: Sequence[int], required: Sequence[bool]) -> tuple[int, ...]:
+    """Keep the values of the required inputs."""
+    return tuple(value for value, needed in zip(values, required, strict=True) if needed)

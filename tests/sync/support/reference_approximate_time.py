@@ -66,9 +66,8 @@ class ReferenceApproximateTime:
                 self.drop_skipped()
                 self.start, self.end = start, end
             self.cursors[first] += 1
-            if first == self.pivot or self.scale(end - self.end) >= self.pivot_stamp - self.start:
-                self.emit()
-            elif None in [self.head(index) for index in self.inputs] and self.virtually_proved():
+            seen_all = first == self.pivot or self.scale(end - self.end) >= self.pivot_stamp - self.start
+            if seen_all or (None in map(self.head, self.inputs) and self.virtually_proved()):
                 self.emit()
 
     def drop_skipped(self):

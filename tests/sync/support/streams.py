@@ -1,7 +1,5 @@
 """Seeded random streams: what a rig may send, with jitter, latency, bursts, gaps, loss and ties."""
 
-import random
-
 MS = 1_000_000
 START_NS = 10**9
 AGE_PENALTIES = (0.0, 0.1, 0.5, 1.0, 2.0)
@@ -40,3 +38,17 @@ def in_order(rng, n_inputs, count):
             merged.append((arrival, rng.random(), index, stamp))
     merged.sort()
     return [(index, stamp) for _, _, index, stamp in merged[:count]]
+
+
+def disordered(rng, n_inputs, count):
+    """(input, stamp) in order of arrival, with duplicates, inversions and stamps of few values."""
+    events = in_order(rng, n_inputs, count)
+    grid = rng.choice((1, MS, 10 * MS, 50 * MS))
+    events = [(index, max(stamp // grid * grid, 1)) for index, stamp in events]
+    for _ in range(rng.choice((0, count // 50, count // 5))):
+        at = rng.randrange(len(events))
+        if rng.random() < 0.5:
+            events.insert(rng.randrange(at, min(at + 20, len(events))), events[at])
+        else:
+            events.insert(min(at + rng.randrange(20), len(events) - 1), events.pop(at))
+    return events

@@ -1,0 +1,71 @@
+"""approximate_epsilon_time: the oldest messages are a set if they lie within epsilon, else they go."""
+
+from collections.abc import Sequence
+
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.optional import OptionalInputs
+from syncrelay.sync.policy import Policy, check_sizes
+from syncrelay.sync.queues import Losses, StampQueue
+
+
+class ApproximateEpsilonTime(Policy):
+    """The oldest messages of all inputs are a set, at once, if none is more than epsilon after the oldest.
+
+    If one is, every input's oldest message within epsilon of the oldest of all is too far. As C++
+    message_filters' ApproximateEpsilonTime, but that queues are in stamp order and that a message of a stamp
+    that is still queued replaces that one.
+    """
+
+    __slots__ = ("_epsilon", "_losses", "_queue_size", "_queues", "n_inputs")
+
+    def __init__(self, *, n_inputs: int, queue_size: int, epsilon_ns: int) -> None:
+        check_sizes(n_inputs, queue_size)
+        if epsilon_ns < 0:
+            raise ValueError(f"epsilon_ns {epsilon_ns} must be 0 or more")
+        self.n_inputs = n_inputs
+        self._queue_size = queue_size
+        self._epsilon = epsilon_ns
+        self._queues = [StampQueue() for _ in range(n_inputs)]
+        self._losses = Losses(n_inputs)
+
+    def narrowed(self, required: Sequence[bool]) -> tuple["ApproximateEpsilonTime", OptionalInputs]:
+        size, epsilon = self._queue_size, self._epsilon
+        stage = OptionalInputs(required=required, queue_size=size, slop_ns=epsilon)
+        return ApproximateEpsilonTime(n_inputs=sum(required), queue_size=size, epsilon_ns=epsilon), stage
+
+    def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
+        queue = self._queues[place]
+        replaced = queue.insert(stamp, message)
+        if replaced is not None:
+            return (Drop(replaced, DropReason.DUPLICATE),)
+        outcomes: list[Outcome] = []
+        while all(queue.stamps for queue in self._queues):
+            self._take_oldest(outcomes)
+        if len(queue.stamps) > self._queue_size:
+            self._losses.lose(place, queue.stamps[0])
+            outcomes += [Drop(lost, DropReason.OVERFLOW) for lost in queue.take(1)]
+        return outcomes
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        self._losses.forget()
+        gone = [queue.take(len(queue.stamps)) for queue in self._queues]
+        return [Drop(message, reason) for messages in gone for message in messages]
+
+    def buffered(self, place: int) -> int:
+        return len(self._queues[place].stamps)
+
+    def needed_queue(self, place: int) -> int | None:
+        return self._losses.needed[place]
+
+    def _take_oldest(self, outcomes: list[Outcome]) -> None:
+        oldest = min(queue.stamps[0] for queue in self._queues)
+        last = oldest + self._epsilon
+        near = [queue for queue in self._queues if queue.stamps[0] <= last]
+        taken = [queue.take(1)[0] for queue in near]
+        if len(taken) == self.n_inputs:
+            outcomes.append(Match(tuple(taken)))
+            return
+        outcomes += [Drop(message, DropReason.TOO_FAR) for message in taken]
+        for place, queue in enumerate(self._queues):
+            if queue not in near:
+                self._losses.miss(place, queue.stamps, oldest, self._epsilon)

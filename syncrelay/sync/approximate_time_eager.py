@@ -1,0 +1,172 @@
+"""approximate_time_eager: the soonest match, with no wait for a better one."""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.optional import OptionalInputs
+from syncrelay.sync.policy import Policy, check_sizes
+from syncrelay.sync.queues import Losses
+
+
+class _Neighbours(NamedTuple):
+    """The stamps of one input next to a new one, within slop: the last not after it, the first after it."""
+
+    before: int | None
+    after: int | None
+
+
+class ApproximateTimeEager(Policy):
+    """The tightest set within slop that holds the message just arrived leaves at once.
+
+    Of sets of one span, the one that starts first, each input in it with its latest message that is not newer
+    than the one just arrived. What is older than a set that leaves is superseded, so sets never go
+    back; what lies further than slop before all messages of another input is too far. Meant for what Python's
+    ApproximateTimeSynchronizer is used for, whose slop is exclusive, whose fit is the first one found, and
+    whose cost is a product of queues.
+    """
+
+    __slots__ = ("_empty", "_latest_head", "_losses", "_messages", "_queue_size", "_slop", "_stamps", "n_inputs")
+
+    def __init__(self, *, n_inputs: int, queue_size: int, slop_ns: int) -> None:
+        check_sizes(n_inputs, queue_size)
+        if slop_ns < 0:
+            raise ValueError(f"slop_ns {slop_ns} must be 0 or more")
+        self.n_inputs = n_inputs
+        self._queue_size = queue_size
+        self._slop = slop_ns
+        self._stamps: list[list[int]] = [[] for _ in range(n_inputs)]
+        self._messages: list[list[Message]] = [[] for _ in range(n_inputs)]
+        self._losses = Losses(n_inputs)
+        self._see_heads()
+
+    def narrowed(self, required: Sequence[bool]) -> tuple["ApproximateTimeEager", OptionalInputs]:
+        size, slop = self._queue_size, self._slop
+        stage = OptionalInputs(required=required, queue_size=size, slop_ns=slop)
+        return ApproximateTimeEager(n_inputs=sum(required), queue_size=size, slop_ns=slop), stage
+
+    def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
+        stamps = self._stamps[place]
+        outcomes: list[Outcome] = []
+        if stamps and stamp > stamps[-1]:
+            stamps.append(stamp)
+            self._messages[place].append(message)
+        else:
+            self._insert(place, stamp, message, outcomes)
+        if not self._empty:
+            self._match(place, stamp, outcomes)
+        if len(stamps) > self._queue_size:
+            self._losses.lose(place, stamps[0])
+            self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
+            self._drop_too_far(outcomes)
+        return outcomes
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        drops = [Drop(message, reason) for messages in self._messages for message in messages]
+        for stamps, messages in zip(self._stamps, self._messages, strict=True):
+            stamps.clear()
+            messages.clear()
+        self._losses.forget()
+        self._see_heads()
+        return drops
+
+    def buffered(self, place: int) -> int:
+        return len(self._stamps[place])
+
+    def needed_queue(self, place: int) -> int | None:
+        return self._losses.needed[place]
+
+    def _insert(self, place: int, stamp: int, message: Message, outcomes: list[Outcome]) -> None:
+        """Put in place what is not newer than its whole queue."""
+        stamps = self._stamps[place]
+        messages = self._messages[place]
+        position = bisect_left(stamps, stamp)
+        if position < len(stamps) and stamps[position] == stamp:
+            outcomes.append(Drop(messages[position], DropReason.DUPLICATE))
+            messages[position] = message
+            return
+        stamps.insert(position, stamp)
+        messages.insert(position, message)
+        if position == 0:
+            self._note_missed(stamp)
+            self._drop_too_far(outcomes)
+
+    def _note_missed(self, stamp: int) -> None:
+        for place, stamps in enumerate(self._stamps):
+            if stamps and stamps[0] > stamp + self._slop:
+                self._losses.miss(place, stamps, stamp, self._slop)
+
+    def _see_heads(self) -> None:
+        heads = [stamps[0] for stamps in self._stamps if stamps]
+        self._empty = self.n_inputs - len(heads)
+        self._latest_head = max(heads, default=0)
+
+    def _drop_too_far(self, outcomes: list[Outcome]) -> None:
+        """Drop what no message that any other input still has, or will show, lies within slop of."""
+        self._see_heads()
+        latest = None
+        while latest != self._latest_head:
+            latest = self._latest_head
+            for place, stamps in enumerate(self._stamps):
+                if stamps and stamps[0] < latest - self._slop:
+                    count = bisect_left(stamps, latest - self._slop)
+                    self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
+            self._see_heads()
+
+    def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
+        messages = self._messages[place]
+        outcomes += [Drop(message, reason) for message in messages[:count]]
+        del messages[:count]
+        del self._stamps[place][:count]
+
+    def _match(self, place: int, stamp: int, outcomes: list[Outcome]) -> None:
+        neighbours = self._neighbours(place, stamp)
+        if neighbours is None:
+            return
+        chosen = _tightest(stamp, neighbours)
+        if max(chosen) - min(chosen) > self._slop:
+            return
+        members = []
+        for other, wanted in enumerate(chosen):
+            stamps = self._stamps[other]
+            if stamps[0] != wanted:
+                self._drop_oldest(other, bisect_left(stamps, wanted), DropReason.SUPERSEDED, outcomes)
+            del stamps[0]
+            members.append(self._messages[other].pop(0))
+        outcomes.append(Match(tuple(members)))
+        self._drop_too_far(outcomes)
+
+    def _neighbours(self, place: int, stamp: int) -> list[_Neighbours] | None:
+        """Give each input's choice, None if one has none. Nothing further away can make a tighter set."""
+        first, last = stamp - self._slop, stamp + self._slop
+        neighbours = []
+        for other, stamps in enumerate(self._stamps):
+            if other == place:
+                neighbours.append(_Neighbours(stamp, None))
+                continue
+            position = bisect_right(stamps, stamp)
+            before = stamps[position - 1] if position and stamps[position - 1] >= first else None
+            after = stamps[position] if position < len(stamps) and stamps[position] <= last else None
+            if before is None and after is None:
+                return None
+            neighbours.append(_Neighbours(before, after))
+        return neighbours
+
+
+def _tightest(stamp: int, neighbours: Sequence[_Neighbours]) -> list[int]:
+    """Choose a stamp per input: the least span, of equal spans the one that starts first.
+
+    Starting from all that come before `stamp`, the earliest is given up for the one after, again and again.
+    """
+    chosen = [near.before if near.before is not None else near.after for near in neighbours]
+    best = [wanted for wanted in chosen if wanted is not None]
+    given_up = best
+    for place in sorted(range(len(best)), key=best.__getitem__):
+        after = neighbours[place].after
+        if after is None or best[place] > stamp:
+            break
+        given_up = [*given_up[:place], after, *given_up[place + 1 :]]
+        if max(given_up) - min(given_up) < max(best) - min(best):
+            best = given_up
+    return best

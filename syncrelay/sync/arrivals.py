@@ -1,0 +1,66 @@
+"""What each input's stamps say of a message that arrives: late, of another time, or of use."""
+
+from collections.abc import Sequence
+
+JUMP_NS = 1_000_000_000
+"""A stamp that falls by more than this on one input is a looped recording or a reset clock, not lateness."""
+
+_UNSEEN = 0
+_NOT_YET = 1 << 62
+_NEVER = -(1 << 62)
+
+
+class Arrivals:
+    """The newest stamp that came in and the newest that went into a set, of each input.
+
+    A message newer than `newest` of its input is of use, and whoever sees that sets it; of any other this
+    class decides. Where one input jumped back, the others may still send what belongs to the time before:
+    stamps that go on where theirs had been and are ahead of the one that jumped.
+    """
+
+    __slots__ = ("_before", "_jumped", "_offsets", "given", "newest")
+
+    def __init__(self, offsets_ns: Sequence[int]) -> None:
+        self._offsets = offsets_ns
+        self.newest = [_UNSEEN] * len(offsets_ns)
+        self.given = [_NEVER] * len(offsets_ns)
+        self.forget()
+
+    def forget(self) -> None:
+        """Start afresh."""
+        self._jumped = 0
+        self._before: list[int | None] = [None] * len(self._offsets)
+        self.newest[:] = [_UNSEEN] * len(self._offsets)
+        self.given[:] = [_NEVER] * len(self._offsets)
+
+    def is_late(self, index: int, stamp: int, *, or_equal: bool) -> bool:
+        """Whether a set of this input's messages would go back; of equal stamps only if they mean the same."""
+        given = self.given[index]
+        return stamp < given or (or_equal and stamp == given)
+
+    def has_fallen(self, index: int, stamp: int) -> bool:
+        """Whether this stamp begins a new time."""
+        newest = self.newest[index]
+        return newest not in (_UNSEEN, _NOT_YET) and stamp < newest - JUMP_NS
+
+    def jump(self, index: int) -> None:
+        """Start afresh because this input has fallen; the others may have something of the old time left."""
+        before = [old if newest == _NOT_YET else newest for old, newest in zip(self._before, self.newest, strict=True)]
+        self.forget()
+        self._jumped = index
+        for other, newest in enumerate(before):
+            if other != index and newest not in (None, _UNSEEN):
+                self._before[other] = newest
+                self.newest[other] = _NOT_YET
+
+    def is_left_over(self, index: int, stamp: int) -> bool:
+        """Whether a message belongs to the time before a jump of another input."""
+        before = self._before[index]
+        if before is None:
+            return False
+        ahead = stamp + self._offsets[index] - self.newest[self._jumped] - self._offsets[self._jumped]
+        if ahead > JUMP_NS and abs(stamp - before) <= JUMP_NS:
+            return True
+        self._before[index] = None
+        self.newest[index] = _UNSEEN
+        return False

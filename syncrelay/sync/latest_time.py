@@ -1,0 +1,185 @@
+"""latest_time: at each message of one input, the latest of every other."""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.optional import OptionalInputs
+from syncrelay.sync.policy import Policy, check_sizes
+from syncrelay.sync.queues import Losses, StampQueue
+
+
+class _Lookup(NamedTuple):
+    """What an input has for a trigger: a place in its queue, or none, and whether one may still come."""
+
+    position: int | None
+    may_come: bool
+
+
+class LatestTime(Policy):
+    """At each message of input `trigger`, a set of it and the latest not newer message of every other input.
+
+    None is older than `max_age_ns` at the trigger's stamp (None: any age will do). A message may serve many
+    sets. A trigger waits for required inputs that have nothing for it yet, and is too far once one of them has
+    shown newer messages only; it never waits for optional ones. `settle` lets the oldest waiting trigger expire.
+
+    A message is superseded when a newer one serves in its place and it never did; expired when it is too old
+    for any trigger to come.
+    """
+
+    __slots__ = (
+        "_losses",
+        "_max_age",
+        "_queue_size",
+        "_queues",
+        "_required",
+        "_served",
+        "_trigger",
+        "closed",
+        "n_inputs",
+        "opened",
+    )
+
+    repeats = True
+
+    def __init__(
+        self,
+        *,
+        n_inputs: int,
+        queue_size: int,
+        trigger: int,
+        max_age_ns: int | None = None,
+        required: Sequence[bool] | None = None,
+    ) -> None:
+        check_sizes(n_inputs, queue_size)
+        needed = (True,) * n_inputs if required is None else tuple(required)
+        if not 0 <= trigger < n_inputs or len(needed) != n_inputs or not needed[trigger]:
+            raise ValueError(f"trigger {trigger} must be a required input of {n_inputs}: {needed}")
+        if max_age_ns is not None and max_age_ns < 0:
+            raise ValueError(f"max_age_ns {max_age_ns} must be 0 or more")
+        self.n_inputs = n_inputs
+        self._queue_size = queue_size
+        self._trigger = trigger
+        self._max_age = max_age_ns
+        self._required = needed
+        self._queues = [StampQueue() for _ in needed]
+        self._served = [False] * n_inputs
+        self._losses = Losses(n_inputs)
+        self.opened = 0
+        self.closed = 0
+
+    def narrowed(self, required: Sequence[bool]) -> tuple["LatestTime", OptionalInputs]:
+        policy = LatestTime(
+            n_inputs=self.n_inputs,
+            queue_size=self._queue_size,
+            trigger=self._trigger,
+            max_age_ns=self._max_age,
+            required=required,
+        )
+        return policy, OptionalInputs(required=(True,) * self.n_inputs, queue_size=1, slop_ns=0)
+
+    def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
+        queue = self._queues[place]
+        if self._served[place] and stamp <= queue.stamps[0]:
+            return (Drop(message, DropReason.LATE),)
+        outcomes: list[Outcome] = []
+        replaced = queue.insert(stamp, message)
+        if replaced is not None:
+            outcomes.append(Drop(replaced, DropReason.DUPLICATE))
+        elif place == self._trigger:
+            self.opened += 1
+        self._serve(outcomes)
+        if len(queue.stamps) > self._queue_size:
+            self._losses.lose(place, queue.stamps[0])
+            if place == self._trigger:
+                self.closed += 1
+            outcomes += self._drop_oldest(place, 1, DropReason.OVERFLOW)
+        return outcomes
+
+    def settle(self) -> Sequence[Outcome]:
+        outcomes: list[Outcome] = [*self._drop_trigger(DropReason.EXPIRED)]
+        self._serve(outcomes)
+        return outcomes
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        drops = []
+        for place, queue in enumerate(self._queues):
+            drops += self._drop_oldest(place, len(queue.stamps), reason)
+        self._losses.forget()
+        self.closed = self.opened
+        return drops
+
+    def buffered(self, place: int) -> int:
+        return len(self._queues[place].stamps) - self._served[place]
+
+    def needed_queue(self, place: int) -> int | None:
+        return self._losses.needed[place]
+
+    def _serve(self, outcomes: list[Outcome]) -> None:
+        triggers = self._queues[self._trigger]
+        while triggers.stamps:
+            stamp = triggers.stamps[0]
+            found = [self._look_up(place, stamp) for place in range(self.n_inputs)]
+            missing = [
+                near for near, needed in zip(found, self._required, strict=True) if needed and near.position is None
+            ]
+            if not missing:
+                self._emit([near.position for near in found], stamp, outcomes)
+            elif all(near.may_come for near in missing):
+                return
+            else:
+                self._note_missed(stamp)
+                outcomes += self._drop_trigger(DropReason.TOO_FAR)
+
+    def _look_up(self, place: int, stamp: int) -> _Lookup:
+        stamps = self._queues[place].stamps
+        position = bisect_right(stamps, stamp) - 1
+        if position >= 0 and (self._max_age is None or stamp - stamps[position] <= self._max_age):
+            return _Lookup(position, may_come=True)
+        return _Lookup(None, may_come=position == len(stamps) - 1)
+
+    def _note_missed(self, stamp: int) -> None:
+        for place, queue in enumerate(self._queues):
+            if queue.stamps and queue.stamps[0] > stamp:
+                age = stamp if self._max_age is None else self._max_age
+                self._losses.miss(place, queue.stamps, stamp, age)
+
+    def _emit(self, positions: Sequence[int | None], stamp: int, outcomes: list[Outcome]) -> None:
+        members: list[Message | None] = []
+        for place, position in enumerate(positions):
+            if position is None:
+                outcomes += self._drop_expired(place, stamp)
+                members.append(None)
+                continue
+            outcomes += self._drop_oldest(place, position, DropReason.SUPERSEDED)
+            members.append(self._queues[place].messages[0])
+            self._served[place] = True
+        outcomes.append(Match(tuple(members)))
+        self._queues[self._trigger].take(1)
+        self._served[self._trigger] = False
+        self.closed += 1
+
+    def _drop_trigger(self, reason: DropReason) -> list[Drop]:
+        stamp = self._queues[self._trigger].stamps[0]
+        drops = self._drop_oldest(self._trigger, 1, reason)
+        self.closed += 1
+        for place in range(self.n_inputs):
+            if place != self._trigger:
+                drops += self._drop_expired(place, stamp)
+        return drops
+
+    def _drop_expired(self, place: int, stamp: int) -> list[Drop]:
+        """Drop what is too old for a trigger of this stamp, and so for all that follow."""
+        if self._max_age is None:
+            return []
+        count = bisect_left(self._queues[place].stamps, stamp - self._max_age)
+        return self._drop_oldest(place, count, DropReason.EXPIRED)
+
+    def _drop_oldest(self, place: int, count: int, reason: DropReason) -> list[Drop]:
+        """Remove the oldest; the first may have served in a set, and then leaves matched."""
+        taken = self._queues[place].take(count)
+        if taken and self._served[place]:
+            self._served[place] = False
+            del taken[0]
+        return [Drop(message, reason) for message in taken]

@@ -1,0 +1,201 @@
+"""A policy at work in a group: at once, or with a limit to what may wait."""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Protocol
+
+from syncrelay.sync.arrivals import Arrivals
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.policy import Policy
+
+
+class Matching(Protocol):
+    """Feeds a policy and notes which stamps each input has given to sets."""
+
+    __slots__ = ()
+
+    def feed(self, stamp: int, message: Message, now: int) -> Sequence[Outcome]:
+        """Take a message to be matched at `stamp`; give what leaves because of it."""
+        ...
+
+    def due(self, now: int) -> Sequence[Outcome]:
+        """Give what has waited long enough."""
+        ...
+
+    def next_deadline(self) -> int | None:
+        """When something will have waited long enough, if nothing else comes."""
+        ...
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        """Drop all that is buffered, and be as new."""
+        ...
+
+    def buffered(self, index: int) -> int:
+        """How many messages of this input are buffered and have been in no set."""
+        ...
+
+    def needed_queue(self, index: int) -> int | None:
+        """See Policy."""
+        ...
+
+
+class Unlimited(Matching):
+    """All inputs are required, and a set waits as long as the policy has it wait."""
+
+    __slots__ = ("_given", "_policy")
+
+    def __init__(self, policy: Policy, arrivals: Arrivals) -> None:
+        self._policy = policy
+        self._given = arrivals.given
+
+    def feed(self, stamp: int, message: Message, now: int) -> Sequence[Outcome]:
+        del now
+        outcomes = self._policy.feed(message.input, stamp, message)
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                note_given(outcome.messages, self._given)
+        return outcomes
+
+    def due(self, now: int) -> Sequence[Outcome]:
+        del now
+        return ()
+
+    def next_deadline(self) -> int | None:
+        return None
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        return self._policy.flush(reason)
+
+    def buffered(self, index: int) -> int:
+        return self._policy.buffered(index)
+
+    def needed_queue(self, index: int) -> int | None:
+        return self._policy.needed_queue(index)
+
+
+class Limited(Matching):
+    """A set waits no longer than `max_wait_ns` from when its required messages are all there.
+
+    Waits count from the `now` at which the message that began them was fed. Where `now` falls, they count from
+    there: no set waits longer because of it.
+    """
+
+    __slots__ = (
+        "_closed",
+        "_given",
+        "_max_wait",
+        "_now",
+        "_offsets",
+        "_opened",
+        "_places",
+        "_policy",
+        "_since",
+        "_stage",
+    )
+
+    def __init__(
+        self,
+        policy: Policy,
+        arrivals: Arrivals,
+        *,
+        required: Sequence[bool],
+        max_wait_ns: int,
+        offsets_ns: Sequence[int],
+    ) -> None:
+        self._policy, self._stage = policy.narrowed(required)
+        taken = [index for index in range(policy.n_inputs) if index not in self._stage.inputs]
+        self._places = {index: place for place, index in enumerate(taken)}
+        self._given = arrivals.given
+        self._offsets = offsets_ns
+        self._max_wait = max_wait_ns
+        self._now = 0
+        self._since: deque[int] = deque()
+        self._opened = self._closed = 0
+
+    def feed(self, stamp: int, message: Message, now: int) -> Sequence[Outcome]:
+        place = self._places.get(message.input)
+        if place is None:
+            outcomes = self._given_out(self._stage.put(message.input, stamp, message))
+        else:
+            outcomes = self._join(self._policy.feed(place, stamp, message), now)
+        return [*outcomes, *self.due(now)]
+
+    def due(self, now: int) -> Sequence[Outcome]:
+        if now < self._now:
+            self._since = deque(min(since, now) for since in self._since)
+            self._stage.wait_from(now)
+        self._now = now
+        outcomes: list[Outcome] = []
+        while (deadline := self.next_deadline()) is not None and deadline <= now:
+            if self._stage.oldest_since is not None:
+                outcomes += self._given_out(self._stage.leave())
+            else:
+                outcomes += self._join(self._policy.settle(), now)
+        return outcomes
+
+    def next_deadline(self) -> int | None:
+        # What is in the stage left the policy before anything that still waits there, and began no later.
+        since = self._stage.oldest_since
+        if since is None and self._since:
+            since = self._since[0]
+        return None if since is None else since + self._max_wait
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        drops = self._policy.flush(reason) + self._stage.flush(reason)
+        self._note_waits(self._now)
+        return drops
+
+    def buffered(self, index: int) -> int:
+        place = self._places.get(index)
+        return self._stage.buffered(index) + (0 if place is None else self._policy.buffered(place))
+
+    def needed_queue(self, index: int) -> int | None:
+        place = self._places.get(index)
+        return None if place is None else self._policy.needed_queue(place)
+
+    def _join(self, outcomes: Sequence[Outcome], now: int) -> list[Outcome]:
+        """Let the optional inputs join the sets of the policy."""
+        since = self._note_waits(now)
+        joined: list[Outcome] = []
+        for outcome in outcomes:
+            if isinstance(outcome, Drop):
+                joined.append(outcome)
+                continue
+            note_given(outcome.messages, self._given)
+            joined += self._given_out(self._stage.hold(*self._widened(outcome), since))
+            since = now
+        return joined
+
+    def _widened(self, match: Match) -> tuple[tuple[Message | None, ...], int, int]:
+        """Give a set a place for every input, with the least and the greatest stamp it is matched by."""
+        messages: list[Message | None] = [None] * len(self._offsets)
+        stamps = []
+        for message in match.messages:
+            if message is not None:
+                messages[message.input] = message
+                stamps.append(message.stamp + self._offsets[message.input])
+        return tuple(messages), min(stamps), max(stamps)
+
+    def _given_out(self, outcomes: list[Outcome]) -> list[Outcome]:
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                note_given(outcome.messages, self._given)
+        return outcomes
+
+    def _note_waits(self, now: int) -> int:
+        """See what waits began and ended; give when the first that ended had begun, `now` if none did."""
+        policy = self._policy
+        self._since.extend([now] * (policy.opened - self._opened))
+        ended = policy.closed - self._closed
+        self._opened, self._closed = policy.opened, policy.closed
+        since = self._since[0] if ended else now
+        for _ in range(ended):
+            self._since.popleft()
+        return since
+
+
+def note_given(messages: Sequence[Message | None], given: list[int]) -> None:
+    """Note the newest stamp that each input has given to a set."""
+    for message in messages:
+        if message is not None and message.stamp > given[message.input]:
+            given[message.input] = message.stamp

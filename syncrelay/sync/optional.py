@@ -1,0 +1,148 @@
+"""Where sets of the required inputs wait for a message of the optional ones."""
+
+from bisect import bisect_left, bisect_right
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.queues import StampQueue
+
+
+class _Waiting(NamedTuple):
+    """A set of the required inputs: None at the optional ones, the span of its stamps, when its wait began."""
+
+    messages: tuple[Message | None, ...]
+    low: int
+    high: int
+    since: int
+
+
+class OptionalInputs:
+    """Adds to each set, of each optional input, the message nearest to its middle that keeps it within slop.
+
+    Sets come and leave in one order, whatever the optional inputs do; at once where there are none. A set
+    leaves as soon as no message that may still come, each input in stamp order, would be nearer; or when it is
+    told to. A message goes to the nearer of two sets that wait. It is superseded when its input gave a newer
+    one to a set, too far when it lies too far back for any set to come.
+    """
+
+    __slots__ = ("_min_periods", "_newest", "_queue_size", "_queues", "_slop", "_waiting", "inputs")
+
+    def __init__(
+        self,
+        *,
+        required: Sequence[bool],
+        queue_size: int,
+        slop_ns: int,
+        min_periods_ns: Sequence[int] | None = None,
+    ) -> None:
+        self.inputs = [index for index, needed in enumerate(required) if not needed]
+        self._queue_size = queue_size
+        self._slop = slop_ns
+        self._min_periods = (0,) * len(required) if min_periods_ns is None else tuple(min_periods_ns)
+        self._queues = {index: StampQueue() for index in self.inputs}
+        self._newest: dict[int, int] = {}
+        self._waiting: deque[_Waiting] = deque()
+
+    @property
+    def oldest_since(self) -> int | None:
+        """Since when the oldest set waits."""
+        return self._waiting[0].since if self._waiting else None
+
+    def wait_from(self, now: int) -> None:
+        """Let no wait have begun later than `now`: the clock fell."""
+        self._waiting = deque(waiting._replace(since=min(waiting.since, now)) for waiting in self._waiting)
+
+    def put(self, index: int, stamp: int, message: Message) -> list[Outcome]:
+        """Take a message of an optional input; give what leaves because of it."""
+        queue = self._queues[index]
+        outcomes: list[Outcome] = []
+        replaced = queue.insert(stamp, message)
+        if replaced is not None:
+            outcomes.append(Drop(replaced, DropReason.DUPLICATE))
+        self._newest[index] = max(stamp, self._newest.get(index, stamp))
+        outcomes += self._leave_decided()
+        if len(queue.stamps) > self._queue_size:
+            outcomes += [Drop(lost, DropReason.OVERFLOW) for lost in queue.take(1)]
+        return outcomes
+
+    def hold(self, messages: tuple[Message | None, ...], low: int, high: int, since: int) -> list[Outcome]:
+        """Take a set of the required inputs whose stamps go from `low` to `high`; give what leaves."""
+        self._waiting.append(_Waiting(messages, low, high, since))
+        outcomes = self._leave_decided()
+        if len(self._waiting) > self._queue_size:
+            outcomes += self.leave()
+        return outcomes
+
+    def leave(self) -> list[Outcome]:
+        """Let the oldest set leave with what there is."""
+        waiting = self._waiting[0]
+        messages = list(waiting.messages)
+        low, high = waiting.low, waiting.high
+        drops: list[Drop] = []
+        for index in self.inputs:
+            queue = self._queues[index]
+            position = self._nearest(waiting, queue.stamps, low, high)
+            if position is None:
+                useless = bisect_right(queue.stamps, waiting.high - self._slop)
+                drops += [Drop(message, DropReason.TOO_FAR) for message in queue.take(useless)]
+                continue
+            low, high = min(low, queue.stamps[position]), max(high, queue.stamps[position])
+            *older, messages[index] = queue.take(position + 1)
+            drops += [Drop(message, DropReason.SUPERSEDED) for message in older]
+        self._waiting.popleft()
+        return [*drops, Match(tuple(messages))]
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        """Drop all that is in here, and be as new."""
+        held = [message for waiting in self._waiting for message in waiting.messages if message is not None]
+        queued = [message for queue in self._queues.values() for message in queue.take(len(queue.stamps))]
+        self._waiting.clear()
+        self._newest.clear()
+        return [Drop(message, reason) for message in held + queued]
+
+    def buffered(self, index: int) -> int:
+        """How many messages of this input, required or not, are in here."""
+        held = sum(waiting.messages[index] is not None for waiting in self._waiting)
+        return held + (len(self._queues[index].stamps) if index in self._queues else 0)
+
+    def _leave_decided(self) -> list[Outcome]:
+        outcomes: list[Outcome] = []
+        while self._waiting and all(self._is_decided(index) for index in self.inputs):
+            outcomes += self.leave()
+        return outcomes
+
+    def _is_decided(self, index: int) -> bool:
+        """Whether nothing that this input may still send is better for the oldest set than what it has."""
+        newest = self._newest.get(index)
+        if newest is None:
+            return False
+        waiting = self._waiting[0]
+        next_stamp = newest + max(1, self._min_periods[index])
+        stamps = self._queues[index].stamps
+        position = self._nearest(waiting, stamps, waiting.low, waiting.high)
+        if position is None:
+            return next_stamp > self._last_fitting(waiting, waiting.low)
+        mirrored = waiting.low + waiting.high - stamps[position]
+        return next_stamp >= mirrored
+
+    def _nearest(self, waiting: _Waiting, stamps: list[int], low: int, high: int) -> int | None:
+        """Give the place of the stamp nearest to the set's middle, the older of two, that spans within slop."""
+        first = bisect_left(stamps, high - self._slop)
+        end = bisect_right(stamps, self._last_fitting(waiting, low))
+        if first >= end:
+            return None
+        after = min(max(bisect_left(stamps, -(-(waiting.low + waiting.high) // 2)), first), end - 1)
+        before = max(after - 1, first)
+        is_after = 2 * stamps[after] - waiting.low - waiting.high
+        is_before = waiting.low + waiting.high - 2 * stamps[before]
+        return after if abs(is_after) < abs(is_before) else before
+
+    def _last_fitting(self, waiting: _Waiting, low: int) -> int:
+        """Give the last stamp within slop of `low` that is not nearer to the next set that waits."""
+        last = low + self._slop
+        if len(self._waiting) > 1:
+            following = self._waiting[1]
+            last = min(last, (waiting.low + waiting.high + following.low + following.high) // 4)
+        return last

@@ -1,0 +1,67 @@
+"""Queues in stamp order, and what is known of a queue that was too short."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+
+from syncrelay.sync.messages import Message
+
+
+class StampQueue:
+    """Messages of one input in stamp order, each stamp once. `stamps` and `messages` run in parallel."""
+
+    __slots__ = ("messages", "stamps")
+
+    def __init__(self) -> None:
+        self.stamps: list[int] = []
+        self.messages: list[Message] = []
+
+    def insert(self, stamp: int, message: Message) -> Message | None:
+        """Put a message in its place; give the one of the same stamp that it replaces, if there is one."""
+        stamps = self.stamps
+        if not stamps or stamp > stamps[-1]:
+            stamps.append(stamp)
+            self.messages.append(message)
+            return None
+        position = bisect_left(stamps, stamp)
+        if stamps[position] == stamp:
+            replaced = self.messages[position]
+            self.messages[position] = message
+            return replaced
+        stamps.insert(position, stamp)
+        self.messages.insert(position, message)
+        return None
+
+    def take(self, count: int) -> list[Message]:
+        """Remove the oldest `count` messages and give them."""
+        taken = self.messages[:count]
+        del self.messages[:count]
+        del self.stamps[:count]
+        return taken
+
+
+class Losses:
+    """What queues lost by overflow, and how long they should have been."""
+
+    __slots__ = ("_lost", "needed")
+
+    def __init__(self, n_inputs: int) -> None:
+        self._lost: list[int | None] = [None] * n_inputs
+        self.needed: list[int | None] = [None] * n_inputs
+
+    def forget(self) -> None:
+        """Start afresh, but keep what is known to be needed."""
+        self._lost = [None] * len(self._lost)
+
+    def lose(self, place: int, stamp: int) -> None:
+        """Note that the queue of `place` dropped its oldest message, of this stamp."""
+        self._lost[place] = stamp
+
+    def miss(self, place: int, stamps: Sequence[int], wanted: int, reach: int) -> None:
+        """Note that a message of stamp `wanted` found only newer ones in this queue, `stamps`.
+
+        Nothing comes of it unless the queue lost one that was not older than `wanted` by more than `reach`.
+        The length is that of a queue back to `wanted`, at the mean rate of what is in it, and one more.
+        """
+        lost = self._lost[place]
+        if lost is not None and wanted - reach <= lost < stamps[0]:
+            self.needed[place] = 2 + (stamps[-1] - wanted) * len(stamps) // (stamps[-1] - lost)

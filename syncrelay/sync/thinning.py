@@ -1,0 +1,113 @@
+"""Thinning: which sets leave when not all may."""
+
+from collections.abc import Sequence
+
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+
+_EARLY = 4
+"""A set that comes up to a fourth of a period early counts for the period it is early for."""
+
+
+class Thinning:
+    """Lets every `every`th set pass, the first first, and of those one in each period of `min_set_period_ns`.
+
+    Periods are counted from the first set on, so that what passes is spread evenly and a source that jitters
+    at just the greatest rate passes whole. At most one set a period passes: over any time no more than
+    that time holds periods, and two.
+    """
+
+    __slots__ = ("_every", "_first", "_period", "_seen", "_slot", "_withheld")
+
+    def __init__(self, *, n_inputs: int, repeats: bool, every: int = 1, min_set_period_ns: int | None = None) -> None:
+        if every < 1 or (min_set_period_ns is not None and min_set_period_ns < 1):
+            raise ValueError(f"every {every} and min_set_period_ns {min_set_period_ns} must be 1 or more")
+        self._every = every
+        self._period = min_set_period_ns
+        self._withheld = Withheld(n_inputs) if repeats else None
+        self._reset()
+
+    def thin(self, match: Match, stamp: int) -> Sequence[Outcome]:
+        """Give the set, of this stamp, if it passes, else the drops it comes to."""
+        if self._passes(stamp):
+            return (match,) if self._withheld is None else (*self._withheld.note_passed(match), match)
+        if self._withheld is not None:
+            return self._withheld.note_stopped(match)
+        return [Drop(message, DropReason.THINNED) for message in match.messages if message is not None]
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        """Drop what is withheld, and be as new: the next set is the first."""
+        self._reset()
+        return [] if self._withheld is None else self._withheld.flush(reason)
+
+    def buffered(self, index: int) -> int:
+        """How many messages of this input are withheld."""
+        return 0 if self._withheld is None else self._withheld.buffered(index)
+
+    def _reset(self) -> None:
+        self._seen = 0
+        self._first: int | None = None
+        self._slot = -1
+
+    def _passes(self, stamp: int) -> bool:
+        self._seen += 1
+        if (self._seen - 1) % self._every:
+            return False
+        if self._period is None:
+            return True
+        if self._first is None:
+            self._first = stamp
+        slot = (stamp - self._first + self._period // _EARLY) // self._period
+        if slot <= self._slot:
+            return False
+        self._slot = slot
+        return True
+
+
+class Withheld:
+    """Messages that so far were only in sets that did not pass, where a message may be in many sets.
+
+    The newest of each input is kept, as it may yet be in a set that passes; thinned when it can't any more.
+    """
+
+    __slots__ = ("_messages", "_passed")
+
+    def __init__(self, n_inputs: int) -> None:
+        self._messages: list[Message | None] = [None] * n_inputs
+        self._passed: list[int | None] = [None] * n_inputs
+
+    def note_passed(self, match: Match) -> list[Drop]:
+        """See a set that passed; give what will not be in any other."""
+        stopped = self._messages
+        self._messages = [None] * len(stopped)
+        for index, message in enumerate(match.messages):
+            if message is not None:
+                self._passed[index] = message.stamp
+        return _not_in(stopped, match.messages)
+
+    def note_stopped(self, match: Match) -> list[Drop]:
+        """See a set that did not pass; give what will not be in any other."""
+        stopped = self._messages
+        self._messages = [
+            None if message is None or message.stamp == passed else message
+            for message, passed in zip(match.messages, self._passed, strict=True)
+        ]
+        return _not_in(stopped, self._messages)
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        """Drop all, and be as new."""
+        drops = [Drop(message, reason) for message in self._messages if message is not None]
+        self._messages = [None] * len(self._messages)
+        self._passed = [None] * len(self._messages)
+        return drops
+
+    def buffered(self, index: int) -> int:
+        """How many messages of this input are in here."""
+        return int(self._messages[index] is not None)
+
+
+def _not_in(stopped: Sequence[Message | None], messages: Sequence[Message | None]) -> list[Drop]:
+    return [
+        Drop(message, DropReason.THINNED)
+        for message, current in zip(stopped, messages, strict=True)
+        if message is not None and message is not current
+    ]
