@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 
-from syncrelay.cli.stop import StopRequest
+from syncrelay.cli.stop import StopRequest, release_signals
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -12,6 +12,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stop = StopRequest()
     if _runs_until_stopped(words):
         stop.install()
+    release_signals()
     # Only now: what follows is imported with the signals in hand.
     from syncrelay.cli.boundary import guarded
     from syncrelay.cli.dispatch import dispatch

@@ -1,5 +1,6 @@
 """The one error boundary: what a command raises becomes text on stderr and an exit code."""
 
+import io
 import os
 import sys
 import traceback
@@ -19,6 +20,9 @@ INTERRUPTED: Final = 130
 
 def guarded(command: Callable[[], int]) -> int:
     """Run a command and return its exit code, or that of the error it raised."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # A file's name or line may hold what the terminal's encoding lacks.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         return _flushed(command())
     except SyncRelayError as error:
@@ -37,7 +41,13 @@ def guarded(command: Callable[[], int]) -> int:
 
 def say(text: str) -> None:
     """Print talk on stderr."""
-    print(text, file=sys.stderr, flush=True)
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
+
+
+def put(text: str) -> None:
+    """Print what was asked for on stdout."""
+    sys.stdout.write(f"{text}\n")
 
 
 def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isatty

@@ -1,12 +1,11 @@
 """From the words of the command line to a command and its exit code."""
 
-import sys
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
-from syncrelay.cli.boundary import DONE, USAGE, say
+from syncrelay.cli.boundary import DONE, USAGE, put, say
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import UsageError
@@ -20,6 +19,7 @@ commands:
   validate FILE...      check files and report everything that is wrong with them
   schema                print the JSON Schema of the file, for editors
   demo                  show it all on a simulated rig, without a robot
+  healthcheck           tell whether the relay receives, by its heartbeat
   syncrelay COMMAND --help says more
 
 exit codes:
@@ -136,10 +136,26 @@ def _demo(words: Sequence[str], stop: StopRequest) -> int:
     return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)
 
 
+def _healthcheck(words: Sequence[str], _stop: StopRequest) -> int:
+    from syncrelay.cli.heartbeat import VARIABLE, healthcheck
+
+    parser = Parser(
+        "syncrelay healthcheck",
+        description="Tells whether the relay's receive loop turns, by the heartbeat that the relay writes into the file\n"
+        f"that {VARIABLE} names. Exit code 1 if it does not.",
+    )
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    parser.read(words)
+    return healthcheck()
+
+
 _COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
     "validate": _validate,
     "schema": _schema,
     "demo": _demo,
+    "healthcheck": _healthcheck,
 }
 
 
@@ -189,5 +205,5 @@ def _version() -> str:
 
 
 def _print(text: str) -> int:
-    sys.stdout.write(text.rstrip("\n") + "\n")
+    put(text.rstrip("\n"))
     return DONE

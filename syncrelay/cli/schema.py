@@ -2,11 +2,11 @@
 
 import json
 
-from syncrelay.cli.boundary import DONE
+from syncrelay.cli.boundary import DONE, put
 from syncrelay.config.schema import json_schema
 
 
 def schema() -> int:
     """Print the JSON Schema (draft 7) of the file."""
-    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    put(json.dumps(json_schema(), indent=2, ensure_ascii=False))
     return DONE

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, say, wants_colour
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 
 
@@ -39,21 +39,21 @@ def _print_text(findings: Sequence[Finding]) -> None:
         if finding.config is None:
             say(render(finding.problems, colour=wants_colour(sys.stderr.isatty())))
             continue
-        print(_ok(finding.file, finding.config))
+        put(_ok(finding.file, finding.config))
         if finding.problems:
-            print(render(finding.problems, colour=wants_colour(sys.stdout.isatty())))
+            put(render(finding.problems, colour=wants_colour(sys.stdout.isatty())))
 
 
 def _print_json(findings: Sequence[Finding]) -> None:
-    print(json.dumps([_as_json(finding) for finding in findings], indent=2, ensure_ascii=False))
+    put(json.dumps([_as_json(finding) for finding in findings], indent=2, ensure_ascii=False))
 
 
 def _print_github(findings: Sequence[Finding]) -> None:
     for finding in findings:
         for problem in finding.problems:
-            print(_workflow_command(problem))
+            put(_workflow_command(problem))
         if finding.config is not None:
-            print(_ok(finding.file, finding.config))
+            put(_ok(finding.file, finding.config))
 
 
 _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {

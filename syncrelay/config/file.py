@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from syncrelay.config.keys import Keys
 from syncrelay.config.models import NodeConfig, Topic
 from syncrelay.config.names import check_group_name
-from syncrelay.config.policies import GROUP_MODELS, AnyGroup
+from syncrelay.config.policies import GROUP_MODELS, AnyGroup, Topics
 
 GROUP_MODEL_OF: Final[dict[str, type[AnyGroup]]] = {
     get_args(model.model_fields["policy"].annotation)[0]: model for model in GROUP_MODELS
@@ -52,7 +52,7 @@ GroupOfAnyPolicy: Final = create_model(
     "GroupOfAnyPolicy",
     __base__=Keys,
     policy=(_PolicyName, Field(description=_POLICY)),
-    topics=(_TopicsOfAnyPolicy, Field()),
+    topics=(_TopicsOfAnyPolicy, Topics),
     **_GROUP_KEYS,
 )
 """A group whose policy is missing or misspelt: its other keys are checked all the same."""
@@ -84,7 +84,7 @@ class FileKeys(Keys):
     """A syncrelay file: which topics are matched by time, and where the matched messages go."""
 
     version: Literal[1] = Field(description="Version of this format: 1.")
-    node: NodeConfig = Field(default=NodeConfig(), description="The ROS node.")
+    node: NodeConfig = Field(default_factory=NodeConfig, description="The ROS node.")
     defaults: Keys | None = None
     groups: dict[str, AnyGroup]
 
@@ -92,10 +92,26 @@ class FileKeys(Keys):
 File: Final = create_model(
     "File",
     __base__=FileKeys,
-    defaults=(Defaults, Field(default=None)),
+    __doc__=FileKeys.__doc__,
+    defaults=(
+        Defaults,
+        Field(
+            default=None,
+            description=(
+                "Keys of a group, used where a group is silent. A key that the group's policy does not have is"
+                " passed over there; one that no policy has is an error."
+            ),
+        ),
+    ),
     groups=(
         _Groups,
-        Field(description="Groups by name. The name stands in logs, diagnostics, metrics and default output names."),
+        Field(
+            description=(
+                "Groups by name, 1 or more. The name stands in the log, in diagnostics, in metrics and in the"
+                " names of outputs."
+            ),
+            json_schema_extra={"minProperties": 1, "propertyNames": {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}},
+        ),
     ),
 )
 """FileKeys with the group's model chosen by its policy."""

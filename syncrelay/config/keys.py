@@ -1,10 +1,17 @@
 """What all models of the file share: no unknown key, no conversion between types, and the kinds of values."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
-from syncrelay.config.names import check_topic_name
+from syncrelay.config.names import (
+    LONGEST_TOPIC,
+    check_namespace,
+    check_node_name,
+    check_output_prefix,
+    check_topic_name,
+)
+from syncrelay.config.typenames import check_type_name
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import describe
 
@@ -16,8 +23,8 @@ class Keys(BaseModel):
 
 
 def tag_of_mapping(value: Any) -> str:
-    """Tell a union's branch for a mapping from its branch for a single word. Tags in <> never are in the file."""
-    return "<name>" if not isinstance(value, dict | Keys) else "<mapping>"
+    """Tell a union's branch for a mapping from its branch for a word. No key of the file is in <>."""
+    return "<mapping>" if isinstance(value, dict | Keys) else "<name>"
 
 
 def _not_negative(value: Any) -> int:
@@ -27,38 +34,51 @@ def _not_negative(value: Any) -> int:
     return nanoseconds
 
 
-_UNITS = "(ns|us|µs|μs|ms|s|min)"
-_NUMBER = r"([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"
+def _refuse_null(value: Any) -> Any:
+    if value is None:
+        raise ValueError("found nothing: give the key a value, or leave it out")
+    return value
 
-Duration = Annotated[
-    int,
-    BeforeValidator(_not_negative),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "minimum": 0},
-                {"type": "string", "pattern": rf"^\s*\+?{_NUMBER}\s*{_UNITS}\s*$"},
-            ]
-        }
-    ),
-]
+
+NOT_NULL: Final = BeforeValidator(_refuse_null)
+"""For a field that is None where its key is absent: `key:` without a value is no way to say so."""
+
+_NUMBER: Final = r"([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"
+_UNIT: Final = "(ns|us|µs|μs|ms|s|min)"
+_TOKENS: Final = "[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
+
+
+def duration_schema(*, sign: str, **limits: int) -> dict[str, Any]:
+    """Return the JSON Schema of a duration with a pattern for the sign that it may have."""
+    return {
+        "anyOf": [
+            {"type": "number", **limits},
+            {"type": "string", "pattern": rf"^\s*{sign}{_NUMBER}\s*{_UNIT}\s*$"},
+        ]
+    }
+
+
+def _text(pattern: str, **limits: int) -> WithJsonSchema:
+    return WithJsonSchema({"type": "string", "pattern": pattern, **limits})
+
+
+Duration = Annotated[int, BeforeValidator(_not_negative), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0))]
 """A duration of 0 or more, in nanoseconds."""
 
-SignedDuration = Annotated[
-    int,
-    BeforeValidator(parse_duration),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number"},
-                {"type": "string", "pattern": rf"^\s*[+-]?{_NUMBER}\s*{_UNITS}\s*$"},
-            ]
-        }
-    ),
-]
+SignedDuration = Annotated[int, BeforeValidator(parse_duration), WithJsonSchema(duration_schema(sign="[+-]?"))]
 """A duration of either sign, in nanoseconds."""
 
-TopicName = Annotated[str, BeforeValidator(check_topic_name)]
+TopicName = Annotated[str, BeforeValidator(check_topic_name), _text(rf"^(~?/)?{_TOKENS}$", maxLength=LONGEST_TOPIC)]
 """A topic name: absolute, relative to the node's namespace, or private (`~/`)."""
 
-__all__ = ["AfterValidator", "Duration", "Keys", "SignedDuration", "TopicName", "tag_of_mapping"]
+OutputPrefix = Annotated[str, AfterValidator(check_output_prefix), _text(rf"^(/|~|(~?/)?{_TOKENS})?$")]
+"""What stands before an input's name in its output's."""
+
+NodeName = Annotated[str, AfterValidator(check_node_name), _text("^[A-Za-z_][A-Za-z0-9_]*$", maxLength=255)]
+"""A node's name without its namespace."""
+
+Namespace = Annotated[str, AfterValidator(check_namespace), _text(rf"^(/|/?{_TOKENS})?$")]
+"""A node's namespace; empty or `/` is the root."""
+
+TypeName = Annotated[str, BeforeValidator(check_type_name), _text("^[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*$")]
+"""A message type in full, `package/msg/Name`."""

@@ -2,28 +2,37 @@
 
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 
-from syncrelay.config.keys import Duration, Keys, SignedDuration, TopicName, tag_of_mapping
-from syncrelay.config.names import check_namespace, check_node_name, check_output_prefix
+from syncrelay.config.keys import (
+    NOT_NULL,
+    Duration,
+    Keys,
+    Namespace,
+    NodeName,
+    OutputPrefix,
+    SignedDuration,
+    TopicName,
+    TypeName,
+    tag_of_mapping,
+)
 from syncrelay.config.qos import AUTO, Qos
-from syncrelay.config.typenames import check_type_name
 
 
 class NodeConfig(Keys):
     """The ROS node. Remaps and parameters behind --ros-args still win."""
 
-    name: Annotated[str, AfterValidator(check_node_name)] = Field(
-        default="syncrelay", description="Name of the node.", examples=["syncrelay"]
+    name: NodeName = Field(
+        default="syncrelay", description="Name of the node. Default: syncrelay.", examples=["syncrelay"]
     )
-    namespace: Annotated[str, AfterValidator(check_namespace)] = Field(
+    namespace: Namespace = Field(
         default="",
-        description="Namespace of the node; relative topic names and `~/` names stand in it. Empty is the root.",
+        description="Namespace of the node, in which relative and `~/` topic names stand. Default: empty, the root.",
         examples=["/robot1"],
     )
     use_sim_time: bool = Field(
         default=False,
-        description="Take the time from /clock, as with a simulation or a bag played with --clock.",
+        description="Take the time from /clock, as with a simulation or a bag played with --clock. Default: false.",
     )
 
 
@@ -44,10 +53,8 @@ class Topic(Keys):
     """An input, and the output that its messages leave on."""
 
     topic: TopicName = Field(description="Name of the input topic.", examples=["/camera/image_raw"])
-    type: Annotated[str, BeforeValidator(check_type_name)] = Field(
-        description="Message type in full, package/msg/Name.", examples=["sensor_msgs/msg/Image"]
-    )
-    output: TopicName | None = Field(
+    type: TypeName = Field(description="Message type in full, package/msg/Name.", examples=["sensor_msgs/msg/Image"])
+    output: Annotated[TopicName | None, NOT_NULL] = Field(
         default=None,
         description="Name of the output topic. Default: the group's output_prefix followed by the input's name.",
         examples=["/fused/image"],
@@ -59,6 +66,7 @@ class Topic(Keys):
             " holds rosbag2's override keys, of which those not given stay `auto`. Default: auto."
         ),
         examples=["auto", "sensor_data", {"reliability": "best_effort", "depth": 5}],
+        json_schema_extra={"default": "auto"},
     )
     offset: SignedDuration = Field(
         default=0,
@@ -113,7 +121,7 @@ class Group(Keys):
         ),
         examples=["none", "earliest", "latest", "/lidar/points"],
     )
-    output_prefix: Annotated[str, AfterValidator(check_output_prefix)] | None = Field(
+    output_prefix: Annotated[OutputPrefix | None, NOT_NULL] = Field(
         default=None,
         description="What default output names begin with. Default: / and the group's name.",
         examples=["/fused"],

@@ -6,7 +6,7 @@ from typing import Final
 from syncrelay.config.wording import describe, quoted
 
 # RMW_TOPIC_MAX_NAME_LENGTH and RMW_NODE_NAME_MAX_NAME_LENGTH.
-_LONGEST_TOPIC: Final = 247
+LONGEST_TOPIC: Final = 247
 _LONGEST_NODE: Final = 255
 _TOKEN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_/]")
@@ -25,8 +25,8 @@ def check_topic_name(name: object) -> str:
     if name == "~" or (name.startswith("~") and not name.startswith("~/")):
         raise ValueError(f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points")
     _check_tokens(name.removeprefix("~/").removeprefix("/"), whole=name, kind="topic name")
-    if len(name) > _LONGEST_TOPIC:
-        raise ValueError(f"a topic name of {len(name)} characters, at most {_LONGEST_TOPIC} are allowed")
+    if len(name) > LONGEST_TOPIC:
+        raise ValueError(f"a topic name of {len(name)} characters, at most {LONGEST_TOPIC} are allowed")
     return name
 
 

@@ -8,14 +8,17 @@ from syncrelay.config.keys import Duration
 from syncrelay.config.models import Group, PacedTopic, Topic
 from syncrelay.sync import ApproximateTime, ExactTime
 
-_TOPICS = "Inputs in the order in which the messages of a set leave, 2 or more."
+Topics = Field(
+    description="Inputs in the order in which the messages of a set leave, 2 or more.",
+    json_schema_extra={"minItems": 2},
+)
 
 
 class ExactTimeGroup(Group):
     """Sets of equal stamps."""
 
     policy: Literal["exact_time"] = Field(description="Sets of equal stamps.")
-    topics: tuple[Topic, ...] = Field(description=_TOPICS)
+    topics: tuple[Topic, ...] = Topics
 
     def matcher(self) -> ExactTime:
         """Return a new policy of the engine."""
@@ -42,7 +45,7 @@ class ApproximateTimeGroup(Group):
         ),
         examples=[0.1],
     )
-    topics: tuple[PacedTopic, ...] = Field(description=_TOPICS)
+    topics: tuple[PacedTopic, ...] = Topics
 
     def matcher(self) -> ApproximateTime:
         """Return a new policy of the engine."""

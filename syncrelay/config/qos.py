@@ -10,10 +10,12 @@ from pydantic import (
     Field,
     GetPydanticSchema,
     Tag,
+    ValidationInfo,
     WithJsonSchema,
+    field_validator,
 )
 
-from syncrelay.config.keys import Keys, tag_of_mapping
+from syncrelay.config.keys import NOT_NULL, Keys, duration_schema, tag_of_mapping
 from syncrelay.config.units import MAX_NS, parse_duration
 from syncrelay.config.wording import describe
 
@@ -44,33 +46,77 @@ def _qos_duration(value: Any) -> int:
     if not isinstance(value, dict):
         nanoseconds = parse_duration(value)
     elif value.keys() == {"sec", "nsec"} and all(type(part) is int for part in value.values()):
+        # rosbag2 writes "no limit" as more seconds than nanoseconds can count.
         nanoseconds = min(value["sec"] * _NS_PER_SECOND + value["nsec"], MAX_NS)
     else:
-        raise ValueError("expected a duration such as 100ms, or both sec and nsec as whole numbers")
+        raise ValueError("expected a duration such as 100ms, or a mapping of sec and nsec with whole numbers")
     if nanoseconds < 0:
         raise ValueError(f"expected a duration of 0 or more, found {describe(value)}")
     return nanoseconds
 
 
+_SEC_AND_NSEC: Final = {
+    "type": "object",
+    "properties": {
+        "sec": {"type": "integer", "minimum": 0, "description": "Seconds."},
+        "nsec": {"type": "integer", "minimum": 0, "description": "Nanoseconds."},
+    },
+    "required": ["sec", "nsec"],
+    "additionalProperties": False,
+}
 _QosDuration = Annotated[
-    int,
+    int | None,
     BeforeValidator(_qos_duration),
-    WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0}, {"type": "string"}, {"type": "object"}]}),
+    WithJsonSchema({"anyOf": [*duration_schema(sign=r"\+?", minimum=0)["anyOf"], _SEC_AND_NSEC]}),
 ]
+_DURATION: Final = "A number is seconds, a text has a unit (ns, us, ms, s, min), a mapping has sec and nsec."
 
 
 class QosOverrides(Keys):
     """Single QoS policies by rosbag2's override keys; what is None is matched to the publishers (`auto`)."""
 
-    history: Literal["keep_last", "keep_all", "system_default"] | None = None
-    depth: int | None = Field(default=None, ge=0)
-    reliability: Literal["reliable", "best_effort", "system_default", "best_available"] | None = None
-    durability: Literal["volatile", "transient_local", "system_default", "best_available"] | None = None
-    deadline: _QosDuration | None = None
-    lifespan: _QosDuration | None = None
-    liveliness: Literal["automatic", "manual_by_topic", "system_default", "best_available"] | None = None
-    liveliness_lease_duration: _QosDuration | None = None
-    avoid_ros_namespace_conventions: bool | None = None
+    history: Annotated[Literal["keep_last", "keep_all", "system_default"] | None, NOT_NULL] = Field(
+        default=None, description="Which messages DDS keeps until they are taken. Default: keep_last."
+    )
+    depth: Annotated[int | None, NOT_NULL] = Field(
+        default=None,
+        ge=0,
+        description="Messages that DDS keeps per topic until they are taken; not queue_size. Default: 100.",
+        examples=[5],
+    )
+    reliability: Annotated[Literal["reliable", "best_effort", "system_default", "best_available"] | None, NOT_NULL] = (
+        Field(
+            default=None, description="Whether lost messages are sent again. Default: reliable if all publishers are."
+        )
+    )
+    durability: Annotated[
+        Literal["volatile", "transient_local", "system_default", "best_available"] | None, NOT_NULL
+    ] = Field(
+        default=None,
+        description="Whether late subscribers get earlier messages. Default: transient_local if all publishers are.",
+    )
+    deadline: _QosDuration = Field(
+        default=None, description=f"Longest time between two messages. {_DURATION} Default: no limit."
+    )
+    lifespan: _QosDuration = Field(
+        default=None, description=f"Age at which a message is void. {_DURATION} Default: no limit."
+    )
+    liveliness: Annotated[
+        Literal["automatic", "manual_by_topic", "system_default", "best_available"] | None, NOT_NULL
+    ] = Field(default=None, description="How a publisher shows that it lives. Default: system_default.")
+    liveliness_lease_duration: _QosDuration = Field(
+        default=None, description=f"Silence after which a publisher counts as dead. {_DURATION} Default: no limit."
+    )
+    avoid_ros_namespace_conventions: Annotated[bool | None, NOT_NULL] = Field(
+        default=None, description="Use the topic's name in DDS without the prefix of ROS. Default: false."
+    )
+
+    @field_validator("depth")
+    @classmethod
+    def _is_kept(cls, depth: int | None, info: ValidationInfo) -> int | None:
+        if depth == 0 and info.data.get("history") in (None, "keep_last"):
+            raise ValueError("a depth of 0 keeps no message, expected 1 or more")
+        return depth
 
 
 AUTO: Final = QosOverrides()

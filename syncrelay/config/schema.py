@@ -1,10 +1,96 @@
-"""The JSON Schema of the file, from the models."""
+"""The JSON Schema of the file (draft 7, which editors read), made from the models.
 
-from typing import Any
+pydantic's own schema is of a later draft, picks a group's model by OpenAPI's `discriminator`, and knows neither
+`defaults`, which may hold what a group then lacks, nor variables, which may stand where a number is expected.
+"""
 
-from syncrelay.config.file import File
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, TypeAlias
+
+from syncrelay.config.file import GROUP_MODEL_OF, File, GroupOfAnyPolicy
+
+Schema: TypeAlias = dict[str, Any]
+
+_REF: Final = "#/definitions/"
+_VARIABLE: Final[Schema] = {
+    "type": "string",
+    "pattern": r"\$\{[A-Za-z_][A-Za-z0-9_]*(:-[^{}$]*)?\}",
+    "description": "${NAME} or ${NAME:-default}, filled in from the environment.",
+}
+# What is said about a value whatever its kind.
+_ANNOTATIONS: Final = ("description", "default", "examples")
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the schema (draft 7)."""
-    return File.model_json_schema()
+def json_schema() -> Schema:
+    """Return the schema of a file."""
+    generated = File.model_json_schema(ref_template=_REF + "{model}")
+    models: dict[str, Schema] = generated.pop("$defs")
+    needed = {policy: _take_required(models[model.__name__]) for policy, model in GROUP_MODEL_OF.items()}
+    _take_required(models[GroupOfAnyPolicy.__name__])
+    generated["properties"]["groups"]["additionalProperties"] = {"$ref": f"{_REF}Group"}
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "syncrelay file",
+        **_mapping(generated),
+        "if": {"not": {"required": ["defaults"]}},
+        "then": {"properties": {"groups": {"additionalProperties": {"allOf": list(_without_defaults(needed))}}}},
+        "definitions": {
+            **{name: _mapping(model) for name, model in models.items()},
+            "Group": _by_policy(),
+            "Variable": _VARIABLE,
+        },
+    }
+
+
+def _take_required(group: Schema) -> list[str]:
+    """Leave a group its topics as the one required key, and return the others, which `defaults` may hold."""
+    required: list[str] = group["required"]
+    group["required"] = ["topics"]
+    return [key for key in required if key not in ("policy", "topics")]
+
+
+def _by_policy() -> Schema:
+    """Return a group: by its policy's keys, or by those of all policies where it names none that is known."""
+    schema: Schema = {"$ref": _REF + GroupOfAnyPolicy.__name__}
+    for policy, model in reversed(GROUP_MODEL_OF.items()):
+        schema = {"if": _has_policy(policy), "then": {"$ref": _REF + model.__name__}, "else": schema}
+    return schema
+
+
+def _without_defaults(needed: Mapping[str, list[str]]) -> Iterator[Schema]:
+    yield {"required": ["policy"]}
+    for policy, keys in needed.items():
+        if keys:
+            yield {"if": _has_policy(policy), "then": {"required": keys}}
+
+
+def _has_policy(policy: str) -> Schema:
+    return {"required": ["policy"], "properties": {"policy": {"const": policy}}}
+
+
+def _mapping(model: Schema) -> Schema:
+    """Return a model's schema with its keys in order."""
+    properties = {key: _key(value) for key, value in model["properties"].items()}
+    return {**{key: value for key, value in model.items() if key != "title"}, "properties": properties}
+
+
+def _key(generated: Schema) -> Schema:
+    said = {key: generated[key] for key in _ANNOTATIONS if generated.get(key) is not None}
+    kinds = _kinds({key: value for key, value in generated.items() if key not in (*_ANNOTATIONS, "title")})
+    if any(_is_written_as_one_word(kind) for kind in kinds):
+        kinds.append({"$ref": f"{_REF}Variable"})
+    if len(kinds) > 1:
+        return {**said, "anyOf": kinds}
+    # Draft 7 passes over all that stands beside a $ref.
+    return {**said, "allOf": kinds} if "$ref" in kinds[0] else {**said, **kinds[0]}
+
+
+def _kinds(schema: Schema) -> list[Schema]:
+    """Return the kinds of value that a key may have. None is in the models for keys that are absent."""
+    union: list[Schema] = schema.get("anyOf") or schema.get("oneOf") or [schema]
+    return [kind for kind in union if kind.get("type") != "null"]
+
+
+def _is_written_as_one_word(kind: Schema) -> bool:
+    """Tell numbers, truth values and restricted texts, in whose place a variable is another kind of value."""
+    return kind.get("type") in ("integer", "number", "boolean") or (kind.get("type") == "string" and len(kind) > 1)

@@ -1,6 +1,5 @@
 """The text of a file, or the reason why it can't be one."""
 
-import os
 import re
 import sys
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from typing import Final
 
 from syncrelay.config.errors import ConfigError
 from syncrelay.config.problems import Problem, Span
+from syncrelay.config.wording import nearest
 
 STDIN: Final = "-"
 # A thousand groups of four topics are half of it.
@@ -91,11 +91,21 @@ def _span_at(before: str) -> Span:
 def _reason(path: str, error: OSError) -> str:
     match error:
         case FileNotFoundError():
-            return f"no such file in {os.getcwd()}" if not os.path.isabs(path) else "no such file"
+            return f"no such file{_similar_file(Path(path))}"
         case IsADirectoryError():
             return "is a directory, expected a YAML file"
         case _:
             return f"cannot be read: {error.strerror}"
+
+
+def _similar_file(path: Path) -> str:
+    """Return a question for the YAML file beside a path whose name is most like it."""
+    try:
+        by_stem = {file.stem: file for file in path.parent.iterdir() if file.suffix in (".yaml", ".yml")}
+    except OSError:
+        return ""
+    stem = nearest(path.stem, by_stem)
+    return f", did you mean `{by_stem[stem]}`?" if stem else ""
 
 
 def _unreadable(name: str, text: str) -> ConfigError:

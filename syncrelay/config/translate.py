@@ -1,7 +1,7 @@
 """pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
@@ -20,6 +20,9 @@ from syncrelay.config.problems import Path, Problem
 from syncrelay.config.qos import QosOverrides
 from syncrelay.config.wording import describe, did_you_mean, nearest, one_of
 
+Location: TypeAlias = tuple[str | int, ...]
+"""A place in pydantic's words: a path with the tags of unions in it."""
+
 _LEVELS: Final[dict[str, type[BaseModel]]] = {
     "the file": File,
     "`node`": NodeConfig,
@@ -27,6 +30,12 @@ _LEVELS: Final[dict[str, type[BaseModel]]] = {
     "a topic": TopicOfAnyPolicy,
     "a topic's `qos`": QosOverrides,
 }
+_MODEL_AT: Final[dict[Location, type[BaseModel]]] = {
+    (): File,
+    ("node",): NodeConfig,
+    ("defaults",): Defaults,
+}
+_TOPIC_MODEL_OF: Final = {policy: topic_model(group) for policy, group in GROUP_MODEL_OF.items()}
 _EXPECTED: Final = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -44,6 +53,8 @@ _WHAT_IS_MISSING: Final = {
     "policy": f"expected {one_of(GROUP_MODEL_OF)}",
     "version": "expected `version: 1`",
 }
+# So alike is `topic` to `topics`: meant is the key here, although there is such a key elsewhere.
+_A_SLIP: Final = 0.8
 # What YAML 1.1 and other formats take for a truth value.
 _TRUTH_WORDS: Final = ("yes", "no", "on", "off", "true", "false")
 
@@ -66,7 +77,7 @@ def translate(errors: Sequence[ErrorDetails], document: Document) -> list[Proble
 def _problem(error: ErrorDetails, path: Path, document: Document) -> Problem:
     match error["type"]:
         case "extra_forbidden":
-            text = _unknown_key(error, path)
+            text = _unknown_key(error["loc"])
             return document.problem(path, text, code="unknown_key", span=document.key_span(path))
         case "missing":
             text = f"missing, {_what_is_missing(path)}"
@@ -114,42 +125,40 @@ def _found(value: object, kind: str) -> str:
     return found
 
 
-def _unknown_key(error: ErrorDetails, path: Path) -> str:
-    key = str(path[-1])
-    model = _model(error["loc"][:-1])
-    for policy, group in GROUP_MODEL_OF.items():
-        other = topic_model(group) if issubclass(model, tuple(map(topic_model, GROUP_MODEL_OF.values()))) else group
-        if key in other.model_fields and model in (
-            *GROUP_MODEL_OF.values(),
-            *map(topic_model, GROUP_MODEL_OF.values()),
-        ):
-            return f"unknown key here, only {policy} has it"
-    for level, owner in _LEVELS.items():
-        if key in owner.model_fields and owner is not model:
-            return f"unknown key here, `{key}` is a key of {level}"
-    found = did_you_mean(key, model.model_fields)
-    return f"unknown key{found}" if found else f"unknown key, expected {one_of(model.model_fields)}"
+def _unknown_key(loc: Location) -> str:
+    key = str(loc[-1])
+    model = _model(loc[:-1])
+    for models in (GROUP_MODEL_OF, _TOPIC_MODEL_OF):
+        owners = [policy for policy, other in models.items() if key in other.model_fields]
+        if owners and model in models.values():
+            return f"{_policy(loc)} has no `{key}`, only {' and '.join(owners)}"
+    levels = [level for level, owner in _LEVELS.items() if key in owner.model_fields]
+    if levels and nearest(key, model.model_fields, likeness=_A_SLIP) is None:
+        return f"unknown key here, `{key}` is a key of {levels[0]}"
+    if ":" in key:
+        return "unknown key, is a space missing behind the colon?"
+    hint = did_you_mean(key, model.model_fields)
+    return f"unknown key{hint}" if hint else f"unknown key, expected {one_of(model.model_fields)}"
 
 
-def _model(loc: tuple[str | int, ...]) -> type[BaseModel]:
+def _model(loc: Location) -> type[BaseModel]:
     """Return the model whose keys stand at a place of pydantic's."""
     match loc:
-        case ():
-            return File
-        case ("node",):
-            return NodeConfig
-        case ("defaults",):
-            return Defaults
         case (*_, "qos", "<mapping>"):
             return QosOverrides
         case (*_, "stamp", "<mapping>"):
             return StampField
-        case ("groups", _, str(tag)):
-            return GROUP_MODEL_OF.get(tag.strip("<>"), GroupOfAnyPolicy)
-        case ("groups", _, str(tag), "topics", _):
-            group = GROUP_MODEL_OF.get(tag.strip("<>"))
-            return topic_model(group) if group else TopicOfAnyPolicy
-    raise AssertionError(f"no model at {loc}")
+        case ("groups", _, _, "topics", _):
+            return _TOPIC_MODEL_OF.get(_policy(loc), TopicOfAnyPolicy)
+        case ("groups", _, _):
+            return GROUP_MODEL_OF.get(_policy(loc), GroupOfAnyPolicy)
+        case _:
+            return _MODEL_AT[loc]
+
+
+def _policy(loc: Location) -> str:
+    """Return the tag of the group's model, which is its policy's name."""
+    return str(loc[2]).strip("<>")
 
 
 def _meant_keys(errors: Sequence[ErrorDetails]) -> Iterator[Path]:

@@ -6,12 +6,12 @@ from difflib import get_close_matches
 _LONGEST_QUOTE = 60
 
 
-def nearest(word: str, candidates: Iterable[str]) -> str | None:
-    """Return the candidate most like `word`, whatever its case; None if none is alike."""
+def nearest(word: str, candidates: Iterable[str], *, likeness: float = 0.6) -> str | None:
+    """Return the candidate most like `word`, whatever its case; None if none is as alike as `likeness` of 1."""
     by_lower: dict[str, str] = {}
     for candidate in candidates:
         by_lower.setdefault(candidate.lower(), candidate)
-    found = get_close_matches(word[:_LONGEST_QUOTE].lower(), by_lower, n=1, cutoff=0.6)
+    found = get_close_matches(word[:_LONGEST_QUOTE].lower(), by_lower, n=1, cutoff=likeness)
     return by_lower[found[0]] if found else None
 
 
@@ -22,11 +22,11 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str:
 
 
 def quoted(text: str) -> str:
-    """Return the text in backticks, on one line and cut to a length that can be read."""
+    """Return the text in backticks, or quotes if it has some, on one line and no longer than can be read."""
     line = text.replace("\n", "\\n").replace("\r", "\\r").replace("\t", "\\t")
     if len(line) > _LONGEST_QUOTE:
         line = line[: _LONGEST_QUOTE - 1] + "…"
-    return f"`{line}`"
+    return f"'{line}'" if "`" in line else f"`{line}`"
 
 
 def describe(value: object) -> str:
