@@ -1,0 +1,156 @@
+"""`syncrelay demo`: a simulated rig, relayed with a shipped file, drawn as it happens."""
+
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.resources import files
+from logging.handlers import MemoryHandler
+from typing import Protocol
+
+from rich.console import Console
+from rich.live import Live
+
+from syncrelay.cli.digest import plain_line, summary
+from syncrelay.cli.live import Moment, frame
+from syncrelay.cli.stop import StopRequest
+from syncrelay.cli.tally import GroupPlan, Tally
+from syncrelay.config import GroupConfig, load_text
+from syncrelay.config.policies import ApproximateTimeGroup
+from syncrelay.ros.logs import LOGGER, configure
+from syncrelay.ros.snapshot import RelaySnapshot
+
+_TITLE = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
+_FRAME_S = 0.125
+_LINE_S = 1.0
+# Lines of log; more than that, and something else is wrong.
+_MOST_HELD = 1000
+
+
+def shipped_config() -> str:
+    """Return the text of the file that the demo relays."""
+    return (files("syncrelay.cli") / "demo.yaml").read_text(encoding="utf-8")
+
+
+def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopRequest) -> int:  # noqa: FBT001 - as parsed
+    """Run the demo for a time, or until asked to stop; 0 if every group gave sets, 1 if not.
+
+    With `show_config` the shipped file is printed and nothing runs. Raises RosUnavailableError where ROS
+    cannot be used.
+    """
+    if show_config:
+        sys.stdout.write(shipped_config())
+        return 0
+    configure("warning", "text")
+    prepare_ros()
+    console = Console(highlight=False)
+    with _view(console) as view:
+        final = relay_rig(view.show, total_s=seconds, seed=seed, stop=stop)
+    console.print(summary(final))
+    return 0 if all(figures.state.sets for figures in final.groups) else 1
+
+
+def prepare_ros() -> None:
+    """Import rclpy with this process kept to its machine; raises RosUnavailableError where ROS cannot be used."""
+    from syncrelay.ros.environment import require_rclpy
+
+    os.environ.update(isolation(os.environ))
+    require_rclpy()
+
+
+def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: int, stop: StopRequest) -> Moment:
+    """Start the rig, relay it and show every moment; return how it stood when all was drained."""
+    from syncrelay.ros.relay import Relay
+    from syncrelay.ros.rig.discovery import quick_discovery
+    from syncrelay.ros.rig.processes import Rig
+
+    config = load_text(shipped_config())
+    tally = Tally([_plan(group) for group in config.groups])
+    began = time.monotonic()
+    end = math.inf if total_s is None else began + total_s
+
+    def moment(snapshot: RelaySnapshot) -> Moment:
+        elapsed_s = time.monotonic() - began
+        tally.add(elapsed_s, snapshot)
+        return Moment(_TITLE, tally.figures(), elapsed_s, total_s)
+
+    stop.defer()
+    with quick_discovery(), Rig(seed=seed) as rig, Relay(config) as relay:
+        stop.wake_with(relay.wake)
+        while not stop.requested and (left_s := end - time.monotonic()) > 0:
+            relay.step(min(_FRAME_S, left_s))
+            rig.check()
+            show(moment(relay.snapshot()))
+        return moment(relay.drain())
+
+
+def _plan(group: GroupConfig) -> GroupPlan:
+    return GroupPlan(
+        policy=group.keys.policy,
+        slop=group.keys.slop if isinstance(group.keys, ApproximateTimeGroup) else 0,
+        offsets=tuple(topic.offset_ns for topic in group.topics),
+    )
+
+
+def isolation(environ: Mapping[str, str]) -> dict[str, str]:
+    """Return what to set in the environment so that the demo stays on this machine.
+
+    It neither disturbs a robot on the network then nor is disturbed. Whoever has chosen a domain or a range
+    for it wants it to be seen there.
+    """
+    chosen = "ROS_DOMAIN_ID" in environ or "ROS_AUTOMATIC_DISCOVERY_RANGE" in environ
+    return {} if chosen else {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+class _View(Protocol):
+    def show(self, moment: Moment) -> None:
+        """Show a moment, if it is time to."""
+
+
+class _Screen:
+    """The whole terminal, drawn anew at each moment."""
+
+    def __init__(self, live: Live) -> None:
+        self._live = live
+
+    def show(self, moment: Moment) -> None:
+        width, height = self._live.console.size
+        self._live.update(frame(moment, width=width, height=height), refresh=True)
+
+
+class _Lines:
+    """A plain line, once a second."""
+
+    def __init__(self) -> None:
+        self._next_s = _LINE_S
+
+    def show(self, moment: Moment) -> None:
+        if moment.elapsed_s >= self._next_s:
+            sys.stdout.write(f"{plain_line(moment)}\n")
+            sys.stdout.flush()
+            self._next_s = math.floor(moment.elapsed_s) + _LINE_S
+
+
+@contextmanager
+def _view(console: Console) -> Iterator[_View]:
+    if not console.is_terminal or console.is_dumb_terminal:
+        yield _Lines()
+        return
+    with _log_held_back(), Live(console=console, screen=True, auto_refresh=False) as live:
+        yield _Screen(live)
+
+
+@contextmanager
+def _log_held_back() -> Iterator[None]:
+    """Keep the log off the picture; it comes out at the end."""
+    shown = list(LOGGER.handlers)
+    held = [MemoryHandler(_MOST_HELD, flushLevel=sys.maxsize, target=handler) for handler in shown]
+    LOGGER.handlers[:] = held
+    try:
+        yield
+    finally:
+        LOGGER.handlers[:] = shown
+        for handler in held:
+            handler.close()

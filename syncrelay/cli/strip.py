@@ -1,0 +1,181 @@
+"""A group's recent messages as lanes of text: a letter per set, a mark per message that left without one."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from types import MappingProxyType
+
+from rich.text import Text
+
+from syncrelay.ros.snapshot import GroupSnapshot, RecentDrop, RecentSet, RelaySnapshot
+from syncrelay.sync.messages import DropReason
+
+# A 100 Hz input gives two messages a column, a set of a 10 Hz group has five for its letter and its span.
+COLUMN_NS = 20_000_000
+# Columns kept blank ahead of the newest message, where the lanes begin to be written over.
+_GAP = 3
+
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+# Fixed middle tones (of the 256-colour palette), so that black letters on them and lines of them on a light or a
+# dark ground can be told, whatever the terminal's theme makes of `green`.
+_COLOURS = tuple(f"color({number})" for number in (37, 71, 172, 133))
+
+MARKS: Mapping[DropReason, str] = MappingProxyType(
+    {
+        DropReason.TOO_FAR: "×",  # noqa: RUF001  the sign, a cross
+        DropReason.SUPERSEDED: "·",
+        DropReason.LATE: "<",
+        DropReason.DUPLICATE: "=",
+        DropReason.OVERFLOW: "!",
+        DropReason.EXPIRED: "~",
+        DropReason.TIME_JUMP: "^",
+        DropReason.UNSTAMPED: "0",
+        DropReason.MALFORMED: "?",
+        DropReason.THINNED: "-",
+        DropReason.SHUTDOWN: "|",
+    }
+)
+
+# What becomes of most messages of a fast input.
+_USUAL = frozenset({DropReason.TOO_FAR, DropReason.SUPERSEDED})
+
+
+def letter_style(number: int) -> str:
+    """Return the style of a set's letter by the set's number."""
+    return f"color(16) on {_COLOURS[number % len(_COLOURS)]}"
+
+
+def drop_style(group: GroupSnapshot, lane: int) -> str:
+    """Return the style of an input's drops: what a faster input has too much of is dim, a lost set stands out.
+
+    Sets are lost by drops of the slowest input, and of those hardly faster.
+    """
+    fed = [each.counts.fed for each in group.inputs]
+    return "bold red" if fed[lane] <= 1.5 * min(fed) else "dim"
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """Which stamps are on the strip and where.
+
+    As on an oscilloscope, time runs to the right and begins again at the left: a message stays where it was
+    drawn until the sweep comes round. `head` is the newest stamp, in nanoseconds; one for all groups, so that
+    a message is in the same column in each of them.
+    """
+
+    head: int
+    width: int
+
+    def column(self, stamp: int) -> int | None:
+        """Return the column of a stamp; None when it is too old, or newer than the head."""
+        behind = self.head // COLUMN_NS - stamp // COLUMN_NS
+        if not 0 <= behind < self.width - _GAP:
+            return None
+        return stamp // COLUMN_NS % self.width
+
+
+def newest_stamp(snapshot: RelaySnapshot) -> int:
+    """Return the newest stamp in any group's recent outcomes, in nanoseconds; 0 where nothing happened yet."""
+    return max((stamp for group in snapshot.groups for stamp in _stamps(group)), default=0)
+
+
+def _stamps(group: GroupSnapshot) -> Iterator[int]:
+    for outcome in group.recent:
+        if isinstance(outcome, RecentDrop):
+            yield outcome.stamp
+        else:
+            yield from (stamp for stamp in outcome.stamps if stamp is not None)
+
+
+def strip(group: GroupSnapshot, sweep: Sweep) -> list[Text]:
+    """Draw a lane per input with the joints of the sets between them, and below all the sets' spans in milliseconds.
+
+    Two inputs make four lines, each input more makes two more.
+    """
+    drawing = _Drawing(lanes=len(group.inputs), width=sweep.width)
+    styles = [drop_style(group, lane) for lane in range(len(group.inputs))]
+    for outcome in group.recent:
+        if isinstance(outcome, RecentDrop):
+            _draw_drop(drawing, outcome, sweep, styles[outcome.input])
+    for number, a_set in _numbered_sets(group):
+        _draw_set(drawing, number, a_set, sweep)
+    return drawing.lines()
+
+
+def _numbered_sets(group: GroupSnapshot) -> Iterator[tuple[int, RecentSet]]:
+    """Number the sets since the group's start, so that a set keeps its letter from frame to frame."""
+    recent = [outcome for outcome in group.recent if isinstance(outcome, RecentSet)]
+    return enumerate(recent, start=group.sets - len(recent))
+
+
+def _draw_drop(drawing: "_Drawing", drop: RecentDrop, sweep: Sweep, style: str) -> None:
+    column = sweep.column(drop.stamp)
+    # Where several share a column, it is the unusual that must be seen.
+    if column is None or (drop.reason in _USUAL and drawing.taken(2 * drop.input, column)):
+        return
+    drawing.put(2 * drop.input, column, MARKS[drop.reason], style)
+
+
+def _draw_set(drawing: "_Drawing", number: int, a_set: RecentSet, sweep: Sweep) -> None:
+    colour = _COLOURS[number % len(_COLOURS)]
+    columns = [None if stamp is None else sweep.column(stamp) for stamp in a_set.stamps]
+    for lane, column in enumerate(columns):
+        if column is not None:
+            drawing.put(2 * lane, column, _LETTERS[number % len(_LETTERS)], letter_style(number))
+    for lane, (above, below) in enumerate(pairwise(columns)):
+        if above is not None and below is not None:
+            _draw_joint(drawing, 2 * lane + 1, above, below, colour)
+    last = next((column for column in reversed(columns) if column is not None), None)
+    if last is not None:
+        stamps = [stamp for stamp in a_set.stamps if stamp is not None]
+        drawing.label(last, f"{(max(stamps) - min(stamps)) / 1e6:.1f}")
+
+
+def _draw_joint(drawing: "_Drawing", line: int, above: int, below: int, style: str) -> None:
+    if above == below:
+        drawing.put(line, above, "│", style)
+    elif abs(above - below) > drawing.width // 2:
+        return  # the set lies across the strip's end
+    else:
+        falls = above < below
+        drawing.put(line, above, "╰" if falls else "╯", style)
+        for column in range(min(above, below) + 1, max(above, below)):
+            drawing.put(line, column, "─", style)
+        drawing.put(line, below, "╮" if falls else "╭", style)
+
+
+class _Drawing:
+    """Cells of a character and a style: a line per lane, one between two, and one below for labels."""
+
+    def __init__(self, *, lanes: int, width: int) -> None:
+        self.width = width
+        self._cells = [[(" ", "")] * width for _ in range(2 * lanes)]
+
+    def taken(self, line: int, column: int) -> bool:
+        return self._cells[line][column][0] != " "
+
+    def put(self, line: int, column: int, character: str, style: str) -> None:
+        self._cells[line][column] = (character, style)
+
+    def label(self, column: int, text: str) -> None:
+        """Write below the lanes, about a column, unless that would touch another label."""
+        line = len(self._cells) - 1
+        begin = min(max(0, column - (len(text) - 1) // 2), self.width - len(text))
+        if any(self.taken(line, near) for near in range(max(0, begin - 1), min(self.width, begin + len(text) + 1))):
+            return
+        for place, character in enumerate(text, start=begin):
+            self.put(line, place, character, "")
+
+    def lines(self) -> list[Text]:
+        return [Text.assemble(*_joined(cells), no_wrap=True) for cells in self._cells]
+
+
+def _joined(cells: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """Join neighbours of one style, to spare rich a span per cell."""
+    text, style = "", ""
+    for character, cell_style in cells:
+        if cell_style != style:
+            yield text, style
+            text, style = "", cell_style
+        text += character
+    yield text, style

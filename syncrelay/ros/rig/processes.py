@@ -1,0 +1,70 @@
+"""The rig's sensors as child processes of this one."""
+
+import subprocess
+import sys
+import tempfile
+import time
+from types import TracebackType
+from typing import IO, Self
+
+from syncrelay.ros.rig.schedule import SENSORS
+
+# A sensor leaves DDS in 0.2 s; one that is only starting, on a busy machine, needs longer to hear of it.
+_END_WITHIN_S = 10.0
+
+
+class Rig:
+    """Runs every sensor in a process of its own while entered.
+
+    However this process ends, SIGKILL included, the sensors' stdin ends with it, and so do they: in an order
+    that leaves nothing in /dev/shm.
+    """
+
+    def __init__(self, *, seed: int) -> None:
+        self._seed = seed
+        self._sensors: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+
+    def __enter__(self) -> Self:
+        start = time.time_ns()
+        for name in SENSORS:
+            talk = tempfile.TemporaryFile()
+            self._sensors[name] = (_start(name, seed=self._seed, start=start, talk=talk), talk)
+        return self
+
+    def check(self) -> None:
+        """Raise RuntimeError when a sensor has ended by itself, with the end of what it said."""
+        for name, (process, talk) in self._sensors.items():
+            code = process.poll()
+            if code is not None:
+                talk.seek(0)
+                said = talk.read().decode(errors="replace").strip()
+                raise RuntimeError(f"the rig's {name} ended with exit code {code}: {said[-2000:]}")
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for process, _ in self._sensors.values():
+            assert process.stdin is not None  # noqa: S101 - a pipe was asked for
+            process.stdin.close()
+        deadline = time.monotonic() + _END_WITHIN_S
+        for process, talk in self._sensors.values():
+            _await_end(process, deadline)
+            talk.close()
+
+
+def _start(name: str, *, seed: int, start: int, talk: IO[bytes]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "syncrelay.ros.rig", name, f"--seed={seed}", f"--start={start}", "--until-stdin-ends"],
+        stdin=subprocess.PIPE,
+        stdout=talk,
+        stderr=talk,
+        process_group=0,  # Control-C is for the demo, which ends the rig in its own order
+    )
+
+
+def _await_end(process: subprocess.Popen[bytes], deadline: float) -> None:
+    try:
+        process.wait(max(0, deadline - time.monotonic()))
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,168 @@
+"""The demo as a user starts it: real processes over DDS."""
+
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from fcntl import ioctl
+from pathlib import Path
+
+import pytest
+import yaml
+
+import syncrelay.cli
+from syncrelay.cli.demo import isolation
+from syncrelay.config import load_text
+from tests.ros.processes import DEADLINE_S, wait_until
+
+_SHIPPED = Path(syncrelay.cli.__file__).parent / "demo.yaml"
+_DEMO = [sys.executable, "-m", "syncrelay", "demo"]
+_WITHOUT_ROS = """
+import sys
+sys.modules["rclpy"] = None
+from syncrelay.cli import main
+sys.exit(main(["demo", "--show-config"]))
+"""
+
+
+def test_the_shipped_file_is_printed_as_it_is_without_ros():
+    shown = subprocess.run([sys.executable, "-c", _WITHOUT_ROS], check=True, capture_output=True, text=True)
+    assert shown.stdout == _SHIPPED.read_text()
+    assert shown.stderr == ""
+
+
+def test_the_shipped_file_is_valid_and_names_the_rigs_topics():
+    config = load_text(_SHIPPED.read_text())
+    assert [group.name for group in config.groups] == ["camera_lidar", "lidar_imu"]
+    assert {topic.topic for group in config.groups for topic in group.topics} == {
+        "/demo/camera/image_raw",
+        "/demo/lidar/points",
+        "/demo/imu/data",
+    }
+
+
+def test_the_shipped_file_is_plain_yaml():
+    assert yaml.safe_load(_SHIPPED.read_text())["groups"]["camera_lidar"]["topics"][0]["offset"] == "-12ms"
+
+
+@pytest.mark.parametrize(
+    ("environ", "added"),
+    [
+        ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}),
+        ({"ROS_DOMAIN_ID": "7"}, {}),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {}),
+    ],
+)
+def test_it_stays_on_this_machine_unless_a_network_was_chosen(environ, added):
+    assert isolation(environ) == added
+
+
+def summary_rows(text):
+    """Group name -> (sets, possible, span and p95 in milliseconds) of a summary."""
+    rows = re.findall(r"^(\w+) +(\d+) +(\d+) +\d+% +([\d.]+) ms +([\d.]+) ms", text, re.MULTILINE)
+    return {name: (int(sets), int(possible), float(span), float(p95)) for name, sets, possible, span, p95 in rows}
+
+
+def children(pid):
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+@pytest.mark.ros
+def test_it_matches_a_simulated_rig_and_sums_up(stage):
+    demo = stage.start("demo", [*_DEMO, "--seconds", "10"])
+    assert demo.wait() == 0, demo.stderr
+    rows = summary_rows(demo.stdout)
+    assert set(rows) == {"camera_lidar", "lidar_imu"}
+    for sets, possible, _, _ in rows.values():
+        assert 0 < sets <= possible
+    assert rows["camera_lidar"][2] < 3  # the offset is in use: without it, 12
+    assert re.search(r"Without it, the span of these sets would be 1[12](\.\d)? ms", " ".join(demo.stdout.split()))
+    assert rows["lidar_imu"][3] <= 8
+    assert len(re.findall(r"^ +\d+\.\d s  camera_lidar", demo.stdout, re.MULTILINE)) in range(3, 11)
+    assert "\x1b" not in demo.stdout
+    assert demo.stderr == ""
+
+
+@pytest.mark.ros
+def test_it_fails_if_no_set_came(stage):
+    demo = stage.start("demo", [*_DEMO, "--seconds", "0.1"])
+    assert demo.wait() == 1
+    assert re.search(r"^camera_lidar +0 +0 ", demo.stdout, re.MULTILINE)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_the_summary_and_leaves_nothing(stage, number):
+    demo = stage.start("demo", _DEMO)
+    demo.wait_until(lambda: re.search(r"camera_lidar .* span .* lidar_imu .* span", demo.stdout), "sets of both groups")
+    sensors = children(demo.pid)
+    assert len(sensors) == 3
+    stage.note_shared_memory()
+    demo.send(number)
+    assert demo.wait() == 0, demo.stderr
+    assert set(summary_rows(demo.stdout)) == {"camera_lidar", "lidar_imu"}
+    assert not any(map(running, sensors))
+    assert stage.left_in_shared_memory() == set()
+
+
+@pytest.mark.ros
+def test_the_rig_does_not_outlive_it(stage):
+    demo = stage.start("demo", _DEMO)
+    demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
+    sensors = children(demo.pid)
+    demo.send(signal.SIGKILL)
+    wait_until(lambda: not any(map(running, sensors)), "the end of the rig", deadline_s=20)
+
+
+@pytest.mark.ros
+def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
+    screen = on_terminal(stage, [*_DEMO, "--seconds", "10"], columns=80, lines=24)
+    drawn, _, after = screen.partition("\x1b[?1049l")
+    assert "\x1b[?1049h" in drawn
+    assert re.search(r"camera -12 ms.*A", drawn)
+    assert "each letter is a set" in drawn
+    assert "38;5" not in screen  # the stage sets NO_COLOR
+    assert set(summary_rows(re.sub(r"\x1b\[[\d;]*m", "", after).replace("\r", ""))) == {"camera_lidar", "lidar_imu"}
+
+
+def on_terminal(stage, argv, *, columns, lines):
+    """Run to the end on a terminal of its own; everything that was written to it."""
+    ours, theirs = pty.openpty()
+    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+    environment = stage.environment | {"TERM": "xterm-256color"}
+    process = subprocess.Popen(
+        argv, stdin=theirs, stdout=theirs, stderr=theirs, env=environment, cwd=stage.folder, start_new_session=True
+    )
+    os.close(theirs)
+    try:
+        written = read_until_closed(ours, time.monotonic() + DEADLINE_S)
+        assert process.wait(DEADLINE_S) == 0, written
+    finally:
+        process.kill()
+        process.wait()
+        os.close(ours)
+    return written
+
+
+def read_until_closed(descriptor, deadline):
+    written = b""
+    while select.select([descriptor], [], [], max(0, deadline - time.monotonic()))[0]:
+        try:
+            chunk = os.read(descriptor, 65536)
+        except OSError:  # the other end is closed
+            break
+        written += chunk
+    return written.decode()

@@ -1,0 +1,142 @@
+"""Strips of hand-written states, drawn as they are seen."""
+
+# ruff: noqa: RUF001  the marks are what they look like
+
+import pytest
+
+from syncrelay.cli.strip import MARKS, Sweep, drop_style, newest_stamp, strip
+from syncrelay.ros.snapshot import RelaySnapshot
+from syncrelay.sync.messages import DropReason
+from tests.cli.demo_states import MS, a_drop, a_group, a_set, an_input
+
+# A column is 20 ms.
+_HEAD = 340 * MS
+
+
+def drawn(group, *, head=_HEAD, width=20):
+    return [line.plain.rstrip() for line in strip(group, Sweep(head=head, width=width))]
+
+
+@pytest.mark.parametrize(
+    ("recent", "lanes"),
+    [
+        pytest.param(
+            [a_set(45, 41), a_set(145, 141), a_set(240, 245)],
+            [
+                "  A    B    C",
+                "  │    │    │",
+                "  A    B    C",
+                " 4.0  4.0  5.0",
+            ],
+            id="a set is a letter on each lane, a joint between them, its span below",
+        ),
+        pytest.param(
+            [a_set(45, 65), a_set(185, 165)],
+            [
+                "  A      B",
+                "  ╰╮    ╭╯",
+                "   A    B",
+                "  20.0 20.0",
+            ],
+            id="joints lean as the stamps do",
+        ),
+        pytest.param(
+            [a_set(45, 105), a_set(320, 220)],
+            [
+                "  A             B",
+                "  ╰──╮     ╭────╯",
+                "     A     B",
+                "    60.0 100.0",
+            ],
+            id="a wide set has a long joint",
+        ),
+        pytest.param(
+            [a_drop(0, 40), a_drop(0, 60, DropReason.LATE), a_drop(1, 80, DropReason.TOO_FAR)],
+            ["  ·<", "", "    ×", ""],
+            id="unmatched messages are marked by their reason",
+        ),
+        pytest.param(
+            [a_drop(0, 40, DropReason.OVERFLOW), a_drop(0, 45), a_drop(1, 40), a_set(41, 45)],
+            ["  A", "  │", "  A", " 4.0"],
+            id="where several share a column, a set hides drops",
+        ),
+        pytest.param(
+            [a_drop(0, 40, DropReason.OVERFLOW), a_drop(0, 45)],
+            ["  !", "", "", ""],
+            id="where several share a column, a loss hides what was superseded",
+        ),
+        pytest.param(
+            [a_set(45, None), a_set(None, 145)],
+            ["  A", "", "       B", " 0.0  0.0"],
+            id="a missing optional message leaves its lane empty and has no joint",
+        ),
+        pytest.param(
+            [a_set(41, 41), a_set(81, 81), a_set(141, 141)],
+            ["  A B  C", "  │ │  │", "  A B  C", " 0.0  0.0"],
+            id="a span that would touch its neighbour is left out",
+        ),
+        pytest.param(
+            [a_set(1, 0)],
+            ["", "", "", ""],
+            id="what is older than the strip is not on it",
+        ),
+    ],
+)
+def test_messages_stand_on_their_lanes_by_their_stamps(recent, lanes):
+    assert drawn(a_group(recent)) == lanes
+
+
+def test_time_begins_again_at_the_left_and_messages_stay_where_they_were():
+    group = a_group([a_set(245, 245), a_set(345, 345), a_set(445, 445)])
+    assert drawn(group, head=445 * MS) == [
+        "  C         A    B",
+        "  │         │    │",
+        "  C         A    B",
+        " 0.0       0.0  0.0",
+    ]
+
+
+def test_a_set_across_the_end_of_the_strip_has_no_joint():
+    assert drawn(a_group([a_set(399, 401)]), head=401 * MS) == [
+        "                   A",
+        "",
+        "A",
+        "2.0",
+    ]
+
+
+def test_a_set_keeps_its_letter_when_older_ones_are_forgotten():
+    group = a_group([a_set(45, 45), a_set(145, 145)], sets=28)
+    assert drawn(group)[0] == "  A    B"
+
+
+def test_three_inputs_have_three_lanes():
+    inputs = [an_input("/a"), an_input("/b"), an_input("/c")]
+    assert drawn(a_group([a_set(40, 60, 60)], inputs=inputs)) == ["  A", "  ╰╮", "   A", "   │", "   A", "  20.0"]
+
+
+def test_each_reason_has_a_mark_of_its_own():
+    assert set(MARKS) == set(DropReason)
+    assert len(set(MARKS.values())) == len(DropReason)
+    assert all(len(mark) == 1 and not mark.isupper() for mark in MARKS.values())
+
+
+def test_the_newest_stamp_is_looked_for_in_all_groups():
+    groups = (a_group([a_set(45, None)]), a_group([a_drop(0, 50)]), a_group())
+    assert newest_stamp(RelaySnapshot(groups)) == 50 * MS
+    assert newest_stamp(RelaySnapshot(())) == 0
+
+
+@pytest.mark.parametrize(
+    ("fed", "styles"),
+    [((30, 10), ["dim", "bold red"]), ((100, 100), ["bold red", "bold red"]), ((14, 10), ["bold red", "bold red"])],
+)
+def test_a_drop_stands_out_where_it_costs_a_set(fed, styles):
+    group = a_group(inputs=[an_input("/a", fed=fed[0]), an_input("/b", fed=fed[1])])
+    assert [drop_style(group, lane) for lane in range(2)] == styles
+
+
+def test_sets_are_told_apart_by_colour_and_by_letter():
+    lane = strip(a_group([a_set(45, 45), a_set(145, 145)]), Sweep(head=_HEAD, width=20))[0]
+    letters = {lane.plain[span.start : span.end].strip(): str(span.style) for span in lane.spans}
+    assert letters["A"] != letters["B"]

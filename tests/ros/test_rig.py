@@ -1,0 +1,221 @@
+"""The simulated rig: its times repeat, its messages are valid, its processes end with whoever started them."""
+
+import math
+import os
+import re
+import signal
+import struct
+import subprocess
+import sys
+import time
+from itertools import islice, takewhile
+from pathlib import Path
+
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+from syncrelay.cdr import read_stamp
+from syncrelay.ros.rig.discovery import quick_discovery
+from syncrelay.ros.rig.schedule import SENSORS, schedule
+from tests.ros.processes import shared_memory_of, wait_until
+
+MS = 1_000_000
+SECOND = 1_000_000_000
+_START = 1_700_000_000 * SECOND
+
+
+_TYPES = get_typestore(Stores.ROS2_JAZZY)
+
+
+def shots(name, count, *, seed=1, start=_START):
+    return list(islice(schedule(SENSORS[name], seed=seed, start=start), count))
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_seed_repeats_every_time_and_loss(name):
+    assert shots(name, 500) == shots(name, 500)
+    assert shots(name, 500) != shots(name, 500, seed=2)
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_later_start_moves_all_times_and_nothing_else(name):
+    moved = [
+        shot._replace(stamp=shot.stamp - SECOND, sent=shot.sent - SECOND)
+        for shot in shots(name, 100, start=_START + SECOND)
+    ]
+    assert moved == shots(name, 100)
+
+
+@pytest.mark.parametrize(("name", "rate_hz"), [("camera", 30), ("lidar", 10), ("imu", 100)])
+def test_sensors_run_at_their_rates_but_for_what_they_lose(name, rate_hz):
+    within = _START + 200 * SECOND
+    sent = list(takewhile(lambda shot: shot.sent < within, schedule(SENSORS[name], seed=1, start=_START)))
+    assert sent[-1].number == pytest.approx(200 * rate_hz, abs=0.1 * rate_hz)
+    lost = 1 - len(sent) / sent[-1].number
+    assert lost == pytest.approx(SENSORS[name].loss, abs=0.01)
+    assert lost > 0
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_messages_are_sent_in_order_after_they_were_measured(name):
+    sent = [shot.sent for shot in shots(name, 2000)]
+    assert sent == sorted(sent)
+    late = [
+        shot.sent - _START - SENSORS[name].phase - shot.number * SECOND // SENSORS[name].rate_hz
+        for shot in shots(name, 2000)
+    ]
+    assert sum(late) / len(late) == pytest.approx(SENSORS[name].latency, rel=0.1)
+
+
+def test_the_camera_is_triggered_by_the_lidar_and_stamps_twelve_milliseconds_ahead():
+    camera = {shot.number: shot.stamp for shot in shots("camera", 3000)}
+    lidar = {shot.number: shot.stamp for shot in shots("lidar", 1000)}
+    apart = [camera[3 * number] - stamp for number, stamp in lidar.items() if 3 * number in camera]
+    assert sum(apart) / len(apart) == pytest.approx(12 * MS, abs=0.2 * MS)
+    assert max(abs(gap - 12 * MS) for gap in apart) < 6 * MS
+
+
+def sensor(stage, name, start):
+    argv = [sys.executable, "-m", "syncrelay.ros.rig", name, "--seed=3", f"--start={start}"]
+    return stage.start(name, argv)
+
+
+def received(stage, name, type_name, count):
+    """The first messages of a sensor, once their stamps are found to be those of its schedule."""
+    topic = SENSORS[name].topic
+    reliability = "reliable" if SENSORS[name].reliable else "best_effort"
+    collector = stage.collector({topic: type_name}, reliability=reliability)
+    start = time.time_ns()
+    sensor(stage, name, start)
+    payloads = collector.wait_for(topic, count)
+    stamps = [read_stamp(payload) for payload in payloads]
+    assert set(stamps) <= {shot.stamp for shot in shots(name, 20_000, seed=3, start=start)}
+    assert stamps == sorted(stamps)
+    return [_TYPES.deserialize_cdr(payload, type_name) for payload in payloads[:count]]
+
+
+@pytest.mark.ros
+def test_the_camera_sends_images_that_move_by_its_schedule(stage):
+    first, second = received(stage, "camera", "sensor_msgs/msg/Image", 2)
+    assert (first.width, first.height, first.encoding, first.step) == (640, 480, "rgb8", 1920)
+    assert first.header.frame_id == "camera"
+    assert len(first.data) == len(second.data) == 1920 * 480
+    assert bytes(first.data) != bytes(second.data)
+
+
+@pytest.mark.ros
+def test_the_lidar_sends_twenty_thousand_points_of_a_room_by_its_schedule(stage):
+    (cloud,) = received(stage, "lidar", "sensor_msgs/msg/PointCloud2", 1)
+    assert cloud.header.frame_id == "lidar"
+    assert [(field.name, field.offset, field.datatype) for field in cloud.fields] == [
+        ("x", 0, 7),
+        ("y", 4, 7),
+        ("z", 8, 7),
+        ("intensity", 12, 7),
+    ]
+    points = list(struct.iter_unpack("<4f", bytes(cloud.data)))
+    assert len(points) == cloud.width * cloud.height == 20_000
+    assert all(max(abs(x), abs(y)) == pytest.approx(6, abs=1e-3) for x, y, _, _ in points[::100])
+    assert max(intensity for *_, intensity in points) == pytest.approx(255, abs=1)
+
+
+@pytest.mark.ros
+def test_the_imu_sends_a_level_turn_by_its_schedule(stage):
+    first, second = received(stage, "imu", "sensor_msgs/msg/Imu", 2)
+    assert first.header.frame_id == "imu"
+    assert math.hypot(first.orientation.z, first.orientation.w) == pytest.approx(1)
+    assert first.orientation.z != second.orientation.z
+    assert first.linear_acceleration.z == pytest.approx(9.81)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_sensor_ends_at_a_signal_and_leaves_nothing_in_shared_memory(stage, number):
+    process = sensor(stage, "imu", time.time_ns())
+    process.wait_until(process.shared_memory, "shared memory of the sensor")
+    stage.note_shared_memory()
+    process.send(number)
+    assert process.wait() == 0
+    assert stage.left_in_shared_memory() == set()
+
+
+_HOLD_RIG = """
+import select, sys
+from syncrelay.ros.rig.processes import Rig
+with Rig(seed=1) as rig:
+    while not select.select([sys.stdin], [], [], 0.1)[0]:
+        rig.check()
+"""
+
+
+@pytest.fixture
+def holder(stage):
+    """A process that runs the whole rig until its stdin ends."""
+    process = stage.start("holder", [sys.executable, "-c", _HOLD_RIG], stdin=subprocess.PIPE)
+    process.wait_until(lambda: len(children(process.pid)) == len(SENSORS), "the rig's processes")
+    process.wait_until(lambda: all(map(segments, children(process.pid))), "shared memory of all sensors")
+    return process
+
+
+def children(pid):
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def segments(pid):
+    maps = Path(f"/proc/{pid}/maps").read_text()
+    return {Path(word) for word in re.findall(r"/dev/shm/fastrtps_(?!port)\w+", maps)}  # noqa: S108  where Linux has it
+
+
+def runs(pid):
+    # An orphan's corpse stays where the machine's process 1 buries none, as in many containers.
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_the_sensors_end_with_the_process_that_started_them_however_that_ends(stage, holder, number):
+    sensors = children(holder.pid)
+    held = set().union(*map(segments, sensors))
+    holder.send(number)
+    holder.wait()
+    wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes", deadline_s=20)
+    assert shared_memory_of(stage.domain, held) == set()
+
+
+@pytest.mark.ros
+def test_an_orderly_end_takes_the_sensors_along(stage, holder):
+    sensors = children(holder.pid)
+    held = set().union(*map(segments, sensors))
+    holder.ask_to_end()
+    assert holder.wait() == 0
+    assert not any(map(runs, sensors))
+    assert shared_memory_of(stage.domain, held) == set()
+
+
+@pytest.mark.ros
+def test_a_sensor_that_dies_is_named(holder):
+    os.kill(children(holder.pid)[0], signal.SIGKILL)
+    assert holder.wait() == 1
+    assert "RuntimeError: the rig's camera ended with exit code -9" in holder.stderr
+
+
+def test_quick_discovery_is_a_profile_for_as_long_as_it_lasts(monkeypatch):
+    monkeypatch.delenv("FASTRTPS_DEFAULT_PROFILES_FILE", raising=False)
+    monkeypatch.delenv("FASTDDS_DEFAULT_PROFILES_FILE", raising=False)
+    with quick_discovery():
+        profile = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
+        assert "initialAnnouncements" in profile.read_text()
+    assert "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ
+    assert not profile.exists()
+
+
+@pytest.mark.parametrize("name", ["FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"])
+def test_a_profile_of_the_users_own_stays(monkeypatch, name):
+    monkeypatch.delenv("FASTRTPS_DEFAULT_PROFILES_FILE", raising=False)
+    monkeypatch.setenv(name, "/mine.xml")
+    before = dict(os.environ)
+    with quick_discovery():
+        assert dict(os.environ) == before
