@@ -10,9 +10,10 @@ from rclpy.callback_groups import CallbackGroup
 
 from syncrelay.config import TopicConfig
 from syncrelay.errors import TypeImportError
+from syncrelay.ros.backlog import Deliver, Subscription
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.qos import input_profile
-from syncrelay.ros.receive import Deliver, ReceiveLoop, Subscription
+from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.types import begins_with_header, import_type, stamp_reader
 
 _LOG = logging.getLogger("syncrelay")

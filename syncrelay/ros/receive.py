@@ -4,38 +4,29 @@ rclpy's executors rebuild their wait set for every callback, which is most of th
 Here a wake drains all subscriptions that are ready.
 """
 
+import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future
-from heapq import heapify, heappop, heapreplace
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-Deliver: TypeAlias = Callable[[bytes, int], None]
-"""Takes a payload and the time DDS received it, in nanoseconds of the system clock."""
+from syncrelay.ros.backlog import Backlog, Subscription
 
 _Result = TypeVar("_Result")
 
-# A wake hands on this many messages before it looks for others, deadlines and calls again.
-_TURN = 64
-# At the end this many turns are taken, enough for the history of `qos: auto`: what had arrived is not lost.
-_LAST_TURNS = 16
-
-
-class Subscription(NamedTuple):
-    """What the loop drains: an rclpy subscription, and where its payloads go."""
-
-    subscription: Any
-    deliver: Deliver
+# With a heartbeat, an idle loop turns as often as this.
+_BEAT_NS = 1_000_000_000
 
 
 class ReceiveLoop:
     """Drains raw subscriptions on the thread that calls `run`.
 
     Only `call` and `stop` may be used from other threads. `deadline` says when `expire` wants to be called
-    next, by the clock of `now`, in nanoseconds; None for never.
+    next, by the clock of `now`, in nanoseconds; None for never. `beat` is called at every turn, at least once
+    a second; without it an idle loop sleeps until something comes.
     """
 
     def __init__(
@@ -45,12 +36,15 @@ class ReceiveLoop:
         now: Callable[[], int],
         deadline: Callable[[], int | None],
         expire: Callable[[int], None],
+        beat: Callable[[], None] | None = None,
     ) -> None:
         self._context = context
         self._now = now
         self._deadline = deadline
         self._expire = expire
+        self._beat = beat
         self._subscriptions: list[Subscription] = []
+        self._backlog = Backlog()
         self._wait_set: Any = None
         self._guard = GuardCondition(callback=None, callback_group=None, context=context)
         self._calls: deque[tuple[Future[Any], Callable[[], None]]] = deque()
@@ -93,7 +87,9 @@ class ReceiveLoop:
         self._replace_all([*self._subscriptions, subscription])
 
     def remove(self, subscription: Any) -> None:
-        """Stop draining an rclpy subscription, which may be destroyed then. On the loop's thread."""
+        """Take what a subscription has, then stop draining it: it may be destroyed. On the loop's thread."""
+        self._backlog.deliver(self._subscriptions, seen_until=time.time_ns())
+        self._backlog.forget(subscription)
         self._replace_all([kept for kept in self._subscriptions if kept.subscription is not subscription])
 
     def _replace_all(self, subscriptions: list[Subscription]) -> None:
@@ -105,10 +101,12 @@ class ReceiveLoop:
         try:
             while not self._stopping:
                 self._carry_out_calls()
-                self._drain(self._wait())
+                asked_at = time.time_ns()
+                self._backlog.deliver(self._wait(), seen_until=asked_at)
                 self._expire_due()
-            for _ in range(_LAST_TURNS):
-                self._drain(self._subscriptions)
+                if self._beat is not None:
+                    self._beat()
+            self._backlog.deliver_all(self._subscriptions, until=time.time_ns())
             self._carry_out_calls()
         finally:
             self._ended = True
@@ -150,34 +148,12 @@ class ReceiveLoop:
         ]
 
     def _timeout(self) -> int:
-        """Nanoseconds until the next deadline; negative waits for ever."""
+        """Nanoseconds until the next deadline, none while messages are held; negative waits for ever."""
+        if self._backlog:
+            return 0
         deadline = self._deadline()
-        return -1 if deadline is None else max(0, deadline - self._now())
-
-    def _drain(self, ready: Sequence[Subscription]) -> None:
-        """Hand on what has arrived, in the order of arrival over all subscriptions.
-
-        DDS keeps order within a topic only. Drained one after the other, a backlog of a fast topic would
-        overflow its queues before the slow topic's messages of the same time are seen.
-        """
-        heads = [head for index, each in enumerate(ready) if (head := _take(each, index)) is not None]
-        heapify(heads)
-        left = _TURN
-        while heads:
-            received, index, payload = heads[0]
-            following = _take(ready[index], index) if left > 0 else None
-            left -= 1
-            if following is None:
-                heappop(heads)
-            else:
-                heapreplace(heads, following)
-            ready[index].deliver(payload, received)
-
-
-def _take(subscription: Subscription, index: int) -> tuple[int, int, bytes] | None:
-    """The next message: when DDS received it, the subscription's place, the payload."""
-    taken = subscription.subscription.handle.take_message(subscription.subscription.msg_type, True)  # noqa: FBT003
-    if taken is None:
-        return None
-    payload, meta = taken
-    return meta["received_timestamp"], index, payload
+        longest = -1 if self._beat is None else _BEAT_NS
+        if deadline is None:
+            return longest
+        left = max(0, deadline - self._now())
+        return left if self._beat is None else min(left, longest)

@@ -3,7 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
@@ -47,15 +47,25 @@ class Relay:
     parameters and the clock are served on a third.
     """
 
-    def __init__(self, config: Config, *, groups: Collection[str] | None = None, ros_args: Sequence[str] = ()) -> None:
-        """Join the ROS graph; `groups` are the names of those to run, None for all of them."""
+    def __init__(
+        self,
+        config: Config,
+        *,
+        groups: Collection[str] | None = None,
+        ros_args: Sequence[str] = (),
+        beat: Callable[[], None] | None = None,
+    ) -> None:
+        """Join the ROS graph; `groups` are the names of those to run, None for all of them.
+
+        `beat` is called on the receive thread for as long as that turns, once a second at least.
+        """
         self._context = _init(config, ros_args)
         self.node = rclpy.create_node(config.node.name, namespace=config.node.namespace, context=self._context)
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
         chosen = [group for group in config.groups if groups is None or group.name in groups]
-        self._loop = ReceiveLoop(self._context, now=self._now, deadline=self._deadline, expire=self._expire)
+        self._loop = ReceiveLoop(self._context, now=self._now, deadline=self._deadline, expire=self._expire, beat=beat)
         self._groups = [GroupRelay(group, now=self._now) for group in chosen]
         self._wirings = wire(self._groups, node=self.node, loop=self._loop)
         self._inputs = list(dict.fromkeys(each for wiring in self._wirings for each in wiring.inputs))
