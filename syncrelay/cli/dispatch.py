@@ -141,8 +141,8 @@ def _healthcheck(words: Sequence[str], _stop: StopRequest) -> int:
 
     parser = Parser(
         "syncrelay healthcheck",
-        description="Tells whether the relay's receive loop turns, by the heartbeat that the relay writes into the file\n"
-        f"that {VARIABLE} names. Exit code 1 if it does not.",
+        description="Tells whether the relay's receive loop turns, by the heartbeat that the relay writes into the\n"
+        f"file that {VARIABLE} names. Exit code 1 if it does not.",
     )
     _add_help(parser)
     if _asks_for_help(words):

@@ -1,7 +1,11 @@
 """`syncrelay --config FILE`: run the relay until SIGINT or SIGTERM."""
 
+import os
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 
+from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import UsageError
 
@@ -32,13 +36,28 @@ def run(
     from syncrelay.ros.relay import Relay
 
     stop.defer()
-    with Relay(config, groups=groups or None, ros_args=ros_args) as relay:
+    with (
+        _heartbeat(os.environ.get(VARIABLE)) as heartbeat,
+        Relay(config, groups=groups or None, ros_args=ros_args, beat=heartbeat.beat if heartbeat else None) as relay,
+    ):
         stop.wake_with(relay.wake)
         while not stop.requested:
             relay.step()
         for line in summarize(relay.drain()):
             LOGGER.info(line)
     return 0
+
+
+def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:
+    from syncrelay.ros.logs import LOGGER
+
+    if not named:
+        return nullcontext()
+    try:
+        return Heartbeat(Path(named))
+    except OSError as error:
+        LOGGER.warning("%s=%s cannot be written, so there is no heartbeat: %s", VARIABLE, named, error.strerror)
+        return nullcontext()
 
 
 def _require_groups(asked: Sequence[str], there: Sequence[str], config_path: str) -> None:

@@ -5,6 +5,16 @@ import signal
 from collections.abc import Callable
 from types import FrameType
 
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def release_signals() -> None:
+    """Let SIGINT and SIGTERM come, with those that were held back until now.
+
+    The image's entry point blocks them: PID 1 would lose what comes before Python has a handler.
+    """
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+
 
 class StopRequest:
     """Ends the process at once while there is nothing to lose, and is remembered from `defer` on.
@@ -20,8 +30,8 @@ class StopRequest:
 
     def install(self) -> None:
         """Take SIGINT and SIGTERM from here on."""
-        signal.signal(signal.SIGINT, self._request)
-        signal.signal(signal.SIGTERM, self._request)
+        for number in _SIGNALS:
+            signal.signal(number, self._request)
 
     def defer(self) -> None:
         """From here on there is something to end in order: only remember the request."""

@@ -1,0 +1,85 @@
+"""The sign of life and its probe, told apart from every way in which a relay can be dead."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import syncrelay.cli.heartbeat
+from syncrelay.cli.heartbeat import VARIABLE, Heartbeat, ailment
+
+_SECOND_NS = 1_000_000_000
+
+
+def test_a_relay_that_has_just_beaten_ails_nothing(tmp_path):
+    with Heartbeat(tmp_path / "beat") as heartbeat:
+        heartbeat.beat()
+        assert ailment(tmp_path / "beat") is None
+
+
+def test_a_relay_that_has_not_begun_is_no_healthy_one(tmp_path):
+    with Heartbeat(tmp_path / "beat"):
+        assert ailment(tmp_path / "beat") == "the relay has not begun to receive yet"
+
+
+def test_what_an_earlier_run_left_does_not_speak_for_this_one(tmp_path):
+    (tmp_path / "beat").write_text(f"{time.monotonic_ns():020d}\n")
+    with Heartbeat(tmp_path / "beat"):
+        assert ailment(tmp_path / "beat") == "the relay has not begun to receive yet"
+
+
+def test_a_loop_that_stopped_turning_is_told_with_its_age(tmp_path):
+    (tmp_path / "beat").write_text(f"{time.monotonic_ns() - 3600 * _SECOND_NS:020d}\n")
+    assert ailment(tmp_path / "beat") == "the receive loop last turned 3600 s ago"
+
+
+def test_a_beat_from_before_the_machine_started_is_not_believed(tmp_path):
+    (tmp_path / "beat").write_text(f"{time.monotonic_ns() + 3600 * _SECOND_NS:020d}\n")
+    assert ailment(tmp_path / "beat") == "the heartbeat is of an earlier run"
+
+
+def test_nothing_is_left_after_the_end(tmp_path):
+    with Heartbeat(tmp_path / "beat") as heartbeat:
+        heartbeat.beat()
+    assert list(tmp_path.iterdir()) == []
+    assert "No such file" in ailment(tmp_path / "beat")
+
+
+def test_a_link_that_someone_laid_is_not_followed(tmp_path):
+    (tmp_path / "precious").write_text("kept")
+    (tmp_path / "beat").symlink_to(tmp_path / "precious")
+    with pytest.raises(OSError, match="symbolic links"):
+        Heartbeat(tmp_path / "beat")
+    assert (tmp_path / "precious").read_text() == "kept"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["-m", "syncrelay", "healthcheck"], ["-I", "-S", str(Path(syncrelay.cli.heartbeat.__file__))]],
+    ids=["command", "bare"],
+)
+def test_the_command_and_the_bare_probe_say_the_same(tmp_path, command):
+    def probe(**environment):
+        run = subprocess.run(
+            [sys.executable, *command],
+            env={**os.environ, **environment},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return run.returncode, run.stdout.strip()
+
+    path = tmp_path / "beat"
+    (tmp_path / "old").write_text(f"{time.monotonic_ns() - 3600 * _SECOND_NS:020d}\n")
+    with Heartbeat(path) as heartbeat:
+        heartbeat.beat()
+        alive = probe(**{VARIABLE: str(path)})
+    assert alive == (0, "receiving")
+    assert probe(**{VARIABLE: str(path)})[0] == 1
+    code, said = probe(**{VARIABLE: str(tmp_path / "old")})
+    assert code == 1
+    assert said.startswith("the receive loop last turned 36")
+    assert probe(**{VARIABLE: ""}) == (1, f"{VARIABLE} does not name the heartbeat's file")
