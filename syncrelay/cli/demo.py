@@ -133,9 +133,14 @@ class _Lines:
             self._next_s = math.floor(moment.elapsed_s) + _LINE_S
 
 
+def _can_draw(console: Console) -> bool:
+    # Not rich's is_terminal: FORCE_COLOR makes that true for a pipe.
+    return sys.stdout.isatty() and not console.is_dumb_terminal and console.encoding.startswith("utf")
+
+
 @contextmanager
 def _view(console: Console) -> Iterator[_View]:
-    if not console.is_terminal or console.is_dumb_terminal:
+    if not _can_draw(console):
         yield _Lines()
         return
     with _log_held_back(), Live(console=console, screen=True, auto_refresh=False) as live:

@@ -31,7 +31,7 @@ def summary(moment: Moment) -> RenderableType:
 
 
 def _sets(moment: Moment) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
     table.add_column("group")
     for heading in ("sets", "possible", "", "span", "p95", "slop"):
         table.add_column(heading, justify="right")
@@ -50,7 +50,7 @@ def _sets(moment: Moment) -> Table:
 
 
 def _messages(moment: Moment) -> Table:
-    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
     table.add_column("group")
     table.add_column("input")
     table.add_column("received", justify="right")

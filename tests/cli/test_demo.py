@@ -106,10 +106,11 @@ def test_it_fails_if_no_set_came(stage):
 @pytest.mark.ros
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_with_the_summary_and_leaves_nothing(stage, number):
-    demo = stage.start("demo", _DEMO)
+    demo = stage.start("demo", [*_DEMO, "--seed", "7"])
     demo.wait_until(lambda: re.search(r"camera_lidar .* span .* lidar_imu .* span", demo.stdout), "sets of both groups")
     sensors = children(demo.pid)
     assert len(sensors) == 3
+    assert all(b"--seed=7" in Path(f"/proc/{pid}/cmdline").read_bytes() for pid in sensors)
     stage.note_shared_memory()
     demo.send(number)
     assert demo.wait() == 0, demo.stderr
@@ -138,11 +139,19 @@ def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
     assert set(summary_rows(re.sub(r"\x1b\[[\d;]*m", "", after).replace("\r", ""))) == {"camera_lidar", "lidar_imu"}
 
 
-def on_terminal(stage, argv, *, columns, lines):
+@pytest.mark.ros
+@pytest.mark.parametrize("setting", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "latin-1"}])
+def test_a_terminal_that_cannot_draw_gets_plain_lines(stage, setting):
+    screen = on_terminal(stage, [*_DEMO, "--seconds", "10"], columns=80, lines=24, **setting)
+    assert "\x1b[?1049h" not in screen
+    assert "s  camera_lidar " in screen
+
+
+def on_terminal(stage, argv, *, columns, lines, **environ):
     """Run to the end on a terminal of its own; everything that was written to it."""
     ours, theirs = pty.openpty()
     ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
-    environment = stage.environment | {"TERM": "xterm-256color"}
+    environment = stage.environment | {"TERM": "xterm-256color"} | environ
     process = subprocess.Popen(
         argv, stdin=theirs, stdout=theirs, stderr=theirs, env=environment, cwd=stage.folder, start_new_session=True
     )
