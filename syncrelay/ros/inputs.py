@@ -46,6 +46,7 @@ class TopicInput:
         self._name = name
         self._callback_group = _LeftToTheReceiveLoop()
         self._users: list[tuple[GroupRelay, int]] = []
+        self._takers: list[Deliver] = []
         self._message_type: Any = None
         self._profile: Any = None
         self._subscription: Any = None
@@ -71,10 +72,12 @@ class TopicInput:
             return None
         importlib.invalidate_caches()
         try:
-            self._message_type = import_type(self.type)
+            message_type = import_type(self.type)
+            self._takers = [_taker(group, index, message_type) for group, index in self._users]
         except TypeImportError as error:
             self._say_once(logging.ERROR, f"{self.topic}: {error}")
             return f"the type {self.type} of {self.topic}"
+        self._message_type = message_type
         return None
 
     def _find_publishers(self) -> str | None:
@@ -127,29 +130,23 @@ class TopicInput:
         for publisher in self._publishers:
             self._node.destroy_publisher(publisher)
         self._subscription, self._publishers = subscription, publishers
-        self._loop.add(Subscription(subscription, self._deliver()))
+        self._loop.add(Subscription(subscription, self._takers[0] if len(self._takers) == 1 else self._deliver))
 
-    def _deliver(self) -> Deliver:
-        takers = [self._taker(group, index) for group, index in self._users]
-        if len(takers) == 1:
-            return takers[0]
-
-        def deliver(payload: bytes, received: int) -> None:
-            for take in takers:
-                take(payload, received)
-
-        return deliver
-
-    def _taker(self, group: GroupRelay, index: int) -> Deliver:
-        read = stamp_reader(group.config.topics[index].stamp, self._message_type)
-        if read is None:
-            return lambda payload, received: group.receive(index, payload, received)
-        return lambda payload, _: group.receive(index, payload, read(payload))
+    def _deliver(self, payload: bytes, received: int) -> None:
+        for take in self._takers:
+            take(payload, received)
 
     def wait_until_acknowledged(self, timeout: Any) -> None:
         """Give reliable subscribers a moment to get what was published last."""
         for publisher in self._publishers:
             publisher.wait_for_all_acked(timeout)
+
+
+def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
+    read = stamp_reader(group.config.topics[index].stamp, message_type)
+    if read is None:
+        return lambda payload, received: group.receive(index, payload, received)
+    return lambda payload, _: group.receive(index, payload, read(payload))
 
 
 def _never_called(_: bytes) -> None:

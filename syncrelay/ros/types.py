@@ -1,20 +1,16 @@
 """Message types by name, and where in a payload the stamp of a type is found."""
 
 import importlib
-from collections.abc import Callable
-from operator import attrgetter
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
-from rclpy.serialization import deserialize_message
-
 from syncrelay.cdr import read_stamp
+from syncrelay.cdr_fields import UnreadableFieldError, field_reader
 from syncrelay.config import StampField, StampSource
 from syncrelay.errors import TypeImportError
 
 StampReader: TypeAlias = Callable[[bytes], int | None]
 """From a payload to its stamp in nanoseconds; None where none can be read."""
-
-_SECOND_NS = 1_000_000_000
 
 
 def import_type(name: str) -> Any:
@@ -42,18 +38,23 @@ def begins_with_header(message_type: Any) -> bool:
 def stamp_reader(source: StampSource, message_type: Any) -> StampReader | None:
     """How to read the stamp that the file asks for; None for the receive time, which no payload holds."""
     if isinstance(source, StampField):
-        return _field_reader(message_type, source.field)
+        return value_reader(message_type, source.field)
     return read_stamp if source == "header" else None
 
 
-def _field_reader(message_type: Any, path: str) -> StampReader:
-    field = attrgetter(path)
+def value_reader(message_type: Any, path: str) -> Callable[[bytes], Any]:
+    """What reads the field at a dotted path: a number, a text, or a time in nanoseconds; None where it cannot.
 
-    def read(payload: bytes) -> int | None:
-        try:
-            time = field(deserialize_message(payload, message_type))
-        except Exception:  # noqa: BLE001  the middleware raises several, bare RuntimeError among them
-            return None
-        return int(time.sec) * _SECOND_NS + int(time.nanosec)
+    Raises TypeImportError where the type has no such field.
+    """
+    module, name = message_type.__module__.split(".")[0], message_type.__name__
+    try:
+        return field_reader(_fields_of, f"{module}/{name}", path)
+    except UnreadableFieldError as error:
+        raise TypeImportError(f"{module}/msg/{name} has no field {path} to go by: {error}") from error
 
-    return read
+
+def _fields_of(name: str) -> Mapping[str, str]:
+    package, message = name.split("/")
+    fields: Mapping[str, str] = import_type(f"{package}/msg/{message}").get_fields_and_field_types()
+    return fields

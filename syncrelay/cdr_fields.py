@@ -1,0 +1,216 @@
+"""One field of a serialized message, found by skipping what stands before it: nothing is deserialized.
+
+Layout after the OMG's CDR (DDS-XTypes 1.3, 7.4.1 and 7.4.3.5): a primitive is aligned to its size, counted from
+behind the encapsulation header, to at most 8 bytes in plain CDR and 4 in plain XCDR2; strings and sequences begin
+with a uint32 length, a string's counts its final zero.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from struct import Struct, error
+from typing import Any, Final, NamedTuple, TypeAlias
+
+from syncrelay.cdr import Payload
+
+FieldsOf: TypeAlias = Callable[[str], Mapping[str, str]]
+"""From a type's name to its fields' names and types in order, as rosidl's Python classes tell them."""
+
+TIME: Final = "builtin_interfaces/Time"
+
+_NS_PER_SECOND: Final = 1_000_000_000
+_PRIMITIVES: Final = {
+    "boolean": "?",
+    "octet": "B",
+    "char": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float": "f",
+    "double": "d",
+}
+_ARRAY = re.compile(r"(?P<type>.+)\[(?P<count>\d+)\]")
+_SEQUENCE = re.compile(r"sequence<(?P<type>.+?)(, \d+)?>")
+_STRING = re.compile(r"string(<\d+>)?")
+# What of the encapsulation header names an order of bytes and the largest alignment.
+_ENCAPSULATIONS: Final = {0x00: (">", 8), 0x01: ("<", 8), 0x06: (">", 4), 0x07: ("<", 4)}
+
+
+class UnreadableFieldError(Exception):
+    """A field that cannot be read in place: a path that is not there, or a type without a plain layout."""
+
+
+class _Bytes(NamedTuple):
+    """A payload behind its encapsulation header, its byte order as Struct's, and the largest alignment."""
+
+    body: memoryview
+    order: str
+    alignment: int
+
+
+_Skip: TypeAlias = Callable[[_Bytes, int], int]
+"""From the place where a value begins, padding before it included, to the place behind it."""
+_Read: TypeAlias = Callable[[_Bytes, int], Any]
+
+
+def field_reader(fields_of: FieldsOf, type_name: str, path: str) -> Callable[[Payload], Any]:
+    """Return what reads the field at a dotted path: a number, a text, or a time in nanoseconds.
+
+    The reader gives None for a payload that is malformed on the way to the field. Raises UnreadableFieldError
+    where the type has no such field, or it is not one value.
+    """
+    skips, found = _route(fields_of, type_name, path.split("."))
+    read = _reader(found, path)
+
+    def read_field(payload: Payload) -> Any:
+        encapsulation = _ENCAPSULATIONS.get(payload[1]) if len(payload) >= _BODY_AT and not payload[0] else None
+        if encapsulation is None:
+            return None
+        data = _Bytes(memoryview(payload)[_BODY_AT:], *encapsulation)
+        place = 0
+        try:
+            for skip in skips:
+                place = skip(data, place)
+            return read(data, place)
+        except (error, UnicodeDecodeError, _Lying):
+            return None
+
+    return read_field
+
+
+_BODY_AT: Final = 4
+
+
+class _Lying(Exception):  # noqa: N818  a payload's fault, told by None
+    """A length that the payload cannot hold."""
+
+
+def _route(fields_of: FieldsOf, type_name: str, steps: Sequence[str]) -> tuple[list[_Skip], str]:
+    """What stands before the field, and the field's type."""
+    skips: list[_Skip] = []
+    for step in steps:
+        if "/" not in type_name or "<" in type_name or "[" in type_name:
+            raise UnreadableFieldError(f"{type_name} has no field {step}")
+        fields = fields_of(type_name)
+        if step not in fields:
+            raise UnreadableFieldError(f"{type_name} has no field {step}, it has {', '.join(fields)}")
+        for name, each in fields.items():
+            if name == step:
+                type_name = each
+                break
+            skips.append(_skipper(fields_of, each))
+    return skips, type_name
+
+
+def _reader(type_name: str, path: str) -> _Read:
+    if type_name == TIME:
+        return _read_time
+    if type_name in _PRIMITIVES:
+        return _primitive_reader(_PRIMITIVES[type_name])
+    if _STRING.fullmatch(type_name):
+        return _read_string
+    raise UnreadableFieldError(f"{path} is {type_name}, expected a number, a text or a time")
+
+
+def _skipper(fields_of: FieldsOf, type_name: str) -> _Skip:
+    if type_name in _PRIMITIVES:
+        return _run_skipper(_size_of(type_name), 1)
+    if _STRING.fullmatch(type_name):
+        return _skip_string
+    if array := _ARRAY.fullmatch(type_name):
+        if array["type"] in _PRIMITIVES:
+            return _run_skipper(_size_of(array["type"]), int(array["count"]))
+        return _repeater(_skipper(fields_of, array["type"]), int(array["count"]))
+    if sequence := _SEQUENCE.fullmatch(type_name):
+        return _sequence_skipper(fields_of, sequence["type"])
+    if "/" in type_name:
+        return _message_skipper(fields_of, type_name)
+    raise UnreadableFieldError(f"{type_name} has no plain layout")
+
+
+def _size_of(primitive: str) -> int:
+    return Struct(f"<{_PRIMITIVES[primitive]}").size
+
+
+def _align(data: _Bytes, place: int, size: int) -> int:
+    size = min(size, data.alignment)
+    return (place + size - 1) // size * size
+
+
+def _run_skipper(size: int, count: int) -> _Skip:
+    return lambda data, place: _align(data, place, size) + size * count
+
+
+def _repeater(skip: _Skip, count: int) -> _Skip:
+    def repeat(data: _Bytes, place: int) -> int:
+        for _ in range(count):
+            place = skip(data, place)
+        return place
+
+    return repeat
+
+
+def _sequence_skipper(fields_of: FieldsOf, element: str) -> _Skip:
+    size = _size_of(element) if element in _PRIMITIVES else 0
+    skip_one = None if size else _skipper(fields_of, element)
+
+    def skip(data: _Bytes, place: int) -> int:
+        count, place = _read_length(data, place)
+        if skip_one is None:
+            return _align(data, place, size) + size * count if count else place
+        return _repeater(skip_one, count)(data, place)
+
+    return skip
+
+
+def _message_skipper(fields_of: FieldsOf, type_name: str) -> _Skip:
+    skips = [_skipper(fields_of, each) for each in fields_of(type_name).values()]
+
+    def skip(data: _Bytes, place: int) -> int:
+        for each in skips:
+            place = each(data, place)
+        return place
+
+    return skip
+
+
+def _read_length(data: _Bytes, place: int) -> tuple[int, int]:
+    place = _align(data, place, 4)
+    (count,) = Struct(f"{data.order}I").unpack_from(data.body, place)
+    # No element is smaller than a byte: a larger count is a lie, and would be counted down for hours.
+    if count > len(data.body) - place:
+        raise _Lying
+    return count, place + 4
+
+
+def _skip_string(data: _Bytes, place: int) -> int:
+    count, place = _read_length(data, place)
+    return place + count
+
+
+def _read_string(data: _Bytes, place: int) -> str:
+    count, place = _read_length(data, place)
+    if len(data.body) < place + count:
+        raise _Lying
+    return bytes(data.body[place : place + count]).rstrip(b"\0").decode()
+
+
+def _primitive_reader(code: str) -> _Read:
+    structs = {order: Struct(order + code) for order in "<>"}
+
+    def read(data: _Bytes, place: int) -> Any:
+        struct = structs[data.order]
+        return struct.unpack_from(data.body, _align(data, place, struct.size))[0]
+
+    return read
+
+
+def _read_time(data: _Bytes, place: int) -> int | None:
+    seconds, nanoseconds = Struct(f"{data.order}iI").unpack_from(data.body, _align(data, place, 4))
+    if nanoseconds >= _NS_PER_SECOND:
+        return None
+    return int(seconds * _NS_PER_SECOND + nanoseconds)
