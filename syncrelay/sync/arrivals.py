@@ -15,7 +15,8 @@ class Arrivals:
 
     A message newer than `newest` of its input is of use, and whoever sees that sets it; of any other this
     class decides. Where one input jumped back, the others may still send what belongs to the time before:
-    stamps that go on where theirs had been and are ahead of the one that jumped.
+    stamps that go on, by no more than a second, where theirs had been, and are ahead by more than a second of
+    the one that jumped.
     """
 
     __slots__ = ("_before", "_jumped", "_offsets", "given", "newest")
@@ -59,7 +60,7 @@ class Arrivals:
         if before is None:
             return False
         ahead = stamp + self._offsets[index] - self.newest[self._jumped] - self._offsets[self._jumped]
-        if ahead > JUMP_NS and abs(stamp - before) <= JUMP_NS:
+        if ahead > JUMP_NS and before < stamp <= before + JUMP_NS:
             return True
         self._before[index] = None
         self.newest[index] = _UNSEEN

@@ -88,15 +88,15 @@ class SyncGroup:
         index = message.input
         stamp = message.stamp
         self._ledger.fed[index] += 1
-        due = self._matching.due(now)
+        due = self.expire(now=now)
         if stamp <= self._newest[index]:
             outcomes = self._take_behind(message, now)
         else:
             self._newest[index] = stamp
             outcomes = self._matching.feed(stamp + self._offsets[index], message, now)
-        if due:
-            outcomes = [*due, *outcomes]
-        return self._leave(outcomes, now) if outcomes else outcomes
+        if outcomes:
+            outcomes = self._leave(outcomes, now)
+        return [*due, *outcomes] if due else outcomes
 
     def reject(self, message: Message, reason: DropReason) -> Drop:
         """Count a message that cannot be fed: it has no readable stamp."""
@@ -111,7 +111,8 @@ class SyncGroup:
 
     def expire(self, *, now: int) -> Sequence[Outcome]:
         """Give what leaves because it has waited long enough."""
-        return self._leave(self._matching.due(now), now)
+        outcomes = self._matching.due(now)
+        return self._leave(outcomes, now) if outcomes else outcomes
 
     def flush(self, reason: DropReason) -> Sequence[Drop]:
         """Drop all that is buffered and start afresh. The counts go on."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.policy import OptionalStage
 from syncrelay.sync.queues import StampQueue
 
 
@@ -18,7 +19,7 @@ class _Waiting(NamedTuple):
     since: int
 
 
-class OptionalInputs:
+class OptionalInputs(OptionalStage):
     """Adds to each set, of each optional input, the message nearest to its middle that keeps it within slop.
 
     Sets come and leave in one order, whatever the optional inputs do; at once where there are none. A set
@@ -47,15 +48,12 @@ class OptionalInputs:
 
     @property
     def oldest_since(self) -> int | None:
-        """Since when the oldest set waits."""
         return self._waiting[0].since if self._waiting else None
 
     def wait_from(self, now: int) -> None:
-        """Let no wait have begun later than `now`: the clock fell."""
         self._waiting = deque(waiting._replace(since=min(waiting.since, now)) for waiting in self._waiting)
 
     def put(self, index: int, stamp: int, message: Message) -> list[Outcome]:
-        """Take a message of an optional input; give what leaves because of it."""
         queue = self._queues[index]
         outcomes: list[Outcome] = []
         replaced = queue.insert(stamp, message)
@@ -68,7 +66,6 @@ class OptionalInputs:
         return outcomes
 
     def hold(self, messages: tuple[Message | None, ...], low: int, high: int, since: int) -> list[Outcome]:
-        """Take a set of the required inputs whose stamps go from `low` to `high`; give what leaves."""
         self._waiting.append(_Waiting(messages, low, high, since))
         outcomes = self._leave_decided()
         if len(self._waiting) > self._queue_size:
@@ -76,7 +73,6 @@ class OptionalInputs:
         return outcomes
 
     def leave(self) -> list[Outcome]:
-        """Let the oldest set leave with what there is."""
         waiting = self._waiting[0]
         messages = list(waiting.messages)
         low, high = waiting.low, waiting.high
@@ -95,7 +91,6 @@ class OptionalInputs:
         return [*drops, Match(tuple(messages))]
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop all that is in here, and be as new."""
         held = [message for waiting in self._waiting for message in waiting.messages if message is not None]
         queued = [message for queue in self._queues.values() for message in queue.take(len(queue.stamps))]
         self._waiting.clear()
@@ -103,7 +98,6 @@ class OptionalInputs:
         return [Drop(message, reason) for message in held + queued]
 
     def buffered(self, index: int) -> int:
-        """How many messages of this input, required or not, are in here."""
         held = sum(waiting.messages[index] is not None for waiting in self._waiting)
         return held + (len(self._queues[index].stamps) if index in self._queues else 0)
 

@@ -4,7 +4,44 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from syncrelay.sync.messages import Drop, DropReason, Message, Outcome
-from syncrelay.sync.optional import OptionalInputs
+
+
+class OptionalStage(Protocol):
+    """Where the sets of required inputs wait for messages of the optional ones."""
+
+    __slots__ = ()
+
+    inputs: Sequence[int]
+    """The optional inputs."""
+
+    @property
+    def oldest_since(self) -> int | None:
+        """Since when the oldest set waits."""
+        ...
+
+    def wait_from(self, now: int) -> None:
+        """Let no wait have begun later than `now`: the clock fell."""
+        ...
+
+    def put(self, index: int, stamp: int, message: Message) -> list[Outcome]:
+        """Take a message of an optional input; give what leaves because of it."""
+        ...
+
+    def hold(self, messages: tuple[Message | None, ...], low: int, high: int, since: int) -> list[Outcome]:
+        """Take a set of the required inputs whose stamps go from `low` to `high`; give what leaves."""
+        ...
+
+    def leave(self) -> list[Outcome]:
+        """Let the oldest set leave with what there is."""
+        ...
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        """Drop all that is in here, and be as new."""
+        ...
+
+    def buffered(self, index: int) -> int:
+        """How many messages of this input, required or not, are in here."""
+        ...
 
 
 class Policy(Protocol):
@@ -27,7 +64,7 @@ class Policy(Protocol):
     n_inputs: int
     """How many inputs a set has."""
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["Policy", OptionalInputs]:
+    def narrowed(self, required: Sequence[bool]) -> tuple["Policy", OptionalStage]:
         """Give this rule, as new, for a group in which only some inputs are required.
 
         Either a policy of the required inputs alone, places counted among them, and the stage in which the

@@ -1,0 +1,147 @@
+"""Hypothesis strategies for what may happen to a group: any policy, any options, any disorder."""
+
+from dataclasses import dataclass, replace
+
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from syncrelay.sync import (
+    ApproximateEpsilonTime,
+    ApproximateTime,
+    ApproximateTimeEager,
+    DropReason,
+    EqualKey,
+    ExactTime,
+    LatestTime,
+    Message,
+    Restamp,
+    SyncGroup,
+)
+
+TICK = 10_000_000
+START = 10**12
+REPEATABLE = settings(derandomize=True, deadline=None, max_examples=150, database=None)
+
+
+@dataclass(frozen=True)
+class Options:
+    """A group, but for its policy's name; times in ticks."""
+
+    required: tuple
+    queue_size: int = 3
+    slop: int = 2
+    age_penalty: float = 0.1
+    min_periods: tuple = ()
+    max_wait: int | None = None
+    offsets: tuple = ()
+    restamp: object = None
+    every: int = 1
+    min_set_period: int | None = None
+
+    @property
+    def n_inputs(self):
+        return len(self.required)
+
+
+POLICIES = {
+    "exact_time": lambda sizes, _: ExactTime(**sizes),
+    "approximate_time": lambda sizes, options: ApproximateTime(
+        **sizes,
+        slop_ns=options.slop * TICK,
+        age_penalty=options.age_penalty,
+        min_periods_ns=[period * TICK for period in options.min_periods] or None,
+    ),
+    "approximate_time_eager": lambda sizes, options: ApproximateTimeEager(**sizes, slop_ns=options.slop * TICK),
+    "approximate_epsilon_time": lambda sizes, options: ApproximateEpsilonTime(**sizes, epsilon_ns=options.slop * TICK),
+    "latest_time": lambda sizes, options: LatestTime(
+        **sizes, trigger=options.required.index(True), max_age_ns=options.slop * TICK
+    ),
+    "equal_key": lambda sizes, _: EqualKey(**sizes),
+}
+BY_STAMP = [name for name in POLICIES if name != "equal_key"]
+ONCE = [name for name in POLICIES if name != "latest_time"]
+
+
+def make_policy(name, options):
+    return POLICIES[name]({"n_inputs": options.n_inputs, "queue_size": options.queue_size}, options)
+
+
+def make_group(name, options):
+    return SyncGroup(
+        make_policy(name, options),
+        required=options.required,
+        max_wait_ns=None if options.max_wait is None else options.max_wait * TICK,
+        offsets_ns=[offset * TICK for offset in options.offsets] or None,
+        restamp=options.restamp,
+        every=options.every,
+        min_set_period_ns=None if options.min_set_period is None else options.min_set_period * TICK,
+    )
+
+
+@dataclass(frozen=True)
+class Step:
+    """What happens to a group at `now`: a message if there is one, else `expire`."""
+
+    now: int
+    message: Message | None
+
+    def shifted(self, by):
+        return replace(self, now=self.now + by)
+
+
+def few(low, high):
+    return st.integers(low, high)
+
+
+@st.composite
+def options(draw, *, optional=True, limited=True, thinned=True):
+    n_inputs = draw(few(1, 4))
+    required = draw(st.tuples(*[st.sampled_from((True, not optional))] * n_inputs).filter(any))
+    waits = few(0, 8) if not all(required) else st.none() | few(0, 8) if limited else st.none()
+    return Options(
+        required=required,
+        queue_size=draw(few(1, 5)),
+        slop=draw(few(0, 5)),
+        age_penalty=draw(st.sampled_from((0.0, 0.1, 0.7, 2.0))),
+        min_periods=draw(st.just(()) | st.tuples(*[few(0, 4)] * n_inputs)),
+        max_wait=draw(waits),
+        offsets=draw(st.just(()) | st.tuples(*[few(-5, 5)] * n_inputs)),
+        restamp=draw(st.none() | st.sampled_from(Restamp) | few(0, n_inputs - 1)),
+        every=draw(few(1, 3)) if thinned else 1,
+        min_set_period=draw(st.none() | few(1, 6)) if thinned else None,
+    )
+
+
+LAGS = (0, 0, 0, 0, 0, 1, 1, 2, 3, 5, 8, 13, 100, 101, 250)
+"""By how much a stamp is behind the newest: jitter between inputs, inversions, jumps of more than a second."""
+
+
+@st.composite
+def steps(draw, n_inputs, *, disorder=True, jumps=True):
+    """Messages and expiries as they may come; with `disorder` the clock falls at times, too."""
+    lags = st.sampled_from([lag for lag in LAGS if disorder and (jumps or lag < 100)] or [0])
+    kinds = st.tuples(few(-1, n_inputs - 1), few(0, 3), lags, few(0, 3))
+    falls = st.sampled_from((0,) * 20 + (30,)) if disorder else st.just(0)
+    newest, clock, drawn = START // TICK, START // TICK, []
+    for number, (index, advance, lag, key) in enumerate(draw(st.lists(kinds, max_size=60))):
+        newest += advance
+        clock += advance - draw(falls)
+        stamp = (newest - lag) * TICK if lag != 13 or not disorder else 0
+        message = None if index < 0 else Message(index, stamp, number, key=newest // 2 + key)
+        drawn.append(Step(now=clock * TICK, message=message))
+    return drawn
+
+
+def take(group, step):
+    if step.message is None:
+        return group.expire(now=step.now)
+    return group.add(step.message, now=step.now)
+
+
+def run(group, taken):
+    return [list(take(group, step)) for step in taken]
+
+
+def finish(group, taken):
+    """What leaves step by step, and at the end by a flush."""
+    return [*run(group, taken), list(group.flush(DropReason.SHUTDOWN))]

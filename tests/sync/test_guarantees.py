@@ -1,0 +1,396 @@
+"""What is promised of every policy and group, whatever happens to them: a property for each promise."""
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from rigs import (
+    BY_STAMP,
+    ONCE,
+    POLICIES,
+    REPEATABLE,
+    START,
+    TICK,
+    few,
+    finish,
+    make_group,
+    make_policy,
+    options,
+    run,
+    steps,
+    take,
+)
+
+from syncrelay.sync import Drop, DropReason, Match, Message, Restamp
+
+every_policy = pytest.mark.parametrize("policy", POLICIES)
+
+
+@st.composite
+def rigs(draw, *, disorder=True, jumps=True, **kinds):
+    chosen = draw(options(**kinds))
+    return chosen, draw(steps(chosen.n_inputs, disorder=disorder, jumps=jumps))
+
+
+def sets_of(outcomes):
+    return [outcome for outcome in outcomes if isinstance(outcome, Match)]
+
+
+def members(match):
+    return [message for message in match.messages if message is not None]
+
+
+def flat(left):
+    return [outcome for outcomes in left for outcome in outcomes]
+
+
+class Tally:
+    """Counts from outside, by each message's own fate."""
+
+    def __init__(self, n_inputs):
+        self.fed = Counter()
+        self.matched = [set() for _ in range(n_inputs)]
+        self.dropped = [Counter() for _ in range(n_inputs)]
+
+    def note(self, step, outcomes):
+        if step.message is not None:
+            self.fed[step.message.input] += 1
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                for message in members(outcome):
+                    self.matched[message.input].add(message.payload)
+            else:
+                self.dropped[outcome.message.input][outcome.reason] += 1
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs())
+def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(policy, rig):
+    chosen, taken = rig
+    group = make_group(policy, chosen)
+    tally = Tally(chosen.n_inputs)
+    for step in taken:
+        tally.note(step, take(group, step))
+        for index, counts in enumerate(group.counts()):
+            assert counts.fed == tally.fed[index]
+            assert counts.matched == len(tally.matched[index])
+            assert counts.dropped == tally.dropped[index]
+            assert counts.fed == counts.matched + sum(counts.dropped.values()) + counts.buffered
+    left = group.flush(DropReason.SHUTDOWN)
+    assert all(drop.reason is DropReason.SHUTDOWN for drop in left)
+    assert [counts.buffered for counts in group.counts()] == [0] * chosen.n_inputs
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs())
+def test_each_message_leaves_once_in_a_set_or_as_a_drop_with_one_reason(policy, rig):
+    chosen, taken = rig
+    left = flat(finish(make_group(policy, chosen), taken))
+    dropped = Counter(outcome.message for outcome in left if isinstance(outcome, Drop))
+    matched = Counter(message for match in sets_of(left) for message in members(match))
+    fed = Counter(step.message for step in taken if step.message is not None)
+    if policy != "latest_time":
+        assert dropped + matched == fed
+    assert dropped + Counter(set(matched)) == fed
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs(disorder=False))
+def test_sets_leave_in_the_order_of_their_stamps(policy, rig):
+    chosen, taken = rig
+    left = sets_of(flat(run(make_group(policy, chosen), taken)))
+    first = chosen.required.index(True)
+    for index in range(chosen.n_inputs):
+        stamps = [match.messages[index].stamp for match in left if match.messages[index] is not None]
+        if policy == "equal_key" or (policy == "latest_time" and index != first):
+            assert stamps == sorted(stamps)
+        else:
+            assert stamps == sorted(set(stamps))
+    if all(chosen.required):
+        for pick in (min, max):
+            picked = [pick(shifted(match, chosen)) for match in left]
+            assert picked == sorted(picked)
+
+
+def shifted(match, chosen, inputs=(True,) * 9):
+    offsets = chosen.offsets or (0,) * chosen.n_inputs
+    kept = [message for message in members(match) if inputs[message.input]]
+    return [message.stamp + offsets[message.input] * TICK for message in kept]
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs(jumps=False))
+def test_without_a_jump_no_input_ever_goes_back(policy, rig):
+    chosen, taken = rig
+    left = sets_of(flat(run(make_group(policy, chosen), taken)))
+    for index in range(chosen.n_inputs):
+        messages = [match.messages[index] for match in left if match.messages[index] is not None]
+        stamps = [message.stamp for message in messages if message.stamp]
+        assert stamps == sorted(stamps)
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs())
+def test_a_set_has_all_required_inputs_and_fits(policy, rig):
+    chosen, taken = rig
+    for match in sets_of(flat(run(make_group(policy, chosen), taken))):
+        assert [message.input for message in members(match)] == [
+            index for index, message in enumerate(match.messages) if message is not None
+        ]
+        assert all(match.messages[index] for index, needed in enumerate(chosen.required) if needed)
+        stamps = shifted(match, chosen)
+        if policy == "equal_key":
+            assert len({message.key for message in members(match)}) == 1
+        else:
+            assert max(stamps) - min(stamps) <= (0 if policy == "exact_time" else chosen.slop * TICK)
+        if policy == "latest_time":
+            assert max(stamps) == stamps[members(match).index(match.messages[chosen.required.index(True)])]
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs(optional=False, limited=False), shift=st.integers(-START, START))
+def test_without_max_wait_the_clock_changes_nothing(policy, rig, shift):
+    chosen, taken = rig
+    assume(chosen.min_set_period is None or policy != "equal_key")
+    later = [step.shifted(shift * number) for number, step in enumerate(taken)]
+    assert run(make_group(policy, chosen), taken) == run(make_group(policy, chosen), later)
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs())
+def test_expiring_more_often_changes_nothing_that_is_due(policy, rig):
+    chosen, taken = rig
+    group, eager = make_group(policy, chosen), make_group(policy, chosen)
+    clock = START
+    for step in taken:
+        clock = max(clock, step.now)  # a clock that rises: one that falls is seen when it is seen
+        expected = list(take(group, replace(step, now=clock)))
+        before = []
+        while (deadline := eager.next_deadline()) is not None and deadline <= clock:
+            before += eager.expire(now=clock)
+        assert [*before, *take(eager, replace(step, now=clock))] == expected
+        assert list(eager.expire(now=clock)) == []
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs())
+def test_nothing_waits_longer_than_max_wait_even_when_the_clock_falls(policy, rig):
+    chosen, taken = rig
+    group = make_group(policy, chosen)
+    for step in taken:
+        take(group, step)
+        deadline = group.next_deadline()
+        if chosen.max_wait is None:
+            assert deadline is None
+        else:
+            assert deadline is None or step.now < deadline <= step.now + chosen.max_wait * TICK
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs())
+def test_what_is_buffered_is_bounded(policy, rig):
+    chosen, taken = rig
+    group = make_group(policy, chosen)
+    for step in taken:
+        take(group, step)
+        # A queue, the sets that wait for optional inputs, and what thinning may yet let pass.
+        assert all(counts.buffered <= 2 * chosen.queue_size + 1 for counts in group.counts())
+    if all(chosen.required) and chosen.every == 1 and chosen.min_set_period is None:
+        assert all(counts.buffered <= chosen.queue_size for counts in group.counts())
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs(thinned=False, disorder=False))
+def test_optional_inputs_never_change_which_required_messages_go_together(policy, rig):
+    chosen, taken = rig
+    assume(not all(chosen.required))
+    mixed = sets_of(flat(run(make_group(policy, chosen), taken)))
+    alone = replace(
+        chosen,
+        required=(True,) * sum(chosen.required),
+        offsets=only_required(chosen.offsets, chosen),
+        min_periods=only_required(chosen.min_periods, chosen),
+        restamp=None,
+    )
+    places = {index: place for place, index in enumerate(only_required(range(chosen.n_inputs), chosen))}
+    group = make_group(policy, alone)
+    expected = []
+    for step in taken:
+        if step.message is not None and step.message.input in places:
+            moved = replace(step, message=step.message._replace(input=places[step.message.input]))
+        else:
+            moved = replace(step, message=None)
+        expected += [[message.payload for message in match.messages] for match in sets_of(take(group, moved))]
+    found = [[match.messages[index].payload for index in places] for match in mixed]
+    assert found == expected[: len(found)]
+    if policy != "equal_key":
+        assert len(expected) - len(found) <= chosen.queue_size, "sets wait, they don't vanish"
+
+
+def only_required(values, chosen):
+    return tuple(value for value, needed in zip(values, chosen.required, strict=False) if needed)
+
+
+@pytest.mark.parametrize("policy", BY_STAMP)
+@REPEATABLE
+@given(rig=rigs(thinned=False))
+def test_an_offset_is_as_if_the_stamps_were_other_ones(policy, rig):
+    chosen, taken = rig
+    assume(chosen.offsets)
+    moved = [
+        step
+        if step.message is None or step.message.stamp == 0
+        else replace(
+            step,
+            message=step.message._replace(stamp=step.message.stamp + chosen.offsets[step.message.input] * TICK),
+        )
+        for step in taken
+    ]
+    told = run(make_group(policy, replace(chosen, restamp=None)), taken)
+    expected = run(make_group(policy, replace(chosen, restamp=None, offsets=())), moved)
+    assert [list(map(names, outcomes)) for outcomes in told] == [list(map(names, outcomes)) for outcomes in expected]
+
+
+def names(outcome):
+    if isinstance(outcome, Drop):
+        return outcome.message.payload, outcome.reason
+    return tuple(message and message.payload for message in outcome.messages)
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs(disorder=False, thinned=False), every=few(1, 4), period=few(1, 8))
+def test_thinning_lets_some_sets_pass_whole_and_evenly(policy, rig, every, period):
+    chosen, taken = rig
+    whole = sets_of(flat(run(make_group(policy, chosen), taken)))
+    each = sets_of(flat(run(make_group(policy, replace(chosen, every=every)), taken)))
+    assert each == whole[::every]
+    rated = sets_of(flat(run(make_group(policy, replace(chosen, min_set_period=period)), taken)))
+    assert [match for match in whole if match in rated] == rated
+    assert rated[:1] == whole[:1]
+    stamps = [max(shifted(match, chosen, chosen.required)) for match in rated]
+    for first in range(len(stamps)):
+        for last in range(first, len(stamps)):
+            assert last - first + 1 <= (stamps[last] - stamps[first]) // (period * TICK) + 2
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs())
+def test_restamp_is_a_stamp_of_the_set(policy, rig):
+    chosen, taken = rig
+    for match in sets_of(flat(run(make_group(policy, chosen), taken))):
+        stamps = [message.stamp for message in members(match)]
+        if chosen.restamp is None:
+            assert match.stamp is None
+        elif chosen.restamp is Restamp.LATEST:
+            assert match.stamp == max(stamps)
+        elif chosen.restamp is Restamp.EARLIEST or match.messages[chosen.restamp] is None:
+            assert match.stamp == min(stamps)
+        else:
+            assert match.stamp == match.messages[chosen.restamp].stamp
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs(disorder=False), gap=few(101, 500))
+def test_the_second_pass_of_a_looped_recording_gives_the_sets_of_the_first(policy, rig, gap):
+    chosen, taken = rig
+    taken = [step for step in taken if step.message is not None]
+    assume(taken)
+    # A recording long enough for a jump, in which each input has a message at the end.
+    ends = [
+        Message(index, taken[-1].message.stamp + gap * TICK, -1 - index, key=-1 - index)
+        for index in range(chosen.n_inputs)
+    ]
+    last = replace(taken[-1], message=None).shifted(10 * TICK)  # time enough for what waits
+    recording = [*taken, *(replace(taken[-1], message=end) for end in ends), last]
+    length = gap * TICK * 10
+    again = [step.shifted(length) for step in recording]
+    group = make_group(policy, chosen)
+    one = run(group, recording)
+    two = run(group, again)
+    assert sets_of(flat(two)) == sets_of(flat(one))
+
+
+@every_policy
+@REPEATABLE
+@given(rig=rigs(disorder=False, optional=False, limited=False), data=st.data())
+def test_left_overs_of_the_first_pass_do_not_disturb_the_second(policy, rig, data):
+    chosen, taken = rig
+    taken = [step.message for step in taken if step.message is not None]
+    assume(taken)
+    end = taken[-1].stamp + 200 * TICK
+    tail = [
+        Message(index, end + number * TICK, f"{index}{number}", key=-1)
+        for number in range(3)
+        for index in range(chosen.n_inputs)
+    ]
+    recording = [*taken, *tail]
+    group = make_group(policy, chosen)
+    one = [group.add(message, now=0) for message in recording]
+    # What the inputs still have of the first pass comes among the first messages of the second.
+    late = tail[-chosen.n_inputs + 1 :] if chosen.n_inputs > 1 else []
+    group = make_group(policy, chosen)
+    for message in recording[: len(recording) - len(late)]:
+        group.add(message, now=0)
+    begun, two = {taken[0].input}, [group.add(taken[0], now=0)]
+    waiting = list(late)
+    for message in recording[1:]:
+        for over in [over for over in waiting if over.input not in begun and message not in tail]:
+            if data.draw(st.booleans()):
+                continue
+            waiting.remove(over)
+            assert list(group.add(over, now=0)) == [Drop(over, DropReason.TIME_JUMP)]
+        if message.input not in begun:
+            begun.add(message.input)
+        two.append(group.add(message, now=0))
+    assert sets_of(flat(two)) == sets_of(flat(one))
+
+
+@REPEATABLE
+@given(data=st.data(), chosen=options(optional=False, limited=False, thinned=False))
+def test_sets_of_approximate_time_depend_on_stamps_alone_while_no_queue_is_full(data, chosen):
+    chosen = replace(chosen, queue_size=100, min_periods=())  # a period that is not kept leads astray
+    streams = [
+        [Message(index, stamp * TICK, (index, stamp)) for stamp in sorted(data.draw(st.sets(few(1, 60), max_size=20)))]
+        for index in range(chosen.n_inputs)
+    ]
+    told = []
+    for _ in range(2):
+        policy = make_policy("approximate_time", chosen)
+        waiting = [list(stream) for stream in streams]
+        left = []
+        while any(waiting):
+            stream = data.draw(st.sampled_from([stream for stream in waiting if stream]))
+            left += sets_of(policy.add(stream.pop(0)))
+        told.append(left)
+    assert told[0] == told[1]
+
+
+@pytest.mark.parametrize("policy", ONCE)
+@REPEATABLE
+@given(rig=rigs(optional=False, limited=False, thinned=False))
+def test_a_policy_alone_loses_nothing_either(policy, rig):
+    chosen, taken = rig
+    subject = make_policy(policy, chosen)
+    fed = [step.message for step in taken if step.message is not None]
+    left = flat([subject.add(message) for message in fed])
+    left += subject.flush(DropReason.SHUTDOWN)
+    matched = [message for match in sets_of(left) for message in members(match)]
+    dropped = [outcome.message for outcome in left if isinstance(outcome, Drop)]
+    assert Counter(matched + dropped) == Counter(fed)
+    assert [subject.buffered(place) for place in range(chosen.n_inputs)] == [0] * chosen.n_inputs
+    assert subject.opened == subject.closed
