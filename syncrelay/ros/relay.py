@@ -115,10 +115,10 @@ class Relay:
 
     def drain(self) -> RelaySnapshot:
         """Take in what has arrived, let go of what is buffered, stop receiving; what became of it all."""
-        if self._receiving is not None:
+        receiving, self._receiving = self._receiving, None
+        if receiving is not None:
             self._loop.stop()
-            self._receiving.result()
-            self._receiving = None
+            receiving.result()
             for group in self._groups:
                 group.flush(DropReason.SHUTDOWN)
             for topic_input in self._inputs:
@@ -126,8 +126,13 @@ class Relay:
         return self._snapshot()
 
     def close(self) -> None:
-        """Drain, then leave the ROS graph."""
-        self.drain()
+        """Drain, then leave the ROS graph, also when draining fails."""
+        try:
+            self.drain()
+        finally:
+            self._leave_graph()
+
+    def _leave_graph(self) -> None:
         if self._jump_handle is not None:
             self._jump_handle.unregister()
         self._services.shutdown()

@@ -8,14 +8,14 @@ from syncrelay.sync.messages import DropReason
 
 @dataclass(frozen=True, slots=True)
 class RecentSet:
-    """A set that left: the stamps it was matched by in nanoseconds, in input order, None where one was missing."""
+    """A set that left: its messages' stamps as they came, in nanoseconds, in input order, None where one was missing."""
 
     stamps: tuple[int | None, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class RecentDrop:
-    """A message that left unmatched; stamp in nanoseconds."""
+    """A message that left unmatched; its stamp as it came, in nanoseconds."""
 
     input: int
     stamp: int

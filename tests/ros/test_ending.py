@@ -3,6 +3,7 @@
 import random
 import signal
 import subprocess
+import sys
 
 import pytest
 
@@ -100,3 +101,27 @@ def test_it_leaves_nothing_in_shared_memory(stage: Stage, number: signal.Signals
     relay.send(number)
     assert relay.wait() == 0
     assert stage.left_in_shared_memory() == set()
+
+
+# A bug of ours on the receive thread: the real relay with one method that raises.
+_WITH_A_BUG = """\
+import sys
+from syncrelay.cli import main
+from syncrelay.ros.group import GroupRelay
+def receive(*_): raise ZeroDivisionError("in the middle of the data")
+GroupRelay.receive = receive
+sys.exit(main(["--config", sys.argv[1]]))
+"""
+
+
+def test_a_bug_on_the_receive_thread_ends_the_relay_and_is_told(stage: Stage):
+    path = stage.folder / "fusion.yaml"
+    path.write_text(config({"front": _FRONT}))
+    (stage.folder / "with_a_bug.py").write_text(_WITH_A_BUG)
+    relay = stage.start("relay", [sys.executable, str(stage.folder / "with_a_bug.py"), str(path)])
+    player = stage.player(_PAIR)
+    player.match()
+    player.start(at("/camera", *range(0, 60_000, 50)))
+    assert relay.wait() == 70
+    assert "ZeroDivisionError: in the middle of the data" in relay.stderr
+    assert "this is a bug in syncrelay" in relay.stderr
