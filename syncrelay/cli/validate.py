@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
+from syncrelay.config.source import STDIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +28,12 @@ def validate(files: Sequence[str], output_format: str) -> int:
 
 
 def _check(file: str) -> Finding:
+    name = "<stdin>" if file == STDIN else file
     try:
         config = load(file)
     except ConfigError as error:
-        return Finding(file, None, error.problems)
-    return Finding(file, config, config.notes)
+        return Finding(name, None, error.problems)
+    return Finding(name, config, config.notes)
 
 
 def _print_text(findings: Sequence[Finding]) -> None:

@@ -38,7 +38,7 @@ def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[
     except yaml.MarkedYAMLError as error:
         text, span = in_words(error, source.lines)
         raise ConfigError([source.problem(text, span=span, code="yaml")]) from error
-    if composer.root is None:
+    if composer.root is None or (isinstance(composer.root, ScalarNode) and composer.root.value is None):
         raise ConfigError([source.problem(_EMPTY, span=None, code="empty")])
     return Document(source.name, source.lines, composer.root), composer.problems
 
@@ -79,7 +79,7 @@ class _Composer:
             case yaml.SequenceStartEvent():
                 self._begin(SequenceNode(self._span(event)), event)
             case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
-                self._end()
+                self._end(event)
 
     def _begin(self, node: MappingNode | SequenceNode, event: Any) -> None:
         self._check_tag(event)
@@ -90,8 +90,12 @@ class _Composer:
             raise self._refusal(f"more than {_DEEPEST} levels of nesting", node.span)
         self._open.append(_Open(node, event.anchor))
 
-    def _end(self) -> None:
+    def _end(self, event: Any) -> None:
         ended = self._open.pop()
+        closes_bracket = event.end_mark.column > event.start_mark.column
+        if closes_bracket and event.end_mark.line == ended.node.span.line - 1:
+            start = ended.node.span
+            ended.node.span = Span(start.line, start.column, event.end_mark.column - start.column + 1)
         self._place(ended.node, ended.anchor)
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
@@ -100,6 +104,10 @@ class _Composer:
         if self._awaits_key():
             self._key(event.value, span)
             return
+        top = self._open[-1] if self._open else None
+        if not event.value and top is not None and top.key is not None:
+            # Nothing stands there: its key is what can be shown.
+            span = top.key
         self._place(self._value(event, span), event.anchor)
 
     def _key(self, key: str, span: Span) -> None:
@@ -122,11 +130,11 @@ class _Composer:
 
     def _resolved(self, event: yaml.ScalarEvent) -> Scalar:
         written: str = event.value
-        text = substitute(written, self._environ) if "$" in written else written
-        is_plain = event.implicit[0]
-        if not is_plain or (written and not text):
-            return text
-        return read_plain(text)
+        if "$" in written:
+            # Read as if it stood there unquoted: within braces a variable has no other way to be a number.
+            text = substitute(written, self._environ)
+            return read_plain(text) if text else ""
+        return read_plain(written) if event.implicit[0] else written
 
     def _alias(self, event: yaml.AliasEvent) -> None:
         span, name = self._span(event), str(event.anchor)
@@ -163,7 +171,8 @@ class _Composer:
 
     def _check_tag(self, event: Any) -> None:
         if event.tag is not None:
-            raise self._refusal(f"tags such as {quoted(event.tag)} are not supported", self._span(event))
+            written = event.tag.replace("tag:yaml.org,2002:", "!!")
+            raise self._refusal(f"tags such as {quoted(written)} are not supported", self._span(event))
 
     def _report(self, text: str, span: Span, *, code: str) -> None:
         self.problems.append(self._source.problem(text, path=dotted(self._path()), span=span, code=code))

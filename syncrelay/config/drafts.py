@@ -14,7 +14,7 @@ from syncrelay.config.names import (
     expand,
 )
 from syncrelay.config.problems import Path
-from syncrelay.config.typenames import check_type_name
+from syncrelay.config.typenames import check_field_path, check_type_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,8 @@ class TopicDraft:
     output: str | None
     has_own_output: bool
     qos: Any
-    stamp: Any
+    has_header_stamp: bool
+    stamp_field: str | None
 
     @property
     def output_path(self) -> Path:
@@ -83,6 +84,7 @@ def _topic(path: Path, node: MappingNode, *, prefix: str, absolute: Callable[[st
         output = _checked(check_topic_name, _value(node, "output"))
     else:
         output = default_output(topic, prefix=prefix) if topic else None
+    stamp = _value(node, "stamp")
     return TopicDraft(
         path=path,
         topic=absolute(topic) if topic else None,
@@ -90,7 +92,8 @@ def _topic(path: Path, node: MappingNode, *, prefix: str, absolute: Callable[[st
         output=absolute(output) if output else None,
         has_own_output=has_own_output,
         qos=_value(node, "qos") or "auto",
-        stamp=_value(node, "stamp") or "header",
+        has_header_stamp="stamp" not in node.entries or stamp == "header",
+        stamp_field=_checked(check_field_path, stamp.get("field")) if isinstance(stamp, dict) else None,
     )
 
 

@@ -7,13 +7,14 @@ from operator import or_
 from types import GenericAlias
 from typing import Annotated, Any, Final, Literal, get_args
 
-from pydantic import AfterValidator, BaseModel, Discriminator, Field, Tag, create_model
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Tag, create_model
 from pydantic.fields import FieldInfo
 
 from syncrelay.config.keys import Keys
 from syncrelay.config.models import NodeConfig, Topic
 from syncrelay.config.names import check_group_name
 from syncrelay.config.policies import GROUP_MODELS, AnyGroup, Topics
+from syncrelay.config.wording import describe
 
 GROUP_MODEL_OF: Final[dict[str, type[AnyGroup]]] = {
     get_args(model.model_fields["policy"].annotation)[0]: model for model in GROUP_MODELS
@@ -80,10 +81,17 @@ _Group: Any = Annotated[reduce(or_, _BRANCHES), Discriminator(_tag_of_group)]
 _Groups: Any = GenericAlias(dict, (Annotated[str, AfterValidator(check_group_name)], _Group))
 
 
+def _version(value: Any) -> Any:
+    """Return 1; to Python `true` and 1.0 are that too."""
+    if type(value) is not int or value != 1:
+        raise ValueError(f"expected 1, the version of the format, found {describe(value)}")
+    return value
+
+
 class FileKeys(Keys):
     """A syncrelay file: which topics are matched by time, and where the matched messages go."""
 
-    version: Literal[1] = Field(description="Version of this format: 1.")
+    version: Annotated[Literal[1], BeforeValidator(_version)] = Field(description="Version of this format: 1.")
     node: NodeConfig = Field(default_factory=NodeConfig, description="The ROS node.")
     defaults: Keys | None = None
     groups: dict[str, AnyGroup]

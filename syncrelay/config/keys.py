@@ -11,7 +11,7 @@ from syncrelay.config.names import (
     check_output_prefix,
     check_topic_name,
 )
-from syncrelay.config.typenames import check_type_name
+from syncrelay.config.typenames import check_field_path, check_type_name
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import describe
 
@@ -82,3 +82,6 @@ Namespace = Annotated[str, AfterValidator(check_namespace), _text(rf"^(/|/?{_TOK
 
 TypeName = Annotated[str, BeforeValidator(check_type_name), _text("^[A-Za-z][A-Za-z0-9_]*/msg/[A-Za-z][A-Za-z0-9_]*$")]
 """A message type in full, `package/msg/Name`."""
+
+FieldPath = Annotated[str, AfterValidator(check_field_path), _text(r"^[A-Za-z]\w*(\.[A-Za-z]\w*)*$")]
+"""Fields of a message joined by dots."""

@@ -20,9 +20,7 @@ from syncrelay.config.source import Source, check_text, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
 
-_NO_INDEX = (
-    "types not checked: there is no ament index here (neither AMENT_PREFIX_PATH nor the Python environment has one)"
-)
+_NO_INDEX = "message types were not checked: there is no ament index here (source ROS 2, or install syncrelay[ros])"
 
 
 def load(

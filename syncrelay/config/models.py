@@ -1,12 +1,13 @@
 """What a file may say. The JSON Schema and the errors come from these models and nowhere else."""
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from syncrelay.config.keys import (
     NOT_NULL,
     Duration,
+    FieldPath,
     Keys,
     Namespace,
     NodeName,
@@ -17,6 +18,7 @@ from syncrelay.config.keys import (
     tag_of_mapping,
 )
 from syncrelay.config.qos import AUTO, Qos
+from syncrelay.config.wording import describe
 
 
 class NodeConfig(Keys):
@@ -39,8 +41,7 @@ class NodeConfig(Keys):
 class StampField(Keys):
     """A stamp in a field of its own."""
 
-    field: str = Field(
-        pattern=r"^[A-Za-z]\w*(\.[A-Za-z]\w*)*$",
+    field: FieldPath = Field(
         description="Path of a builtin_interfaces/msg/Time in the message, fields joined by dots.",
         examples=["status.stamp"],
     )
@@ -103,9 +104,17 @@ class PacedTopic(Topic):
     )
 
 
+def _restamp(value: Any) -> str:
+    """Return a text; which texts are inputs only the group can tell."""
+    if not isinstance(value, str):
+        raise ValueError(f"expected none, earliest, latest or an input topic, found {describe(value)}")  # noqa: TRY004
+    return value
+
+
 class Group(Keys):
     """Keys that the groups of every policy have."""
 
+    policy: str
     queue_size: int = Field(
         default=10,
         ge=1,
@@ -113,7 +122,7 @@ class Group(Keys):
         description="Messages kept per input while they wait for a match. Default: 10.",
         examples=[10],
     )
-    restamp: str = Field(
+    restamp: Annotated[str, BeforeValidator(_restamp)] = Field(
         default="none",
         description=(
             "Stamp of all messages of a set as they leave: `none` (each keeps its own), `earliest` or `latest` of the"

@@ -18,15 +18,7 @@ def check_topic_name(name: object) -> str:
         raise ValueError(f"expected a topic name such as /camera/image_raw, found {describe(name)}")  # noqa: TRY004
     if not name:
         raise ValueError("a topic name is empty")
-    if "{" in name or "}" in name:
-        raise ValueError(
-            f"{quoted(name)}: substitutions such as {{ns}} are not filled in here, write a relative name instead"
-        )
-    if name == "~" or (name.startswith("~") and not name.startswith("~/")):
-        raise ValueError(f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points")
-    _check_tokens(name.removeprefix("~/").removeprefix("/"), whole=name, kind="topic name")
-    if len(name) > LONGEST_TOPIC:
-        raise ValueError(f"a topic name of {len(name)} characters, at most {LONGEST_TOPIC} are allowed")
+    _check_name(name, kind="topic name")
     return name
 
 
@@ -39,7 +31,9 @@ def check_namespace(name: str) -> str:
 
 def check_output_prefix(prefix: str) -> str:
     """Return what default output names begin with; raises ValueError saying what is wrong."""
-    return prefix if prefix in ("", "/", "~") else check_topic_name(prefix)
+    if prefix not in ("", "/", "~"):
+        _check_name(prefix, kind="prefix of topic names")
+    return prefix
 
 
 def check_node_name(name: str) -> str:
@@ -54,6 +48,8 @@ def check_node_name(name: str) -> str:
 
 def check_group_name(name: str) -> str:
     """Return a group's name: one token of a topic name; raises ValueError saying what is wrong."""
+    if "$" in name:
+        raise ValueError(f"variables are filled in in values only, found {quoted(name)}")
     if not _TOKEN.fullmatch(name):
         raise ValueError(
             f"a group name has letters, digits and `_`, and no digit first, found {quoted(name)}:"
@@ -88,3 +84,15 @@ def _check_tokens(tokens: str, *, whole: str, kind: str) -> None:
             raise ValueError(f"a {kind} has one `/` between its parts and none at the end, found {quoted(whole)}")
         if token[0].isdigit():
             raise ValueError(f"no part of a {kind} begins with a digit, found {quoted(token)} in {quoted(whole)}")
+
+
+def _check_name(name: str, *, kind: str) -> None:
+    if "{" in name or "}" in name:
+        raise ValueError(
+            f"{quoted(name)}: substitutions such as {{ns}} are not filled in here, write a relative name instead"
+        )
+    if name.startswith("~") and not name.startswith("~/"):
+        raise ValueError(f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points")
+    _check_tokens(name.removeprefix("~/" if name.startswith("~") else "/"), whole=name, kind=kind)
+    if len(name) > LONGEST_TOPIC:
+        raise ValueError(f"a {kind} of {len(name)} characters, at most {LONGEST_TOPIC} are allowed")

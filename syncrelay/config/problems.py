@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, TypeAlias
 
+from syncrelay.config.wording import printable
+
 Path: TypeAlias = tuple[str | int, ...]
 """Keys and list indices from the top of the file down to a value."""
 
@@ -48,5 +50,5 @@ def dotted(path: Path) -> str:
             text += f"[{step}]"
             continue
         text += "." if text else ""
-        text += step if _PLAIN_KEY.fullmatch(step) else json.dumps(step, ensure_ascii=False)
+        text += step if _PLAIN_KEY.fullmatch(step) else printable(json.dumps(step, ensure_ascii=False))
     return text

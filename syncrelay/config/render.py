@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from syncrelay.config.problems import Problem, Severity, Span
+from syncrelay.config.wording import printable
 
 _MOST_SHOWN: Final = 100
 _TAB_WIDTH: Final = 4
@@ -25,9 +26,10 @@ def render(problems: Sequence[Problem], *, colour: bool = False) -> str:
 
 def where(problem: Problem) -> str:
     """Return `file:line:column`, or the file alone if it is meant as a whole."""
+    file = printable(problem.file)
     if problem.span is None:
-        return problem.file
-    return f"{problem.file}:{problem.span.line}:{problem.span.column}"
+        return file
+    return f"{file}:{problem.span.line}:{problem.span.column}"
 
 
 def _block(problem: Problem, *, colour: bool) -> str:
@@ -47,12 +49,9 @@ def _excerpt(source: str, span: Span, *, colour: bool) -> str:
     if len(source) > _LONGEST_LINE:
         first = max(0, start - _LEAD)
     before = ("…" if first else "") + _shown(source[first:start])
-    token = _shown(source[start:end])
-    after = _shown(source[end : max(end, first + _LONGEST_LINE)])
-    if len(token) > _LONGEST_LINE:
-        token, after = token[:_LONGEST_LINE] + "…", ""
-    elif len(source) > max(end, first + _LONGEST_LINE):
-        after += "…"
+    last = min(len(source), first + _LONGEST_LINE)
+    token = _shown(source[start : min(end, last)])
+    after = _shown(source[end:last]) + ("…" if last < len(source) else "")
     number = f"{span.line:>5} | "
     gutter = " " * 5 + " | "
     underline = " " * _columns(before) + "^" * max(1, _columns(token))

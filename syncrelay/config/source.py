@@ -41,13 +41,15 @@ def read_source(path: str) -> Source:
     """Return the text of a file, `-` for standard input; raises ConfigError where it has none."""
     if path == STDIN:
         return decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name="<stdin>")
+    if not path:
+        raise _unreadable("''", "is no file name")
     try:
         with Path(path).open("rb") as file:
             content = file.read(_MOST_BYTES + 1)
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
     except ValueError as error:
-        raise _unreadable(repr(path), "not a file name") from error
+        raise _unreadable(path, "is no file name") from error
     return decode(content, name=path)
 
 

@@ -126,7 +126,9 @@ def _not_here(scene: _Scene) -> Fault:
         return f"indented by {spaces}, expected {one_of(map(str, below + above))} as above", content
     if scene.line[scene.column :].startswith("-"):
         return "a list item (`- `) where a key belongs", content
-    return "a key where a list item (`- `) belongs", content
+    of_item = [level for level in levels if level > scene.column][-1:]
+    hint = f"; indented by {of_item[0]} it belongs to the item above" if of_item else ""
+    return f"a key where a list item (`- `) belongs{hint}", content
 
 
 def _open_levels(scene: _Scene) -> list[int]:
@@ -174,6 +176,8 @@ def _open_quote(scene: _Scene) -> Fault:
 
 
 def _no_content(scene: _Scene) -> Fault:
+    if not scene.found:
+        return "expected a value, found the end of the file: is a bracket not closed?", scene.here()
     return f"expected a value, found {quoted(scene.found)}", scene.here()
 
 

@@ -18,7 +18,8 @@ from syncrelay.config.file import (
 from syncrelay.config.models import NodeConfig, StampField
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.qos import QosOverrides
-from syncrelay.config.wording import describe, did_you_mean, nearest, one_of
+from syncrelay.config.scalars import read_plain
+from syncrelay.config.wording import describe, did_you_mean, nearest, one_of, quoted
 
 Location: TypeAlias = tuple[str | int, ...]
 """A place in pydantic's words: a path with the tags of unions in it."""
@@ -53,6 +54,8 @@ _WHAT_IS_MISSING: Final = {
     "policy": f"expected {one_of(GROUP_MODEL_OF)}",
     "version": "expected `version: 1`",
 }
+# What a key takes beside single words.
+_MAPPING_FORMS: Final = {"qos": "a mapping", "stamp": "{field: path.to.a.Time}"}
 # So alike is `topic` to `topics`: meant is the key here, although there is such a key elsewhere.
 _A_SLIP: Final = 0.8
 # What YAML 1.1 and other formats take for a truth value.
@@ -80,7 +83,7 @@ def _problem(error: ErrorDetails, path: Path, document: Document) -> Problem:
             text = _unknown_key(error["loc"])
             return document.problem(path, text, code="unknown_key", span=document.key_span(path))
         case "missing":
-            text = f"missing, {_what_is_missing(path)}"
+            text = f"missing, {_what_is_missing(error['loc'])}"
             return document.problem(path, text, code="missing_key", span=_owner_span(path, document))
         case kind if kind in _EXPECTED:
             text = f"expected {_EXPECTED[kind]}, {_found(error['input'], kind)}"
@@ -98,20 +101,21 @@ def _bad_value(error: ErrorDetails) -> str:
         case "value_error":
             return str(context["error"])
         case "greater_than_equal":
-            return f"expected {context['ge']} or more, found {describe(found)}"
+            return f"expected {context['ge']:g} or more, found {describe(found)}"
         case "less_than_equal":
             return f"expected {context['le']} or less, found {describe(found)}"
         case "literal_error":
-            return _no_such_word(found, context["expected"])
+            words = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
+            return _no_such_word(found, words, error["loc"])
         case _:
             return f"{error['msg'][0].lower()}{error['msg'][1:]}, found {describe(found)}"
 
 
-def _no_such_word(found: object, expected: str) -> str:
-    words = [word.strip("'") for word in expected.replace(" or ", ", ").split(", ")]
+def _no_such_word(found: object, words: Sequence[str], loc: Location) -> str:
     if isinstance(found, str) and nearest(found, words):
-        return f"unknown value{did_you_mean(found, words)}"
-    return f"expected {one_of(words)}, found {describe(found)}"
+        return f"unknown value {quoted(found)}{did_you_mean(found, words)}"
+    choices = [*words, _MAPPING_FORMS[str(loc[-2])]] if loc[-1] == "<name>" else words
+    return f"expected {one_of(choices)}, found {describe(found)}"
 
 
 def _found(value: object, kind: str) -> str:
@@ -120,7 +124,7 @@ def _found(value: object, kind: str) -> str:
         return found
     if kind == "bool_type" and value.lower() in _TRUTH_WORDS:
         return f"{found}, which is no truth value in YAML 1.2"
-    if kind in ("int_type", "float_type") and value.strip().isdecimal():
+    if kind in ("int_type", "float_type") and isinstance(read_plain(value), int | float):
         return f"{found}: write it without quotes"
     return found
 
@@ -135,6 +139,8 @@ def _unknown_key(loc: Location) -> str:
     levels = [level for level, owner in _LEVELS.items() if key in owner.model_fields]
     if levels and nearest(key, model.model_fields, likeness=_A_SLIP) is None:
         return f"unknown key here, `{key}` is a key of {levels[0]}"
+    if "$" in key:
+        return "unknown key; variables are filled in in values only"
     if ":" in key:
         return "unknown key, is a space missing behind the colon?"
     hint = did_you_mean(key, model.model_fields)
@@ -171,16 +177,14 @@ def _meant_keys(errors: Sequence[ErrorDetails]) -> Iterator[Path]:
                 yield (*parents, meant)
 
 
-def _what_is_missing(path: Path) -> str:
-    key = str(path[-1])
+def _what_is_missing(loc: Location) -> str:
+    key = str(loc[-1])
     if key in _WHAT_IS_MISSING:
         return _WHAT_IS_MISSING[key]
-    models: tuple[type[BaseModel], ...] = (*GROUP_MODEL_OF.values(), TopicOfAnyPolicy, StampField)
-    for model in models:
-        info = model.model_fields.get(key)
-        if info is not None and info.examples:
-            return f"expected for example `{key}: {info.examples[0]}`"
-    return "expected"
+    model = _model(loc[:-1])
+    example = (model.model_fields[key].examples or [""])[0]
+    needs = f"{_policy(loc)} needs it, " if model in GROUP_MODEL_OF.values() else ""
+    return f"{needs}for example `{key}: {example}`"
 
 
 def _owner_span(path: Path, document: Document) -> Any:

@@ -21,21 +21,21 @@ def check_types(groups: Sequence[GroupDraft], document: Document, interfaces: In
 def _check_topic(topic: TopicDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
     if topic.type is None:
         return
-    fault = _not_installed(topic.type, interfaces)
     path = (*topic.path, "type")
+    span = document.value_span(path)
+    fault = _not_installed(topic.type, interfaces)
     if fault is not None:
         text, code = fault
-        yield document.problem(path, text, code=code, span=document.value_span(path))
-        return
-    fields = interfaces.fields(topic.type)
-    if fields is None:
-        text = f"{quoted(topic.type)} is installed without its .msg file, so its stamp was not checked"
-        yield document.problem(path, text, code="not_checked", span=document.value_span(path), severity=Severity.NOTE)
-        return
-    if topic.stamp == "header" and not _begins_with_header(fields):
-        yield _no_header(topic, fields, document, interfaces)
-    if isinstance(topic.stamp, dict) and isinstance(topic.stamp.get("field"), str):
-        yield from _check_field(topic, document, interfaces)
+        yield document.problem(path, text, code=code, span=span)
+    elif topic.has_header_stamp or topic.stamp_field is not None:
+        fields = interfaces.fields(topic.type)
+        if fields is None:
+            text = f"{quoted(topic.type)} is installed without its .msg file, so its stamp was not checked"
+            yield document.problem(path, text, code="not_checked", span=span, severity=Severity.NOTE)
+        elif topic.stamp_field is not None:
+            yield from _check_field(topic, topic.stamp_field, document, interfaces)
+        elif not _begins_with_header(fields):
+            yield _no_header(topic, fields, document, interfaces)
 
 
 def _not_installed(type_name: str, interfaces: Interfaces) -> tuple[str, str] | None:
@@ -43,7 +43,8 @@ def _not_installed(type_name: str, interfaces: Interfaces) -> tuple[str, str] | 
     if package not in interfaces.packages:
         if package in interfaces.other_packages:
             return f"the package {quoted(package)} defines no messages", "unknown_type"
-        hint = did_you_mean(package, interfaces.packages)
+        # Half of a package's name is _msgs or _interfaces.
+        hint = did_you_mean(package, interfaces.packages, likeness=0.8)
         return f"the package {quoted(package)} is not installed here, or not sourced{hint}", "package_missing"
     types = interfaces.types(package)
     if type_name in types:
@@ -53,9 +54,15 @@ def _not_installed(type_name: str, interfaces: Interfaces) -> tuple[str, str] | 
     for kind, word in (("srv", "a service"), ("action", "an action")):
         if f"{package}/{kind}/{name}" in types:
             return f"{quoted(name)} is {word} of {package}, expected a message type", "unknown_type"
-    close = nearest(type_name, messages) or nearest(type_name, _same_name_elsewhere(name, interfaces))
+    close = next(_same_name_elsewhere(name, interfaces), None) or _nearest_message(name, messages)
     hint = f", did you mean `{close}`?" if close else ""
     return f"the package {package} has no message {quoted(name)}{hint}", "unknown_type"
+
+
+def _nearest_message(name: str, messages: Sequence[str]) -> str | None:
+    by_name = {message.rpartition("/")[2]: message for message in messages}
+    close = nearest(name, by_name)
+    return by_name[close] if close else None
 
 
 def _same_name_elsewhere(name: str, interfaces: Interfaces) -> Iterator[str]:
@@ -89,36 +96,38 @@ def _time_paths(fields: Sequence[Field], interfaces: Interfaces, *, depth: int =
         yield from (f"{field.name}.{path}" for path in _time_paths(below or (), interfaces, depth=depth - 1))
 
 
-def _check_field(topic: TopicDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+def _check_field(topic: TopicDraft, field_path: str, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
     path = (*topic.path, "stamp", "field")
-    text = _field_fault(str(topic.type), topic.stamp["field"].split("."), interfaces)
+    text = _field_fault(str(topic.type), (), field_path.split("."), interfaces)
     if text is not None:
         yield document.problem(path, text, code="no_such_field", span=document.value_span(path))
 
 
-def _field_fault(type_name: str, steps: Sequence[str], interfaces: Interfaces) -> str | None:
-    """Follow a path of fields; say where it ends before it reaches a time. A type without .msg file is believed."""
+def _field_fault(type_name: str, above: tuple[str, ...], steps: Sequence[str], interfaces: Interfaces) -> str | None:
+    """Follow the steps of a path; say where it ends before it reaches a time. A type without .msg is believed."""
     first, *rest = steps
     fields = interfaces.fields(type_name)
     if fields is None:
-        return None if "/" in type_name else f"{type_name} has no fields, so no {quoted(first)}"
+        return None if "/" in type_name else f"{quoted(above[-1])} is {type_name}, which has no fields"
     by_name = {field.name: field for field in fields}
     field = by_name.get(first)
     if field is None:
-        hint = did_you_mean(first, by_name) or f", it has {one_of(by_name)}"
-        return f"{type_name} has no field {quoted(first)}{hint}"
+        close = nearest(first, by_name)
+        hint = f"did you mean `{'.'.join((*above, close, *rest))}`?" if close else f"it has {one_of(by_name)}"
+        return f"{type_name} has no field {quoted(first)}, {hint}"
     if field.is_array:
         return f"{quoted(first)} of {type_name} is an array, expected one {TIME}"
     if rest:
-        return _field_fault(field.type, rest, interfaces)
+        return _field_fault(field.type, (*above, first), rest, interfaces)
     if field.type == TIME:
         return None
-    return f"{quoted(first)} of {type_name} is {field.type}, expected {TIME}{_times_below(field, interfaces)}"
+    hint = _time_below((*above, first), field, interfaces)
+    return f"{quoted(first)} of {type_name} is {field.type}, expected {TIME}{hint}"
 
 
-def _times_below(field: Field, interfaces: Interfaces) -> str:
+def _time_below(path: tuple[str, ...], field: Field, interfaces: Interfaces) -> str:
     below = next(_time_paths(interfaces.fields(field.type) or (), interfaces), None)
-    return f", did you mean `{field.name}.{below}`?" if below else ""
+    return f", did you mean `{'.'.join((*path, below))}`?" if below else ""
 
 
 def _check_restamp(group: GroupDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:

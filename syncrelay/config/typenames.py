@@ -1,4 +1,4 @@
-"""The form of a message type's name: `package/msg/Name`."""
+"""The form of a message type's name, `package/msg/Name`, and of a path to one of its fields."""
 
 import re
 from typing import Final
@@ -9,6 +9,7 @@ _FULL: Final = re.compile(r"[A-Za-z]\w*/(msg|srv|action)/[A-Za-z]\w*", re.ASCII)
 _SHORT: Final = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)", re.ASCII)
 # As Python and C++ write it.
 _FOREIGN: Final = re.compile(r"([A-Za-z]\w*)(?:\.|::)msg(?:\.|::)([A-Za-z]\w*)", re.ASCII)
+_PATH: Final = re.compile(r"[A-Za-z]\w*(\.[A-Za-z]\w*)*", re.ASCII)
 _KINDS: Final = {"srv": "a service", "action": "an action"}
 
 
@@ -26,3 +27,10 @@ def check_type_name(name: object) -> str:
     if other is not None:
         raise ValueError(f"{quoted(name)} is not the full name, write `{other[1]}/msg/{other[2]}`")
     raise ValueError(f"{quoted(name)} is no message type, expected package/msg/Name such as sensor_msgs/msg/Image")
+
+
+def check_field_path(path: str) -> str:
+    """Return a path of fields if it has the form of one; raises ValueError saying what is wrong."""
+    if not _PATH.fullmatch(path):
+        raise ValueError(f"expected names of fields joined by dots, such as header.stamp, found {describe(path)}")
+    return path

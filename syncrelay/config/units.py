@@ -45,7 +45,7 @@ def parse_duration(value: object) -> int:
         raise ValueError(f"expected a duration such as 20ms, found {describe(value)}")  # noqa: TRY004
     if isinstance(value, str):
         return _whole_ns(*_number_and_unit(value), found=value)
-    if not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"expected a duration such as 20ms, found {describe(value)}")
     # repr gives the digits that were written, where the float itself is a little off.
     return _whole_ns(Decimal(repr(value)), NS_PER_UNIT["s"], found=f"{value} s")

@@ -15,18 +15,23 @@ def nearest(word: str, candidates: Iterable[str], *, likeness: float = 0.6) -> s
     return by_lower[found[0]] if found else None
 
 
-def did_you_mean(word: str, candidates: Iterable[str]) -> str:
+def did_you_mean(word: str, candidates: Iterable[str], *, likeness: float = 0.6) -> str:
     """Return `, did you mean ...?` for the nearest candidate, or nothing."""
-    found = nearest(word, candidates)
+    found = nearest(word, candidates, likeness=likeness)
     return f", did you mean `{found}`?" if found else ""
 
 
 def quoted(text: str) -> str:
     """Return the text in backticks, or quotes if it has some, on one line and no longer than can be read."""
-    line = text.replace("\n", "\\n").replace("\r", "\\r").replace("\t", "\\t")
+    line = printable(text)
     if len(line) > _LONGEST_QUOTE:
         line = line[: _LONGEST_QUOTE - 1] + "…"
     return f"'{line}'" if "`" in line else f"`{line}`"
+
+
+def printable(text: str) -> str:
+    """Return the text on one line, with escapes for what would move a cursor or hide in a terminal."""
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
 
 
 def describe(value: object) -> str:
