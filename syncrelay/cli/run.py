@@ -43,8 +43,9 @@ def run(
         stop.wake_with(relay.wake)
         while not stop.requested:
             relay.step()
-        for line in summarize(relay.drain()):
-            LOGGER.info(line)
+        for group in relay.drain().groups:
+            for line in summarize(group):
+                LOGGER.info(line, extra={"group": group.name})
     return 0
 
 

@@ -2,15 +2,14 @@
 
 from collections.abc import Iterator
 
-from syncrelay.ros.snapshot import InputSnapshot, RelaySnapshot
+from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot
 
 
-def summarize(snapshot: RelaySnapshot) -> Iterator[str]:
-    """A line per group and one per input below it."""
-    for group in snapshot.groups:
-        yield f"{group.name}: {group.sets} {'set' if group.sets == 1 else 'sets'}"
-        for each in group.inputs:
-            yield f"{group.name}:   {each.topic}: {_fates(each)}"
+def summarize(group: GroupSnapshot) -> Iterator[str]:
+    """A line for the group, and one for each input."""
+    yield f"{group.name}: {group.sets} {'set' if group.sets == 1 else 'sets'}"
+    for each in group.inputs:
+        yield f"{group.name}:   {each.topic}: {_fates(each)}"
 
 
 def _fates(each: InputSnapshot) -> str:

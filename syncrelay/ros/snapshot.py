@@ -8,7 +8,7 @@ from syncrelay.sync.messages import DropReason
 
 @dataclass(frozen=True, slots=True)
 class RecentSet:
-    """A set that left: its messages' stamps as they came, in nanoseconds, in input order, None where one was missing."""
+    """A set that left: its messages' stamps as they came in nanoseconds, in input order, None where one was missing."""
 
     stamps: tuple[int | None, ...]
 
