@@ -2,11 +2,13 @@
 
 import importlib
 import logging
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
 
 from syncrelay.config import TopicConfig
 from syncrelay.errors import TypeImportError
@@ -136,10 +138,11 @@ class TopicInput:
         for take in self._takers:
             take(payload, received)
 
-    def wait_until_acknowledged(self, timeout: Any) -> None:
-        """Give reliable subscribers a moment to get what was published last."""
+    def wait_until_acknowledged(self, deadline: int) -> None:
+        """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
         for publisher in self._publishers:
-            publisher.wait_for_all_acked(timeout)
+            left = max(0, deadline - time.monotonic_ns())
+            publisher.wait_for_all_acked(Duration(nanoseconds=left))
 
 
 def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:

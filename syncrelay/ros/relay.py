@@ -36,8 +36,9 @@ _LOOK_S = 1.0
 _GRACE_S = 2.0
 # What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
 _CLOCK_JUMP = Duration(nanoseconds=-1_000_000_000)
-# How long an end may take to see that reliable subscribers have what was published.
-_ACKNOWLEDGE = Duration(nanoseconds=300_000_000)
+# How long an end may take to see that reliable subscribers have what was published on all outputs. They say so
+# at the writer's next heartbeat only, which may be 3 s away.
+_ACKNOWLEDGE_NS = 300_000_000
 
 
 class Relay:
@@ -121,8 +122,9 @@ class Relay:
             receiving.result()
             for group in self._groups:
                 group.flush(DropReason.SHUTDOWN)
+            deadline = time.monotonic_ns() + _ACKNOWLEDGE_NS
             for topic_input in self._inputs:
-                topic_input.wait_until_acknowledged(_ACKNOWLEDGE)
+                topic_input.wait_until_acknowledged(deadline)
         return self._snapshot()
 
     def close(self) -> None:
