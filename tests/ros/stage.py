@@ -37,13 +37,12 @@ class Player:
         self.process.tell(f"play {speed} {path}")
         self._span_s = (recording[-1].time - recording[0].time) / 1e9 / speed
 
+    def finished(self) -> bool:
+        return self.process.stdout.count("play") == self._plays
+
     def finish(self) -> None:
         """Wait until all is published."""
-        self.process.wait_until(
-            lambda: self.process.stdout.count("play") == self._plays,
-            "the end of the recording",
-            deadline_s=self._span_s + DEADLINE_S,
-        )
+        self.process.wait_until(self.finished, "the end of the recording", deadline_s=self._span_s + DEADLINE_S)
         self.process.answer()
 
     def play(self, recording: Sequence[Frame], *, speed: float = 10) -> None:

@@ -1,6 +1,7 @@
 """Groups at work: shared topics, many topics, any order of starting, and a recording that begins again."""
 
 import signal
+import subprocess
 
 import pytest
 
@@ -113,6 +114,34 @@ def test_a_recording_that_begins_again_gives_the_same_sets_again(stage: Stage):
         passes.append([collector.payloads(output)[before:] for output in _PAIR_OUT])
     assert len(passes[0][0]) > 30
     assert passes == [passes[0]] * 3
+
+
+def test_a_relay_that_is_held_up_makes_the_sets_of_one_that_is_not(stage: Stage):
+    recording = merged(
+        jittery("/camera", period_ms=4, jitter_ms=1, count=1000, seed=1),
+        jittery("/lidar", period_ms=4, jitter_ms=1, count=1000, seed=2),
+    )
+    collector = stage.collector(_PAIR_OUT)
+    relay = stage.relay(config({"front": _approximate(_PAIR, slop_ms=2)}))
+    player = stage.player(_PAIR)
+    relaying.connect(player, collector, recording, _PAIR_OUT)
+    player.start(recording, speed=1)
+    while not player.finished():
+        relay.send(signal.SIGSTOP)
+        # In this time come 25 messages of each topic, more than a group keeps.
+        with pytest.raises(subprocess.TimeoutExpired):
+            relay.wait(0.1)
+        before = collector.count("/front/lidar")
+        relay.send(signal.SIGCONT)
+        relay.wait_until(
+            lambda before=before: player.finished() or collector.count("/front/lidar") > before, "another set"
+        )
+    player.finish()
+    relaying.conclude(player, collector, recording, _PAIR_OUT)
+    policy = ApproximateTime(n_inputs=2, queue_size=10, slop_ns=2 * MS)
+    expected = relaying.expected_sets(policy, recording, list(_PAIR))
+    assert len(expected) > 900
+    assert relaying.sets_within(recording, collector, _PAIR_OUT) == expected
 
 
 def test_groups_that_were_not_named_do_not_run(stage: Stage):
