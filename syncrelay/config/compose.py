@@ -19,7 +19,7 @@ from syncrelay.config.substitution import substitute
 from syncrelay.config.syntax import in_words
 from syncrelay.config.wording import quoted
 
-_LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 # A file that uses every key is 7 levels deep.
 _DEEPEST: Final = 50
 # Values after following every alias: a thousand groups are a tenth of it.
@@ -33,7 +33,7 @@ def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[
     """
     composer = _Composer(source, environ)
     try:
-        for event in yaml.parse(source.text, Loader=_LOADER):
+        for event in yaml.parse(source.text, Loader=LOADER):
             composer.take(event)
     except yaml.MarkedYAMLError as error:
         text, span = in_words(error, source.lines)

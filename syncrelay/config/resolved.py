@@ -85,10 +85,8 @@ def _restamp(group: AnyGroup, node: NodeConfig) -> Restamp | int | None:
     match group.restamp:
         case "none":
             return None
-        case "earliest":
-            return Restamp.EARLIEST
-        case "latest":
-            return Restamp.LATEST
+        case "earliest" | "latest":
+            return Restamp(group.restamp)
         case topic:
             inputs = [_absolute(each.topic, node) for each in group.topics]
             return inputs.index(_absolute(topic, node))

@@ -60,10 +60,10 @@ def decode(content: bytes, *, name: str) -> Source:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _unreadable(name, "the text is UTF-16, expected UTF-8")
     try:
-        return check_text(content.decode().removeprefix("\ufeff"), name=name)
+        return check_text(_without_mark(content.decode()), name=name)
     except UnicodeDecodeError as error:
-        readable = Source(name, "", _lines(content.decode("utf-8", "replace")))
-        span = _span_at(content[: error.start].decode("utf-8", "replace"))
+        readable = Source(name, "", _lines(_without_mark(content.decode("utf-8", "replace"))))
+        span = _span_at(_without_mark(content[: error.start].decode()))
         text = f"byte 0x{content[error.start]:02x} at offset {error.start} is not UTF-8"
         raise ConfigError([readable.problem(text, code="encoding", span=span)]) from error
 
@@ -79,6 +79,11 @@ def check_text(text: str, *, name: str) -> Source:
         refusal = f"the character U+{ord(found.group()):04X} is not allowed in YAML"
         raise ConfigError([source.problem(refusal, code="encoding", span=span)])
     return source
+
+
+def _without_mark(text: str) -> str:
+    """Return a text without the byte order mark that some editors put first."""
+    return text.removeprefix("\ufeff")
 
 
 def _lines(text: str) -> tuple[str, ...]:

@@ -1,0 +1,97 @@
+import sys
+
+import pytest
+
+from syncrelay.config import ConfigError, Severity, load_text
+from syncrelay.config.interfaces import Interfaces
+from syncrelay.config.msgfile import Field, parse_fields
+from tests.config.ament import make_index
+
+FILE = """\
+version: 1
+groups:
+  front:
+    policy: exact_time
+    topics:
+      - {{topic: /a, type: {type}}}
+      - {{topic: /b, type: sensor_msgs/msg/Image}}
+"""
+
+
+def notes(type_name, environ, **options):
+    return load_text(FILE.format(type=type_name), name="f.yaml", environ=environ, **options).notes
+
+
+def test_without_an_index_the_file_is_in_order_and_says_what_was_not_checked(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    for environ in ({}, {"AMENT_PREFIX_PATH": ""}, {"AMENT_PREFIX_PATH": str(tmp_path / "none")}):
+        (note,) = notes("no_such/msg/Type", environ)
+        assert (note.severity, note.code, note.span) == (Severity.NOTE, "not_checked", None)
+        assert note.text.startswith("message types were not checked: there is no ament index here")
+
+
+def test_the_index_of_the_python_environment_counts_without_a_variable(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "prefix", str(make_index(tmp_path)))
+    assert notes("sensor_msgs/msg/Imu", {}) == ()
+    with pytest.raises(ConfigError, match="is not installed here"):
+        notes("no_such/msg/Type", {})
+
+
+def test_an_overlay_adds_to_what_is_below_and_hides_it(tmp_path, environ):
+    index = tmp_path / "share/ament_index/resource_index/rosidl_interfaces"
+    index.mkdir(parents=True)
+    (index / "my_msgs").write_text("msg/Mine.msg")
+    (index / "std_msgs").write_text("msg/Other.msg")
+    overlaid = {"AMENT_PREFIX_PATH": f"{tmp_path}:{environ['AMENT_PREFIX_PATH']}"}
+    interfaces = Interfaces.find(overlaid)
+    assert interfaces is not None
+    assert interfaces.types("my_msgs") == ("my_msgs/msg/Mine",)
+    assert interfaces.types("std_msgs") == ("std_msgs/msg/Other",)
+    assert "sensor_msgs/msg/Image" in interfaces.types("sensor_msgs")
+
+
+def test_a_type_without_its_definition_is_a_note_if_its_stamp_matters(environ):
+    (note,) = notes("dock_msgs/msg/Opaque", environ)
+    assert (note.path, note.severity, note.code) == ("groups.front.topics[0].type", Severity.NOTE, "not_checked")
+    assert notes("dock_msgs/msg/Opaque, stamp: receive", environ) == ()
+
+
+def test_a_package_that_may_come_later_is_a_note(environ):
+    (note,) = notes("my_msgs/msg/Mine", environ, package_missing=Severity.NOTE)
+    assert (note.severity, note.code) == (Severity.NOTE, "package_missing")
+    with pytest.raises(ConfigError) as raised:
+        notes("my_msgs/msg/Mine", environ)
+    assert [problem.code for problem in raised.value.problems] == ["package_missing"]
+
+
+def test_a_restamp_is_believed_if_a_type_cannot_be_looked_into(environ):
+    text = FILE.format(type="my_msgs/msg/Mine, stamp: receive").replace("sensor_msgs/msg/Image", "std_msgs/msg/String")
+    text = text.replace("String}", "String, stamp: receive}").replace("exact_time", "exact_time\n    restamp: latest")
+    assert len(load_text(text, environ=environ, package_missing=Severity.NOTE).notes) == 1
+
+
+def test_fields_are_read_as_the_interface_definition_says():
+    text = """\
+        # a comment
+        int32 CONSTANT=5
+        string NAME = "a # b"
+        std_msgs/Header header   # trailing
+        Local local
+        other/msg/Full full
+        float64[9] fixed
+        string<=10[<=5] bounded
+        string<=10 word "default"
+        int32 number 5
+        uint8[] values [1, 2]
+
+    """
+    assert parse_fields(text, package="mine") == (
+        Field("header", "std_msgs/msg/Header", is_array=False),
+        Field("local", "mine/msg/Local", is_array=False),
+        Field("full", "other/msg/Full", is_array=False),
+        Field("fixed", "float64", is_array=True),
+        Field("bounded", "string", is_array=True),
+        Field("word", "string", is_array=False),
+        Field("number", "int32", is_array=False),
+        Field("values", "uint8", is_array=True),
+    )

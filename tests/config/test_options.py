@@ -1,0 +1,140 @@
+"""No option without an effect: each is changed, and what comes out has to change with it."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from syncrelay.config import Config, load_text
+from syncrelay.config.file import Defaults, File, GroupOfAnyPolicy, TopicOfAnyPolicy
+from syncrelay.config.models import NodeConfig, StampField
+from syncrelay.config.qos import QosOverrides
+from syncrelay.sync import Match, Message
+
+MS = 1_000_000
+IMAGE = "sensor_msgs/msg/Image"
+APPROXIMATE = {"policy": "approximate_time", "slop": "20ms"}
+EXACT = {"policy": "exact_time"}
+
+
+def file(keys: dict[str, Any] = APPROXIMATE, *, first: dict[str, Any] | None = None, **top: Any) -> str:
+    """A file with one group of these keys, whose first topic has keys of its own. JSON is YAML."""
+    topics = [{"topic": "/a", "type": IMAGE, **(first or {})}, {"topic": "/b", "type": IMAGE}]
+    return json.dumps({"version": 1, "groups": {"front": {"topics": topics, **keys}}, **top})
+
+
+def sets_of(*arrivals: tuple[int, int]) -> Callable[[Config], object]:
+    """The sets that the first group's engine makes of messages, given as input and milliseconds."""
+
+    def sets(config: Config) -> object:
+        engine = config.groups[0].engine()
+        fed = (Message(index, stamp * MS, None) for index, stamp in arrivals)
+        outcomes = (outcome for message in fed for outcome in engine.add(message, now=0))
+        return [
+            ([message and message.stamp // MS for message in outcome.messages], outcome.stamp)
+            for outcome in outcomes
+            if isinstance(outcome, Match)
+        ]
+
+    return sets
+
+
+def outputs(config: Config) -> object:
+    return [topic.output for group in config.groups for topic in group.topics]
+
+
+def of_first_topic(name: str) -> Callable[[Config], object]:
+    return lambda config: getattr(config.groups[0].topics[0], name)
+
+
+NEAR_PAIRS = sets_of((0, 1), (1, 3), (0, 101), (1, 103), (0, 201), (1, 203))
+WIDER_PAIRS = sets_of((0, 100), (1, 110), (0, 200), (1, 210), (0, 300), (1, 310))
+ONE_INPUT_AHEAD = sets_of((0, 10), (0, 20), (1, 10))
+TWO_SPANS_TO_CHOOSE_FROM = sets_of((0, 8), (1, 11), (0, 13), (0, 19))
+
+OPTIONS = {
+    "policy": (file(), file(EXACT), NEAR_PAIRS),
+    "queue_size": (file({**EXACT, "queue_size": 1}), file({**EXACT, "queue_size": 2}), ONE_INPUT_AHEAD),
+    "slop": (file(), file({**APPROXIMATE, "slop": "5ms"}), WIDER_PAIRS),
+    "age_penalty": (
+        file({**APPROXIMATE, "age_penalty": 0}),
+        file({**APPROXIMATE, "age_penalty": 1}),
+        TWO_SPANS_TO_CHOOSE_FROM,
+    ),
+    "restamp": (file(), file({**APPROXIMATE, "restamp": "earliest"}), NEAR_PAIRS),
+    "restamp: latest": (
+        file({**APPROXIMATE, "restamp": "earliest"}),
+        file({**APPROXIMATE, "restamp": "latest"}),
+        NEAR_PAIRS,
+    ),
+    "restamp: input": (
+        file({**APPROXIMATE, "restamp": "/a"}),
+        file({**APPROXIMATE, "restamp": "/b"}),
+        NEAR_PAIRS,
+    ),
+    "offset": (file(), file(first={"offset": "-50ms"}), sets_of((0, 150), (1, 100), (0, 250), (1, 200))),
+    "min_period": (file(), file(first={"min_period": "90ms"}), sets_of((0, 14), (1, 15))),
+    "topic": (file(), file(first={"topic": "/z"}), of_first_topic("topic")),
+    "type": (file(), file(first={"type": "sensor_msgs/msg/Imu"}), of_first_topic("type")),
+    "output": (file(), file(first={"output": "/z"}), outputs),
+    "output_prefix": (file(), file({**APPROXIMATE, "output_prefix": "/z"}), outputs),
+    "qos": (file(), file(first={"qos": "sensor_data"}), of_first_topic("qos")),
+    "stamp": (file(), file(first={"stamp": "receive"}), of_first_topic("stamp")),
+    "field": (file(), file(first={"stamp": {"field": "header.stamp"}}), of_first_topic("stamp")),
+    "topics": (file(), file(first={"topic": "/z"}), outputs),
+    "groups": (file(), file().replace("front", "back"), outputs),
+    "name": (file(), file(node={"name": "z"}), lambda config: config.node.name),
+    "namespace": (file(), file(node={"namespace": "/z"}), lambda config: config.node.namespace),
+    "use_sim_time": (file(), file(node={"use_sim_time": True}), lambda config: config.node.use_sim_time),
+    "node": (file(), file(node={"name": "z"}), lambda config: config.node),
+    "defaults": (file(), file(defaults={"output_prefix": "/z"}), outputs),
+}
+QOS_POLICIES = {
+    "history": "keep_all",
+    "depth": 5,
+    "reliability": "best_effort",
+    "durability": "volatile",
+    "deadline": "1s",
+    "lifespan": 1,
+    "liveliness": "automatic",
+    "liveliness_lease_duration": {"sec": 1, "nsec": 0},
+    "avoid_ros_namespace_conventions": True,
+}
+OPTIONS |= {
+    key: (file(), file(first={"qos": {key: value}}), of_first_topic("qos")) for key, value in QOS_POLICIES.items()
+}
+
+
+@pytest.mark.parametrize(("one", "other", "outcome"), OPTIONS.values(), ids=OPTIONS)
+def test_changing_an_option_changes_what_comes_out(one, other, outcome, environ):
+    assert outcome(load_text(one, environ=environ)) != outcome(load_text(other, environ=environ))
+
+
+def test_every_key_of_the_file_is_an_option_under_test():
+    models = (File, NodeConfig, Defaults, GroupOfAnyPolicy, TopicOfAnyPolicy, StampField, QosOverrides)
+    keys = {key for model in models for key in model.model_fields}
+    assert keys - OPTIONS.keys() == {"version"}
+
+
+DEFAULTS = {
+    "policy": ("approximate_time", "exact_time", NEAR_PAIRS),
+    "queue_size": (10, 1, sets_of((0, 10), (0, 20), (1, 11), (1, 21), (0, 100), (1, 100))),
+    "slop": ("20ms", "5ms", WIDER_PAIRS),
+    "age_penalty": (0, 1, TWO_SPANS_TO_CHOOSE_FROM),
+    "restamp": ("none", "latest", NEAR_PAIRS),
+    "output_prefix": ("/y", "/z", outputs),
+}
+
+
+@pytest.mark.parametrize(("key", "one", "other", "outcome"), [(key, *case) for key, case in DEFAULTS.items()])
+def test_a_default_counts_where_the_group_is_silent_and_only_there(key, one, other, outcome, environ):
+    def outcome_of(keys: dict[str, Any], default: Any) -> object:
+        return outcome(load_text(file(keys, defaults={**APPROXIMATE, key: default}), environ=environ))
+
+    assert outcome_of({}, one) != outcome_of({}, other)
+    assert outcome_of({key: one}, other) == outcome_of({}, one)
+
+
+def test_every_key_of_defaults_is_a_default_under_test():
+    assert DEFAULTS.keys() == Defaults.model_fields.keys()

@@ -1,0 +1,159 @@
+"""The schema that editors check by says what the models say."""
+
+import re
+from contextlib import suppress
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+import yaml
+from jsonschema import Draft7Validator
+
+from syncrelay.config.file import GROUP_MODEL_OF, Defaults, File, GroupOfAnyPolicy, TopicOfAnyPolicy
+from syncrelay.config.models import NodeConfig, StampField
+from syncrelay.config.qos import QosOverrides
+from syncrelay.config.schema import json_schema
+
+HERE = Path(__file__).parent
+SCHEMA = json_schema()
+VALIDATOR = Draft7Validator(SCHEMA)
+GOOD_FILES = [*sorted((HERE / "valid").glob("*.yaml")), *sorted((HERE.parents[1] / "configs").glob("*.yaml"))]
+# What no schema can tell: how keys bear on each other, what is installed, what the environment holds.
+BEYOND_A_SCHEMA = {
+    "age_penalty_without_end",
+    "default_of_another_policy_does_not_help",
+    "merge_key",
+    "slop_not_a_number",
+    "slop_without_end",
+    "message_misspelt",
+    "one_topic_two_qos",
+    "one_topic_two_types",
+    "output_is_an_input_of_another_group",
+    "output_is_an_input_of_its_group",
+    "output_is_its_own_input",
+    "package_not_installed",
+    "package_without_messages",
+    "restamp_by_a_topic_of_no_input",
+    "restamp_misspelt",
+    "restamp_without_a_header",
+    "slop_of_a_thousand_years",
+    "stamp_field_wrong",
+    "topic_twice",
+    "topic_twice_by_another_name",
+    "two_default_outputs_of_one_name",
+    "two_outputs_of_one_absolute_name",
+    "two_outputs_of_one_name",
+    "type_without_header",
+    "variable_not_set",
+    "variable_of_another_kind",
+}
+
+
+def parsed(file):
+    """The file as an editor sees it: YAML 1.2, so that words stay words."""
+    return yaml.load(file.read_text(encoding="utf-8"), Loader=Yaml12Loader)  # noqa: S506  a SafeLoader
+
+
+class Yaml12Loader(yaml.SafeLoader):
+    yaml_implicit_resolvers: ClassVar = {
+        first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith((":bool", ":timestamp"))]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+
+Yaml12Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile("true|false"), ["t", "f"])
+
+
+def wrong_files():
+    """Files that are YAML, and wrong all the same."""
+    for file in sorted((HERE / "invalid").glob("*.yaml")):
+        with suppress(yaml.YAMLError):
+            parsed(file)
+            yield file
+
+
+WRONG_FILES = list(wrong_files())
+
+
+def test_the_schema_is_draft_7():
+    Draft7Validator.check_schema(SCHEMA)
+    assert SCHEMA["$schema"] == "http://json-schema.org/draft-07/schema#"
+    assert "discriminator" not in str(SCHEMA)
+    assert "$defs" not in str(SCHEMA)
+
+
+@pytest.mark.parametrize("file", GOOD_FILES, ids=lambda file: file.stem)
+def test_a_good_file_is_good_by_the_schema(file):
+    assert list(VALIDATOR.iter_errors(parsed(file))) == []
+
+
+@pytest.mark.parametrize("file", WRONG_FILES, ids=lambda file: file.stem)
+def test_what_is_wrong_in_itself_is_wrong_by_the_schema(file):
+    assert VALIDATOR.is_valid(parsed(file)) == (file.stem in BEYOND_A_SCHEMA)
+
+
+def models():
+    yield from (File, NodeConfig, Defaults, GroupOfAnyPolicy, TopicOfAnyPolicy, StampField, QosOverrides)
+    yield from GROUP_MODEL_OF.values()
+
+
+def test_every_key_is_in_the_schema_with_a_description():
+    described = {
+        (name, key): schema.get("description")
+        for name, definition in {**SCHEMA["definitions"], "File": SCHEMA}.items()
+        for key, schema in definition.get("properties", {}).items()
+    }
+    keys = {(model.__name__, key) for model in models() for key in model.model_fields}
+    assert keys <= described.keys()
+    assert [key for key, description in described.items() if not description] == []
+
+
+def test_every_optional_key_says_its_default():
+    silent = [
+        (model.__name__, key)
+        for model in models()
+        if model not in (File, Defaults, GroupOfAnyPolicy)
+        for key, info in model.model_fields.items()
+        if not info.is_required() and "Default: " not in info.description
+    ]
+    assert silent == []
+
+
+def test_the_default_that_is_said_is_the_default():
+    for name in ("NodeConfig", "ApproximateTimeGroup", "PacedTopic"):
+        for key, schema in SCHEMA["definitions"][name]["properties"].items():
+            if schema.get("default"):
+                assert f"Default: {str(schema['default']).lower()}" in schema["description"], (name, key)
+
+
+def test_a_key_that_takes_a_duration_says_its_units():
+    for name, definition in SCHEMA["definitions"].items():
+        for key, schema in definition.get("properties", {}).items():
+            if "(ns|us" in str(schema):
+                assert "(ns, us, ms, s, min)" in schema["description"], (name, key)
+
+
+def test_a_variable_may_stand_for_any_value():
+    file = {
+        "version": 1,
+        "node": {"use_sim_time": "${SIM:-false}"},
+        "groups": {
+            "front": {
+                "policy": "${POLICY:-exact_time}",
+                "queue_size": "${QUEUE}",
+                "topics": [{"topic": "/${ROBOT}/a", "type": "${TYPE}", "offset": "${OFFSET:-0}ms"}] * 2,
+            }
+        },
+    }
+    assert list(VALIDATOR.iter_errors(file)) == []
+
+
+@pytest.mark.parametrize(("keys", "is_good"), [({"slop": "20ms"}, True), ({}, False)])
+def test_what_a_policy_needs_is_needed_unless_there_are_defaults(keys, is_good):
+    topics = [{"topic": "/a", "type": "a/msg/B"}, {"topic": "/b", "type": "a/msg/B"}]
+    file = {"version": 1, "groups": {"front": {"policy": "approximate_time", "topics": topics, **keys}}}
+    assert VALIDATOR.is_valid(file) == is_good
+    assert VALIDATOR.is_valid({**file, "defaults": {"slop": "20ms"}})
+    del file["groups"]["front"]["policy"]
+    assert not VALIDATOR.is_valid(file)
+    assert VALIDATOR.is_valid({**file, "defaults": {"policy": "approximate_time", "slop": 1}})

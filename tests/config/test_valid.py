@@ -1,0 +1,69 @@
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import QosOverrides, QosPreset, load, load_text
+from syncrelay.sync import Restamp
+
+FOLDER = Path(__file__).parent / "valid"
+EXAMPLES = Path(__file__).parents[2] / "configs"
+
+
+@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.yaml")), ids=lambda file: file.stem)
+def test_a_file_in_order_loads_without_a_note(file, environ):
+    assert load(str(file), environ=environ).notes == ()
+
+
+@pytest.mark.parametrize("file", sorted(EXAMPLES.glob("*.yaml")), ids=lambda file: file.stem)
+def test_every_example_is_in_order(file):
+    config = load(str(file), environ={})
+    assert {note.code for note in config.notes} <= {"not_checked"}
+
+
+def test_every_key_arrives_where_it_is_used(environ):
+    config = load(str(FOLDER / "all_keys.yaml"), environ=environ)
+    assert (config.node.name, config.node.namespace, config.node.use_sim_time) == ("fusion", "/robot1", True)
+    front, back = config.groups
+    assert (front.name, back.name) == ("front", "back")
+    assert front.restamp == 1
+    assert back.restamp is Restamp.LATEST
+    image, points, dock, chatter = front.topics
+    assert (image.topic, image.type) == ("/camera/image_raw", "sensor_msgs/msg/Image")
+    assert (image.offset_ns, image.min_period_ns) == (-12_000_000, 0)
+    assert image.qos == QosPreset("sensor_data")
+    assert image.stamp == "header"
+    assert (points.offset_ns, points.min_period_ns) == (0, 90_000_000)
+    assert points.qos == QosOverrides(
+        history="keep_last",
+        depth=7,
+        reliability="best_effort",
+        durability="volatile",
+        deadline="1.5s",
+        lifespan="2s",
+        liveliness="automatic",
+        liveliness_lease_duration="500ms",
+        avoid_ros_namespace_conventions=False,
+    )
+    assert dock.stamp.field == "trigger.time"
+    assert chatter.stamp == "receive"
+    assert back.topics[0].qos == QosOverrides() == back.topics[1].qos
+
+
+def test_outputs_are_named_by_prefix_and_input_unless_they_have_a_name(environ):
+    config = load(str(FOLDER / "all_keys.yaml"), environ=environ)
+    assert [topic.output for group in config.groups for topic in group.topics] == [
+        "synced/camera/image_raw",
+        "~/points",
+        "synced/dock",
+        "synced/chatter",
+        "/fused/back/image",
+        "/fused/back/imu",
+    ]
+
+
+def test_a_duration_of_the_middleware_has_a_largest_value(environ):
+    text = (FOLDER / "shared_topic.yaml").read_text()
+    no_limit = "qos: {lifespan: {sec: 9223372036, nsec: 854775807}, deadline: {sec: 9223372036854, nsec: 0}}"
+    config = load_text(text.replace("qos: {}", no_limit), environ=environ)
+    qos = config.groups[1].topics[1].qos
+    assert (qos.lifespan, qos.deadline) == (2**63 - 1, 2**63 - 1)
