@@ -24,19 +24,22 @@ def guarded(command: Callable[[], int]) -> int:
         # A file's name or line may hold what the terminal's encoding lacks.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        return _flushed(command())
+        code = command()
+        _to_stdout(sys.stdout.flush)
     except SyncRelayError as error:
         say(_text(error))
         return _code(error)
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
+        # Who read us has seen enough.
         _abandon_stdout()
         return AT_FAULT
     except Exception:  # noqa: BLE001  the boundary: everything else is our bug
         say(traceback.format_exc())
         say("syncrelay: this is a bug in syncrelay, please report it with the lines above and your file")
         return OUR_BUG
+    return code
 
 
 def say(text: str) -> None:
@@ -47,7 +50,7 @@ def say(text: str) -> None:
 
 def put(text: str) -> None:
     """Print what was asked for on stdout."""
-    sys.stdout.write(f"{text}\n")
+    _to_stdout(lambda: sys.stdout.write(f"{text}\n"))
 
 
 def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isatty
@@ -55,20 +58,18 @@ def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isat
     return is_terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
 
-def _flushed(code: int) -> int:
+def _to_stdout(write: Callable[[], object]) -> None:
     try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
+        write()
     except OSError as error:
         _abandon_stdout()
-        say(f"syncrelay: standard output cannot be written: {error.strerror}")
-        return AT_FAULT
-    return code
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise SyncRelayError(f"standard output cannot be written: {error.strerror}") from error
 
 
 def _abandon_stdout() -> None:
-    """Keep the interpreter from flushing what nobody reads, with a traceback, as it ends."""
+    """Keep the interpreter from flushing once more, as it ends, what nobody takes."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -1,0 +1,165 @@
+"""The skeleton: commands, their help, usage errors and exit codes."""
+
+import pytest
+
+from tests.cli.command import BAD, GOOD, run, run_python
+
+
+def test_help_names_every_command_and_option_on_stdout(tmp_path):
+    done = run("--help", folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    for word in ("--config FILE", "--group NAME", "--log-level", "--log-format", "--ros-args", "validate FILE", "demo"):
+        assert word in done.stdout
+    assert run("help", folder=tmp_path).stdout == run("-h", folder=tmp_path).stdout == done.stdout
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("validate", ["FILE", "--format"]),
+        ("schema", ["JSON Schema"]),
+        ("demo", ["--seconds", "--seed", "--show-config"]),
+    ],
+)
+def test_every_command_explains_itself(command, words, tmp_path):
+    done = run(command, "--help", folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"usage: syncrelay {command} ")
+    assert all(word in done.stdout for word in words)
+
+
+def test_without_a_word_it_says_how_on_stderr(tmp_path):
+    done = run(folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("usage: syncrelay --config FILE")
+
+
+def test_the_version_is_that_of_the_package(tmp_path):
+    done = run("--version", folder=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout.startswith("syncrelay ")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["validat", "f.yaml"], "unknown command validat, did you mean `validate`?\n  syncrelay --help"),
+        (["xyzzy"], "unknown command xyzzy\n  syncrelay --help lists the commands"),
+        (["f.yaml"], "f.yaml is not a command\n  syncrelay --config f.yaml "),
+        (["--confg", "f.yaml"], "unknown argument --confg, did you mean `--config`?\n  syncrelay --help says more"),
+        (["--log-level", "info"], "--config FILE is missing"),
+        (["--config"], "argument --config: expected one argument"),
+        (["--config", "f.yaml", "g.yaml"], "unknown argument g.yaml"),
+        (["--config", "f.yaml", "--log-level", "loud"], "argument --log-level: invalid choice: 'loud'"),
+        (["--config", "f.yaml", "-r", "__ns:=/a"], "unknown argument -r"),
+        (["--ros-args", "--config", "f.yaml"], "--config FILE is missing"),
+        (["validate"], "the following arguments are required: FILE\n  syncrelay validate --help says more"),
+        (["validate", "--formt=json", "f.yaml"], "unknown argument --formt=json, did you mean `--format`?"),
+        (["validate", "--format", "xml", "f.yaml"], "argument --format: invalid choice: 'xml'"),
+        (["schema", "f.yaml"], "unknown argument f.yaml"),
+        (["demo", "--seconds", "0"], "argument --seconds: expected a number above 0, found 0"),
+        (["demo", "--seconds", "soon"], "argument --seconds: expected a number above 0, found soon"),
+        (["demo", "--seed", "x"], "argument --seed: invalid int value: 'x'"),
+    ],
+)
+def test_a_wrong_word_is_a_usage_error_that_helps(words, said, tmp_path):
+    done = run(*words, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"syncrelay: {said}")
+
+
+def test_a_group_that_the_file_lacks_is_a_usage_error(tmp_path):
+    (tmp_path / "f.yaml").write_text(GOOD)
+    done = run("--config", "f.yaml", "--group", "frnt", folder=tmp_path)
+    assert done.returncode == 2
+    assert "did you mean `front`?" in done.stderr
+
+
+def test_the_relay_shows_the_faults_of_its_file_as_validate_does(tmp_path):
+    (tmp_path / "f.yaml").write_text(BAD)
+    relayed = run("--config", "f.yaml", folder=tmp_path)
+    assert (relayed.returncode, relayed.stdout) == (1, "")
+    assert relayed.stderr == run("validate", "f.yaml", folder=tmp_path).stderr
+
+
+IN_THE_BOUNDARY = """
+import sys
+from syncrelay.cli.boundary import guarded
+from syncrelay.errors import *
+sys.exit(guarded(lambda: {}))
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "code", "said"),
+    [
+        ("0", 0, ""),
+        ("1", 1, ""),
+        ("(_ for _ in ()).throw(SyncRelayError('it is so'))", 1, "syncrelay: it is so\n"),
+        ("(_ for _ in ()).throw(TypeImportError('it is so'))", 1, "syncrelay: it is so\n"),
+        ("(_ for _ in ()).throw(UsageError('it is so'))", 2, "syncrelay: it is so\n"),
+        ("(_ for _ in ()).throw(RosUnavailableError('it is so'))", 69, "syncrelay: it is so\n"),
+        ("(_ for _ in ()).throw(KeyboardInterrupt)", 130, ""),
+    ],
+)
+def test_every_error_has_its_exit_code(command, code, said, tmp_path):
+    done = run_python("-c", IN_THE_BOUNDARY.format(command), folder=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (code, "", said)
+
+
+def test_a_bug_of_ours_shows_its_traceback_and_asks_for_a_report(tmp_path):
+    done = run_python("-c", IN_THE_BOUNDARY.format("1 / 0"), folder=tmp_path)
+    assert (done.returncode, done.stdout) == (70, "")
+    assert done.stderr.startswith("Traceback (most recent call last):")
+    assert "ZeroDivisionError" in done.stderr
+    assert "this is a bug in syncrelay, please report it" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("words", [["schema"], ["--help"], ["validate", "-"]])
+def test_a_reader_that_goes_away_is_no_bug(words, tmp_path):
+    # The pipe's other end is closed before anything is written.
+    script = (
+        "import os, sys; from syncrelay.cli import main; read, write = os.pipe(); os.close(read); os.dup2(write, 1);"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    done = run_python("-c", script, *words, folder=tmp_path, stdin=GOOD)
+    assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_a_full_disk_is_no_bug(tmp_path):
+    script = (
+        "import os, sys; from syncrelay.cli import main; os.dup2(os.open('/dev/full', os.O_WRONLY), 1);"
+        "sys.exit(main(['schema']))"
+    )
+    done = run_python("-c", script, folder=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr == "syncrelay: standard output cannot be written: No space left on device\n"
+
+
+def test_the_signals_of_the_relay_are_taken_before_anything_slow_is_imported(tmp_path):
+    script = (
+        "import signal, sys\n"
+        "before = set(sys.modules)\n"
+        "seen = []\n"
+        "installed = signal.signal\n"
+        "def signal_seen(number, action):\n"
+        "    seen.append(sorted({name.partition('.')[0] for name in set(sys.modules) - before}))\n"
+        "    return installed(number, action)\n"
+        "signal.signal = signal_seen\n"
+        "from syncrelay.cli import main\n"
+        "main(['--config', 'missing.yaml'])\n"
+        "print(*seen[0])\n"
+    )
+    done = run_python("-c", script, folder=tmp_path)
+    assert set(done.stdout.split()) <= {"syncrelay", "collections"}
+
+
+def test_commands_without_ros_import_none(tmp_path):
+    (tmp_path / "f.yaml").write_text(GOOD)
+    script = (
+        "import sys; from syncrelay.cli import main\n"
+        "for words in (['validate', 'f.yaml'], ['schema'], ['demo', '--show-config']): main(words)\n"
+        "print('rclpy' in sys.modules, 'std_msgs' in sys.modules)\n"
+    )
+    done = run_python("-c", script, folder=tmp_path)
+    assert done.stdout.splitlines()[-1] == "False False"

@@ -1,0 +1,145 @@
+import json
+import os
+import pty
+import subprocess
+import sys
+
+import pytest
+
+from tests.cli.command import BAD, GOOD, ROOT, run
+from tests.config.ament import make_index
+
+ERROR = """\
+f.yaml:4:13: groups.front.policy: unknown value `exact_tim`, did you mean `exact_time`?
+    4 |     policy: exact_tim
+      |             ^^^^^^^^^
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "good.yaml").write_text(GOOD)
+    (tmp_path / "f.yaml").write_text(BAD)
+    return tmp_path
+
+
+@pytest.fixture
+def environ(tmp_path_factory):
+    return {"AMENT_PREFIX_PATH": str(make_index(tmp_path_factory.mktemp("ament")))}
+
+
+def test_a_file_in_order_is_counted_on_stdout(folder, environ):
+    done = run("validate", "good.yaml", folder=folder, environ=environ)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "good.yaml: ok, 1 group, 2 topics\n", "")
+
+
+def test_a_faulty_file_is_shown_on_stderr(folder, environ):
+    done = run("validate", "f.yaml", folder=folder, environ=environ)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", ERROR)
+
+
+def test_several_files_are_all_checked(folder, environ):
+    done = run("validate", "f.yaml", "good.yaml", "missing.yaml", folder=folder, environ=environ)
+    assert done.returncode == 1
+    assert done.stdout == "good.yaml: ok, 1 group, 2 topics\n"
+    assert done.stderr == ERROR + "missing.yaml: no such file\n"
+
+
+def test_a_topic_of_two_groups_is_one_topic(folder, environ):
+    second = GOOD.partition("groups:\n")[2].replace("front", "back").replace("/b", "/c")
+    (folder / "two.yaml").write_text(GOOD + second)
+    done = run("validate", "two.yaml", folder=folder, environ=environ)
+    assert done.stdout == "two.yaml: ok, 2 groups, 3 topics\n"
+
+
+def test_a_dash_is_standard_input(folder, environ):
+    done = run("validate", "-", folder=folder, environ=environ, stdin=GOOD)
+    assert (done.returncode, done.stdout) == (0, "<stdin>: ok, 1 group, 2 topics\n")
+    done = run("validate", "-", folder=folder, environ=environ, stdin=BAD)
+    assert (done.returncode, done.stderr) == (1, ERROR.replace("f.yaml", "<stdin>"))
+
+
+def test_what_could_not_be_checked_is_noted_beside_the_file(folder, environ):
+    (folder / "opaque.yaml").write_text(
+        GOOD.replace("/a, type: sensor_msgs/msg/Image", "/a, type: dock_msgs/msg/Opaque")
+    )
+    done = run("validate", "opaque.yaml", folder=folder, environ=environ)
+    assert (done.returncode, done.stderr) == (0, "")
+    first, note = done.stdout.splitlines()[:2]
+    assert first == "opaque.yaml: ok, 1 group, 2 topics"
+    assert note.startswith("opaque.yaml:6:27: note: groups.front.topics[0].type: `dock_msgs/msg/Opaque` is installed ")
+
+
+def test_json_holds_every_file_and_every_problem(folder, environ):
+    done = run("validate", "--format", "json", "good.yaml", "f.yaml", folder=folder, environ=environ)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert json.loads(done.stdout) == [
+        {"file": "good.yaml", "ok": True, "problems": []},
+        {
+            "file": "f.yaml",
+            "ok": False,
+            "problems": [
+                {
+                    "severity": "error",
+                    "code": "bad_value",
+                    "path": "groups.front.policy",
+                    "message": "unknown value `exact_tim`, did you mean `exact_time`?",
+                    "line": 4,
+                    "column": 13,
+                    "end_column": 22,
+                }
+            ],
+        },
+    ]
+
+
+def test_json_has_no_place_for_the_file_as_a_whole(folder):
+    done = run("validate", "--format=json", "missing.yaml", folder=folder)
+    (problem,) = json.loads(done.stdout)[0]["problems"]
+    assert (problem["code"], problem["line"], problem["column"]) == ("unreadable", None, None)
+
+
+def test_github_gets_workflow_commands(folder, environ):
+    done = run("validate", "--format", "github", "f.yaml", "good.yaml", "missing.yaml", folder=folder, environ=environ)
+    assert (done.returncode, done.stderr) == (1, "")
+    error, good, missing = done.stdout.splitlines()
+    assert error.startswith("::error file=f.yaml,line=4,col=13,endColumn=22::groups.front.policy: unknown value ")
+    assert good == "good.yaml: ok, 1 group, 2 topics"
+    assert missing == "::error file=missing.yaml::no such file"
+
+
+def test_github_takes_what_would_end_a_property_or_a_command(folder, environ):
+    (folder / "50%,a:b.yaml").write_text(GOOD.replace("exact_time", '"100%\\n::error::"'))
+    done = run("validate", "--format", "github", "50%,a:b.yaml", folder=folder, environ=environ)
+    (line,) = done.stdout.splitlines()
+    assert line.startswith("::error file=50%25%2Ca%3Ab.yaml,line=4,")
+    assert "found the text `100%25\\n::error::`" in line
+
+
+def test_variables_come_from_the_environment(folder, environ):
+    (folder / "v.yaml").write_text(GOOD.replace("exact_time", "${POLICY}"))
+    done = run("validate", "v.yaml", folder=folder, environ={**environ, "POLICY": "exact_time"})
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("variables", "coloured"),
+    [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
+)
+def test_colour_is_for_terminals_that_want_it(variables, coloured, folder, environ):
+    reader, terminal = pty.openpty()
+    started = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "NO_COLOR": "", **environ, **variables}
+    command = [sys.executable, "-m", "syncrelay", "validate", "f.yaml"]
+    subprocess.run(command, cwd=folder, env=started, stderr=terminal, check=False, timeout=120)
+    os.close(terminal)
+    shown = os.read(reader, 100_000).decode()
+    os.close(reader)
+    assert "unknown value" in shown
+    assert ("\033[" in shown) == coloured
+
+
+def test_a_name_that_the_terminal_cannot_show_is_escaped(folder, environ):
+    (folder / "good.yaml").rename(folder / "\udcff.yaml")
+    done = run("validate", "\udcff.yaml", folder=folder, environ={**environ, "PYTHONIOENCODING": "utf-8"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "\\udcff.yaml: ok, 1 group, 2 topics\n"
