@@ -66,6 +66,8 @@ class ApproximateEpsilonTime(Policy):
             outcomes.append(Match(tuple(taken)))
             return
         outcomes += [Drop(message, DropReason.TOO_FAR) for message in taken]
+        if all(queue.stamps for queue in near):
+            return
         for place, queue in enumerate(self._queues):
             if queue not in near:
                 self._losses.miss(place, queue.stamps, oldest, self._epsilon)

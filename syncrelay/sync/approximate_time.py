@@ -10,6 +10,9 @@ from syncrelay.sync.queues import Losses
 
 _NO_PIVOT = -1
 
+_STEPS = 8
+"""So many steps of a search are taken singly: most searches take fewer, and a stride costs as much as some."""
+
 
 class ApproximateTime(Policy):
     """The set of least span around each pivot leaves as soon as no later message could better it.
@@ -129,7 +132,7 @@ class ApproximateTime(Policy):
     def _reset(self) -> None:
         self.closed = self.opened
         self._losses.forget()
-        self._overflowed = [False] * self.n_inputs
+        self._overflowed: set[int] = set()
         self._heads = [0] * self.n_inputs
         self._cursors = [0] * self.n_inputs
         self._forget_candidate()
@@ -165,65 +168,125 @@ class ApproximateTime(Policy):
         return outcomes
 
     def _overflow(self, place: int, outcomes: list[Outcome]) -> list[Outcome]:
-        outcomes.append(Drop(self._messages[place].pop(0), DropReason.OVERFLOW))
-        self._losses.lose(place, self._stamps[place].pop(0))
-        self._overflowed[place] = True
+        self._losses.lose(place, self._stamps[place][0])
+        self._overflowed.add(place)
         had_candidate = self._pivot != _NO_PIVOT
-        self._forget_candidate()
+        if had_candidate:
+            self._forget_candidate()
+        self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
         return self._search(outcomes) if had_candidate else outcomes
 
     def _search(self, outcomes: list[Outcome]) -> list[Outcome]:
         heads = self._heads
-        cursors = self._cursors
+        overflowed = self._overflowed
         numerator, denominator = self._scale
+        steps = 0
         while not self._empty:
+            steps += 1
+            if steps > _STEPS:
+                self._stride(outcomes)
             start = min(heads)
             end = max(heads)
-            latest = self._latest_head(end)
             first = heads.index(start)
+            if overflowed:
+                self._excuse_all_but_latest(end)
             if self._pivot == _NO_PIVOT:
-                if end - start > self._slop or self._overflowed[latest]:
-                    self._note_missed(start)
+                if end - start > self._slop or overflowed:
                     self._drop_head(first, outcomes)
                     continue
-                self._pivot = latest
+                self._pivot = self._latest_place(end)
                 self._pivot_stamp = end
                 self._take_candidate(start, end)
-            elif (end - self._candidate_end) * numerator < (start - self._candidate_start) * denominator:
-                self._drop_skipped(outcomes)
-                self._take_candidate(start, end)
-            cursor = cursors[first] + 1
-            cursors[first] = cursor
-            stamps = self._stamps[first]
-            if cursor == len(stamps):
-                self._empty = 1
             else:
-                heads[first] = stamps[cursor]
+                later_end = end - self._candidate_end
+                later_start = start - self._candidate_start
+                # The penalty only lengthens: the first comparison spares most of the products.
+                if later_end < later_start and later_end * numerator < later_start * denominator:
+                    self._drop_skipped(outcomes)
+                    self._take_candidate(start, end)
+            self._pass_head(first)
             if first == self._pivot or end >= self._proof_end or (self._empty and self._is_proved()):
                 self._emit(outcomes)
+        self._note_wait()
+        return outcomes
+
+    def _pass_head(self, place: int) -> None:
+        stamps = self._stamps[place]
+        cursor = self._cursors[place] = self._cursors[place] + 1
+        if cursor == len(stamps):
+            self._empty = 1
+        else:
+            self._heads[place] = stamps[cursor]
+
+    def _drop_head(self, place: int, outcomes: list[Outcome]) -> None:
+        if len(self._stamps[place]) == 1:
+            self._note_missed(self._heads[place])
+        self._drop_oldest(place, 1, DropReason.TOO_FAR, outcomes)
+
+    def _note_wait(self) -> None:
+        """Count the wait for something better than the candidate: over, begun, or the one there was."""
         if self._pivot == _NO_PIVOT:
             self.closed = self.opened
         elif self.closed == self.opened:
             self.opened += 1
-        return outcomes
 
-    def _latest_head(self, end: int) -> int:
-        """Give the last input whose head is the latest; the others have not lost what could be their best."""
-        latest = self.n_inputs - 1 - self._heads[::-1].index(end)
-        if True in self._overflowed:
-            self._overflowed = [lost and place == latest for place, lost in enumerate(self._overflowed)]
-        return latest
+    def _stride(self, outcomes: list[Outcome]) -> None:
+        """Pass at once all heads that single steps would pass to no other end.
+
+        With a candidate: all that moves no head beyond the latest, up to the pivot. On the way each step is no
+        better than the candidate or, from some step on, better than the step before: the last one decides.
+        Without one: all that is too far from the latest head, or all before it if it is of an input that
+        overflowed; in either case not the last message of any input, which would end the search.
+        """
+        end = max(self._heads)
+        if self._pivot != _NO_PIVOT:
+            if end < self._proof_end:
+                self._pass_until(min(self._pivot_stamp, *self._last_stamps(end)))
+            return
+        self._excuse_all_but_latest(end)
+        target = min(self._last_stamps(end - 1), default=end) if self._overflowed else end - self._slop
+        target = min(target, *[stamps[-1] for stamps in self._stamps])
+        for place, head in enumerate(self._heads):
+            if head < target:
+                count = bisect_left(self._stamps[place], target)
+                self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
+
+    def _last_stamps(self, end: int) -> list[int]:
+        """The last stamp up to `end` of each input that has one."""
+        lasts = []
+        for head, stamps in zip(self._heads, self._stamps, strict=True):
+            if head <= end:
+                lasts.append(stamps[bisect_right(stamps, end) - 1])
+        return lasts
+
+    def _pass_until(self, target: int) -> None:
+        for place, head in enumerate(self._heads):
+            if head < target:
+                stamps = self._stamps[place]
+                self._cursors[place] = bisect_left(stamps, target)
+                self._heads[place] = stamps[self._cursors[place]]
+
+    def _excuse_all_but_latest(self, end: int) -> None:
+        """Forget the overflow of inputs that don't have the latest head: they may be the pivot again."""
+        self._overflowed.intersection_update((self._latest_place(end),))
+
+    def _latest_place(self, end: int) -> int:
+        """The last of the inputs whose head is the latest."""
+        return self.n_inputs - 1 - self._heads[::-1].index(end)
 
     def _note_missed(self, start: int) -> None:
-        """See whether what would have matched the earliest head had overflowed."""
+        """See whether what would have matched the only message of an input had overflowed."""
         for place, head in enumerate(self._heads):
             if head > start:
                 self._losses.miss(place, self._stamps[place], start, self._slop)
 
-    def _drop_head(self, place: int, outcomes: list[Outcome]) -> None:
+    def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
+        """Drop heads while there is no candidate."""
         stamps = self._stamps[place]
-        outcomes.append(Drop(self._messages[place].pop(0), DropReason.TOO_FAR))
-        del stamps[0]
+        messages = self._messages[place]
+        outcomes += [Drop(message, reason) for message in messages[:count]]
+        del messages[:count]
+        del stamps[:count]
         if stamps:
             self._heads[place] = stamps[0]
         else:

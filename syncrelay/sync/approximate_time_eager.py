@@ -88,8 +88,9 @@ class ApproximateTimeEager(Policy):
             return
         stamps.insert(position, stamp)
         messages.insert(position, message)
-        if position == 0:
+        if len(stamps) == 1:
             self._note_missed(stamp)
+        if position == 0:
             self._drop_too_far(outcomes)
 
     def _note_missed(self, stamp: int) -> None:

@@ -30,6 +30,7 @@ class SyncGroup:
     __slots__ = (
         "_arrivals",
         "_by_stamp",
+        "_is_limited",
         "_ledger",
         "_matching",
         "_newest",
@@ -73,6 +74,7 @@ class SyncGroup:
                 n_inputs=n_inputs, repeats=policy.repeats, every=every, min_set_period_ns=min_set_period_ns
             )
         self._matching: Matching = Unlimited(policy, self._arrivals)
+        self._is_limited = max_wait_ns is not None
         if max_wait_ns is not None:
             self._matching = Limited(
                 policy, self._arrivals, required=required, max_wait_ns=max_wait_ns, offsets_ns=offsets
@@ -88,7 +90,7 @@ class SyncGroup:
         index = message.input
         stamp = message.stamp
         self._ledger.fed[index] += 1
-        due = self.expire(now=now)
+        due = self.expire(now=now) if self._is_limited else ()
         if stamp <= self._newest[index]:
             outcomes = self._take_behind(message, now)
         else:
