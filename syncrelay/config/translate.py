@@ -67,7 +67,7 @@ def translate(errors: Sequence[ErrorDetails], document: Document) -> list[Proble
     misspelt = set(_meant_keys(errors))
     problems = []
     for error in errors:
-        path = _path(error)
+        path = _path(error["loc"])
         if error["type"] == "missing" and path in misspelt:
             continue
         node = document.node(path)
@@ -171,7 +171,7 @@ def _meant_keys(errors: Sequence[ErrorDetails]) -> Iterator[Path]:
     """Yield the paths of missing keys that stand there misspelt."""
     for error in errors:
         if error["type"] == "extra_forbidden":
-            *parents, key = _path(error)
+            *parents, key = _path(error["loc"])
             meant = nearest(str(key), _model(error["loc"][:-1]).model_fields)
             if meant:
                 yield (*parents, meant)
@@ -197,9 +197,12 @@ def _owner_span(path: Path, document: Document) -> Any:
     return node.span
 
 
-def _path(error: ErrorDetails) -> Path:
-    return tuple(step for step in error["loc"] if not _is_tag(step))
-
-
-def _is_tag(step: str | int) -> bool:
-    return isinstance(step, str) and (step == "[key]" or (step.startswith("<") and step.endswith(">")))
+def _path(loc: Location) -> Path:
+    """Return a place without its tags, which stand where a union is: at a group, and below `qos` and `stamp`."""
+    match loc:
+        case ("groups", name, _, "topics", index, ("qos" | "stamp") as key, _, *rest):
+            return ("groups", name, "topics", index, key, *rest)
+        case ("groups", name, _, *rest):
+            return ("groups", name, *rest)
+        case _:
+            return loc
