@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from syncrelay.config.document import Document, MappingNode, SequenceNode
 from syncrelay.config.drafts import GroupDraft, TopicDraft
+from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.wording import did_you_mean, quoted
 
@@ -18,6 +19,7 @@ def check_between(groups: Sequence[GroupDraft], document: Document) -> Iterator[
         yield from _restamp(group, document)
     yield from _shared_topics(groups, document)
     yield from _outputs(groups, document)
+    yield from _too_long(groups, document)
 
 
 def _too_few(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
@@ -96,6 +98,15 @@ def _outputs(groups: Sequence[GroupDraft], document: Document) -> Iterator[Probl
             text = f"{what} is taken by line {line}, give it another `output`"
             yield _at(document, topic.output_path, text, code="repeated_output")
         outputs.setdefault(topic.output, topic)
+
+
+def _too_long(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
+    """Yield names that only their namespace or prefix makes too long."""
+    for topic in _topics(groups):
+        for name, path in ((topic.topic, (*topic.path, "topic")), (topic.output, topic.output_path)):
+            if name is not None and len(name) > LONGEST_TOPIC:
+                text = f"{quoted(name)} has {len(name)} characters in full, at most {LONGEST_TOPIC} are allowed"
+                yield _at(document, path, text, code="bad_value")
 
 
 def _topics(groups: Iterable[GroupDraft]) -> Iterator[TopicDraft]:

@@ -26,6 +26,7 @@ BEYOND_A_SCHEMA = {
     "slop_not_a_number",
     "slop_without_end",
     "message_misspelt",
+    "names_too_long_in_full",
     "one_topic_two_qos",
     "one_topic_two_types",
     "output_is_an_input_of_another_group",
