@@ -17,6 +17,9 @@ def check_between(groups: Sequence[GroupDraft], document: Document) -> Iterator[
     for group in groups:
         yield from _repeated_inputs(group, document)
         yield from _restamp(group, document)
+        yield from _trigger(group, document)
+        yield from _keys(group, document)
+        yield from _optional_inputs(group, document)
     yield from _shared_topics(groups, document)
     yield from _outputs(groups, document)
     yield from _too_long(groups, document)
@@ -53,6 +56,36 @@ def _restamp(group: GroupDraft, document: Document) -> Iterator[Problem]:
     hint = did_you_mean(group.restamp, (*_RESTAMP_WORDS, *inputs))
     text = f"{quoted(group.restamp)} is not an input of this group, nor none, earliest or latest{hint}"
     yield _at(document, (*group.path, "restamp"), text, code="bad_value")
+
+
+def _trigger(group: GroupDraft, document: Document) -> Iterator[Problem]:
+    if group.trigger is None:
+        return
+    inputs = {topic.topic: topic for topic in group.topics if topic.topic}
+    path = (*group.path, "trigger")
+    if group.trigger_topic not in inputs:
+        hint = did_you_mean(group.trigger, inputs)
+        yield _at(document, path, f"{quoted(group.trigger)} is not an input of this group{hint}", code="bad_value")
+    elif not inputs[group.trigger_topic].is_required:
+        text = f"{quoted(group.trigger)} triggers every set, so it cannot be optional (`required: false`)"
+        yield _at(document, path, text, code="conflict")
+
+
+def _keys(group: GroupDraft, document: Document) -> Iterator[Problem]:
+    for topic in group.topics if group.needs_key else ():
+        if document.find(topic.key_path) is None:
+            text = "missing, equal_key needs the field to match by, here or in the group: `key: header.frame_id`"
+            yield _at(document, (*topic.path, "key"), text, code="missing")
+
+
+def _optional_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]:
+    optional = [topic for topic in group.topics if not topic.is_required]
+    if optional and len(optional) == len(group.topics):
+        text = "all inputs of this group are optional, expected one or more without `required: false`"
+        yield _at(document, (*group.path, "topics"), text, code="conflict", at_key=True)
+    if optional and not group.has_max_wait:
+        text = "an optional input needs the group's `max_wait`: how long a set waits for it, for example 100ms"
+        yield _at(document, (*optional[0].path, "required"), text, code="missing")
 
 
 def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:

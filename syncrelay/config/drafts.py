@@ -19,7 +19,7 @@ from syncrelay.config.typenames import check_field_path, check_type_name
 
 @dataclass(frozen=True, slots=True)
 class TopicDraft:
-    """A topic. Names are absolute; what is missing or wrong is None."""
+    """A topic. Names are absolute; what is missing or wrong is None. `key_path` is where its key is written."""
 
     path: Path
     topic: str | None
@@ -29,6 +29,9 @@ class TopicDraft:
     qos: Any
     has_header_stamp: bool
     stamp_field: str | None
+    is_required: bool
+    key: str | None
+    key_path: Path
 
     @property
     def output_path(self) -> Path:
@@ -38,11 +41,18 @@ class TopicDraft:
 
 @dataclass(frozen=True, slots=True)
 class GroupDraft:
-    """A group with those of its topics that are mappings. `restamp_topic` is absolute, and None if it is a word."""
+    """A group with those of its topics that are mappings.
+
+    `restamp_topic` and `trigger_topic` are absolute, and None where they name no topic.
+    """
 
     path: Path
     restamp: str
     restamp_topic: str | None
+    trigger: str | None
+    trigger_topic: str | None
+    needs_key: bool
+    has_max_wait: bool
     topics: tuple[TopicDraft, ...]
 
     @property
@@ -65,19 +75,26 @@ def _group(path: Path, node: MappingNode, absolute: Callable[[str], str]) -> Gro
     restamp = _value(node, "restamp")
     restamp = restamp if isinstance(restamp, str) else "none"
     restamp_topic = None if restamp in ("none", "earliest", "latest") else _checked(check_topic_name, restamp)
+    trigger = _checked(check_topic_name, _value(node, "trigger"))
     topics = node.entries["topics"].value if "topics" in node.entries else None
     return GroupDraft(
         path=path,
         restamp=restamp,
         restamp_topic=absolute(restamp_topic) if restamp_topic else None,
+        trigger=trigger,
+        trigger_topic=absolute(trigger) if trigger else None,
+        needs_key=_value(node, "policy") == "equal_key",
+        has_max_wait="max_wait" in node.entries,
         topics=tuple(
-            _topic((*path, "topics", *step), topic, prefix=prefix or f"/{path[-1]}", absolute=absolute)
+            _topic((*path, "topics", *step), topic, node, prefix=prefix or f"/{path[-1]}", absolute=absolute)
             for step, topic in (mappings(topics) if isinstance(topics, SequenceNode) else ())
         ),
     )
 
 
-def _topic(path: Path, node: MappingNode, *, prefix: str, absolute: Callable[[str], str]) -> TopicDraft:
+def _topic(
+    path: Path, node: MappingNode, group: MappingNode, *, prefix: str, absolute: Callable[[str], str]
+) -> TopicDraft:
     topic = _checked(check_topic_name, _value(node, "topic"))
     has_own_output = "output" in node.entries
     if has_own_output:
@@ -85,6 +102,7 @@ def _topic(path: Path, node: MappingNode, *, prefix: str, absolute: Callable[[st
     else:
         output = default_output(topic, prefix=prefix) if topic else None
     stamp = _value(node, "stamp")
+    has_own_key = "key" in node.entries
     return TopicDraft(
         path=path,
         topic=absolute(topic) if topic else None,
@@ -94,6 +112,9 @@ def _topic(path: Path, node: MappingNode, *, prefix: str, absolute: Callable[[st
         qos=_value(node, "qos") or "auto",
         has_header_stamp="stamp" not in node.entries or stamp == "header",
         stamp_field=_checked(check_field_path, stamp.get("field")) if isinstance(stamp, dict) else None,
+        is_required=_value(node, "required") is not False,
+        key=_checked(check_field_path, _value(node if has_own_key else group, "key")),
+        key_path=(*(path if has_own_key else path[:-2]), "key"),
     )
 
 

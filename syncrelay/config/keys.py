@@ -12,7 +12,7 @@ from syncrelay.config.names import (
     check_topic_name,
 )
 from syncrelay.config.typenames import check_field_path, check_type_name
-from syncrelay.config.units import parse_duration
+from syncrelay.config.units import parse_duration, parse_rate
 from syncrelay.config.wording import describe
 
 
@@ -67,6 +67,20 @@ Duration = Annotated[int, BeforeValidator(_not_negative), WithJsonSchema(duratio
 
 SignedDuration = Annotated[int, BeforeValidator(parse_duration), WithJsonSchema(duration_schema(sign="[+-]?"))]
 """A duration of either sign, in nanoseconds."""
+
+Rate = Annotated[
+    int,
+    BeforeValidator(parse_rate),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0},
+                {"type": "string", "pattern": rf"^\s*\+?{_NUMBER}\s*([Hh]z|kHz)\s*$"},
+            ]
+        }
+    ),
+]
+"""A rate, as the nanoseconds between two events."""
 
 TopicName = Annotated[str, BeforeValidator(check_topic_name), _text(rf"^(~?/)?{_TOKENS}$", maxLength=LONGEST_TOPIC)]
 """A topic name: absolute, relative to the node's namespace, or private (`~/`)."""

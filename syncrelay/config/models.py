@@ -12,6 +12,7 @@ from syncrelay.config.keys import (
     Namespace,
     NodeName,
     OutputPrefix,
+    Rate,
     SignedDuration,
     TopicName,
     TypeName,
@@ -69,6 +70,13 @@ class Topic(Keys):
         examples=["auto", "sensor_data", {"reliability": "best_effort", "depth": 5}],
         json_schema_extra={"default": "auto"},
     )
+    required: bool = Field(
+        default=True,
+        description=(
+            "Whether every set has a message of this input. With false a set leaves without one after the group's"
+            " max_wait. Default: true."
+        ),
+    )
     offset: SignedDuration = Field(
         default=0,
         description=(
@@ -87,6 +95,16 @@ class Topic(Keys):
             " time of its arrival here) or a field, as in {field: status.stamp}. Default: header."
         ),
         examples=["header", "receive", {"field": "status.stamp"}],
+    )
+
+
+class KeyedTopic(Topic):
+    """An input of a policy that matches by a field."""
+
+    key: Annotated[FieldPath | None, NOT_NULL] = Field(
+        default=None,
+        description="Path of the field to match by, where it is another than the group's `key`. Default: the group's.",
+        examples=["image_header.frame_id"],
     )
 
 
@@ -121,6 +139,29 @@ class Group(Keys):
         le=1_000_000,
         description="Messages kept per input while they wait for a match. Default: 10.",
         examples=[10],
+    )
+    max_wait: Annotated[Duration | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "How long a set may wait, once its required messages are there, for optional ones or for a closer match;"
+            " then it leaves as it is. Needed where an input is optional. A number is seconds, a text has a unit"
+            " (ns, us, ms, s, min). Default: no limit."
+        ),
+        examples=["100ms"],
+    )
+    max_rate: Annotated[Rate | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "Most sets a second, evenly spaced by their stamps; the others are dropped whole, as `thinned`. A number"
+            " is Hz, a text has a unit (Hz, kHz). Default: no limit."
+        ),
+        examples=["10 Hz"],
+    )
+    every: int = Field(
+        default=1,
+        ge=1,
+        description="Only each n-th set leaves; the others are dropped whole, as `thinned`. Default: 1, every set.",
+        examples=[2],
     )
     restamp: Annotated[str, BeforeValidator(_restamp)] = Field(
         default="none",

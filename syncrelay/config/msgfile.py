@@ -9,7 +9,7 @@ TIME: Final = "builtin_interfaces/msg/Time"
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[[^\]]*\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)"
 )
-_PRIMITIVES: Final = frozenset(
+PRIMITIVES: Final = frozenset(
     [
         "bool",
         "byte",
@@ -49,7 +49,7 @@ def parse_fields(text: str, *, package: str) -> tuple[Field, ...]:
 
 
 def _full_name(written: str, package: str) -> str:
-    if written in _PRIMITIVES:
+    if written in PRIMITIVES:
         return written
     owner, slash, name = written.rpartition("/")
     return f"{owner.removesuffix('/msg')}/msg/{name}" if slash else f"{package}/msg/{name}"

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from syncrelay.config.file import FileKeys
-from syncrelay.config.models import NodeConfig, PacedTopic, StampSource, Topic
-from syncrelay.config.names import default_output, expand
-from syncrelay.config.policies import AnyGroup
+from syncrelay.config.models import KeyedTopic, NodeConfig, PacedTopic, StampSource, Topic
+from syncrelay.config.names import default_output
+from syncrelay.config.policies import AnyGroup, EqualKeyGroup, Inputs
 from syncrelay.config.problems import Problem
 from syncrelay.config.qos import QosOverrides, QosPreset
 from syncrelay.sync import Restamp, SyncGroup
@@ -13,7 +13,11 @@ from syncrelay.sync import Restamp, SyncGroup
 
 @dataclass(frozen=True, slots=True)
 class TopicConfig:
-    """An input and its output. `stamp` is "header", "receive" or a StampField with the path of the field."""
+    """An input and its output.
+
+    `stamp` is "header", "receive" or a StampField with the path of the field; `key` the path of the field to
+    match by, None where stamps are matched.
+    """
 
     topic: str
     type: str
@@ -22,6 +26,8 @@ class TopicConfig:
     offset_ns: int
     min_period_ns: int
     stamp: StampSource
+    required: bool
+    key: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +38,18 @@ class GroupConfig:
     topics: tuple[TopicConfig, ...]
     restamp: Restamp | int | None
     keys: AnyGroup
+    inputs: Inputs
 
     def engine(self) -> SyncGroup:
         """Return a new, empty engine of this group."""
         return SyncGroup(
-            self.keys.matcher(),
-            required=(True,) * len(self.topics),
-            max_wait_ns=None,
+            self.keys.matcher(self.inputs),
+            required=tuple(topic.required for topic in self.topics),
+            max_wait_ns=self.keys.max_wait,
             offsets_ns=tuple(topic.offset_ns for topic in self.topics),
             restamp=self.restamp,
+            every=self.keys.every,
+            min_set_period_ns=self.keys.max_rate,
         )
 
 
@@ -61,15 +70,17 @@ def resolve(file: FileKeys, *, notes: tuple[Problem, ...]) -> Config:
 
 def _group(name: str, group: AnyGroup, node: NodeConfig) -> GroupConfig:
     prefix = f"/{name}" if group.output_prefix is None else group.output_prefix
+    inputs = Inputs.of(group.topics, node)
     return GroupConfig(
         name=name,
-        topics=tuple(_topic(topic, prefix=prefix) for topic in group.topics),
-        restamp=_restamp(group, node),
+        topics=tuple(_topic(topic, group, prefix=prefix) for topic in group.topics),
+        restamp=_restamp(group.restamp, inputs),
         keys=group,
+        inputs=inputs,
     )
 
 
-def _topic(topic: Topic, *, prefix: str) -> TopicConfig:
+def _topic(topic: Topic, group: AnyGroup, *, prefix: str) -> TopicConfig:
     return TopicConfig(
         topic=topic.topic,
         type=topic.type,
@@ -78,19 +89,18 @@ def _topic(topic: Topic, *, prefix: str) -> TopicConfig:
         offset_ns=topic.offset,
         min_period_ns=topic.min_period if isinstance(topic, PacedTopic) else 0,
         stamp=topic.stamp,
+        required=topic.required,
+        key=(topic.key or group.key) if isinstance(topic, KeyedTopic) and isinstance(group, EqualKeyGroup) else None,
     )
 
 
-def _restamp(group: AnyGroup, node: NodeConfig) -> Restamp | int | None:
-    match group.restamp:
+def _restamp(word: str, inputs: Inputs) -> Restamp | int | None:
+    match word:
         case "none":
             return None
-        case "earliest" | "latest":
-            return Restamp(group.restamp)
+        case "earliest":
+            return Restamp.EARLIEST
+        case "latest":
+            return Restamp.LATEST
         case topic:
-            inputs = [_absolute(each.topic, node) for each in group.topics]
-            return inputs.index(_absolute(topic, node))
-
-
-def _absolute(topic: str, node: NodeConfig) -> str:
-    return expand(topic, node=node.name, namespace=node.namespace)
+            return inputs.index_of(topic)

@@ -19,7 +19,7 @@ from syncrelay.config.models import NodeConfig, StampField
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.qos import QosOverrides
 from syncrelay.config.scalars import read_plain
-from syncrelay.config.wording import describe, did_you_mean, nearest, one_of, quoted
+from syncrelay.config.wording import all_of, describe, did_you_mean, nearest, one_of, quoted
 
 Location: TypeAlias = tuple[str | int, ...]
 """A place in pydantic's words: a path with the tags of unions in it."""
@@ -135,7 +135,7 @@ def _unknown_key(loc: Location) -> str:
     for models in (GROUP_MODEL_OF, _TOPIC_MODEL_OF):
         owners = [policy for policy, other in models.items() if key in other.model_fields]
         if owners and model in models.values():
-            return f"{_policy(loc)} has no `{key}`, only {' and '.join(owners)}"
+            return f"{_policy(loc)} has no `{key}`, only {all_of(owners)}"
     levels = [level for level, owner in _LEVELS.items() if key in owner.model_fields]
     if levels and nearest(key, model.model_fields, likeness=_A_SLIP) is None:
         return f"unknown key here, `{key}` is a key of {levels[0]}"

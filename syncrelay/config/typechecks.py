@@ -1,11 +1,12 @@
 """Checks of message types against what is installed, importing nothing."""
 
 from collections.abc import Iterator, Sequence
+from typing import Final, NamedTuple
 
 from syncrelay.config.document import Document
 from syncrelay.config.drafts import GroupDraft, TopicDraft
 from syncrelay.config.interfaces import Interfaces
-from syncrelay.config.msgfile import HEADER, TIME, Field
+from syncrelay.config.msgfile import HEADER, PRIMITIVES, TIME, Field
 from syncrelay.config.problems import Path, Problem, Severity
 from syncrelay.config.wording import did_you_mean, nearest, one_of, quoted
 
@@ -27,15 +28,26 @@ def _check_topic(topic: TopicDraft, document: Document, interfaces: Interfaces) 
     if fault is not None:
         text, code = fault
         yield document.problem(path, text, code=code, span=span)
-    elif topic.has_header_stamp or topic.stamp_field is not None:
+    elif topic.has_header_stamp or topic.stamp_field is not None or topic.key is not None:
         fields = interfaces.fields(topic.type)
         if fields is None:
-            text = f"{quoted(topic.type)} is installed without its .msg file, so its stamp was not checked"
+            text = f"{quoted(topic.type)} is installed without its .msg file, so its fields were not checked"
             yield document.problem(path, text, code="not_checked", span=span, severity=Severity.NOTE)
-        elif topic.stamp_field is not None:
-            yield from _check_field(topic, topic.stamp_field, document, interfaces)
-        elif not _begins_with_header(fields):
-            yield _no_header(topic, fields, document, interfaces)
+        else:
+            yield from _check_fields(topic, fields, document, interfaces)
+
+
+def _check_fields(
+    topic: TopicDraft, fields: Sequence[Field], document: Document, interfaces: Interfaces
+) -> Iterator[Problem]:
+    if topic.stamp_field is not None:
+        stamp = _FieldDraft((*topic.path, "stamp", "field"), topic.stamp_field, _A_TIME)
+        yield from _check_field(topic, stamp, document, interfaces)
+    elif topic.has_header_stamp and not _begins_with_header(fields):
+        yield _no_header(topic, fields, document, interfaces)
+    if topic.key is not None:
+        key = _FieldDraft(topic.key_path, topic.key, _A_KEY)
+        yield from _check_field(topic, key, document, interfaces)
 
 
 def _not_installed(type_name: str, interfaces: Interfaces) -> tuple[str, str] | None:
@@ -96,15 +108,37 @@ def _time_paths(fields: Sequence[Field], interfaces: Interfaces, *, depth: int =
         yield from (f"{field.name}.{path}" for path in _time_paths(below or (), interfaces, depth=depth - 1))
 
 
-def _check_field(topic: TopicDraft, field_path: str, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
-    path = (*topic.path, "stamp", "field")
-    text = _field_fault(str(topic.type), (), field_path.split("."), interfaces)
+class _Wanted(NamedTuple):
+    """The types that a field may have, and what they are called."""
+
+    types: frozenset[str]
+    name: str
+
+
+class _FieldDraft(NamedTuple):
+    """A field that the file names: where it does, the fields to go through joined by dots, and what it has to be."""
+
+    path: Path
+    steps: str
+    wanted: _Wanted
+
+
+_A_TIME: Final = _Wanted(frozenset([TIME]), TIME)
+_A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a text or a time")
+
+
+def _check_field(
+    topic: TopicDraft, field: _FieldDraft, document: Document, interfaces: Interfaces
+) -> Iterator[Problem]:
+    text = _field_fault(str(topic.type), (), field.steps.split("."), field.wanted, interfaces)
     if text is not None:
-        yield document.problem(path, text, code="no_such_field", span=document.value_span(path))
+        yield document.problem(field.path, text, code="no_such_field", span=document.value_span(field.path))
 
 
-def _field_fault(type_name: str, above: tuple[str, ...], steps: Sequence[str], interfaces: Interfaces) -> str | None:
-    """Follow the steps of a path; say where it ends before it reaches a time. A type without .msg is believed."""
+def _field_fault(
+    type_name: str, above: tuple[str, ...], steps: Sequence[str], wanted: _Wanted, interfaces: Interfaces
+) -> str | None:
+    """Follow the steps of a path; say where it misses what is wanted. A type without .msg is believed."""
     first, *rest = steps
     fields = interfaces.fields(type_name)
     if fields is None:
@@ -116,13 +150,13 @@ def _field_fault(type_name: str, above: tuple[str, ...], steps: Sequence[str], i
         hint = f"did you mean `{'.'.join((*above, close, *rest))}`?" if close else f"it has {one_of(by_name)}"
         return f"{type_name} has no field {quoted(first)}, {hint}"
     if field.is_array:
-        return f"{quoted(first)} of {type_name} is an array, expected one {TIME}"
+        return f"{quoted(first)} of {type_name} is an array, expected one {wanted.name.removeprefix('a ')}"
     if rest:
-        return _field_fault(field.type, (*above, first), rest, interfaces)
-    if field.type == TIME:
+        return _field_fault(field.type, (*above, first), rest, wanted, interfaces)
+    if field.type in wanted.types:
         return None
     hint = _time_below((*above, first), field, interfaces)
-    return f"{quoted(first)} of {type_name} is {field.type}, expected {TIME}{hint}"
+    return f"{quoted(first)} of {type_name} is {field.type}, expected {wanted.name}{hint}"
 
 
 def _time_below(path: tuple[str, ...], field: Field, interfaces: Interfaces) -> str:

@@ -1,4 +1,4 @@
-"""Durations as people write them, to nanoseconds."""
+"""Durations and rates as people write them, to nanoseconds."""
 
 import math
 import re
@@ -15,6 +15,7 @@ NS_PER_UNIT: Final = {
     "s": 1_000_000_000,
     "min": 60_000_000_000,
 }
+_HERTZ: Final = {"Hz": 1, "hz": 1, "kHz": 1_000}
 MAX_NS: Final = 2**63 - 1
 _UNITS = "ns, us, ms, s or min"
 # What other programs call the units.
@@ -49,6 +50,34 @@ def parse_duration(value: object) -> int:
         raise ValueError(f"expected a duration such as 20ms, found {describe(value)}")
     # repr gives the digits that were written, where the float itself is a little off.
     return _whole_ns(Decimal(repr(value)), NS_PER_UNIT["s"], found=f"{value} s")
+
+
+def parse_rate(value: object) -> int:
+    """Return the nanoseconds between two events of a rate: a number of them a second, or a text such as 10 Hz.
+
+    Rounded to the nearest nanosecond. Raises ValueError saying what to write instead.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"expected a rate such as 10 Hz, found {describe(value)}")  # noqa: TRY004
+    hertz = _hertz(value) if isinstance(value, str) else Decimal(repr(value))
+    if not hertz.is_finite() or hertz <= 0:
+        raise ValueError(f"expected a rate above 0, such as 10 Hz, found {describe(value)}")
+    period = NS_PER_UNIT["s"] / hertz
+    if not 1 <= period <= MAX_NS:
+        raise ValueError(f"{quoted(str(value))} is out of range, at most 1 GHz")
+    return round(period)
+
+
+def _hertz(text: str) -> Decimal:
+    matched = _DURATION.fullmatch(text.strip())
+    if matched is None:
+        raise ValueError(f"expected a rate such as 10 Hz, found {describe(text)}")
+    number, unit = matched.groups()
+    if not unit:
+        raise ValueError(f"the text {quoted(text)} has no unit: write {number} Hz, or {number} without quotes")
+    if unit not in _HERTZ:
+        raise ValueError(f"unknown unit {quoted(unit)}, expected Hz or kHz")
+    return Decimal(number) * _HERTZ[unit]
 
 
 def _number_and_unit(text: str) -> tuple[Decimal, int]:

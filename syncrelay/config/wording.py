@@ -53,7 +53,14 @@ def describe(value: object) -> str:
 
 def one_of(words: Iterable[str]) -> str:
     """Return `a`, `a or b`, `a, b or c`."""
-    listed = list(words)
-    if len(listed) == 1:
-        return listed[0]
-    return f"{', '.join(listed[:-1])} or {listed[-1]}"
+    return _listed(words, "or")
+
+
+def all_of(words: Iterable[str]) -> str:
+    """Return `a`, `a and b`, `a, b and c`."""
+    return _listed(words, "and")
+
+
+def _listed(words: Iterable[str], conjunction: str) -> str:
+    *first, last = words
+    return f"{', '.join(first)} {conjunction} {last}" if first else last

@@ -16,6 +16,9 @@ MS = 1_000_000
 IMAGE = "sensor_msgs/msg/Image"
 APPROXIMATE = {"policy": "approximate_time", "slop": "20ms"}
 EXACT = {"policy": "exact_time"}
+LATEST = {"policy": "latest_time", "trigger": "/a"}
+KEYED = {"policy": "equal_key", "key": "header.stamp"}
+OPTIONAL = {"required": False}
 
 
 def file(keys: dict[str, Any] = APPROXIMATE, *, first: dict[str, Any] | None = None, **top: Any) -> str:
@@ -40,6 +43,19 @@ def sets_of(*arrivals: tuple[int, int]) -> Callable[[Config], object]:
     return sets
 
 
+def sets_after(wait_ms: int, *arrivals: tuple[int, int]) -> Callable[[Config], object]:
+    """How many sets have left some time after these messages."""
+
+    def sets(config: Config) -> object:
+        engine = config.groups[0].engine()
+        for index, stamp in arrivals:
+            engine.add(Message(index, stamp * MS, None), now=0)
+        engine.expire(now=wait_ms * MS)
+        return engine.sets
+
+    return sets
+
+
 def outputs(config: Config) -> object:
     return [topic.output for group in config.groups for topic in group.topics]
 
@@ -52,6 +68,10 @@ NEAR_PAIRS = sets_of((0, 1), (1, 3), (0, 101), (1, 103), (0, 201), (1, 203))
 WIDER_PAIRS = sets_of((0, 100), (1, 110), (0, 200), (1, 210), (0, 300), (1, 310))
 ONE_INPUT_AHEAD = sets_of((0, 10), (0, 20), (1, 10))
 TWO_SPANS_TO_CHOOSE_FROM = sets_of((0, 8), (1, 11), (0, 13), (0, 19))
+
+EXACT_PAIRS = sets_of((0, 10), (1, 10), (0, 20), (1, 20), (0, 200), (1, 200))
+LATEST_OF_BOTH = sets_of((1, 10), (0, 100), (1, 110), (0, 120))
+OPEN_PAIR = sets_after(50, (0, 100), (1, 101))
 
 OPTIONS = {
     "policy": (file(), file(EXACT), NEAR_PAIRS),
@@ -73,6 +93,23 @@ OPTIONS = {
         file({**APPROXIMATE, "restamp": "/b"}),
         NEAR_PAIRS,
     ),
+    "required": (
+        file({**EXACT, "max_wait": 1}),
+        file({**EXACT, "max_wait": 1}, first=OPTIONAL),
+        sets_of((1, 10), (0, 20)),
+    ),
+    "max_wait": (
+        file({**EXACT, "max_wait": "10ms"}, first=OPTIONAL),
+        file({**EXACT, "max_wait": "1s"}, first=OPTIONAL),
+        sets_after(50, (1, 100)),
+    ),
+    "max_wait: all required": (file(), file({**APPROXIMATE, "max_wait": "10ms"}), OPEN_PAIR),
+    "max_rate": (file(EXACT), file({**EXACT, "max_rate": "10 Hz"}), EXACT_PAIRS),
+    "every": (file(EXACT), file({**EXACT, "every": 2}), EXACT_PAIRS),
+    "trigger": (file(LATEST), file({**LATEST, "trigger": "/b"}), LATEST_OF_BOTH),
+    "max_age": (file(LATEST), file({**LATEST, "max_age": "50ms"}), LATEST_OF_BOTH),
+    "key": (file(KEYED), file({**KEYED, "key": "header.frame_id"}), of_first_topic("key")),
+    "key: own": (file(KEYED), file(KEYED, first={"key": "header.frame_id"}), of_first_topic("key")),
     "offset": (file(), file(first={"offset": "-50ms"}), sets_of((0, 150), (1, 100), (0, 250), (1, 200))),
     "min_period": (file(), file(first={"min_period": "90ms"}), sets_of((0, 14), (1, 15))),
     "topic": (file(), file(first={"topic": "/z"}), of_first_topic("topic")),
@@ -124,13 +161,22 @@ DEFAULTS = {
     "age_penalty": (0, 1, TWO_SPANS_TO_CHOOSE_FROM),
     "restamp": ("none", "latest", NEAR_PAIRS),
     "output_prefix": ("/y", "/z", outputs),
+    "max_wait": ("10ms", "1s", OPEN_PAIR),
+    "max_rate": ("1 Hz", "1 kHz", NEAR_PAIRS),
+    "every": (1, 2, NEAR_PAIRS),
+    "trigger": ("/a", "/b", LATEST_OF_BOTH, LATEST),
+    "max_age": ("10s", "50ms", LATEST_OF_BOTH, LATEST),
+    "key": ("header.stamp", "header.frame_id", of_first_topic("key"), KEYED),
 }
 
 
-@pytest.mark.parametrize(("key", "one", "other", "outcome"), [(key, *case) for key, case in DEFAULTS.items()])
-def test_a_default_counts_where_the_group_is_silent_and_only_there(key, one, other, outcome, environ):
+@pytest.mark.parametrize("key", DEFAULTS)
+def test_a_default_counts_where_the_group_is_silent_and_only_there(key, environ):
+    one, other, outcome, *others = DEFAULTS[key]
+    (rest,) = others or (APPROXIMATE,)
+
     def outcome_of(keys: dict[str, Any], default: Any) -> object:
-        return outcome(load_text(file(keys, defaults={**APPROXIMATE, key: default}), environ=environ))
+        return outcome(load_text(file(keys, defaults={**rest, key: default}), environ=environ))
 
     assert outcome_of({}, one) != outcome_of({}, other)
     assert outcome_of({key: one}, other) == outcome_of({}, one)
