@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from tests.ros.shared_memory import Mapped, left_of, mapped_by
+from tests.ros.shared_memory import segments_of
 
 # What is still missing after this long will not come. A bound for broken runs, not a measure: on an idle
 # machine everything waited for here takes a second or two.
@@ -40,6 +40,15 @@ def ros_environment(*, domain: int, folder: Path, python_path: Sequence[Path]) -
         "PYTHONPATH": os.pathsep.join(map(str, python_path)),
         "NO_COLOR": "1",
     }
+
+
+def children_of(pid: int) -> list[int]:
+    """The ids of the processes that a process has started; none if it is gone."""
+    try:
+        children = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return []
+    return [int(child) for child in children.split()]
 
 
 class Process:
@@ -80,11 +89,19 @@ class Process:
 
     def wait_until(self, condition: Callable[[], bool], what: str, *, deadline_s: float = DEADLINE_S) -> None:
         """As the function of that name, but over at once when the process ends."""
+        held = False
+
+        def over() -> bool:
+            nonlocal held
+            ended = not self.running()
+            held = condition()
+            return held or ended
+
         try:
-            wait_until(lambda: condition() or not self.running(), what, deadline_s=deadline_s)
+            wait_until(over, what, deadline_s=deadline_s)
         except AssertionError as error:
             raise AssertionError(f"{error}\n{self._said()}") from None
-        if not condition():
+        if not held:
             raise AssertionError(f"{self.name} ended with {self._child.poll()} before {what}\n{self._said()}")
 
     def wait_for_log(self, text: str) -> None:
@@ -135,14 +152,10 @@ class Process:
         mask = next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:"))
         return bool(int(mask, 16) >> (number - 1) & 1)
 
-    def shared_memory(self) -> set[Mapped]:
-        """What it has mapped of Fast DDS's shared memory."""
-        return mapped_by(self.pid)
+    def shared_memory(self) -> set[Path]:
+        """The segments of Fast DDS that it and its children have mapped."""
+        return set().union(*map(segments_of, [self.pid, *children_of(self.pid)]))
 
     def _said(self) -> str:
         tail = self.stderr.splitlines()[-30:]
         return "\n".join([f"--- the last of {self.name}'s stderr", *tail])
-
-
-def shared_memory_of(domain: int, segments: set[Path]) -> set[Path]:
-    return left_of(domain, {Mapped(path, path.stat().st_ino if path.exists() else 0) for path in segments})

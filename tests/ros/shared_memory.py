@@ -1,47 +1,34 @@
 """What Fast DDS leaves in /dev/shm when a process is killed: which of it was ours.
 
-Segments carry a random number in their names, ports the number of a UDP port: one of the domain's, or one from
-7000 on, whichever is free on the machine. Only a living process tells what it uses, by what it has mapped.
+Segments carry a random number in their names: only a living process tells which are its own, by what it has
+mapped. Ports carry the number of a UDP port of their domain, but for those from 7000 on, of which each process
+takes the first that is free on the machine, whatever its domain. These are left alone: one stays even after an
+orderly end if a process of another domain looked at it just then, and whoever starts next takes it over.
 """
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
 
 from tests.ros.domain import ports_of
 
 _FOLDER = Path("/dev/shm")  # noqa: S108  where POSIX shared memory is on Linux
-_PREFIX = "fastrtps_"
 
 
-class Mapped(NamedTuple):
-    """A file of Fast DDS that a process has mapped. A file of that name with another inode is somebody else's."""
-
-    path: Path
-    inode: int
-
-
-def mapped_by(pid: int) -> set[Mapped]:
-    """What a process has mapped, its own and its peers'; nothing if it is gone or not ours to ask."""
+def segments_of(pid: int) -> set[Path]:
+    """The segments that a process has mapped, its own and its peers'; none if it is gone."""
     try:
         maps = Path(f"/proc/{pid}/maps").read_text()
-    except (FileNotFoundError, ProcessLookupError, PermissionError):
+    except (FileNotFoundError, ProcessLookupError):
         return set()
-    rows = [line.split(maxsplit=5) for line in maps.splitlines() if f"{_FOLDER}/{_PREFIX}" in line]
-    return {Mapped(Path(row[5]), int(row[4])) for row in rows if Path(row[5]).name.startswith(_PREFIX)}
+    mapped = {Path(line.split(maxsplit=5)[5]) for line in maps.splitlines() if f"{_FOLDER}/" in line}
+    return {path for path in mapped if path.name.startswith("fastrtps_") and "port" not in path.name}
 
 
-def left_of(domain: int, mapped: Iterable[Mapped]) -> set[Path]:
-    """What still exists of a domain's ports, and of what its processes had mapped and nobody maps now."""
-    in_use = {one for process in Path("/proc").glob("[0-9]*") for one in mapped_by(int(process.name))}
-    ours = {one.path for one in mapped if one not in in_use and _inode(one.path) in (one.inode, None)}
-    ours |= {_FOLDER / f"{_PREFIX}port{port}" for port in ports_of(domain)}
-    files = {file for path in ours for file in (path, *_companions(path))}
+def left_of(domain: int, segments: Iterable[Path]) -> set[Path]:
+    """What still exists of a domain's ports and of the segments that its processes had mapped."""
+    ports = [_FOLDER / f"fastrtps_port{port}" for port in ports_of(domain)]
+    files = {file for path in (*ports, *segments) for file in (path, *_companions(path))}
     return {file for file in files if file.exists()}
-
-
-def _inode(path: Path) -> int | None:
-    return path.stat().st_ino if path.exists() else None
 
 
 def _companions(path: Path) -> tuple[Path, Path]:

@@ -11,7 +11,7 @@ import syncrelay
 from tests.ros import frames
 from tests.ros.frames import Frame
 from tests.ros.processes import DEADLINE_S, Process, ros_environment
-from tests.ros.shared_memory import Mapped, left_of
+from tests.ros.shared_memory import left_of
 
 _CHECKOUT = Path(__file__).parents[2]
 _PACKAGE = Path(syncrelay.__file__).parents[1]
@@ -99,7 +99,7 @@ class Stage:
         self.folder, self.domain = folder, domain
         self.environment = ros_environment(domain=domain, folder=folder, python_path=[_PACKAGE, _CHECKOUT])
         self._processes: list[Process] = []
-        self._mapped: set[Mapped] = set()
+        self._segments: set[Path] = set()
 
     def start(self, name: str, argv: Sequence[str], *, stdin: int = subprocess.DEVNULL) -> Process:
         process = Process(
@@ -143,12 +143,12 @@ class Stage:
         return Collector(self.start("collector", [*argv, "--output", str(output)], stdin=subprocess.PIPE), output)
 
     def note_shared_memory(self) -> None:
-        """Remember what our processes have mapped: of the dead, nothing tells it."""
+        """Remember the segments that our processes have mapped: of the dead, nothing tells it."""
         for process in self._processes:
-            self._mapped |= process.shared_memory()
+            self._segments |= process.shared_memory()
 
     def left_in_shared_memory(self) -> set[Path]:
-        return left_of(self.domain, self._mapped)
+        return left_of(self.domain, self._segments)
 
     def end(self) -> None:
         """End all processes and remove what they left, as Fast DDS does after SIGKILL."""

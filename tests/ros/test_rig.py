@@ -2,7 +2,6 @@
 
 import math
 import os
-import re
 import signal
 import struct
 import subprocess
@@ -17,7 +16,8 @@ from rosbags.typesys import Stores, get_typestore
 from syncrelay.cdr import read_stamp
 from syncrelay.ros.rig.discovery import quick_discovery
 from syncrelay.ros.rig.schedule import SENSORS, schedule
-from tests.ros.processes import shared_memory_of, wait_until
+from tests.ros.processes import children_of, wait_until
+from tests.ros.shared_memory import left_of, segments_of
 
 MS = 1_000_000
 SECOND = 1_000_000_000
@@ -152,18 +152,10 @@ with Rig(seed=1) as rig:
 def holder(stage):
     """A process that runs the whole rig until its stdin ends."""
     process = stage.start("holder", [sys.executable, "-c", _HOLD_RIG], stdin=subprocess.PIPE)
-    process.wait_until(lambda: len(children(process.pid)) == len(SENSORS), "the rig's processes")
-    process.wait_until(lambda: all(map(segments, children(process.pid))), "shared memory of all sensors")
+    process.wait_until(lambda: len(children_of(process.pid)) == len(SENSORS), "the rig's processes")
+    process.wait_until(lambda: all(map(segments_of, children_of(process.pid))), "shared memory of all sensors")
+    stage.note_shared_memory()
     return process
-
-
-def children(pid):
-    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-
-
-def segments(pid):
-    maps = Path(f"/proc/{pid}/maps").read_text()
-    return {Path(word) for word in re.findall(r"/dev/shm/fastrtps_(?!port)\w+", maps)}  # noqa: S108  where Linux has it
 
 
 def runs(pid):
@@ -177,27 +169,27 @@ def runs(pid):
 @pytest.mark.ros
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_the_sensors_end_with_the_process_that_started_them_however_that_ends(stage, holder, number):
-    sensors = children(holder.pid)
-    held = set().union(*map(segments, sensors))
+    sensors = children_of(holder.pid)
+    held = set().union(*map(segments_of, sensors))
     holder.send(number)
     holder.wait()
     wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes", deadline_s=20)
-    assert shared_memory_of(stage.domain, held) == set()
+    assert left_of(stage.domain, held) == set()
 
 
 @pytest.mark.ros
 def test_an_orderly_end_takes_the_sensors_along(stage, holder):
-    sensors = children(holder.pid)
-    held = set().union(*map(segments, sensors))
+    sensors = children_of(holder.pid)
+    held = set().union(*map(segments_of, sensors))
     holder.ask_to_end()
     assert holder.wait() == 0
     assert not any(map(runs, sensors))
-    assert shared_memory_of(stage.domain, held) == set()
+    assert left_of(stage.domain, held) == set()
 
 
 @pytest.mark.ros
 def test_a_sensor_that_dies_is_named(holder):
-    os.kill(children(holder.pid)[0], signal.SIGKILL)
+    os.kill(children_of(holder.pid)[0], signal.SIGKILL)
     assert holder.wait() == 1
     assert "RuntimeError: the rig's camera ended with exit code -9" in holder.stderr
 
