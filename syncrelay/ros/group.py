@@ -1,7 +1,7 @@
 """One group at work: payloads in, matched sets out on the group's publishers. Lives on the receive thread."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 from syncrelay.cdr import patch_stamp
@@ -34,11 +34,20 @@ class GroupRelay:
 
     def receive(self, index: int, payload: bytes, stamp: int | None) -> None:
         """Take in a message of one input by its stamp in nanoseconds; None where none could be read."""
-        message = Message(index, 0 if stamp is None else stamp, payload)
         if stamp is None:
-            self._settle([self.engine.reject(message, DropReason.MALFORMED)])
+            self._reject(index, payload)
         else:
-            self._settle(self.engine.add(message, now=self._now()))
+            self._settle(self.engine.add(Message(index, stamp, payload), now=self._now()))
+
+    def receive_keyed(self, index: int, payload: bytes, stamp: int | None, key: Hashable) -> None:
+        """Take in a message that is matched by its key; None where none could be read."""
+        if stamp is None or key is None:
+            self._reject(index, payload)
+        else:
+            self._settle(self.engine.add(Message(index, stamp, payload, key), now=self._now()))
+
+    def _reject(self, index: int, payload: bytes) -> None:
+        self._settle([self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED)])
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""

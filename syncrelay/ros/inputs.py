@@ -16,7 +16,7 @@ from syncrelay.ros.backlog import Deliver, Subscription
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.receive import ReceiveLoop
-from syncrelay.ros.types import begins_with_header, import_type, stamp_reader
+from syncrelay.ros.types import begins_with_header, import_type, stamp_reader, value_reader
 
 _LOG = logging.getLogger("syncrelay")
 
@@ -146,10 +146,16 @@ class TopicInput:
 
 
 def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
-    read = stamp_reader(group.config.topics[index].stamp, message_type)
-    if read is None:
+    topic = group.config.topics[index]
+    read_stamp = stamp_reader(topic.stamp, message_type)
+    if topic.key is not None:
+        read_key = value_reader(message_type, topic.key)
+        return lambda payload, received: group.receive_keyed(
+            index, payload, read_stamp(payload) if read_stamp else received, read_key(payload)
+        )
+    if read_stamp is None:
         return lambda payload, received: group.receive(index, payload, received)
-    return lambda payload, _: group.receive(index, payload, read(payload))
+    return lambda payload, _: group.receive(index, payload, read_stamp(payload))
 
 
 def _never_called(_: bytes) -> None:
