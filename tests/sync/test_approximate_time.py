@@ -1,83 +1,221 @@
+from functools import partial
+
 import pytest
-from timeline import TICK_NS, play_policy
+from drawn import policy_cases
+from timeline import TICK_NS
 
-from syncrelay.sync import ApproximateTime
-
-
-def policy(inputs=2, queue=10, slop=20, **options):
-    return ApproximateTime(n_inputs=inputs, queue_size=queue, slop_ns=slop * TICK_NS, **options)
+from syncrelay.sync import ApproximateTime, Match, Message
 
 
-CASES = {
-    "equal stamps leave at once": (
-        policy(),
-        """
-        lidar  |a..b
-        camera |A..B
-        -> A: aA
-        -> B: bB
-        """,
-    ),
-    "a set leaves when the next message proves it the best": (
-        policy(),
-        """
-        lidar  |a....b
-        camera |.A....
-        -> b: aA
-        """,
-    ),
-    "a nearer message replaces the one before, which is superseded": (
-        policy(),
-        """
-        lidar  |a..b....c
-        camera |....B....
-        -> B: a superseded
-        -> c: bB
-        """,
-    ),
-    "what is further than slop from the latest input is too far, slop itself is not": (
-        policy(slop=3),
-        """
-        lidar  |ab.......
-        camera |....B....C
-        lidar  |........c.
-        -> B: a too_far
-        -> c: bB
-        """,
-    ),
-    "a queue above its size overflows": (
-        policy(queue=2),
-        """
-        lidar  |abcd
-        camera |....
-        -> c: a overflow
-        -> d: b overflow
-        """,
-    ),
-    "an older message still finds its place in the queue": (
-        policy(),
-        """
-        lidar  |a.b.c.
-        camera |..B...
-        arrive: a c b B
-        -> B: a superseded, bB
-        """,
-    ),
-    "a later message of the same stamp replaces the one before": (
-        policy(),
-        """
-        lidar  |a.....
-        lidar  |b.....
-        camera |A.....
-        arrive: a b A
-        -> b: a duplicate
-        -> A: bA
-        """,
-    ),
-}
+def approximate(inputs=2, queue=10, slop=20, periods=None, **options):
+    min_periods_ns = periods and [period * TICK_NS for period in periods]
+    return ApproximateTime(
+        n_inputs=inputs, queue_size=queue, slop_ns=slop * TICK_NS, min_periods_ns=min_periods_ns, **options
+    )
 
 
-@pytest.mark.parametrize(("subject", "drawing"), CASES.values(), ids=CASES)
-def test_drawn(subject, drawing):
-    left, drawn = play_policy(subject, drawing)
-    assert left == drawn
+three = partial(approximate, 3)
+
+test_drawn = policy_cases(
+    {
+        "equal stamps leave at once": (
+            approximate,
+            """
+            lidar  |a..b
+            camera |A..B
+            -> A: aA
+            -> B: bB
+            """,
+        ),
+        "a set leaves when the next message proves it the best": (
+            approximate,
+            """
+            lidar  |a...b...c
+            camera |.A...B...
+            -> b: aA
+            -> c: bB
+            """,
+        ),
+        "a nearer message takes the place of the one before, which is superseded": (
+            approximate,
+            """
+            lidar  |a..b....c
+            camera |....B....
+            -> B: a superseded
+            -> c: bB
+            """,
+        ),
+        "what was skipped comes back for the next set": (
+            three,
+            """
+            lidar  |a..b..........c
+            camera |.A......B......
+            radar  |..r.....s......
+            -> B: aAr
+            -> c: bBs
+            """,
+        ),
+        "without a penalty of age the least span wins": (
+            partial(approximate, age_penalty=0.0),
+            """
+            lidar  |a..b..c
+            camera |..X...Y
+            -> b: a superseded, bX
+            -> Y: cY
+            """,
+        ),
+        "with a penalty of age the older set may win": (
+            partial(approximate, age_penalty=1.0),
+            """
+            lidar  |a..b..c
+            camera |..X...Y
+            -> b: aX
+            -> Y: b superseded, cY
+            """,
+        ),
+        "a known least period lets a set leave when its last member arrives": (
+            partial(approximate, periods=(3, 0)),
+            """
+            lidar  |a...b
+            camera |.A..B
+            -> A: aA
+            -> B: bB
+            """,
+        ),
+        "too short a period does not prove anything": (
+            partial(approximate, periods=(1, 0)),
+            """
+            lidar  |a...b
+            camera |.A..B
+            -> b: aA
+            -> B: bB
+            """,
+        ),
+        "what is further than slop from the latest head is too far, slop itself is not": (
+            partial(approximate, slop=3),
+            """
+            lidar  |ab......c
+            camera |....B....
+            -> B: a too_far
+            -> c: bB
+            """,
+        ),
+        "a queue above its size overflows": (
+            partial(approximate, queue=2),
+            """
+            lidar  |abcde
+            camera |....E
+            -> c: a overflow
+            -> d: b overflow
+            -> e: c overflow
+            -> E: d superseded, eE
+            """,
+        ),
+        "an overflow takes a message from the set that waits": (
+            partial(approximate, 3, queue=2),
+            """
+            lidar  |a.bcd..
+            camera |.X....Y
+            radar  |..R...S
+            -> R: a superseded
+            -> d: b overflow, X too_far
+            -> S: R superseded, c superseded
+            """,
+        ),
+        "an input that overflowed is no pivot until another one has the latest head": (
+            partial(approximate, 3, queue=3),
+            """
+            lidar  |a..bcde
+            camera |.X....Y
+            radar  |..R...
+            -> d: a overflow, X too_far
+            -> e: b overflow
+            """,
+        ),
+        "an older message finds its place in the queue": (
+            approximate,
+            """
+            lidar  |a.b.c.
+            camera |..B...
+            arrive: a c b B
+            -> B: a superseded, bB
+            """,
+        ),
+        "a message older than what was passed begins the search anew": (
+            three,
+            """
+            lidar  |a..b..c
+            camera |.....B.C
+            radar  |.....x..y
+            arrive: a x c B b C y
+            -> B: a superseded, cBx
+            """,
+        ),
+        "a later message of a stamp that is queued replaces the one before": (
+            approximate,
+            """
+            lidar  |a.....
+            lidar  |b.....
+            camera |A.....
+            arrive: a b A
+            -> b: a duplicate
+            -> A: bA
+            """,
+        ),
+        "a single input is a set by itself": (
+            partial(approximate, 1),
+            """
+            lidar |ab
+            -> a: a
+            -> b: b
+            """,
+        ),
+    }
+)
+
+
+def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
+    # Input 0 every tick, input 1 a message twelve ticks late; the queue of 5 has lost its partner.
+    policy = approximate(queue=5, slop=1)
+    for column in range(1, 21):
+        policy.add(Message(0, column * TICK_NS, None))
+    assert [policy.needed_queue(place) for place in (0, 1)] == [None, None]
+    policy.add(Message(1, 8 * TICK_NS, None))
+    # Ticks 8 to 20 are thirteen, and one more is on the safe side.
+    assert [policy.needed_queue(place) for place in (0, 1)] == [14, None]
+
+
+def test_a_queue_of_the_needed_length_matches():
+    policy = approximate(queue=14, slop=1)
+    for column in range(1, 21):
+        policy.add(Message(0, column * TICK_NS, None))
+    outcomes = policy.add(Message(1, 8 * TICK_NS, None))
+    assert [message.stamp for match in outcomes if isinstance(match, Match) for message in match.messages] == [
+        8 * TICK_NS,
+        8 * TICK_NS,
+    ]
+
+
+def test_a_message_too_far_from_what_is_queued_does_not_ask_for_a_longer_queue():
+    policy = approximate(queue=5, slop=1)
+    for column in range(10, 15):
+        policy.add(Message(0, column * TICK_NS, None))
+    policy.add(Message(1, 8 * TICK_NS, None))
+    assert policy.needed_queue(0) is None
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"slop": -1},
+        {"age_penalty": -0.1},
+        {"age_penalty": float("inf")},
+        {"age_penalty": float("nan")},
+        {"queue": 0},
+        {"periods": (0,)},
+        {"periods": (0, -1)},
+    ],
+)
+def test_options_out_of_range_are_refused(wrong):
+    with pytest.raises(ValueError, match="must be"):
+        approximate(**wrong)

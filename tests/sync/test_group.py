@@ -1,85 +1,567 @@
+"""What all policies share, drawn: lateness, disorder, jumps, waiting."""
+
+from functools import partial
+
 import pytest
-from timeline import START_NS, TICK_NS, play_group
+from drawn import group_cases
+from timeline import START_NS, TICK_NS, play_group, stamp
 
-from syncrelay.sync import ApproximateTime, Drop, DropReason, ExactTime, Message, Restamp, SyncGroup
-
-
-def exact_group(inputs=2, queue=10, **options):
-    return SyncGroup(ExactTime(n_inputs=inputs, queue_size=queue), required=(True,) * inputs, **options)
-
-
-CASES = {
-    "older than what its input last gave is late, and so is as old": (
-        """
-        left  |a.b.
-        left  |..c.
-        right |..B.
-        arrive: B b a c
-        -> b: bB
-        -> a: a late
-        -> c: c late
-        """
-    ),
-    "a stamp that falls by more than a second flushes the group": (
-        f"""
-        left  |d{"." * 100}ab
-        right |D{"." * 101}B
-        arrive: a b B d D
-        -> B: a superseded, bB
-        -> D: dD
-        """
-    ),
-}
+from syncrelay.sync import (
+    ApproximateTime,
+    Drop,
+    DropReason,
+    EqualKey,
+    ExactTime,
+    InputCounts,
+    LatestTime,
+    Message,
+    Restamp,
+    SyncGroup,
+)
 
 
-@pytest.mark.parametrize("drawing", CASES.values(), ids=CASES)
-def test_drawn(drawing):
-    left, drawn = play_group(exact_group(), drawing)
-    assert left == drawn
+def grouped(policy, required=None, max_wait=None, **options):
+    return SyncGroup(
+        policy,
+        required=required or (True,) * policy.n_inputs,
+        max_wait_ns=None if max_wait is None else max_wait * TICK_NS,
+        **options,
+    )
 
 
-def test_a_message_with_an_unset_stamp_is_dropped_as_unstamped():
-    group = exact_group()
+def exact(inputs=2, queue=10, **options):
+    return grouped(ExactTime(n_inputs=inputs, queue_size=queue), **options)
+
+
+def approximate(inputs=2, queue=10, slop=20, **options):
+    return grouped(ApproximateTime(n_inputs=inputs, queue_size=queue, slop_ns=slop * TICK_NS), **options)
+
+
+def by_key(inputs=2, **options):
+    return grouped(EqualKey(n_inputs=inputs, queue_size=3), **options)
+
+
+def latest(max_wait=4):
+    policy = LatestTime(n_inputs=2, queue_size=9, trigger=0, max_age_ns=3 * TICK_NS)
+    return grouped(policy, max_wait=max_wait)
+
+
+third_optional = {"inputs": 3, "required": (True, True, False)}
+GAP = "." * 101
+"""More than a second."""
+
+test_disorder = group_cases(
+    {
+        "older than what its input last gave is late, and so is as old": (
+            exact,
+            """
+            left  |a.b.
+            left  |..c.
+            right |..B.
+            arrive: B b a c
+            -> b: bB
+            -> a: a late
+            -> c: c late
+            """,
+        ),
+        "older than what its input has, but not late, is used": (
+            exact,
+            """
+            left  |ab
+            right |A.
+            arrive: b a A
+            -> A: aA
+            """,
+        ),
+        "by key, the stamp of what was given may come again": (
+            by_key,
+            """
+            left  |.a..
+            left  |cb..
+            right |.A..
+            right |.B..
+            keys: aA bB
+            arrive: a A b B c
+            -> A: aA
+            -> B: bB
+            -> c: c late
+            """,
+        ),
+        "a stamp that falls by more than a second flushes the group, which starts afresh": (
+            exact,
+            f"""
+            left  |d.{GAP}abc
+            right |D.{GAP}.B
+            arrive: a b B c d D
+            -> B: a superseded, bB
+            -> d: c time_jump
+            -> D: dD
+            """,
+        ),
+        "a second is late, but no jump": (
+            exact,
+            f"""
+            left  |d{GAP[2:]}a
+            right |D{GAP[2:]}A
+            arrive: a A d D
+            -> A: aA
+            -> d: d late
+            -> D: D late
+            """,
+        ),
+        "what other inputs still send of the time before is dropped": (
+            exact,
+            f"""
+            left  |d.{GAP}ab.
+            right |D.{GAP}A.B
+            arrive: a A b d B D
+            -> A: aA
+            -> d: b time_jump
+            -> B: B time_jump
+            -> D: dD
+            """,
+        ),
+        "but nothing that could belong to the new time": (
+            exact,
+            f"""
+            left  |e.{GAP}ab{GAP}f
+            right |..{GAP}A.{GAP}F
+            arrive: a A b e f F
+            -> A: aA
+            -> e: b time_jump
+            -> F: e superseded, fF
+            """,
+        ),
+    }
+)
+
+test_max_wait = group_cases(
+    {
+        "the best set so far leaves max_wait after it was complete": (
+            partial(approximate, max_wait=3),
+            """
+            lidar  |a........b
+            camera |.A.......B...
+            -> @4: aA
+            -> B: bB
+            """,
+        ),
+        "the wait counts from the first complete set, not from a better one": (
+            partial(approximate, 3, max_wait=6),
+            """
+            lidar  |a..b........
+            camera |..A.........
+            radar  |..R.........
+            -> b: a superseded, bAR
+            """,
+        ),
+        "a set that is proved leaves before": (
+            partial(approximate, max_wait=6),
+            """
+            lidar  |a...b.......
+            camera |.A..........
+            -> b: aA
+            """,
+        ),
+        "the set after one that leaves waits anew": (
+            partial(approximate, max_wait=4),
+            """
+            lidar  |a..b..........
+            camera |.A...B........
+            -> b: aA
+            -> @9: bB
+            """,
+        ),
+        "a max_wait of 0 lets a set leave with the message that completes it": (
+            partial(approximate, max_wait=0),
+            """
+            lidar  |a....b
+            camera |.A....B
+            -> A: aA
+            -> B: bB
+            """,
+        ),
+        "a trigger of latest_time expires": (
+            latest,
+            """
+            lidar |.....a..b.....
+            odom  |A..........B..
+            -> @9: a expired, A expired
+            -> B: b too_far
+            """,
+        ),
+        "each trigger has a wait of its own": (
+            latest,
+            """
+            lidar |.ab...c......
+            odom  |.............
+            -> @5: a expired
+            -> @6: b expired
+            -> @10: c expired
+            """,
+        ),
+    }
+)
+
+test_optional = group_cases(
+    {
+        "a set takes the optional message nearest to its middle, as soon as none can be nearer": (
+            partial(approximate, **third_optional, slop=4, max_wait=5),
+            """
+            lidar  |....b....
+            camera |....B....
+            imu    |..v..w...
+            -> w: v superseded, bBw
+            """,
+        ),
+        "after max_wait it leaves with what there is": (
+            partial(approximate, **third_optional, slop=4, max_wait=5),
+            """
+            lidar  |....b.....c......
+            camera |....B.....C......
+            imu    |...y.............
+            -> @9: bBy
+            -> @15: cC-
+            """,
+        ),
+        "an optional message that is too far is not waited for once its input has shown a later one": (
+            partial(approximate, **third_optional, slop=2, max_wait=9),
+            """
+            lidar  |....b......
+            camera |....B......
+            imu    |.x.....y...
+            -> y: x too_far, bB-
+            """,
+        ),
+        "the whole set is within slop, so one optional message may shut out another": (
+            partial(approximate, 4, required=(True, True, False, False), slop=3, max_wait=9),
+            """
+            lidar  |...b...
+            camera |...B...
+            imu    |.x...v.
+            gps    |.....y.
+            -> y: bBx-
+            """,
+        ),
+        "of two as near, the older is taken; what is older is superseded": (
+            partial(approximate, **third_optional, slop=4, max_wait=9),
+            """
+            lidar  |...b...
+            camera |...B...
+            imu    |.wx.y..
+            -> y: w superseded, bBx
+            """,
+        ),
+        "a known least period decides sooner": (
+            lambda: grouped(
+                ApproximateTime(n_inputs=2, queue_size=9, slop_ns=4 * TICK_NS, min_periods_ns=(0, 3 * TICK_NS)),
+                required=(True, False),
+                max_wait=9,
+            ),
+            """
+            lidar |..b...
+            imu   |.x....
+            -> b: bx
+            """,
+        ),
+        "of two sets that wait, a message goes to the nearer": (
+            partial(approximate, **third_optional, slop=5, max_wait=20),
+            """
+            lidar  |a...b...
+            camera |A...B...
+            gps    |...x....
+            gps    |......y.
+            arrive: a A b B x y
+            -> x: aA-
+            -> y: bBx
+            """,
+        ),
+        "sets leave in their order, and a later one waits for an earlier": (
+            partial(exact, **third_optional, max_wait=6),
+            """
+            left  |a.b..........
+            right |A.B..........
+            depth |..x..........
+            arrive: a A b x B
+            -> x: aA-
+            -> B: bBx
+            """,
+        ),
+        "a late optional message is no use to a set that has left": (
+            partial(exact, **third_optional, max_wait=2),
+            """
+            left  |a...c
+            right |A...C
+            depth |x.y.z
+            arrive: a A y c C x z
+            -> @2: aA-
+            -> z: x superseded, y superseded, cCz
+            """,
+        ),
+        "older than what it last gave is late for an optional input, too": (
+            partial(exact, **third_optional, max_wait=2),
+            """
+            left  |.a
+            right |.A
+            depth |xy
+            arrive: a A y x
+            -> y: aAy
+            -> x: x late
+            """,
+        ),
+        "an optional queue overflows; a later message of a stamp replaces the one before": (
+            partial(exact, **third_optional, queue=2, max_wait=2),
+            """
+            left  |.....
+            right |.....
+            depth |vwxy.
+            depth |...z.
+            arrive: v w x y z
+            -> x: v overflow
+            -> y: w overflow
+            -> z: y duplicate
+            """,
+        ),
+        "more sets than a queue holds do not wait": (
+            partial(exact, **third_optional, queue=2, max_wait=50),
+            """
+            left  |abc
+            right |ABC
+            depth |...
+            -> C: aA-
+            """,
+        ),
+        "a set waits for its best and for the optional no more than max_wait together": (
+            partial(approximate, **third_optional, slop=4, max_wait=5),
+            """
+            lidar  |a.........
+            camera |.A........
+            imu    |..........
+            -> @6: aA-
+            """,
+        ),
+        "by key: the optional message of the key is waited for": (
+            partial(by_key, **third_optional, max_wait=4),
+            """
+            left  |a.b.c.........
+            right |A.B.C.........
+            depth |.x...z........
+            keys: aAx bBz cC
+            -> x: aAx
+            -> z: bBz
+            -> @8: cC-
+            """,
+        ),
+        "by key: not once its input has shown the key of a later set": (
+            partial(by_key, **third_optional, max_wait=9),
+            """
+            left  |ab....
+            right |AB....
+            depth |..wz..
+            keys: aA bBz
+            -> z: aA-, w superseded, bBz
+            """,
+        ),
+        "by key: replaced, overflown, and not more waiting sets than a queue holds": (
+            partial(by_key, **third_optional, max_wait=50),
+            """
+            left  |.....abcd
+            right |.....ABCD
+            depth |wxyzv....
+            depth |....u....
+            keys: aA bB cC dD vu
+            -> z: w overflow
+            -> v: x overflow
+            -> u: v duplicate
+            -> D: aA-
+            """,
+        ),
+        "by key: older stamps are superseded with older arrivals": (
+            partial(by_key, **third_optional, max_wait=50),
+            """
+            left  |...a
+            right |...A
+            depth |wxy.
+            keys: aAx
+            arrive: y x w a A
+            -> A: y superseded, w superseded, aAx
+            """,
+        ),
+    }
+)
+
+
+def test_an_unset_stamp_is_dropped_as_unstamped():
+    group = exact()
     message = Message(0, 0, "a")
     assert group.add(message, now=1) == (Drop(message, DropReason.UNSTAMPED),)
+    assert group.counts()[0].dropped == {DropReason.UNSTAMPED: 1}
 
 
-def test_offsets_count_for_matching_and_messages_leave_with_the_stamp_they_came_with():
-    group = exact_group(offsets_ns=(0, -12_000_000))
+def test_by_key_a_stamp_may_be_unset():
+    group = by_key()
+    for number in range(3):
+        assert list(group.add(Message(0, 0, number, key=number), now=0)) == []
+        (match,) = group.add(Message(1, 0, number, key=number), now=0)
+        assert [message.payload for message in match.messages] == [number, number]
+    assert group.sets == 3
+
+
+def test_an_input_that_fell_too_belongs_to_the_new_time_however_far_ahead_it_is():
+    group = exact(queue=9)
+    for index, column in ((0, 300), (1, 310), (0, 100)):
+        group.add(Message(index, stamp(column), column), now=0)
+    assert group.add(Message(1, stamp(205), 205), now=0) == []
+    assert group.counts()[1].buffered == 1
+
+
+def test_stamps_below_zero_match_and_are_late_but_never_jump():
+    group = exact()
+    for time in (-9 * START_NS, -3 * START_NS):
+        group.add(Message(0, time, None), now=0)
+        assert [match.messages[0].stamp for match in group.add(Message(1, time, None), now=0)] == [time]
+    late = Message(0, -4 * START_NS, None)
+    assert list(group.add(late, now=0)) == [Drop(late, DropReason.LATE)]
+
+
+def test_offsets_count_for_matching_and_messages_leave_with_the_stamps_they_came_with():
+    group = exact(offsets_ns=(0, -12_000_000))
     first, second = Message(0, START_NS, "a"), Message(1, START_NS + 12_000_000, "A")
     assert group.add(first, now=0) == ()
     (match,) = group.add(second, now=0)
     assert match.messages == (first, second)
 
 
+def test_offsets_count_for_what_is_left_over_of_the_time_before():
+    # Input 1 is ten seconds ahead; after the jump of input 0 it goes on in the new time, at once.
+    offset = 10 * 10**9
+    group = exact(offsets_ns=(0, -offset), queue=3)
+    for second in (5, 6, 3):
+        group.add(Message(0, second * 10**9, second), now=0)
+    assert list(group.add(Message(1, 3 * 10**9 + offset, 3), now=0)) != []
+
+
 @pytest.mark.parametrize(
     ("restamp", "expected"), [(None, None), (Restamp.EARLIEST, 0), (Restamp.LATEST, 3), (1, 3), (0, 0)]
 )
 def test_restamp_gives_the_set_a_common_stamp(restamp, expected):
-    policy = ApproximateTime(n_inputs=2, queue_size=5, slop_ns=5 * TICK_NS)
-    group = SyncGroup(policy, required=(True, True), restamp=restamp, offsets_ns=(0, -3 * TICK_NS))
-    group.add(Message(0, START_NS, "a"), now=0)
-    (match,) = group.add(Message(1, START_NS + 3 * TICK_NS, "A"), now=0)
-    assert match.stamp == (None if expected is None else START_NS + expected * TICK_NS)
+    group = approximate(slop=5, restamp=restamp, offsets_ns=(0, -3 * TICK_NS))
+    group.add(Message(0, stamp(0), "a"), now=0)
+    (match,) = group.add(Message(1, stamp(3), "A"), now=0)
+    assert match.stamp == (None if expected is None else stamp(expected))
+
+
+def test_restamp_by_a_missing_input_gives_the_earliest_stamp():
+    group = approximate(3, required=(True, True, False), slop=5, restamp=2, max_wait=0)
+    group.add(Message(0, stamp(2), "a"), now=0)
+    (match,) = group.add(Message(1, stamp(2), "A"), now=0)
+    assert (match.messages[2], match.stamp) == (None, stamp(2))
 
 
 def test_counts_say_where_every_message_went():
-    group = exact_group()
-    for message in (
-        Message(0, 1, ""),
-        Message(0, 2, ""),
-        Message(1, 2, ""),
-        Message(0, 3, ""),
-        Message(0, 1, ""),
-    ):
-        group.add(message, now=0)
-    group.reject(Message(1, 0, ""), DropReason.MALFORMED)
-    left, right = group.counts()
-    assert (left.fed, left.matched, left.dropped, left.buffered) == (
-        4,
-        1,
-        {DropReason.SUPERSEDED: 1, DropReason.LATE: 1},
-        1,
+    group = exact()
+    for index, time in ((0, 1), (0, 2), (1, 2), (0, 3), (0, 1)):
+        group.add(Message(index, time, None), now=0)
+    drop = group.reject(Message(1, 0, None), DropReason.MALFORMED)
+    assert drop == Drop(Message(1, 0, None), DropReason.MALFORMED)
+    superseded_and_late = {DropReason.SUPERSEDED: 1, DropReason.LATE: 1}
+    assert group.counts() == (
+        InputCounts(fed=4, matched=1, dropped=superseded_and_late, buffered=1, needed_queue=None),
+        InputCounts(fed=2, matched=1, dropped={DropReason.MALFORMED: 1}, buffered=0, needed_queue=None),
     )
-    assert (right.fed, right.matched, right.dropped, right.buffered) == (2, 1, {DropReason.MALFORMED: 1}, 0)
     assert group.sets == 1
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"max_wait": 5}, {"inputs": 3, "required": (False, True, True), "max_wait": 5}]
+)
+def test_counts_tell_the_queue_that_was_needed(options):
+    group = approximate(queue=5, slop=1, **options)
+    for column in range(20):
+        group.add(Message(1, stamp(column), None), now=0)
+    if len(group.counts()) == 3:
+        group.add(Message(2, stamp(7), None), now=0)
+        assert [counts.needed_queue for counts in group.counts()] == [None, 14, None]
+    else:
+        group.add(Message(0, stamp(7), None), now=0)
+        assert [counts.needed_queue for counts in group.counts()] == [None, 14]
+
+
+def test_a_served_message_of_latest_time_is_matched_once_and_not_buffered():
+    group = latest(max_wait=None)
+    for index, column in ((1, 0), (0, 1), (0, 2)):
+        group.add(Message(index, stamp(column), None), now=0)
+    trigger, odom = group.counts()
+    assert (trigger.matched, odom.matched, odom.buffered, group.sets) == (2, 1, 0, 2)
+
+
+def test_a_flush_starts_afresh_but_counts_go_on():
+    group = approximate(3, required=(True, True, False), max_wait=50)
+    waiting = [Message(0, stamp(5), "a"), Message(1, stamp(5), "A"), Message(2, stamp(0), "x")]
+    for message in waiting:
+        group.add(message, now=0)
+    assert group.next_deadline() == 50 * TICK_NS
+    assert sorted(group.flush(DropReason.SHUTDOWN)) == sorted(Drop(message, DropReason.SHUTDOWN) for message in waiting)
+    assert group.next_deadline() is None
+    assert [counts.dropped for counts in group.counts()] == [{DropReason.SHUTDOWN: 1}] * 3
+    assert group.add(waiting[0], now=0) == [], "not late: what was before is forgotten"
+
+
+def test_the_clock_may_fall_while_a_set_waits():
+    group = approximate(max_wait=3)
+    group.add(Message(0, stamp(0), "a"), now=100 * TICK_NS)
+    group.add(Message(1, stamp(1), "A"), now=100 * TICK_NS)
+    assert group.next_deadline() == 103 * TICK_NS
+    assert list(group.expire(now=10 * TICK_NS)) == []
+    assert group.next_deadline() == 13 * TICK_NS
+    assert list(group.expire(now=13 * TICK_NS - 1)) == []
+    (match,) = group.expire(now=13 * TICK_NS)
+    assert [message.payload for message in match.messages] == ["a", "A"]
+
+
+@pytest.mark.parametrize("make", [partial(exact, inputs=2), partial(by_key, inputs=2)], ids=["stamp", "key"])
+def test_the_clock_may_fall_while_a_set_waits_for_an_optional_input(make):
+    group = make(required=(True, False), max_wait=3)
+    group.add(Message(0, stamp(0), "a", key=1), now=100 * TICK_NS)
+    assert list(group.expire(now=99 * TICK_NS)) == []
+    assert group.next_deadline() == 102 * TICK_NS
+    (match,) = group.expire(now=102 * TICK_NS)
+    assert match.messages[1] is None
+
+
+def test_what_is_due_leaves_before_what_is_added():
+    group = exact(inputs=2, required=(True, False), max_wait=3)
+    group.add(Message(0, stamp(0), "a"), now=0)
+    late, on_time = group.add(Message(0, stamp(9), "b"), now=3 * TICK_NS), group.next_deadline()
+    assert [match.messages[0].payload for match in late] == ["a"]
+    assert on_time == 6 * TICK_NS
+
+
+def test_no_message_is_needed_for_a_deadline():
+    group = approximate(max_wait=3)
+    assert group.next_deadline() is None
+    assert list(group.expire(now=0)) == []
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"required": (True,)},
+        {"required": (False, False), "max_wait": 1},
+        {"required": (True, False)},
+        {"offsets_ns": (0,)},
+        {"max_wait": -1},
+        {"restamp": 2},
+        {"restamp": -1},
+        {"every": 0},
+        {"min_set_period_ns": 0},
+    ],
+)
+def test_options_out_of_range_are_refused(wrong):
+    with pytest.raises(ValueError, match=r"must be|needs max_wait_ns"):
+        exact(**wrong)
+
+
+def test_a_drawing_is_played_with_the_clock_of_its_columns():
+    left, drawn = play_group(exact(), "left |a\nright |A\n-> A: aA")
+    assert left == drawn

@@ -9,7 +9,7 @@ A column is a tick of 10 ms, of stamps and of the clock: messages arrive by colu
 the moment of its stamp. Rows of one label are one input: two messages of one stamp need two rows.
 `arrive: a B b` gives another order of arrival; the clock then follows the newest column so far.
 `-> B:` is what leaves when B arrives, `-> @7:` what leaves by `expire` at column 7. A set is its letters,
-`-` where an input is missing; a drop is a letter and its reason.
+`-` where an input is missing; a drop is a letter and its reason. `keys: aA bB` gives letters common keys.
 """
 
 from dataclasses import dataclass
@@ -34,13 +34,15 @@ class Timeline:
 
 
 def parse(drawing):
-    labels, drawn, expected, order = [], {}, [], None
+    labels, drawn, expected, order, keys = [], {}, [], None, {}
     width = 0
     for line in (line.strip() for line in drawing.strip().splitlines()):
         if line.startswith("->"):
             expected.append(line.removeprefix("->").strip())
         elif line.startswith("arrive:"):
             order = line.removeprefix("arrive:").split()
+        elif line.startswith("keys:"):
+            keys = {letter: same for same in line.removeprefix("keys:").split() for letter in same}
         else:
             label, row = (part.strip() for part in line.split("|"))
             if label not in labels:
@@ -49,7 +51,10 @@ def parse(drawing):
             for column, letter in enumerate(row):
                 if letter != ".":
                     assert letter not in drawn, f"{letter} is drawn twice"
-                    drawn[letter] = (column, Message(labels.index(label), stamp(column), letter))
+                    drawn[letter] = (column, Message(labels.index(label), stamp(column), letter, key=letter))
+    for letter, key in keys.items():
+        column, message = drawn[letter]
+        drawn[letter] = column, message._replace(key=key)
     letters = order or sorted(drawn, key=lambda letter: (drawn[letter][0], drawn[letter][1].input))
     assert sorted(letters) == sorted(drawn), "arrive: must name each letter once"
     arrivals, newest = [], 0

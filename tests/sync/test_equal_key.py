@@ -1,0 +1,120 @@
+from functools import partial
+
+import pytest
+from drawn import policy_cases
+
+from syncrelay.sync import Drop, DropReason, EqualKey, Message
+
+equal_key = partial(EqualKey, n_inputs=2, queue_size=3)
+
+test_drawn = policy_cases(
+    {
+        "messages of equal keys are a set, whatever their stamps": (
+            equal_key,
+            """
+            left  |ab.....
+            right |....A.B
+            keys: aA bB
+            -> A: aA
+            -> B: bB
+            """,
+        ),
+        "what is older than a set that leaves is superseded, on each input": (
+            equal_key,
+            """
+            left  |ab.c.
+            right |.D.B.
+            keys: bB
+            -> B: a superseded, D superseded, bB
+            """,
+        ),
+        "older means stamps, not arrival": (
+            equal_key,
+            """
+            left  |ab.
+            right |..B
+            keys: bB
+            arrive: b a B
+            -> B: a superseded, bB
+            """,
+        ),
+        "messages of one stamp count by arrival": (
+            equal_key,
+            """
+            left  |b..
+            left  |a..
+            right |.AB
+            keys: aA bB
+            arrive: b a A B
+            -> A: b superseded, aA
+            """,
+        ),
+        "a later message of a key that is queued replaces the one before": (
+            equal_key,
+            """
+            left  |a.b.
+            right |...A
+            keys: abA
+            -> b: a duplicate
+            -> A: bA
+            """,
+        ),
+        "a queue above its size overflows, each input's own": (
+            partial(equal_key, queue_size=2),
+            """
+            left  |abcd.
+            right |....C
+            keys: cC
+            -> c: a overflow
+            -> d: b overflow
+            -> C: cC
+            """,
+        ),
+    }
+)
+
+
+def test_stamps_may_be_unset():
+    policy = equal_key()
+    first, second = Message(0, 0, "a", key="one"), Message(0, 0, "b", key="two")
+    other = Message(1, 0, "B", key="two")
+    assert policy.add(first) == []
+    assert policy.add(second) == []
+    *drops, match = policy.add(other)
+    assert drops == [Drop(first, DropReason.SUPERSEDED)]
+    assert match.messages == (second, other)
+
+
+def test_the_queue_that_was_needed_is_told_exactly():
+    policy = equal_key(queue_size=3)
+    for number in range(10):
+        policy.add(Message(0, number, None, key=number))
+    policy.add(Message(1, 4, None, key=4))
+    assert [policy.needed_queue(place) for place in (0, 1)] == [6, None]
+    longer = equal_key(queue_size=6)
+    for number in range(10):
+        longer.add(Message(0, number, None, key=number))
+    assert longer.add(Message(1, 4, None, key=4))
+
+
+def test_only_so_many_lost_keys_are_remembered():
+    policy = equal_key(queue_size=1)
+    for number in range(13):
+        policy.add(Message(0, number, None, key=number))
+    policy.add(Message(1, 0, None, key=1))
+    assert policy.needed_queue(0) is None
+    policy.add(Message(1, 0, None, key=2))
+    assert policy.needed_queue(0) == 11
+
+
+def test_a_key_that_its_own_input_lost_asks_for_nothing():
+    policy = equal_key(queue_size=1)
+    for number in (1, 2, 1):
+        policy.add(Message(0, number, None, key=number))
+    assert policy.needed_queue(0) is None
+
+
+@pytest.mark.parametrize("wrong", [{"n_inputs": 0}, {"queue_size": 0}])
+def test_sizes_below_one_are_refused(wrong):
+    with pytest.raises(ValueError, match="1 or more"):
+        equal_key(**wrong)

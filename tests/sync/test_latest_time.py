@@ -1,0 +1,212 @@
+from functools import partial
+
+import pytest
+from drawn import policy_cases
+from timeline import TICK_NS, play_policy
+
+from syncrelay.sync import Drop, DropReason, LatestTime, Message
+
+
+def latest(inputs=2, queue=10, age=3, **options):
+    """Input 0 is the trigger."""
+    max_age_ns = None if age is None else age * TICK_NS
+    return LatestTime(n_inputs=inputs, queue_size=queue, trigger=0, max_age_ns=max_age_ns, **options)
+
+
+test_drawn = policy_cases(
+    {
+        "a trigger takes the latest message that is not newer, at once": (
+            latest,
+            """
+            lidar |...a.b...c
+            odom  |.AB...C...
+            -> a: A superseded, aB
+            -> b: bB
+            -> c: cC
+            """,
+        ),
+        "a message of the trigger's own stamp is not newer": (
+            latest,
+            """
+            lidar |.a
+            odom  |AB
+            arrive: A B a
+            -> a: A superseded, aB
+            """,
+        ),
+        "a slow input's message serves many sets": (
+            partial(latest, age=None),
+            """
+            lidar |.abcd
+            odom  |A....
+            -> a: aA
+            -> b: bA
+            -> c: cA
+            -> d: dA
+            """,
+        ),
+        "a message of just the greatest age still serves": (
+            latest,
+            """
+            lidar |...ab
+            odom  |A....
+            -> a: aA
+            """,
+        ),
+        "a trigger waits for an input that has nothing for it yet": (
+            latest,
+            """
+            lidar |.....a.
+            odom  |A...B..
+            arrive: A a B
+            -> B: A superseded, aB
+            """,
+        ),
+        "a trigger is too far when an input has shown newer messages only": (
+            latest,
+            """
+            lidar |.a.b..c
+            odom  |.....A.
+            -> A: a too_far, b too_far
+            -> c: cA
+            """,
+        ),
+        "what no trigger can use any more expires": (
+            latest,
+            """
+            lidar |.....a.b
+            odom  |A......B
+            -> B: a too_far, A expired, bB
+            """,
+        ),
+        "a trigger never waits for an optional input": (
+            partial(latest, 3, required=(True, True, False)),
+            """
+            lidar |..a.b......c
+            odom  |.A........B.
+            gps   |...G.......
+            -> a: aA-
+            -> b: bAG
+            -> c: cB-
+            """,
+        ),
+        "an optional input's message that is too old expires": (
+            partial(latest, 3, required=(True, True, False)),
+            """
+            lidar |.....a
+            odom  |....A.
+            gps   |G.....
+            -> a: G expired, aA-
+            """,
+        ),
+        "triggers that wait overflow": (
+            partial(latest, queue=2),
+            """
+            lidar |abcd
+            odom  |....
+            -> c: a overflow
+            -> d: b overflow
+            """,
+        ),
+        "what waits for a trigger overflows, but not what has served": (
+            partial(latest, queue=2, age=9),
+            """
+            lidar |.a....e
+            odom  |A.BCDE.
+            -> a: aA
+            -> D: B overflow
+            -> E: C overflow
+            -> e: D superseded, eE
+            """,
+        ),
+        "an older message finds its place": (
+            latest,
+            """
+            lidar |..a
+            odom  |AB.
+            arrive: B A a
+            -> a: A superseded, aB
+            """,
+        ),
+        "a later message of a stamp that is queued replaces the one before": (
+            latest,
+            """
+            lidar |.a
+            odom  |A.
+            odom  |B.
+            arrive: A B a
+            -> B: A duplicate
+            -> a: aB
+            """,
+        ),
+        "what is not newer than a message that has served is late": (
+            latest,
+            """
+            lidar |..a
+            odom  |.A.
+            odom  |BC.
+            arrive: A a B C
+            -> a: aA
+            -> B: B late
+            -> C: C late
+            """,
+        ),
+    }
+)
+
+
+def test_a_trigger_that_has_waited_enough_expires_and_the_next_is_served():
+    policy = latest(age=3)
+    left, _ = play_policy(policy, "lidar |.....ab\n odom |A......")
+    assert left == ()
+    assert (policy.opened, policy.closed) == (2, 0)
+    assert [drop.reason for drop in policy.settle()] == [DropReason.EXPIRED] * 2
+    assert (policy.opened, policy.closed, policy.buffered(0), policy.buffered(1)) == (2, 1, 1, 0)
+
+
+def test_the_queue_that_was_needed_is_told_when_what_would_have_served_has_overflowed():
+    def fill(policy):
+        for column in range(1, 21):
+            policy.add(Message(1, column * TICK_NS, None))
+        return policy.add(Message(0, 8 * TICK_NS, "late trigger"))
+
+    policy = latest(queue=5)
+    fill(policy)
+    assert [policy.needed_queue(place) for place in (0, 1)] == [None, 14]
+    (*_, match) = fill(latest(queue=14))
+    assert match.messages[1].stamp == 8 * TICK_NS
+
+
+def test_a_queue_that_lost_only_what_was_too_old_was_long_enough():
+    policy = latest(queue=5, age=1)
+    for column in (1, 2, 3, 11, 12, 13, 14, 15):
+        policy.add(Message(1, column * TICK_NS, None))
+    policy.add(Message(0, 8 * TICK_NS, None))
+    assert policy.needed_queue(1) is None
+
+
+def test_a_flush_drops_what_has_not_served():
+    policy = latest(age=None)
+    served, waiting = Message(1, 1, "served"), Message(1, 9, "waiting")
+    for message in (served, Message(0, 2, "trigger"), waiting):
+        policy.add(message)
+    assert [policy.buffered(place) for place in (0, 1)] == [0, 1]
+    assert policy.flush(DropReason.SHUTDOWN) == [Drop(waiting, DropReason.SHUTDOWN)]
+    assert policy.add(served) == [], "nothing of before is known"
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"trigger": -1},
+        {"trigger": 2},
+        {"required": (False, True)},
+        {"required": (True,)},
+        {"max_age_ns": -1},
+        {"n_inputs": 0},
+        {"queue_size": 0},
+    ],
+)
+def test_options_out_of_range_are_refused(wrong):
+    with pytest.raises(ValueError, match="must be"):
+        LatestTime(**{"n_inputs": 2, "queue_size": 1, "trigger": 0, **wrong})

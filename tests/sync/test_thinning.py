@@ -1,0 +1,188 @@
+from functools import partial
+
+from drawn import group_cases
+from timeline import START_NS, TICK_NS, stamp
+
+from syncrelay.sync import DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
+
+
+def grouped(policy, *, period=None, **options):
+    min_set_period_ns = None if period is None else period * TICK_NS
+    return SyncGroup(policy, required=(True, True), min_set_period_ns=min_set_period_ns, **options)
+
+
+def exact(**options):
+    return grouped(ExactTime(n_inputs=2, queue_size=9), **options)
+
+
+def latest(**options):
+    return grouped(LatestTime(n_inputs=2, queue_size=9, trigger=0), **options)
+
+
+GAP = "." * 101
+"""More than a second."""
+
+test_drawn = group_cases(
+    {
+        "every third set passes, the first first, and of the others no message": (
+            partial(exact, every=3),
+            """
+            left  |abcd
+            right |ABCD
+            -> A: aA
+            -> B: b thinned, B thinned
+            -> C: c thinned, C thinned
+            -> D: dD
+            """,
+        ),
+        "one set passes in each period": (
+            partial(exact, period=2),
+            """
+            left  |abcde
+            right |ABCDE
+            -> A: aA
+            -> B: b thinned, B thinned
+            -> C: cC
+            -> D: d thinned, D thinned
+            -> E: eE
+            """,
+        ),
+        "periods are counted from the first set, so what passes is spread evenly": (
+            partial(exact, period=4),
+            """
+            left  |a..b..c..d..e..
+            right |A..B..C..D..E..
+            -> A: aA
+            -> B: bB
+            -> C: c thinned, C thinned
+            -> D: dD
+            -> E: eE
+            """,
+        ),
+        "a set up to a fourth of a period early counts for the next one": (
+            partial(exact, period=4),
+            """
+            left  |a..b...c
+            right |A..B...C
+            -> A: aA
+            -> B: bB
+            -> C: cC
+            """,
+        ),
+        "a set earlier than that does not": (
+            partial(exact, period=4),
+            """
+            left  |a.b..
+            right |A.B..
+            -> A: aA
+            -> B: b thinned, B thinned
+            """,
+        ),
+        "after a pause it goes on in the period that the set falls in": (
+            partial(exact, period=4),
+            """
+            left  |a.........bc
+            right |A.........BC
+            -> A: aA
+            -> B: bB
+            -> C: cC
+            """,
+        ),
+        "both at once: of every second set, one a period": (
+            partial(exact, every=2, period=4),
+            """
+            left  |abcdefg
+            right |ABCDEFG
+            -> A: aA
+            -> B: b thinned, B thinned
+            -> C: c thinned, C thinned
+            -> D: d thinned, D thinned
+            -> E: eE
+            -> F: f thinned, F thinned
+            -> G: g thinned, G thinned
+            """,
+        ),
+        "after a jump the next set is the first": (
+            partial(exact, every=2),
+            f"""
+            left  |b{GAP}a
+            right |B{GAP}A
+            arrive: a A b B
+            -> A: aA
+            -> B: bB
+            """,
+        ),
+        "a set that did not pass was a set: what is older is late": (
+            partial(exact, every=2),
+            """
+            left  |a.bc
+            right |A.B.
+            left  |.d..
+            arrive: a A b B d c
+            -> A: aA
+            -> B: b thinned, B thinned
+            -> d: d late
+            """,
+        ),
+        "a message that serves many sets is thinned when it can be in none that passes": (
+            partial(latest, every=3),
+            """
+            lidar |.a.b.c.d.e
+            odom  |A.B.C.D.E.
+            -> a: aA
+            -> c: b thinned, B thinned
+            -> d: c thinned, C thinned, dD
+            """,
+        ),
+        "and not if it is in one that passes": (
+            partial(latest, every=3),
+            """
+            lidar |.abcde
+            odom  |A.....
+            -> a: aA
+            -> c: b thinned
+            -> d: c thinned, dA
+            """,
+        ),
+    }
+)
+
+
+def test_what_is_withheld_is_buffered_until_it_is_known():
+    group = latest(every=2)
+    for index, column in ((1, 0), (0, 1), (1, 2), (0, 3)):
+        group.add(Message(index, stamp(column), column), now=0)
+    assert [(counts.matched, counts.buffered) for counts in group.counts()] == [(1, 1), (1, 1)]
+    drops = group.flush(DropReason.SHUTDOWN)
+    assert [drop.message.payload for drop in drops] == [3, 2]
+    assert [counts.buffered for counts in group.counts()] == [0, 0]
+
+
+def test_a_message_that_passed_before_a_flush_may_come_again_after_it():
+    group = latest(every=1, period=1)
+    for _ in range(2):
+        group.add(Message(1, stamp(0), "A"), now=0)
+        (match,) = group.add(Message(0, stamp(1), "a"), now=0)
+        assert len(match.messages) == 2
+        group.flush(DropReason.TIME_JUMP)
+    assert [counts.matched for counts in group.counts()] == [2, 2]
+
+
+def test_sets_without_stamps_are_thinned_by_the_clock():
+    group = grouped(EqualKey(n_inputs=2, queue_size=9), period=2)
+    passed = []
+    for tick in range(6):
+        now = START_NS + tick * TICK_NS
+        group.add(Message(0, 0, tick, key=tick), now=now)
+        passed += [
+            tick for outcome in group.add(Message(1, 0, tick, key=tick), now=now) if hasattr(outcome, "messages")
+        ]
+    assert passed == [0, 2, 4]
+
+
+def test_the_period_is_of_the_stamps_that_sets_are_matched_by():
+    group = exact(period=2, offsets_ns=(0, 10 * TICK_NS))
+    for column in range(4):
+        group.add(Message(0, stamp(column), None), now=0)
+        group.add(Message(1, stamp(column - 10), None), now=0)
+    assert group.sets == 2
