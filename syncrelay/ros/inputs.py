@@ -64,10 +64,9 @@ class TopicInput:
         """Feed an input of a group from this topic."""
         self._users.append((group, index))
 
-    def look(self) -> bool:
-        """Look at the graph, and subscribe, anew where the publishers' QoS changed; True if nothing is missing."""
+    def look(self) -> None:
+        """Look at the graph; subscribe, anew where the publishers' QoS changed; `missing` says what is not there."""
         self.missing = self._find_type() or self._find_publishers()
-        return self.missing is None
 
     def _find_type(self) -> str | None:
         if self._message_type is not None:
@@ -172,7 +171,8 @@ class Wiring:
     @property
     def waiting_for(self) -> str | None:
         """What keeps the group from giving sets, in words."""
-        return ", ".join(each.missing for each in self.inputs if each.missing) or None
+        inputs = zip(self.group.config.topics, self.inputs, strict=True)
+        return ", ".join(each.missing for topic, each in inputs if each.missing and topic.required) or None
 
 
 def wire(groups: Sequence[GroupRelay], *, node: Any, loop: ReceiveLoop) -> list[Wiring]:

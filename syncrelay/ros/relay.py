@@ -103,9 +103,11 @@ class Relay:
         """
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
-        missing = [topic_input for topic_input in self._inputs if not topic_input.look()]
+        for topic_input in self._inputs:
+            topic_input.look()
         self._announce()
-        self._wake.wait(min(timeout_s, _EAGER_LOOK_S if missing else _LOOK_S))
+        is_waiting = any(wiring.waiting_for for wiring in self._wirings)
+        self._wake.wait(min(timeout_s, _EAGER_LOOK_S if is_waiting else _LOOK_S))
 
     def snapshot(self) -> RelaySnapshot:
         """What is known of all groups, taken between two messages. Any thread."""
