@@ -1,5 +1,6 @@
 """What the README shows is true: its files are in order, its commands exist, its error is the one that comes."""
 
+import json
 import re
 import subprocess
 import sys
@@ -8,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import load_text
+from syncrelay.config.file import GROUP_MODEL_OF
+from syncrelay.sync import DropReason
+from tests.sync.support.timeline import play_policy
 
 _ROOT = Path(__file__).parents[1]
 _README = (_ROOT / "README.md").read_text()
@@ -72,6 +76,32 @@ def test_the_error_that_the_readme_shows_is_the_one_that_comes(tmp_path):
 def test_every_link_to_a_file_of_ours_leads_somewhere():
     targets = [target for target in re.findall(r"\]\(([^)#]+)\)", _README) if "://" not in target]
     assert [target for target in targets if not (_ROOT / target).exists()] == []
+
+
+_TIMELINES = [text for kind, text in _BLOCKS if kind == "timeline"]
+
+
+@pytest.mark.parametrize("text", _TIMELINES, ids=lambda text: text.split(",")[0].split()[0])
+def test_every_drawing_of_a_policy_is_what_the_policy_does(text):
+    keys, drawing = text.split("\n", maxsplit=1)
+    names = dict.fromkeys(line.split()[0] for line in drawing.splitlines() if "|" in line)
+    topics = [{"topic": f"/{name}", "type": "sensor_msgs/msg/Image"} for name in names]
+    policy, *options = keys.split(", ")
+    group = {"policy": policy, **dict(option.split(": ") for option in options), "topics": topics}
+    (resolved,) = load_text(json.dumps({"version": 1, "groups": {"drawn": group}})).groups
+    left, drawn = play_policy(resolved.keys.matcher(resolved.inputs), drawing)
+    assert drawn
+    assert left == drawn
+
+
+def test_every_policy_has_a_drawing_and_a_row():
+    for policy in GROUP_MODEL_OF:
+        assert any(text.startswith(policy) for text in _TIMELINES)
+        assert f"| `{policy}` |" in _README
+
+
+def test_every_reason_that_a_message_can_leave_for_is_explained():
+    assert [reason.value for reason in DropReason if f"| `{reason.value}` |" not in _README] == []
 
 
 def test_the_launch_file_that_the_readme_shows_is_python():

@@ -15,5 +15,9 @@ def summarize(group: GroupSnapshot) -> Iterator[str]:
 def _fates(each: InputSnapshot) -> str:
     counts = each.counts
     text = f"{counts.fed} received, {counts.matched} in sets, {sum(counts.dropped.values())} dropped"
-    reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
-    return f"{text} ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})" if reasons else text
+    if counts.dropped:
+        reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
+        text += f" ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})"
+    if counts.needed_queue is not None:
+        text += f"; a match needed what had overflowed: queue_size {counts.needed_queue} would have held it"
+    return text

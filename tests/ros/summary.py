@@ -18,7 +18,7 @@ class GroupSummary(NamedTuple):
 _GROUP = re.compile(r"(?P<group>\w+): (?P<sets>\d+) sets?$")
 _INPUT = re.compile(
     r"(?P<group>\w+):   (?P<topic>/\S+): (?P<received>\d+) received, (?P<matched>\d+) in sets,"
-    r" (?P<dropped>\d+) dropped(?: \((?P<reasons>.*)\))?$"
+    r" (?P<dropped>\d+) dropped(?: \((?P<reasons>[^)]*)\))?(?:; .*)?$"
 )
 
 

@@ -1,6 +1,7 @@
 """What only a running relay shows of a policy: sets that leave because time passes, keys read from payloads."""
 
 import itertools
+import re
 
 import pytest
 
@@ -10,6 +11,7 @@ from tests.ros.configs import LOSSLESS, config, inputs, outputs
 from tests.ros.frames import Frame
 from tests.ros.stage import Stage
 from tests.ros.streams import BEGIN, MS, at
+from tests.ros.summary import read_summary
 
 pytestmark = pytest.mark.ros
 
@@ -83,3 +85,29 @@ def test_thinning_lets_every_third_set_leave_whole(stage: Stage):
     sets = [stamps_of(relaying.within(recording, payloads)) for payloads in received]
     gaps = {later - earlier for stamps in sets for earlier, later in itertools.pairwise(stamps)}
     assert gaps == {30 * MS}
+
+
+def test_a_queue_too_short_for_a_late_input_says_how_long_it_should_have_been(stage: Stage):
+    # The lidar's one message comes when the camera, ten times as fast, has long filled its queue.
+    recording = [*at("/camera", *range(0, 300, 10)), *at("/lidar", 101)]
+
+    def summary_with(queue_size: int) -> tuple[int, str]:
+        group = {"policy": "approximate_time", "slop": "5ms", "queue_size": queue_size}
+        relay = stage.relay(config({"front": {**group, "topics": inputs(_PAIR, qos=LOSSLESS)}}))
+        collector = stage.collector(_PAIR_OUT)
+        player = stage.player(_PAIR)
+        first_sets = relaying.connect(player, collector, recording, _PAIR_OUT)
+        player.play(recording)
+        relaying.conclude(player, collector, recording, _PAIR_OUT)
+        for process in (relay, player.process, collector.process):
+            process.ask_to_end()
+            process.reap()
+        return read_summary(relay.stderr)["front"].sets - first_sets - 1, relay.stderr
+
+    sets, log = summary_with(5)
+    assert sets == 0
+    needed = re.search(r"/camera: .*overflow \d+.*queue_size (\d+) would have held it", log)
+    assert needed, log
+    sets, log = summary_with(int(needed[1]))
+    assert sets == 1
+    assert "would have held it" not in log
