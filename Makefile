@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test test-container lint bench clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -12,6 +12,10 @@ demo: $(VENV)/demo
 # Most tests wait on real processes, so more of them run at once than there are cores.
 test: $(VENV)/test
 	$(BIN)/python -m pytest -n $(shell expr 2 \* $$(nproc)) $(ARGS)
+
+# Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
+test-container: $(VENV)/test
+	tests/container/run $(BIN)/python $(ARGS)
 
 lint: $(VENV)/lint
 	$(BIN)/ruff check .

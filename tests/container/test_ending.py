@@ -1,0 +1,34 @@
+"""SIGTERM in a container, at any moment of its start: an orderly end within a second, as PID 1 and below an init."""
+
+import random
+import time
+
+import pytest
+
+from tests.container.docker import docker
+from tests.container.sets import CONFIG
+
+pytestmark = pytest.mark.container
+
+# From the first moment to well after the start: Python's own start, the imports, joining the graph, waiting.
+_MOMENTS_S = [0.0, 0.02, *sorted(random.Random(8).uniform(0.05, 2.5) for _ in range(8))]
+
+
+@pytest.mark.parametrize("below", [(), ("--init",)], ids=["as PID 1", "below an init"])
+@pytest.mark.parametrize("moment_s", _MOMENTS_S, ids=lambda moment_s: f"{moment_s:.2f}s")
+def test_a_container_that_is_told_to_stop_ends_in_order(relays, moment_s, below):
+    relay = relays.run(CONFIG, "--network=host", *below)
+    # The moment is what is tried, not what is waited for.
+    time.sleep(moment_s)
+    # Killed with 137 if a second is not enough.
+    docker("stop", "--time=1", relay.id)
+    assert relay.exit_code() == 0, relay.logs()
+    assert "Traceback" not in relay.logs()
+
+
+def test_a_control_c_at_a_container_ends_it_in_order(relays):
+    relay = relays.run(CONFIG, "--network=host")
+    relay.wait_for_log("front: waiting for")
+    docker("kill", "--signal=INT", relay.id)
+    assert relay.exit_code() == 0
+    assert "front: 0 sets" in relay.logs()

@@ -1,0 +1,53 @@
+"""What the engine is told of a relay's health, and what it makes of a crash."""
+
+import os
+import signal
+
+import pytest
+
+from tests.container.docker import HARDENED, PROBED_EVERY_SECOND, docker
+from tests.container.sets import CONFIG, assert_relayed
+from tests.ros.processes import wait_until
+
+pytestmark = pytest.mark.container
+
+
+def test_a_relay_whose_loop_is_stopped_is_unhealthy_until_it_goes_on(relays):
+    relay = relays.run(CONFIG, "--network=host", "--init", *HARDENED, *PROBED_EVERY_SECOND)
+    relay.wait_for_health("healthy")
+    pid = relay.relay_pid()
+    os.kill(pid, signal.SIGSTOP)
+    relay.wait_for_health("unhealthy")
+    assert "the receive loop last turned" in relay.inspect()["State"]["Health"]["Log"][-1]["Output"]
+    os.kill(pid, signal.SIGCONT)
+    relay.wait_for_health("healthy")
+
+
+def test_a_relay_that_cannot_write_its_heartbeat_is_not_called_healthy(relays):
+    # Its start is given hardly any time, as failed probes do not count in it; 0 would be the image's 20 s.
+    relay = relays.run(
+        CONFIG,
+        "--network=host",
+        "--read-only",
+        "--health-interval=1s",
+        "--health-retries=1",
+        "--health-start-period=1s",
+    )
+    relay.wait_for_health("unhealthy")
+    relay.wait_for_log("cannot be written, so there is no heartbeat")
+
+
+def test_the_command_says_the_same_as_the_probe(relays):
+    relay = relays.run(CONFIG, "--network=host", *PROBED_EVERY_SECOND)
+    relay.wait_for_health("healthy")
+    assert docker("exec", relay.id, "syncrelay", "healthcheck") == "receiving"
+
+
+@pytest.mark.parametrize("below", [(), ("--init",)], ids=["as PID 1", "below an init"])
+def test_a_relay_that_crashed_is_started_again_and_relays(relays, host, below):
+    relay = relays.run(CONFIG, "--network=host", "--restart=unless-stopped", *below, *HARDENED, *PROBED_EVERY_SECOND)
+    relay.wait_for_health("healthy")
+    os.kill(relay.relay_pid(), signal.SIGKILL)
+    wait_until(lambda: relay.inspect()["RestartCount"] == 1 and relay.running(), "the relay to be started again")
+    relay.wait_for_health("healthy")
+    assert_relayed(host)

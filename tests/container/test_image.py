@@ -1,0 +1,129 @@
+"""The image by itself: what is in it, what is left out, and what it does without a relay."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.container.docker import IMAGE, docker, run_docker
+from tests.ros.configs import config, inputs
+
+pytestmark = pytest.mark.container
+
+_ROOT = Path(__file__).parents[2]
+_ALL_TYPES = """
+from pathlib import Path
+from importlib import import_module
+index = Path("/opt/syncrelay/share/ament_index/resource_index/rosidl_interfaces")
+names = [f"{package.name}.{line.removesuffix('.msg')}" for package in sorted(index.iterdir())
+         for line in package.read_text().splitlines() if line.startswith("msg/") and line.endswith(".msg")]
+for name in names:
+    module, _, message = name.replace("/", ".").rpartition(".")
+    getattr(import_module(module), message).__class__.__import_type_support__()
+print(len(names))
+"""
+_FAULTY = """\
+version: 1
+groups:
+  front:
+    policy: exact_time
+    slopp: 20ms
+    topics:
+      - {topic: /camera, type: sensor_msgs/msg/Imag}
+      - {topic: /lidar, type: sensor_msgs/msg/PointCloud2}
+"""
+
+
+@pytest.fixture
+def in_image(tmp_path: Path):
+    """Runs a command of the image on files of the test, without a network."""
+    tmp_path.chmod(0o755)
+
+    def run(*words: str, options: tuple[str, ...] = ()):
+        return run_docker("run", "--rm", "--network=none", f"--volume={tmp_path}:/config:ro", *options, IMAGE, *words)
+
+    return run
+
+
+def test_a_sound_file_is_valid_in_the_container(in_image, tmp_path):
+    topics = inputs({"/camera": "sensor_msgs/msg/Image", "/lidar": "sensor_msgs/msg/PointCloud2"})
+    (tmp_path / "fusion.yaml").write_text(config({"front": {"policy": "exact_time", "topics": topics}}))
+    run = in_image("validate", "/config/fusion.yaml")
+    assert (run.returncode, run.stdout) == (0, "/config/fusion.yaml: ok, 1 group, 2 topics\n")
+
+
+def test_a_faulty_file_is_explained_in_the_container_with_the_types_that_it_has(in_image, tmp_path):
+    (tmp_path / "fusion.yaml").write_text(_FAULTY)
+    run = in_image("validate", "fusion.yaml")
+    assert run.returncode == 1
+    assert "fusion.yaml:5:5: groups.front.slopp" in run.stderr
+    assert "did you mean `sensor_msgs/msg/Image`?" in run.stderr
+
+
+def test_a_relay_without_its_file_says_so(in_image):
+    run = in_image()
+    assert run.returncode == 1
+    assert "/config/fusion.yaml" in run.stderr
+
+
+def test_the_demo_runs_in_the_container(in_image):
+    # On a busy machine its processes need some seconds to find each other.
+    run = in_image("demo", "--seconds", "15")
+    assert run.returncode == 0, run.stderr
+
+
+def test_every_message_type_can_be_imported_after_the_trimming(in_image):
+    run = in_image("-c", _ALL_TYPES, options=("--entrypoint=python3",))
+    assert run.returncode == 0, run.stderr
+    assert int(run.stdout) > 100
+
+
+def test_what_a_relay_never_opens_is_left_out(in_image):
+    run = in_image(
+        "/opt/syncrelay",
+        *("(", "-name", "pip", "-o", "-name", "setuptools", "-o", "-name", "*.hpp", "-o", "-name", "*.pyi", ")"),
+        options=("--entrypoint=find",),
+    )
+    assert (run.returncode, run.stdout) == (0, "")
+
+
+def test_the_user_is_not_root_and_owns_nothing_of_the_program(in_image):
+    assert in_image("-u", options=("--entrypoint=id",)).stdout.strip() == "1000"
+    writable = in_image("/opt/syncrelay", "-writable", "-not", "-type", "l", options=("--entrypoint=find",))
+    assert (writable.returncode, writable.stdout) == (0, "")
+
+
+def test_the_label_says_the_version_of_the_package():
+    project = tomllib.loads((_ROOT / "pyproject.toml").read_text())["project"]
+    label = '{{index .Config.Labels "org.opencontainers.image.version"}}'
+    assert docker("image", "inspect", "--format", label, IMAGE) == project["version"]
+    description = '{{index .Config.Labels "org.opencontainers.image.description"}}'
+    assert docker("image", "inspect", "--format", description, IMAGE) == project["description"]
+
+
+def test_both_dockerfiles_carry_the_same_labels_and_defaults():
+    def instructions(name: str, *kinds: str) -> list[str]:
+        text = (_ROOT / "docker" / name).read_text().replace("\\\n", " ")
+        return [" ".join(line.split()) for line in text.splitlines() if line.startswith(kinds)]
+
+    kinds = ("LABEL", "HEALTHCHECK", "CMD", "USER", "WORKDIR /config")
+    assert instructions("Dockerfile", *kinds) == instructions("Dockerfile.ros", *kinds)
+
+
+def test_the_entry_script_of_the_ros_image_sources_ros_and_the_overlay(tmp_path):
+    ros, overlay = tmp_path / "ros", tmp_path / "overlay"
+    for folder, script in ((ros, "setup.bash"), (overlay, "local_setup.bash")):
+        folder.mkdir(mode=0o755)
+        (folder / script).write_text(f"export SOURCED=$SOURCED:{folder.name}\n")
+    tmp_path.chmod(0o755)
+    (tmp_path / "syncrelay").write_text('#!/bin/sh\necho "$SOURCED $*"\n')
+    (tmp_path / "syncrelay").chmod(0o755)
+    said = docker(
+        *("run", "--rm", "--network=none", "--entrypoint=bash"),
+        f"--volume={_ROOT}/docker/entry.sh:/entry.sh:ro",
+        f"--volume={tmp_path}/syncrelay:/opt/syncrelay/bin/syncrelay:ro",
+        f"--volume={ros}:/opt/ros/jazzy:ro",
+        f"--volume={overlay}:/overlay:ro",
+        *(IMAGE, "/entry.sh", "--config", "/config/fusion.yaml"),
+    )
+    assert said == ":ros:overlay --config /config/fusion.yaml"
