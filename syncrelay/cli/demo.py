@@ -101,7 +101,11 @@ def isolation(environ: Mapping[str, str]) -> dict[str, str]:
     for it wants it to be seen there.
     """
     chosen = "ROS_DOMAIN_ID" in environ or "ROS_AUTOMATIC_DISCOVERY_RANGE" in environ
-    return {} if chosen else {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    if chosen:
+        return {}
+    # Within the range of one host, Fast DDS delivers through shared memory only: its UDP alone, which the container
+    # image chooses, finds peers and sends them nothing.
+    return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "FASTDDS_BUILTIN_TRANSPORTS": "DEFAULT"}
 
 
 class _View(Protocol):

@@ -54,7 +54,7 @@ def test_the_shipped_file_is_plain_yaml():
 @pytest.mark.parametrize(
     ("environ", "added"),
     [
-        ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}),
+        ({}, {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "FASTDDS_BUILTIN_TRANSPORTS": "DEFAULT"}),
         ({"ROS_DOMAIN_ID": "7"}, {}),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {}),
     ],
