@@ -58,6 +58,17 @@ def test_topics_can_be_remapped_from_the_command_line(stage: Stage):
     assert relaying.sets_within(recording, collector, aligned) == expected
 
 
+def test_outputs_are_named_as_the_file_says(stage: Stage):
+    topics = inputs({**_PAIR, "/imu": VECTOR}, qos=LOSSLESS)
+    topics[0]["output"] = "/fused/image"
+    text = config({"front": {"policy": "exact_time", "output_prefix": "/aligned", "topics": topics}})
+    recording = merged(_RECORDING, at("/imu", 0, 10, 20))
+    aligned = dict.fromkeys(["/fused/image", "/aligned/lidar", "/aligned/imu"], VECTOR)
+    _, collector = relaying.relay(stage, text, recording, aligned)
+    expected = [(frame.payload,) * 3 for frame in at("", 0, 10, 20)]
+    assert relaying.sets_within(recording, collector, aligned) == expected
+
+
 def _tick(seconds: int) -> Frame:
     return Frame("/clock", CLOCK, 0, serialize(CLOCK, time(seconds * NS_PER_SECOND)))
 

@@ -57,3 +57,16 @@ def test_a_publisher_of_another_type_is_named_and_does_not_disturb(stage: Stage)
         ),
         "a line that names the publisher, its type and the file's",
     )
+
+
+def test_a_type_that_is_not_installed_is_named_once_and_other_groups_run(stage: Stage):
+    broken = _exact("/camera", "/absent")
+    broken["topics"][1]["type"] = "acme_msgs/msg/Thing"
+    text = config({"front": _exact("/camera", "/lidar"), "rear": broken})
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+    relay, collector = relaying.relay(stage, text, recording, aligned)
+    expected = [(frame.payload, frame.payload) for frame in at("/camera", 0, 10, 20)]
+    assert relaying.sets_within(recording, collector, aligned) == expected
+    relay.wait_for_log("rear: waiting for the type acme_msgs/msg/Thing")
+    assert sum("/absent: acme_msgs/msg/Thing" in line for line in relay.stderr.splitlines()) == 1
