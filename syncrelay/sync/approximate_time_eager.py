@@ -2,19 +2,11 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Policy, check_sizes
 from syncrelay.sync.queues import Losses
-
-
-class _Neighbours(NamedTuple):
-    """The stamps of one input next to a new one, within slop: the last not after it, the first after it."""
-
-    before: int | None
-    after: int | None
 
 
 class ApproximateTimeEager(Policy):
@@ -55,7 +47,9 @@ class ApproximateTimeEager(Policy):
         else:
             self._insert(place, stamp, message, outcomes)
         if not self._empty:
-            self._match(place, stamp, outcomes)
+            # No set was in here before, so this is the first message of its input; all first messages lie
+            # within slop of the latest of them, so there is a set now.
+            self._match(stamp, outcomes)
         if len(stamps) > self._queue_size:
             self._losses.lose(place, stamps[0])
             self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
@@ -121,53 +115,31 @@ class ApproximateTimeEager(Policy):
         del messages[:count]
         del self._stamps[place][:count]
 
-    def _match(self, place: int, stamp: int, outcomes: list[Outcome]) -> None:
-        neighbours = self._neighbours(place, stamp)
-        if neighbours is None:
-            return
-        chosen = _tightest(stamp, neighbours)
-        if max(chosen) - min(chosen) > self._slop:
-            return
+    def _match(self, stamp: int, outcomes: list[Outcome]) -> None:
         members = []
-        for other, wanted in enumerate(chosen):
-            stamps = self._stamps[other]
+        for place, wanted in enumerate(_tightest(stamp, self._stamps)):
+            stamps = self._stamps[place]
             if stamps[0] != wanted:
-                self._drop_oldest(other, bisect_left(stamps, wanted), DropReason.SUPERSEDED, outcomes)
+                self._drop_oldest(place, bisect_left(stamps, wanted), DropReason.SUPERSEDED, outcomes)
             del stamps[0]
-            members.append(self._messages[other].pop(0))
+            members.append(self._messages[place].pop(0))
         outcomes.append(Match(tuple(members)))
         self._drop_too_far(outcomes)
 
-    def _neighbours(self, place: int, stamp: int) -> list[_Neighbours] | None:
-        """Give each input's choice, None if one has none. Nothing further away can make a tighter set."""
-        first, last = stamp - self._slop, stamp + self._slop
-        neighbours = []
-        for other, stamps in enumerate(self._stamps):
-            if other == place:
-                neighbours.append(_Neighbours(stamp, None))
-                continue
-            position = bisect_right(stamps, stamp)
-            before = stamps[position - 1] if position and stamps[position - 1] >= first else None
-            after = stamps[position] if position < len(stamps) and stamps[position] <= last else None
-            if before is None and after is None:
-                return None
-            neighbours.append(_Neighbours(before, after))
-        return neighbours
 
+def _tightest(stamp: int, queues: Sequence[Sequence[int]]) -> list[int]:
+    """Choose a stamp per input around the only one of its input: the least span, of equal spans the first.
 
-def _tightest(stamp: int, neighbours: Sequence[_Neighbours]) -> list[int]:
-    """Choose a stamp per input: the least span, of equal spans the one that starts first.
-
-    Starting from all that come before `stamp`, the earliest is given up for the one after, again and again.
+    From each input only its last stamp up to `stamp` or its first after it can be in the tightest set. Starting
+    from those up to it, the earliest is given up for the one after, again and again, until an input has none:
+    that of `stamp` has none.
     """
-    chosen = [near.before if near.before is not None else near.after for near in neighbours]
-    best = [wanted for wanted in chosen if wanted is not None]
-    given_up = best
-    for place in sorted(range(len(best)), key=best.__getitem__):
-        after = neighbours[place].after
-        if after is None or best[place] > stamp:
-            break
-        given_up = [*given_up[:place], after, *given_up[place + 1 :]]
+    after = [bisect_right(stamps, stamp) for stamps in queues]
+    best = [stamps[max(position - 1, 0)] for stamps, position in zip(queues, after, strict=True)]
+    given_up = best.copy()
+    earliest = iter(sorted(range(len(queues)), key=best.__getitem__))
+    while after[place := next(earliest)] < len(queues[place]):
+        given_up[place] = queues[place][after[place]]
         if max(given_up) - min(given_up) < max(best) - min(best):
-            best = given_up
+            best = given_up.copy()
     return best

@@ -245,10 +245,9 @@ def only_required(values, chosen):
 
 @pytest.mark.parametrize("policy", BY_STAMP)
 @REPEATABLE
-@given(rig=rigs(thinned=False))
+@given(rig=rigs(thinned=False, offset=True))
 def test_an_offset_is_as_if_the_stamps_were_other_ones(policy, rig):
     chosen, taken = rig
-    assume(chosen.offsets)
     moved = [
         step
         if step.message is None or step.message.stamp == 0

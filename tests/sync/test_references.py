@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 from reference_approximate_time import ReferenceApproximateTime
 from references import ReferenceEager, ReferenceEpsilon, ReferenceEqualKey, ReferenceExactTime, ReferenceLatest
-from streams import AGE_PENALTIES, MS, disordered
+from streams import AGE_PENALTIES, MS, disordered, gappy
 
 from syncrelay.sync import (
     ApproximateEpsilonTime,
@@ -69,7 +69,7 @@ def told(outcomes):
 @pytest.mark.parametrize("make", POLICIES, ids=lambda make: make.__name__)
 def test_a_policy_gives_what_its_reference_gives(make):
     sets = 0
-    for seed in range(400):
+    for seed in range(300):
         rng = random.Random(seed)
         sizes = {"n_inputs": rng.choice((1, 2, 2, 3, 4)), "queue_size": rng.choice((1, 2, 3, 5, 20))}
         policy, reference = make(rng, sizes)
@@ -79,3 +79,20 @@ def test_a_policy_gives_what_its_reference_gives(make):
             assert told(given) == told(reference.add(message)), f"seed {seed}, event {number}"
             sets += len(told(given)[0])
     assert sets > 1_000, "too few sets to prove anything"
+
+
+def test_long_searches_give_what_single_steps_give():
+    for seed in range(60):
+        rng = random.Random(seed)
+        sizes = {"n_inputs": rng.randint(2, 5), "queue_size": rng.choice((10, 50))}
+        policy, reference = approximate_time(rng, sizes)
+        for number, (index, stamp) in enumerate(gappy(rng, sizes["n_inputs"], 300)):
+            message = Message(index, stamp, number)
+            assert told(policy.add(message)) == told(reference.add(message)), f"seed {seed}, event {number}"
+
+
+def test_nothing_waits_in_a_policy_that_decides_at_once():
+    for make in (exact_time, approximate_time_eager, approximate_epsilon_time, equal_key):
+        policy, _ = make(random.Random(0), {"n_inputs": 2, "queue_size": 2})
+        policy.add(Message(0, 1, None))
+        assert (policy.opened, policy.closed, policy.settle()) == (0, 0, ())

@@ -52,3 +52,17 @@ def disordered(rng, n_inputs, count):
         else:
             events.insert(min(at + rng.randrange(20), len(events) - 1), events.pop(at))
     return events
+
+
+def gappy(rng, n_inputs, count):
+    """(input, stamp) in order of arrival: long silences, one input seconds late, so that searches are long."""
+    merged = []
+    for index in range(n_inputs):
+        period = 10**9 // rng.randint(5, 100)
+        latency = rng.choice((0, 0, 500 * MS, 2_000 * MS))
+        stamp = START_NS + rng.randrange(period)
+        for _ in range(count // n_inputs):
+            stamp += period * (rng.randint(10, 100) if rng.random() < 0.02 else 1) + rng.randrange(period // 2)
+            merged.append((stamp // MS * MS + latency, index, stamp // MS * MS))
+    merged.sort()
+    return [(index, stamp) for _, index, stamp in merged]
