@@ -37,10 +37,11 @@ def test_a_set_leaves_without_an_optional_input_when_it_has_waited_enough(stage:
 
 
 def test_an_open_match_leaves_when_it_has_waited_enough(stage: Stage):
-    # One pair, and no later message that would prove it the best.
-    group = {"policy": "approximate_time", "slop": "20ms", "max_wait": "50ms", "topics": inputs(_PAIR, qos=LOSSLESS)}
-    pair = at("/camera", 0) + at("/lidar", 7)
-    camera, lidar = stamps_of(_one_set_out(stage, group, itertools.repeat(pair)))
+    group = {"policy": "approximate_time", "slop": "20ms", "max_wait": "5ms", "topics": inputs(_PAIR, qos=LOSSLESS)}
+    # Each pair is long before the one that was sent before it: it proves nothing of that, and flushes it if it waits.
+    falling = range(0, -100_000_000, -10_000)
+    pairs = (at("/camera", offset) + at("/lidar", offset + 7) for offset in falling)
+    camera, lidar = stamps_of(_one_set_out(stage, group, pairs))
     assert lidar - camera == 7 * MS
 
 
