@@ -14,6 +14,13 @@ class ApproximateEpsilonTime(Policy):
     If one is, every input's oldest message within epsilon of the oldest of all is too far. As C++
     message_filters' ApproximateEpsilonTime, but that queues are in stamp order and that a message of a stamp
     that is still queued replaces that one.
+
+        lidar  |ab....c
+        camera |..B...C
+        -> B: a too_far, bB
+        -> C: cC
+
+    Epsilon is 1: a is the oldest, and B lies 2 after it.
     """
 
     __slots__ = ("_epsilon", "_losses", "_queue_size", "_queues", "n_inputs")

@@ -22,7 +22,15 @@ class ApproximateTime(Policy):
     messages. Beyond it: queues are in stamp order, so that what arrives out of order is used; a message of
     a stamp that is still queued replaces that one; each message that leaves unmatched is told.
 
-    Terms as there: heads are the oldest messages not yet passed; the pivot is the input whose head was the
+        lidar  |a..b....c
+        camera |....B....
+        -> B: a superseded
+        -> c: bB
+
+    b is nearer to B than a is, but only c shows that nothing nearer follows. With a slop of less than 4, a
+    would be too far from B.
+
+    Terms as in message_filters: heads are the oldest messages not yet passed; the pivot is the input whose head was the
     latest when a first candidate was found; the candidate is the best set of this pivot so far, always the
     front of the queues; what lies between it and the heads is skipped, and comes back when it leaves.
     """

@@ -17,6 +17,13 @@ class ApproximateTimeEager(Policy):
     back; what lies further than slop before all messages of another input is too far. Meant for what Python's
     ApproximateTimeSynchronizer is used for, whose slop is exclusive, whose fit is the first one found, and
     whose cost is a product of queues.
+
+        lidar  |a..b..cd
+        camera |..A....D
+        -> A: aA
+        -> D: b too_far, c superseded, dD
+
+    Slop is 2. aA does not wait for b, which is nearer to A and comes a little later.
     """
 
     __slots__ = ("_empty", "_latest_head", "_losses", "_messages", "_queue_size", "_slop", "_stamps", "n_inputs")

@@ -17,6 +17,12 @@ class EqualKey(Policy):
     Stamps only put the messages of one input in order, those of one stamp by arrival; they may be unset. When a
     set leaves, what is older on its inputs is superseded, so sets never go back. A message of a key that its
     input still has queued replaces that one.
+
+        left  |ab.c.
+        right |...BC
+        keys: bB cC
+        -> B: a superseded, bB
+        -> C: cC
     """
 
     __slots__ = ("_fed", "_keys", "_lost", "_messages", "_needed", "_queue_size", "_stamps", "n_inputs")

@@ -15,6 +15,10 @@ class ExactTime(Policy):
     As C++ message_filters' ExactTime: what is older than a set that leaves is superseded, and `queue_size` is
     the number of distinct stamps kept over all inputs; above it the oldest stamp overflows, be it the newest
     arrival.
+
+        left  |ab.d
+        right |..CD
+        -> D: a superseded, b superseded, C superseded, dD
     """
 
     __slots__ = ("_losses", "_order", "_queue_size", "_sets", "n_inputs")

@@ -24,6 +24,15 @@ class LatestTime(Policy):
     sets. A trigger waits for required inputs that have nothing for it yet, and is too far once one of them has
     shown newer messages only; it never waits for optional ones. `settle` lets the oldest waiting trigger expire.
 
+        lidar |..a..b.c...d
+        odom  |.A.B......D.
+        -> a: aA
+        -> b: bB
+        -> c: cB
+        -> d: dD
+
+    The lidar is the trigger. B serves b and c.
+
     A message is superseded when a newer one serves in its place and it never did; expired when it is too old
     for any trigger to come.
     """
