@@ -34,8 +34,9 @@ _INDEX = _PREFIX / "share/ament_index/resource_index"
 def main() -> None:
     # Where the generators look for their templates.
     os.environ["AMENT_PREFIX_PATH"] = str(_PREFIX)
-    folders = {folder.name: folder.resolve() for folder in map(Path, sys.argv[1:])}
-    needs = {name: _needs(folder) & {*folders} for name, folder in folders.items()}
+    manifests = {folder: ET.parse(folder / "package.xml").getroot() for folder in map(Path, sys.argv[1:])}  # noqa: S314
+    folders = {manifest.findtext("name", "").strip(): folder.resolve() for folder, manifest in manifests.items()}
+    needs = {name: _needs(manifest) & {*folders} for name, manifest in zip(folders, manifests.values(), strict=True)}
     for name in TopologicalSorter(needs).static_order():
         _build(name, folders[name])
 
@@ -51,10 +52,9 @@ def _build(name: str, folder: Path) -> None:
         _install(name, folder, messages, generated)
 
 
-def _needs(folder: Path) -> set[str]:
+def _needs(manifest: ET.Element) -> set[str]:
     """The packages that a package depends on."""
-    root = ET.parse(folder / "package.xml").getroot()  # noqa: S314  the user's own file
-    return {element.text.strip() for element in root if element.tag.endswith("depend") and element.text}
+    return {element.text.strip() for element in manifest if element.tag.endswith("depend") and element.text}
 
 
 def _generate(name: str, folder: Path, messages: Sequence[Path], output: Path) -> None:
