@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot
 
+_LONGEST_ADVISED = 1000
+
 
 def summarize(group: GroupSnapshot) -> Iterator[str]:
     """A line for the group, and one for each input."""
@@ -18,6 +20,7 @@ def _fates(each: InputSnapshot) -> str:
     if counts.dropped:
         reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
         text += f" ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})"
-    if counts.needed_queue is not None:
+    # Beyond it, the stamps are of another clock, and no queue is the answer.
+    if counts.needed_queue is not None and counts.needed_queue <= _LONGEST_ADVISED:
         text += f"; a match needed what had overflowed: queue_size {counts.needed_queue} would have held it"
     return text

@@ -114,10 +114,7 @@ File: Final = create_model(
     groups=(
         _Groups,
         Field(
-            description=(
-                "Groups by name, 1 or more. The name stands in the log, in diagnostics, in metrics and in the"
-                " names of outputs."
-            ),
+            description=("Groups by name, 1 or more. The name stands in the log and in the names of outputs."),
             json_schema_extra={"minProperties": 1, "propertyNames": {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}},
         ),
     ),

@@ -20,7 +20,7 @@ from syncrelay.config.source import Source, check_text, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
 
-_NO_INDEX = "message types were not checked: there is no ament index here (source ROS 2, or install syncrelay[ros])"
+_NO_INDEX = "message types were not checked: there is no ament index here (source ROS 2, or install with '.[ros]')"
 
 
 def load(

@@ -35,17 +35,20 @@ class _LeftToTheReceiveLoop(CallbackGroup):  # type: ignore[misc]  # CallbackGro
 
 
 class TopicInput:
-    """One topic of the file. Looked at on the main thread; its entities are swapped on the receive thread."""
+    """One topic of the file, under the name that remaps give it.
+
+    Looked at on the main thread; its entities are swapped on the receive thread.
+    """
 
     def __init__(self, config: TopicConfig, *, name: str, node: Any, loop: ReceiveLoop) -> None:
-        self.topic = config.topic
+        self._topic = config.topic
         self.type = config.type
         self.publishers = 0
-        self.missing: str | None = f"a publisher of {self.topic} ({self.type})"
         self._qos = config.qos
         self._node = node
         self._loop = loop
-        self._name = name
+        self.name = name
+        self.missing: str | None = f"a publisher of {self.name} ({self.type})"
         self._callback_group = _LeftToTheReceiveLoop()
         self._users: list[tuple[GroupRelay, int]] = []
         self._takers: list[Deliver] = []
@@ -76,13 +79,13 @@ class TopicInput:
             message_type = import_type(self.type)
             self._takers = [_taker(group, index, message_type) for group, index in self._users]
         except TypeImportError as error:
-            self._say_once(logging.ERROR, f"{self.topic}: {error}")
-            return f"the type {self.type} of {self.topic}"
+            self._say_once(logging.ERROR, f"{self.name}: {error}")
+            return f"the type {self.type} of {self.name}"
         self._message_type = message_type
         return None
 
     def _find_publishers(self) -> str | None:
-        endpoints = self._node.get_publishers_info_by_topic(self._name)
+        endpoints = self._node.get_publishers_info_by_topic(self.name)
         fitting = [endpoint for endpoint in endpoints if endpoint.topic_type == self.type]
         for stranger in endpoints:
             if stranger.topic_type != self.type:
@@ -91,11 +94,11 @@ class TopicInput:
         profile = input_profile(self._qos, [endpoint.qos_profile for endpoint in fitting])
         if profile is not None and profile != self._profile:
             self._adopt(profile)
-        return None if fitting else f"a publisher of {self.topic} ({self.type})"
+        return None if fitting else f"a publisher of {self.name} ({self.type})"
 
     def _of_another_type(self, endpoint: Any) -> str:
         node = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
-        return f"{self.topic}: {node} publishes it as {endpoint.topic_type}, the file says {self.type}"
+        return f"{self.name}: {node} publishes it as {endpoint.topic_type}, the file says {self.type}"
 
     def _say_once(self, level: int, text: str) -> None:
         if text not in self._said:
@@ -105,10 +108,10 @@ class TopicInput:
     def _adopt(self, profile: Any) -> None:
         """Replace the subscription and its outputs by ones of another QoS."""
         if self._profile is not None:
-            _LOG.info("%s: its publishers' QoS changed, subscribing anew", self.topic)
+            _LOG.info("%s: its publishers' QoS changed, subscribing anew", self.name)
         subscription = self._node.create_subscription(
             self._message_type,
-            self.topic,
+            self._topic,
             _never_called,
             profile,
             raw=True,

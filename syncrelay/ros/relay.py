@@ -146,6 +146,11 @@ class Relay:
         self.node.destroy_node()
         self._context.try_shutdown()
 
+    def _flow(self, wiring: Wiring) -> str:
+        """The names after all remaps: those that the graph shows."""
+        topics = zip(wiring.inputs, wiring.group.config.topics, strict=True)
+        return ", ".join(f"{each.name} -> {self.node.resolve_topic_name(topic.output)}" for each, topic in topics)
+
     def _serve(self) -> None:
         try:
             self._services.spin()
@@ -194,14 +199,10 @@ class Relay:
             name, waiting_for = wiring.group.config.name, wiring.waiting_for
             if waiting_for and time.monotonic() - self._started < _GRACE_S:
                 continue
-            text = f"waiting for {waiting_for}" if waiting_for else f"running: {_flow(wiring.group)}"
+            text = f"waiting for {waiting_for}" if waiting_for else f"running: {self._flow(wiring)}"
             if self._announced.get(name) != text:
                 self._announced[name] = text
                 _LOG.info("%s: %s", name, text, extra={"group": name})
-
-
-def _flow(group: GroupRelay) -> str:
-    return ", ".join(f"{topic.topic} -> {topic.output}" for topic in group.config.topics)
 
 
 def _describe(wiring: Wiring) -> GroupSnapshot:
