@@ -29,7 +29,6 @@ class Arrivals:
 
     def forget(self) -> None:
         """Start afresh."""
-        self._jumped = 0
         self._before: list[int | None] = [None] * len(self._offsets)
         self.newest[:] = [_UNSEEN] * len(self._offsets)
         self.given[:] = [_NEVER] * len(self._offsets)

@@ -38,7 +38,7 @@ class OptionalInputs(OptionalStage):
         slop_ns: int,
         min_periods_ns: Sequence[int] | None = None,
     ) -> None:
-        self.inputs = [index for index, needed in enumerate(required) if not needed]
+        self.inputs: Sequence[int] = [index for index, needed in enumerate(required) if not needed]
         self._queue_size = queue_size
         self._slop = slop_ns
         self._min_periods = (0,) * len(required) if min_periods_ns is None else tuple(min_periods_ns)

@@ -25,7 +25,7 @@ class OptionalKeys(OptionalStage):
     __slots__ = ("_queue_size", "_queues", "_waiting", "inputs")
 
     def __init__(self, *, required: Sequence[bool], queue_size: int) -> None:
-        self.inputs = [index for index, needed in enumerate(required) if not needed]
+        self.inputs: Sequence[int] = [index for index, needed in enumerate(required) if not needed]
         self._queue_size = queue_size
         self._queues: dict[int, dict[Hashable, Message]] = {index: {} for index in self.inputs}
         self._waiting: deque[_Waiting] = deque()

@@ -415,6 +415,16 @@ def test_an_input_that_fell_too_belongs_to_the_new_time_however_far_ahead_it_is(
     assert group.counts()[1].buffered == 1
 
 
+def test_any_input_may_be_the_first_to_begin_a_new_pass():
+    group = exact()
+    recording = [Message(index, stamp(column), column) for column in (0, 150, 300) for index in (0, 1)]
+    for turn in range(4):
+        first = turn % 2
+        for message in sorted(recording, key=lambda message: (message.stamp, message.input != first)):
+            group.add(message, now=0)
+        assert group.sets == 3 * (turn + 1)
+
+
 def test_stamps_below_zero_match_and_are_late_but_never_jump():
     group = exact()
     for time in (-9 * START_NS, -3 * START_NS):
