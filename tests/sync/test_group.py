@@ -442,13 +442,21 @@ def test_offsets_count_for_matching_and_messages_leave_with_the_stamps_they_came
     assert match.messages == (first, second)
 
 
-def test_offsets_count_for_what_is_left_over_of_the_time_before():
-    # Input 1 is ten seconds ahead; after the jump of input 0 it goes on in the new time, at once.
-    offset = 10 * 10**9
-    group = exact(offsets_ns=(0, -offset), queue=3)
-    for second in (5, 6, 3):
-        group.add(Message(0, second * 10**9, second), now=0)
-    assert list(group.add(Message(1, 3 * 10**9 + offset, 3), now=0)) != []
+@pytest.mark.parametrize("offsets", [(0, 0), (-7, 0), (0, -7), (4, -7)])
+def test_offsets_count_for_what_is_left_over_of_the_time_before(offsets):
+    second = 10**9
+    group = exact(offsets_ns=[offset * second for offset in offsets], queue=9)
+
+    def told(index, time):
+        """Add a message whose stamp is `time` once the offset is added; give what leaves of its own input."""
+        outcomes = group.add(Message(index, (time - offsets[index]) * second, time), now=0)
+        return [drop.reason.value for drop in outcomes if drop.message.payload == time]
+
+    for index, time in ((0, 50), (1, 54), (0, 52), (1, 55)):
+        assert told(index, time) == []
+    assert told(0, 40) == [], "the jump"
+    assert told(1, 56) == ["time_jump"], "left over"
+    assert told(1, 41) == [], "of the new time"
 
 
 @pytest.mark.parametrize(
