@@ -41,17 +41,17 @@ class Arrivals:
     def has_fallen(self, index: int, stamp: int) -> bool:
         """Whether this stamp begins a new time."""
         newest = self.newest[index]
-        return newest not in (_UNSEEN, _NOT_YET) and stamp < newest - JUMP_NS
+        return newest != _UNSEEN and stamp < newest - JUMP_NS
 
     def jump(self, index: int) -> None:
         """Start afresh because this input has fallen; the others may have something of the old time left."""
         before = [old if newest == _NOT_YET else newest for old, newest in zip(self._before, self.newest, strict=True)]
         self.forget()
         self._jumped = index
-        for other, newest in enumerate(before):
-            if other != index and newest not in (None, _UNSEEN):
-                self._before[other] = newest
-                self.newest[other] = _NOT_YET
+        self._before = before
+        self._before[index] = None
+        self.newest[:] = [_NOT_YET] * len(before)
+        self.newest[index] = _UNSEEN
 
     def is_left_over(self, index: int, stamp: int) -> bool:
         """Whether a message belongs to the time before a jump of another input."""

@@ -415,6 +415,24 @@ def test_an_input_that_fell_too_belongs_to_the_new_time_however_far_ahead_it_is(
     assert group.counts()[1].buffered == 1
 
 
+def test_one_stamp_far_ahead_costs_no_more_than_what_was_buffered():
+    group = exact()
+    told = []
+    for index, column in ((0, 10), (1, 10), (0, 90_000), (0, 12), (1, 12), (0, 14), (1, 14)):
+        told += group.add(Message(index, stamp(column), column), now=0)
+    assert [getattr(outcome, "reason", None) for outcome in told] == [None, DropReason.TIME_JUMP, None, None]
+
+
+def test_two_jumps_in_a_row_are_two():
+    # Input 1 still has something of the first time when input 0 jumps once more.
+    group = exact()
+    told = []
+    for index, column in ((1, 900), (0, 900), (0, 500), (0, 100), (1, 910), (1, 100)):
+        told.append(list(group.add(Message(index, stamp(column), column), now=0)))
+    assert [drop.reason.value for drop in told[4]] == ["time_jump"]
+    assert [message.payload for message in told[5][0].messages] == [100, 100]
+
+
 def test_any_input_may_be_the_first_to_begin_a_new_pass():
     group = exact()
     recording = [Message(index, stamp(column), column) for column in (0, 150, 300) for index in (0, 1)]
