@@ -423,6 +423,20 @@ def test_one_stamp_far_ahead_costs_no_more_than_what_was_buffered():
     assert [getattr(outcome, "reason", None) for outcome in told] == [None, DropReason.TIME_JUMP, None, None]
 
 
+@pytest.mark.parametrize(
+    ("before", "column", "left_over"),
+    [(90, 100, False), (90, 101, True), (150, 150, False), (150, 151, True), (150, 250, True), (150, 251, False)],
+)
+def test_left_over_is_what_goes_on_by_a_second_where_its_input_was_and_is_more_than_a_second_ahead(
+    before, column, left_over
+):
+    group = exact(queue=9)
+    for index, time in ((1, before), (0, 900), (0, 0)):
+        group.add(Message(index, stamp(time), time), now=0)
+    told = group.add(Message(1, stamp(column), column), now=0)
+    assert [drop.reason.value for drop in told] == ["time_jump"] * left_over
+
+
 def test_two_jumps_in_a_row_are_two():
     # Input 1 still has something of the first time when input 0 jumps once more.
     group = exact()
