@@ -14,7 +14,7 @@ pytestmark = pytest.mark.container
 _RANDOM = random.Random(8)
 _MOMENTS_S = [0.0, 0.02, *sorted(_RANDOM.uniform(0.05, 2.5) for _ in range(8))]
 # It takes less than one on an idle machine. A signal that is lost is lost for good.
-_PATIENCE_S = 5
+_PATIENCE_S = 20
 
 
 @pytest.mark.parametrize("below", [(), ("--init",)], ids=["as PID 1", "below an init"])
