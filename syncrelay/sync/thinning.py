@@ -18,7 +18,7 @@ class Thinning:
 
     __slots__ = ("_every", "_first", "_period", "_seen", "_slot", "_withheld")
 
-    def __init__(self, *, n_inputs: int, repeats: bool, every: int = 1, min_set_period_ns: int | None = None) -> None:
+    def __init__(self, *, n_inputs: int, repeats: bool, every: int, min_set_period_ns: int | None) -> None:
         if every < 1 or (min_set_period_ns is not None and min_set_period_ns < 1):
             raise ValueError(f"every {every} and min_set_period_ns {min_set_period_ns} must be 1 or more")
         self._every = every

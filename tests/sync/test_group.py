@@ -404,7 +404,7 @@ def test_by_key_a_stamp_may_be_unset():
         assert list(group.add(Message(0, 0, number, key=number), now=0)) == []
         (match,) = group.add(Message(1, 0, number, key=number), now=0)
         assert [message.payload for message in match.messages] == [number, number]
-    assert group.sets == 3
+    assert [counts.matched for counts in group.counts()] == [3, 3]
 
 
 def test_an_input_that_fell_too_belongs_to_the_new_time_however_far_ahead_it_is():

@@ -134,14 +134,22 @@ test_drawn = group_cases(
             -> d: c thinned, C thinned, dD
             """,
         ),
-        "and not if it is in one that passes": (
-            partial(latest, every=3),
+        "and not if it was in one that passed": (
+            partial(latest, every=2),
             """
-            lidar |.abcde
-            odom  |A.....
+            lidar |.ab.c
+            odom  |A..B.
             -> a: aA
-            -> c: b thinned
-            -> d: c thinned, dA
+            -> c: b thinned, cB
+            """,
+        ),
+        "and not if it is in one that passes": (
+            partial(latest, every=2),
+            """
+            lidar |.a.b.c
+            odom  |A.B...
+            -> a: aA
+            -> c: b thinned, cB
             """,
         ),
     }
@@ -166,6 +174,25 @@ def test_a_message_that_passed_before_a_flush_may_come_again_after_it():
         assert len(match.messages) == 2
         group.flush(DropReason.TIME_JUMP)
     assert [counts.matched for counts in group.counts()] == [2, 2]
+
+
+def test_what_passed_before_a_flush_is_not_known_after_it():
+    policy = LatestTime(n_inputs=2, queue_size=9, trigger=0, max_age_ns=2 * TICK_NS)
+    group = SyncGroup(policy, required=(True, False), max_wait_ns=0, every=2)
+    for index, column in ((1, 5), (0, 6)):
+        group.add(Message(index, stamp(column), column), now=0)
+    group.flush(DropReason.TIME_JUMP)
+    for index, column in ((0, 3), (1, 5), (0, 6)):
+        group.add(Message(index, stamp(column), column), now=0)
+    assert [(counts.matched, counts.buffered) for counts in group.counts()] == [(2, 1), (1, 1)]
+
+
+def test_the_least_period_is_a_nanosecond():
+    group = SyncGroup(ExactTime(n_inputs=2, queue_size=1), required=(True, True), min_set_period_ns=1)
+    for time in (1, 2, 3):
+        for index in (0, 1):
+            group.add(Message(index, time, None), now=0)
+    assert group.sets == 3
 
 
 def test_sets_without_stamps_are_thinned_by_the_clock():
