@@ -50,8 +50,8 @@ test_drawn = group_cases(
         "periods are counted from the first set, so what passes is spread evenly": (
             partial(exact, period=4),
             """
-            left  |a..b..c..d..e..
-            right |A..B..C..D..E..
+            left  |.a..b..c..d..e..
+            right |.A..B..C..D..E..
             -> A: aA
             -> B: bB
             -> C: c thinned, C thinned
