@@ -1,0 +1,62 @@
+import pytest
+
+from syncrelay.sync.messages import Message
+from syncrelay.sync.queues import Losses, StampQueue
+
+
+def message(stamp, payload=None):
+    return Message(0, stamp, payload)
+
+
+def test_a_queue_is_in_stamp_order_whatever_the_order_of_arrival():
+    queue = StampQueue()
+    for stamp in (3, 1, 5, 4, 2):
+        assert queue.insert(stamp, message(stamp)) is None
+    assert queue.stamps == [1, 2, 3, 4, 5]
+    assert [queued.stamp for queued in queue.messages] == queue.stamps
+
+
+def test_a_message_of_a_stamp_that_is_queued_replaces_that_one():
+    queue = StampQueue()
+    for stamp in (1, 2, 3):
+        queue.insert(stamp, message(stamp, "first"))
+    assert queue.insert(2, message(2, "second")) == message(2, "first")
+    assert [queued.payload for queued in queue.messages] == ["first", "second", "first"]
+
+
+def test_the_oldest_are_taken():
+    queue = StampQueue()
+    for stamp in (1, 2, 3):
+        queue.insert(stamp, message(stamp))
+    assert queue.take(2) == [message(1), message(2)]
+    assert (queue.stamps, queue.messages) == ([3], [message(3)])
+
+
+@pytest.mark.parametrize(
+    ("lost", "wanted", "reach", "needed"),
+    [
+        # The queue holds 20, 30, 40: with 10 lost, one every 10.
+        (10, 10, 0, 5),
+        (10, 15, 0, None),  # nothing as new as 15 was lost
+        (10, 15, 5, 4),  # what was lost lies just within reach
+        (10, 16, 5, None),
+        (15, 10, 0, 5),
+        (20, 10, 0, None),  # lost, but not from before what is queued
+        (None, 10, 0, None),
+    ],
+)
+def test_what_was_lost_and_wanted_tells_how_long_a_queue_was_needed(lost, wanted, reach, needed):
+    losses = Losses(2)
+    if lost is not None:
+        losses.lose(1, lost)
+    losses.miss(1, [20, 30, 40], wanted, reach)
+    assert losses.needed == [None, needed]
+
+
+def test_losses_are_forgotten_but_not_what_they_taught():
+    losses = Losses(1)
+    losses.lose(0, 10)
+    losses.miss(0, [20, 30, 40], 10, 0)
+    losses.forget()
+    losses.miss(0, [20, 30, 40], 5, 0)
+    assert losses.needed == [5]
