@@ -2,14 +2,14 @@
 
 import os
 import secrets
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.container.docker import Network, Relays, docker
+from tests.container.docker import Network, Relays, docker, run_docker
 from tests.container.stages import ContainerStage, host_stage
+from tests.ros.processes import wait_until
 from tests.ros.stage import Stage
 
 collect_ignore_glob = [] if os.environ.get("SYNCRELAY_CONTAINER_TESTS") else ["test_*.py"]
@@ -51,10 +51,11 @@ def containers(tmp_path: Path, ros_domain: int) -> Iterator[ContainerStage]:
 
 @pytest.fixture
 def bridge() -> Iterator[Network]:
-    """A bridge network of the engine."""
+    """A bridge network of the engine. A test asks for it first, so that it outlives the containers that use it."""
     name = f"syncrelay-{secrets.token_hex(4)}"
     docker("network", "create", name)
     try:
         yield Network(name)
     finally:
-        subprocess.run(["docker", "network", "rm", name], check=False, capture_output=True)  # noqa: S607
+        # What `docker run --rm` started is removed in its own time.
+        wait_until(lambda: run_docker("network", "rm", name).returncode == 0, "the end of all that used the bridge")

@@ -31,12 +31,6 @@ def test_containers_of_different_users_reach_each_other_on_the_host_network(rela
     assert_relayed(containers)
 
 
-def test_containers_of_different_users_reach_each_other_on_a_bridge(relays, containers, bridge):
-    relays.run(CONFIG, f"--network={bridge}", "--user=4711", *HARDENED)
-    containers.user, containers.network = 4712, bridge
-    assert_relayed(containers)
-
-
 def test_a_relay_shares_memory_with_nodes_of_its_own_user_on_the_host(relays, host):
     relay = relays.run(CONFIG, "--network=host", "--ipc=host", "--user=0", "--env=FASTDDS_BUILTIN_TRANSPORTS=DEFAULT")
     assert relay.shares_memory_with(assert_relayed(host).process.pid)
@@ -45,3 +39,11 @@ def test_a_relay_shares_memory_with_nodes_of_its_own_user_on_the_host(relays, ho
 def test_a_relay_shares_no_memory_by_default(relays, host):
     relay = relays.run(CONFIG, "--network=host", "--ipc=host", "--user=0")
     assert not relay.shares_memory_with(assert_relayed(host).process.pid)
+
+
+# The last one: Fast DDS takes processes for neighbours, who may share memory, by the interfaces that are up when each
+# of them starts, and a bridge that is left goes down in its own time.
+def test_containers_of_different_users_reach_each_other_on_a_bridge(bridge, relays, containers):
+    relays.run(CONFIG, f"--network={bridge}", "--user=4711", *HARDENED)
+    containers.user, containers.network = 4712, bridge
+    assert_relayed(containers)
