@@ -124,7 +124,7 @@ def _span(stamps: Sequence[int | None]) -> int:
 
 def _as_matched(group: GroupSnapshot, offsets: Sequence[int]) -> GroupSnapshot:
     recent = (
-        replace(outcome, stamp=outcome.stamp + offsets[outcome.input])
+        outcome._replace(stamp=outcome.stamp + offsets[outcome.input])
         if isinstance(outcome, RecentDrop)
         else RecentSet(_shifted(outcome.stamps, offsets))
         for outcome in group.recent

@@ -4,6 +4,7 @@ DDS keeps order within a topic only. Drained one topic after the other, a backlo
 queues before a slow topic's messages of the same time are seen.
 """
 
+import time
 from collections.abc import Callable, Iterable
 from heapq import heappop, heappush
 from itertools import count
@@ -27,6 +28,8 @@ class Backlog:
     """Takes messages and delivers them, the oldest first; at most one of each subscription is held between calls."""
 
     def __init__(self) -> None:
+        self.longest_wait = 0
+        """How long a message at most has waited since DDS received it, in nanoseconds; the reader sets it back."""
         self._heads: list[_Head] = []
         self._held: set[int] = set()
         self._ties = count()
@@ -44,6 +47,8 @@ class Backlog:
         for subscription in ready:
             if id(subscription.subscription) not in self._held:
                 self._take(subscription)
+        if self._heads:
+            self.longest_wait = max(self.longest_wait, time.time_ns() - self._heads[0][0])
         # The look saw the newest of these, hence all that came before it too.
         newest = max((head[0] for head in self._heads), default=0)
         self._deliver_until(max(newest, seen_until))

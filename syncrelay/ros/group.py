@@ -1,8 +1,9 @@
 """One group at work: payloads in, matched sets out on the group's publishers. Lives on the receive thread."""
 
+import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from syncrelay.cdr import patch_stamp
 from syncrelay.config import GroupConfig
@@ -11,6 +12,27 @@ from syncrelay.sync import Drop, DropReason, Match, Message
 
 # Enough for the widest terminal's strip of recent sets.
 _RECENT = 256
+# What is kept for whoever watches, between two of his looks: more than comes in a second.
+_WATCHED = 10_000
+
+
+class Received(NamedTuple):
+    """What the engine carries: a payload, and when DDS received it, in nanoseconds of the system clock."""
+
+    payload: bytes
+    at: int
+
+
+class Batch(NamedTuple):
+    """What came and left since the last look, oldest first.
+
+    `arrivals` are stamps and times of receipt of each input, `sets` the sets with their latencies, `keys` what
+    the newest messages are matched by; times in nanoseconds.
+    """
+
+    arrivals: tuple[deque[tuple[int, int]], ...]
+    sets: deque[tuple[RecentSet, int]]
+    keys: tuple[Hashable, ...]
 
 
 class GroupRelay:
@@ -21,6 +43,9 @@ class GroupRelay:
         self.engine = config.engine()
         self.recent: deque[RecentSet | RecentDrop] = deque(maxlen=_RECENT)
         self._now = now
+        self._n_inputs = len(config.topics)
+        self._keys: list[Hashable] = [None] * self._n_inputs
+        self._watch()
         self._restamped = [False] * len(config.topics)
         self._publish: list[Callable[[bytes], None] | None] = [None] * len(config.topics)
 
@@ -32,22 +57,35 @@ class GroupRelay:
         self._publish[index] = publisher.handle.publish_raw
         self._restamped[index] = restamped
 
-    def receive(self, index: int, payload: bytes, stamp: int | None) -> None:
-        """Take in a message of one input by its stamp in nanoseconds; None where none could be read."""
+    def receive(self, index: int, payload: bytes, received: int, stamp: int | None) -> None:
+        """Take in a message of one input by its stamp, None where none could be read; times in nanoseconds."""
         if stamp is None:
-            self._reject(index, payload)
-        else:
-            self._settle(self.engine.add(Message(index, stamp, payload), now=self._now()))
+            self._reject(index, payload, received)
+            return
+        self._arrivals[index].append((stamp, received))
+        self._settle(self.engine.add(Message(index, stamp, Received(payload, received)), now=self._now()))
 
-    def receive_keyed(self, index: int, payload: bytes, stamp: int | None, key: Hashable) -> None:
+    def receive_keyed(self, index: int, payload: bytes, received: int, stamp: int | None, key: Hashable) -> None:
         """Take in a message that is matched by its key; None where none could be read."""
         if stamp is None or key is None:
-            self._reject(index, payload)
-        else:
-            self._settle(self.engine.add(Message(index, stamp, payload, key), now=self._now()))
+            self._reject(index, payload, received)
+            return
+        self._arrivals[index].append((stamp, received))
+        self._keys[index] = key
+        self._settle(self.engine.add(Message(index, stamp, Received(payload, received), key), now=self._now()))
 
-    def _reject(self, index: int, payload: bytes) -> None:
-        self._settle([self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED)])
+    def watched(self) -> Batch:
+        """Give what came and left since this was last asked for."""
+        batch = Batch(self._arrivals, self._sets, tuple(self._keys))
+        self._watch()
+        return batch
+
+    def _watch(self) -> None:
+        self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
+        self._sets = deque[tuple[RecentSet, int]](maxlen=_WATCHED)
+
+    def _reject(self, index: int, payload: bytes, received: int) -> None:
+        self._settle([self.engine.reject(Message(index, 0, Received(payload, received)), DropReason.MALFORMED)])
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""
@@ -60,17 +98,25 @@ class GroupRelay:
     def _settle(self, outcomes: Sequence[Match | Drop]) -> None:
         for outcome in outcomes:
             if isinstance(outcome, Match):
-                self._send(outcome)
-                self.recent.append(RecentSet(tuple(m and m.stamp for m in outcome.messages)))
+                newest = self._send(outcome)
+                sent = RecentSet(tuple(m and m.stamp for m in outcome.messages))
+                self._sets.append((sent, time.time_ns() - newest))
+                self.recent.append(sent)
             else:
                 message = outcome.message
                 self.recent.append(RecentDrop(message.input, message.stamp, outcome.reason))
 
-    def _send(self, match: Match) -> None:
+    def _send(self, match: Match) -> int:
+        """Publish a set; when its newest message was received."""
+        newest = 0
         for message, publish, restamped in zip(match.messages, self._publish, self._restamped, strict=True):
-            if message is None or publish is None:
+            if message is None:
+                continue
+            payload, received = message.payload
+            newest = max(newest, received)
+            if publish is None:
                 continue
             if match.stamp is not None and restamped:
-                publish(patch_stamp(message.payload, match.stamp))
-            else:
-                publish(message.payload)
+                payload = patch_stamp(payload, match.stamp)
+            publish(payload)
+        return newest

@@ -153,11 +153,11 @@ def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
     if topic.key is not None:
         read_key = value_reader(message_type, topic.key)
         return lambda payload, received: group.receive_keyed(
-            index, payload, read_stamp(payload) if read_stamp else received, read_key(payload)
+            index, payload, received, read_stamp(payload) if read_stamp else received, read_key(payload)
         )
     if read_stamp is None:
-        return lambda payload, received: group.receive(index, payload, received)
-    return lambda payload, _: group.receive(index, payload, read_stamp(payload))
+        return lambda payload, received: group.receive(index, payload, received, received)
+    return lambda payload, received: group.receive(index, payload, received, read_stamp(payload))
 
 
 def _never_called(_: bytes) -> None:
