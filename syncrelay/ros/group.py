@@ -26,12 +26,12 @@ class Received(NamedTuple):
 class Batch(NamedTuple):
     """What came and left since the last look, oldest first.
 
-    `arrivals` are stamps and times of receipt of each input, `sets` the sets with their latencies, `keys` what
+    `arrivals` are stamps and times of receipt of each input, `sets` the sets' stamps and their latencies, `keys` what
     the newest messages are matched by; times in nanoseconds.
     """
 
     arrivals: tuple[deque[tuple[int, int]], ...]
-    sets: deque[tuple[RecentSet, int]]
+    sets: deque[tuple[tuple[int | None, ...], int]]
     keys: tuple[Hashable, ...]
 
 
@@ -82,7 +82,7 @@ class GroupRelay:
 
     def _watch(self) -> None:
         self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
-        self._sets = deque[tuple[RecentSet, int]](maxlen=_WATCHED)
+        self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
 
     def _reject(self, index: int, payload: bytes, received: int) -> None:
         self._settle([self.engine.reject(Message(index, 0, Received(payload, received)), DropReason.MALFORMED)])
@@ -99,9 +99,9 @@ class GroupRelay:
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 newest = self._send(outcome)
-                sent = RecentSet(tuple(m and m.stamp for m in outcome.messages))
-                self._sets.append((sent, time.time_ns() - newest))
-                self.recent.append(sent)
+                stamps = tuple(m and m.stamp for m in outcome.messages)
+                self._sets.append((stamps, time.time_ns() - newest))
+                self.recent.append(RecentSet(stamps))
             else:
                 message = outcome.message
                 self.recent.append(RecentDrop(message.input, message.stamp, outcome.reason))

@@ -9,9 +9,12 @@ from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.config import TopicConfig
 from syncrelay.errors import TypeImportError
+from syncrelay.explain import Endpoint
+from syncrelay.ros import graph
 from syncrelay.ros.backlog import Deliver, Subscription
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.qos import input_profile
@@ -43,7 +46,8 @@ class TopicInput:
     def __init__(self, config: TopicConfig, *, name: str, node: Any, loop: ReceiveLoop) -> None:
         self._topic = config.topic
         self.type = config.type
-        self.publishers = 0
+        self.publishers: tuple[Endpoint, ...] = ()
+        self.not_importable: str | None = None
         self._qos = config.qos
         self._node = node
         self._loop = loop
@@ -56,12 +60,18 @@ class TopicInput:
         self._profile: Any = None
         self._subscription: Any = None
         self._publishers: list[Any] = []
+        self._lost: Any = None
         self._said: set[str] = set()
 
     @property
     def subscribed(self) -> bool:
         """Whether messages can come in."""
         return self._profile is not None
+
+    @property
+    def publisher_count(self) -> int:
+        """How many publish it as the file's type."""
+        return sum(publisher.type == self.type for publisher in self.publishers)
 
     def add_user(self, group: GroupRelay, index: int) -> None:
         """Feed an input of a group from this topic."""
@@ -79,26 +89,38 @@ class TopicInput:
             message_type = import_type(self.type)
             self._takers = [_taker(group, index, message_type) for group, index in self._users]
         except TypeImportError as error:
+            self.not_importable = str(error)
             self._say_once(logging.ERROR, f"{self.name}: {error}")
             return f"the type {self.type} of {self.name}"
+        self.not_importable = None
         self._message_type = message_type
         return None
 
     def _find_publishers(self) -> str | None:
         endpoints = self._node.get_publishers_info_by_topic(self.name)
         fitting = [endpoint for endpoint in endpoints if endpoint.topic_type == self.type]
-        for stranger in endpoints:
-            if stranger.topic_type != self.type:
-                self._say_once(logging.WARNING, self._of_another_type(stranger))
-        self.publishers = len(fitting)
         profile = input_profile(self._qos, [endpoint.qos_profile for endpoint in fitting])
         if profile is not None and profile != self._profile:
             self._adopt(profile)
+        self.publishers = graph.publishers(endpoints, self._profile)
+        for stranger in self.publishers:
+            if stranger.type != self.type:
+                self._say_once(logging.WARNING, self._of_another_type(stranger))
         return None if fitting else f"a publisher of {self.name} ({self.type})"
 
-    def _of_another_type(self, endpoint: Any) -> str:
-        node = f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
-        return f"{self.name}: {node} publishes it as {endpoint.topic_type}, the file says {self.type}"
+    def _of_another_type(self, endpoint: Endpoint) -> str:
+        return f"{self.name}: {endpoint.node} publishes it as {endpoint.type}, the file says {self.type}"
+
+    def subscribers(self, group: GroupRelay, index: int) -> tuple[Endpoint, ...]:
+        """Look at who subscribes the output that a group has for this topic."""
+        if self._profile is None:
+            return ()
+        output = self._node.resolve_topic_name(group.config.topics[index].output)
+        return graph.subscribers(self._node.get_subscriptions_info_by_topic(output), self._profile)
+
+    def lost(self) -> int:
+        """How many messages DDS lost on the way here since the subscription was made."""
+        return int(self._lost.take_event().total_count) if self._lost is not None else 0
 
     def _say_once(self, level: int, text: str) -> None:
         if text not in self._said:
@@ -122,6 +144,9 @@ class TopicInput:
             for group, index in self._users
         ]
         self._profile = profile
+        self._lost = _rclpy.EventHandle(
+            subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST
+        )
         self._loop.call(lambda: self._swap(subscription, publishers)).result()
 
     def _swap(self, subscription: Any, publishers: list[Any]) -> None:

@@ -22,6 +22,7 @@ from syncrelay.ros.environment import log_arguments
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.inputs import Wiring, wire
 from syncrelay.ros.logs import RosoutHandler
+from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.sync import DropReason
@@ -70,6 +71,8 @@ class Relay:
         self._groups = [GroupRelay(group, now=self._now) for group in chosen]
         self._wirings = wire(self._groups, node=self.node, loop=self._loop)
         self._inputs = list(dict.fromkeys(each for wiring in self._wirings for each in wiring.inputs))
+        self.monitor = Monitor(self._wirings, node=self.node, loop=self._loop, simulated=self._sim_time)
+        self._next_look = time.monotonic() + LOOK_S
         self._announced: dict[str, str] = {}
         self._started = time.monotonic()
         self._wake = threading.Event()
@@ -106,8 +109,19 @@ class Relay:
         for topic_input in self._inputs:
             topic_input.look()
         self._announce()
+        if time.monotonic() >= self._next_look:
+            self._next_look += LOOK_S
+            self._monitor()
         is_waiting = any(wiring.waiting_for for wiring in self._wirings)
-        self._wake.wait(min(timeout_s, _EAGER_LOOK_S if is_waiting else _LOOK_S))
+        until_look = max(0.0, self._next_look - time.monotonic())
+        self._wake.wait(min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S))
+
+    def _monitor(self) -> None:
+        try:
+            self.monitor.look()
+        except CancelledError:
+            # The receive thread has ended: the next turn raises why.
+            return
 
     def snapshot(self) -> RelaySnapshot:
         """What is known of all groups, taken between two messages. Any thread."""
@@ -215,7 +229,7 @@ def _describe(wiring: Wiring) -> GroupSnapshot:
                 topic=topic.topic,
                 output=topic.output,
                 counts=counts,
-                publishers=topic_input.publishers,
+                publishers=topic_input.publisher_count,
                 subscribed=topic_input.subscribed,
             )
             for topic, topic_input, counts in inputs

@@ -1,0 +1,34 @@
+"""Why nothing comes out, or too little: from what is known of a group to findings in words, with what to do.
+
+Pure: values in, values out. The running relay and the analysis of recordings both ask here.
+"""
+
+from syncrelay.explain.distribution import Distribution
+from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Mismatch, Tolerance
+from syncrelay.explain.find import explanation, find
+from syncrelay.explain.findings import Code, Finding, Severity
+from syncrelay.explain.observation import GroupFigures, InputFigures, Observation, SentSets
+from syncrelay.explain.silence import Silence, in_words
+from syncrelay.explain.watch import GroupWatch, InputGraph
+
+__all__ = [
+    "Code",
+    "Distribution",
+    "Endpoint",
+    "Finding",
+    "GroupFacts",
+    "GroupFigures",
+    "GroupWatch",
+    "InputFacts",
+    "InputFigures",
+    "InputGraph",
+    "Mismatch",
+    "Observation",
+    "SentSets",
+    "Severity",
+    "Silence",
+    "Tolerance",
+    "explanation",
+    "find",
+    "in_words",
+]

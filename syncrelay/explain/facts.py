@@ -1,0 +1,104 @@
+"""What is known of a group at one moment: the file's values, what was observed, what the graph shows."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Final
+
+from syncrelay.explain.observation import GroupFigures, InputFigures
+from syncrelay.sync.counts import InputCounts
+
+_SECOND: Final = 1_000_000_000
+_NO_SETS: Final = 5 * _SECOND
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """A QoS policy by which a publisher and a subscriber do not connect, in DDS's words: offered and requested."""
+
+    policy: str
+    offered: str
+    requested: str
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A publisher of an input or a subscriber of an output: its node, its type, why it does not connect to us."""
+
+    node: str
+    type: str
+    mismatch: Mismatch | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """The key of the file that says how far apart the stamps of a set may be, and its value in nanoseconds."""
+
+    key: str
+    ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class InputFacts:
+    """An input and its output.
+
+    `name` is the topic's in the graph, `not_importable` says why its type cannot be used here, `alike` are topics of
+    the graph that may have been meant, `lost` counts what DDS lost on the way of late. `key` is the newest message's.
+    """
+
+    name: str
+    type: str
+    output: str
+    required: bool
+    counts: InputCounts
+    figures: InputFigures
+    publishers: tuple[Endpoint, ...] = ()
+    subscribers: tuple[Endpoint, ...] = ()
+    alike: tuple[str, ...] = ()
+    not_importable: str | None = None
+    lost: int = 0
+    key: Hashable = None
+
+
+@dataclass(frozen=True, slots=True)
+class GroupFacts:
+    """A group. Durations in nanoseconds.
+
+    `tolerance` is None where stamps may be any distance apart, as with `equal_key`. `by_stamp` says whether stamps are
+    what is matched. `clock_stopped` is for how long the simulated time stands still, None if it does not; `waited` how
+    long messages at most lay before the relay took them.
+    """
+
+    name: str
+    policy: str
+    queue_size: int
+    inputs: tuple[InputFacts, ...]
+    figures: GroupFigures
+    tolerance: Tolerance | None = None
+    by_stamp: bool = True
+    max_wait: int | None = None
+    every: int = 1
+    least_period: int | None = None
+    clock_stopped: int | None = None
+    waited: int = 0
+
+    @property
+    def possible_hz(self) -> float:
+        """The most sets a second that there could be: one for each message of the slowest required input."""
+        possible = self.figures.best_hz / self.every
+        return min(possible, _SECOND / self.least_period) if self.least_period else possible
+
+    @property
+    def slowest(self) -> InputFacts:
+        """The required input with the fewest messages."""
+        return min((each for each in self.inputs if each.required), key=lambda each: each.figures.rate_hz)
+
+    @property
+    def silent_after(self) -> int:
+        """After how long without a set the group is silent: 5 s, or three sets that should have come."""
+        return max(_NO_SETS, round(3 * _SECOND / self.possible_hz)) if self.possible_hz else _NO_SETS
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether sets that should have come did not."""
+        last = self.figures.began if self.figures.last_set is None else self.figures.last_set
+        return self.figures.now - last >= self.silent_after

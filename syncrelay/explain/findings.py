@@ -1,0 +1,91 @@
+"""What a finding is, and what every rule that makes them needs."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+from typing import Final, TypeAlias
+
+from syncrelay.explain.facts import GroupFacts, InputFacts
+
+SECOND: Final = 1_000_000_000
+
+
+class Severity(IntEnum):
+    """How bad it is: nothing to mend, sets suffer, no sets come."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+class Code(Enum):
+    """What a finding is, for programs. In the order in which findings explain a silence."""
+
+    TYPE_NOT_IMPORTABLE = "type_not_importable"
+    OTHER_TYPE = "other_type"
+    NO_PUBLISHER = "no_publisher"
+    INCOMPATIBLE_QOS = "incompatible_qos"
+    CLOCK_STOPPED = "clock_stopped"
+    SILENT = "silent"
+    MALFORMED = "malformed"
+    UNSTAMPED = "unstamped"
+    OTHER_CLOCK = "other_clock"
+    NO_COMMON_KEY = "no_common_key"
+    OVER_SLOP = "over_slop"
+    SHORT_QUEUE = "short_queue"
+    WAITING_FOR_OPTIONAL = "waiting_for_optional"
+    TIME_JUMP = "time_jump"
+    MESSAGES_LOST = "messages_lost"
+    TOO_SLOW = "too_slow"
+    OUT_OF_ORDER = "out_of_order"
+    DUPLICATES = "duplicates"
+    CLOCK_DRIFT = "clock_drift"
+    FEW_SETS = "few_sets"
+    SUBSCRIBER_QOS = "subscriber_qos"
+    UNEXPLAINED = "unexplained"
+    STARTING = "starting"
+    HEALTHY = "healthy"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is so: a sentence with its figures, and what to do, None where nothing is to be done.
+
+    `input` is the index of the input that it is about, None where it is about the group.
+    """
+
+    code: Code
+    severity: Severity
+    text: str
+    suggestion: str | None = None
+    input: int | None = None
+
+
+Found: TypeAlias = Iterator[Finding]
+Rule: TypeAlias = Callable[[GroupFacts], Found]
+
+
+def of_each_input(rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:
+    """Make a rule about an input one about a group, the required inputs first."""
+
+    def of_all(facts: GroupFacts) -> Found:
+        order = sorted(range(len(facts.inputs)), key=lambda index: not facts.inputs[index].required)
+        for index in order:
+            yield from rule(facts, index, facts.inputs[index])
+
+    return of_all
+
+
+def blocks(facts: GroupFacts, an_input: InputFacts) -> Severity:
+    """Return how bad it is that an input gives nothing."""
+    return Severity.ERROR if an_input.required and facts.is_silent else Severity.WARN
+
+
+def counted(count: int, fed: int) -> str:
+    """Return `3 of the last 100`, or `all 100`."""
+    return f"all {fed}" if count >= fed else f"{count} of the last {fed}"
+
+
+def nodes(an_input: InputFacts) -> str:
+    """Return the names of those who publish an input."""
+    return " and ".join(dict.fromkeys(each.node for each in an_input.publishers)) or "its publisher"

@@ -1,0 +1,120 @@
+"""Findings about the graph: who publishes and subscribes, as what type and with which QoS, and who has gone silent."""
+
+from typing import Final
+
+from syncrelay.explain import words
+from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks
+
+# Discovery takes this long.
+_GRACE: Final = 2 * SECOND
+_NO_MESSAGE: Final = 5 * SECOND
+
+
+def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find a type that cannot be used here."""
+    if an_input.not_importable:
+        yield Finding(
+            Code.TYPE_NOT_IMPORTABLE,
+            Severity.ERROR if an_input.required else Severity.WARN,
+            f"{an_input.name}: {an_input.not_importable}",
+            "install the package where the relay runs, or source the workspace that has it",
+            index,
+        )
+
+
+def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find publishers of another type than the file's."""
+    alone = all(each.type != an_input.type for each in an_input.publishers)
+    for publisher in an_input.publishers:
+        if publisher.type != an_input.type:
+            yield Finding(
+                Code.OTHER_TYPE,
+                blocks(facts, an_input) if alone else Severity.WARN,
+                f"{publisher.node} publishes {an_input.name} as {publisher.type}, the file says {an_input.type}",
+                f"write `type: {publisher.type}`" if alone else f"have {publisher.node} use another topic",
+                index,
+            )
+
+
+def no_publisher(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find a topic that nobody publishes, or nobody any more."""
+    if an_input.publishers or facts.figures.now - facts.figures.began < _GRACE:
+        return
+    last = an_input.figures.last_received
+    gone = "" if last is None else f" any more, since {words.seconds(facts.figures.now - last)}"
+    if gone:
+        suggestion = f"restart the node that published {an_input.name}"
+    elif an_input.alike:
+        suggestion = f"did you mean `topic: {an_input.alike[0]}`? It is published as {an_input.type}"
+    else:
+        suggestion = f"start the node that publishes {an_input.name}, or correct the topic's name"
+    text = f"nobody publishes {an_input.name} ({an_input.type}){gone}"
+    yield Finding(Code.NO_PUBLISHER, blocks(facts, an_input), text, suggestion, index)
+
+
+def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find publishers that cannot serve the QoS that the group requests."""
+    of_type = [each for each in an_input.publishers if each.type == an_input.type]
+    alone = all(each.mismatch for each in of_type)
+    for publisher in of_type:
+        if (why := publisher.mismatch) is not None:
+            yield Finding(
+                Code.INCOMPATIBLE_QOS,
+                blocks(facts, an_input) if alone else Severity.WARN,
+                f"{publisher.node} offers {an_input.name} with {why.policy} {why.offered}, the group requests"
+                f" {why.requested}",
+                f"write `qos: auto` at {an_input.name}, or have {publisher.node} offer {why.requested}",
+                index,
+            )
+
+
+def clock_stopped(facts: GroupFacts) -> Found:
+    """Find that simulated time does not pass."""
+    if facts.clock_stopped is not None:
+        yield Finding(
+            Code.CLOCK_STOPPED,
+            Severity.ERROR if facts.is_silent else Severity.WARN,
+            f"/clock has stood still for {words.seconds(facts.clock_stopped)}: nothing that waits expires",
+            "start or resume what publishes /clock, or run without use_sim_time",
+        )
+
+
+def silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find publishers that send nothing, or nothing any more."""
+    fitting = [each for each in an_input.publishers if each.type == an_input.type and not each.mismatch]
+    now, figures = facts.figures.now, an_input.figures
+    if not fitting or facts.clock_stopped is not None:
+        return
+    node = fitting[0].node
+    if an_input.counts.fed == 0 and now - facts.figures.began >= _NO_MESSAGE:
+        yield Finding(
+            Code.SILENT,
+            blocks(facts, an_input),
+            f"{node} publishes {an_input.name}, but no message has come",
+            f"see with `ros2 topic hz {an_input.name}` whether {node} sends; if it does, ask `syncrelay doctor`",
+            index,
+        )
+    elif figures.last_received is not None and now - figures.last_received >= _NO_MESSAGE and not figures.rate_hz:
+        until_then = f"; until then it came at {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
+        yield Finding(
+            Code.SILENT,
+            blocks(facts, an_input),
+            f"{an_input.name} has been silent for {words.seconds(now - figures.last_received)}{until_then}",
+            f"look at {node}, which still publishes it",
+            index,
+        )
+
+
+def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find subscribers of an output that the relay's QoS cannot serve."""
+    for subscriber in an_input.subscribers:
+        if (why := subscriber.mismatch) is not None:
+            yield Finding(
+                Code.SUBSCRIBER_QOS,
+                Severity.WARN,
+                f"{subscriber.node} requests {an_input.output} with {why.policy} {why.requested}, the relay offers"
+                f" {why.offered}, so it gets nothing",
+                f"have {subscriber.node} request {why.offered}, or {an_input.name}'s publisher offer {why.requested}",
+                index,
+            )

@@ -1,0 +1,75 @@
+"""When to say that a group is silent: not at once, not at every look, and once when it is over."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from syncrelay.explain import words
+from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.find import explanation
+from syncrelay.explain.findings import Code, Finding, Severity
+
+_SECOND: Final = 1_000_000_000
+_LONGEST_PAUSE: Final = 600 * _SECOND
+# A warning has to last this long to be worth a line, and to be gone this long to be worth another.
+_LASTING: Final = 5 * _SECOND
+_FORGOTTEN: Final = 60 * _SECOND
+
+
+class Silence:
+    """Turns the findings of one group, look by look, into what is worth saying: its severity and a text."""
+
+    def __init__(self) -> None:
+        self._told_at: int | None = None
+        self._pause = 0
+        self._quiet_since = 0
+        self._warned: dict[tuple[Code, int | None], _Warning] = {}
+
+    def look(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[tuple[Severity, str]]:
+        """Yield what is to be said now."""
+        now = facts.figures.now
+        if facts.is_silent:
+            yield from self._silent(facts, explanation(findings), now)
+            return
+        if self._told_at is not None:
+            self._told_at = None
+            yield Severity.OK, f"sets leave again, after {words.seconds(now - self._quiet_since)}"
+        yield from self._warnings(findings, now)
+
+    def _silent(self, facts: GroupFacts, finding: Finding, now: int) -> Iterator[tuple[Severity, str]]:
+        if self._told_at is None:
+            last = facts.figures.last_set
+            self._quiet_since = facts.figures.began if last is None else last
+            self._pause = now - self._quiet_since
+        elif now - self._told_at < self._pause:
+            return
+        else:
+            self._pause = min(2 * self._pause, _LONGEST_PAUSE)
+        self._told_at = now
+        quiet = words.seconds(now - self._quiet_since)
+        ever = "no set" if facts.figures.last_set is None else "no more sets"
+        yield Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}"
+
+    def _warnings(self, findings: tuple[Finding, ...], now: int) -> Iterator[tuple[Severity, str]]:
+        for finding in findings:
+            if finding.severity is Severity.OK:
+                continue
+            warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
+            if now - warning.seen > _FORGOTTEN:
+                warning.began, warning.told = now, False
+            warning.seen = now
+            if not warning.told and now - warning.began >= _LASTING:
+                warning.told = True
+                yield Severity.WARN, in_words(finding)
+
+
+class _Warning:
+    """Since when something is so, when it was last, and whether it has been said."""
+
+    def __init__(self, now: int) -> None:
+        self.began = self.seen = now
+        self.told = False
+
+
+def in_words(finding: Finding) -> str:
+    """Return a finding with its suggestion, as one line."""
+    return f"{finding.text}; {finding.suggestion}" if finding.suggestion else finding.text

@@ -1,0 +1,64 @@
+"""What the graph shows of a topic's endpoints: nodes, types, and why they do not connect to us."""
+
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
+from typing import Any, Final
+
+from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
+
+from syncrelay.explain import Endpoint, Mismatch
+
+_RELIABILITY: Final = {QoSReliabilityPolicy.BEST_EFFORT: "best_effort", QoSReliabilityPolicy.RELIABLE: "reliable"}
+_DURABILITY: Final = {QoSDurabilityPolicy.VOLATILE: "volatile", QoSDurabilityPolicy.TRANSIENT_LOCAL: "transient_local"}
+_LIVELINESS: Final = {
+    QoSLivelinessPolicy.AUTOMATIC: "automatic",
+    QoSLivelinessPolicy.MANUAL_BY_TOPIC: "manual_by_topic",
+}
+# In a namespace of its own a sensor has the same last words.
+_ALIKE: Final = 0.5
+
+
+def mismatch(offered: QoSProfile, requested: QoSProfile) -> Mismatch | None:
+    """Return the first policy by which a publisher and a subscriber do not connect, None if they do.
+
+    The rules are DDS's: who offers more than is requested is fit (DDS 1.4, section 2.2.3).
+    """
+    for policy, ranks in (("reliability", _RELIABILITY), ("durability", _DURABILITY), ("liveliness", _LIVELINESS)):
+        less, more = ranks
+        if getattr(offered, policy) == less and getattr(requested, policy) == more:
+            return Mismatch(policy, ranks[less], ranks[more])
+    for policy in ("deadline", "liveliness_lease_duration"):
+        offer, request = (_nanoseconds(getattr(profile, policy)) for profile in (offered, requested))
+        if request and (not offer or offer > request):
+            return Mismatch(policy, f"{offer / 1e6:g}ms" if offer else "none", f"{request / 1e6:g}ms")
+    return None
+
+
+def _nanoseconds(duration: Any) -> int:
+    """Return a policy's duration, 0 where it is unset or without end."""
+    nanoseconds = int(duration.nanoseconds)
+    return 0 if nanoseconds >= 2**63 - 1 or nanoseconds < 0 else nanoseconds
+
+
+def publishers(infos: Iterable[Any], requested: QoSProfile | None) -> tuple[Endpoint, ...]:
+    """Return a topic's publishers, with why they cannot serve our subscription."""
+    return _endpoints(infos, lambda qos: requested and mismatch(qos, requested))
+
+
+def subscribers(infos: Iterable[Any], offered: QoSProfile) -> tuple[Endpoint, ...]:
+    """Return a topic's subscribers, with why our publisher cannot serve them."""
+    return _endpoints(infos, lambda qos: mismatch(offered, qos))
+
+
+def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None]) -> tuple[Endpoint, ...]:
+    return tuple(Endpoint(_node(info), info.topic_type, why(info.qos_profile)) for info in infos)
+
+
+def _node(info: Any) -> str:
+    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+
+
+def topics_alike(name: str, type_name: str, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
+    """Return the topics of a type whose names are most like one that nobody publishes; all graph names, best first."""
+    of_type = [topic for topic, types in topics if type_name in types and topic != name]
+    return tuple(get_close_matches(name, of_type, n=3, cutoff=_ALIKE)) or tuple(of_type if len(of_type) == 1 else ())

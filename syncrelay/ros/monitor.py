@@ -1,0 +1,131 @@
+"""Looks at the relay once a second, away from the data, and finds what there is to say of each group."""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from syncrelay.explain import Finding, GroupFacts, GroupWatch, InputGraph, SentSets, Severity, Silence, find
+from syncrelay.ros.graph import topics_alike
+from syncrelay.ros.group import Batch, GroupRelay
+from syncrelay.ros.inputs import TopicInput, Wiring
+from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.ros.snapshot import RecentDrop, RecentSet
+from syncrelay.sync.counts import InputCounts
+
+_LOG = logging.getLogger("syncrelay")
+_LEVELS: Final = {Severity.OK: logging.INFO, Severity.WARN: logging.WARNING, Severity.ERROR: logging.ERROR}
+
+LOOK_S: Final = 1.0
+# Lost messages are told as those of the last ten looks.
+_LOSS_LOOKS: Final = 10
+# Who listens to the outputs changes rarely, and asking costs as much as all the rest.
+_SUBSCRIBERS_EVERY: Final = 5
+# A /clock at 1 Hz stands still for a second between two ticks.
+_CLOCK_STOPPED_NS: Final = 2_500_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class GroupReport:
+    """A group at the last look: the facts, what follows from them, and what happened last, oldest first."""
+
+    facts: GroupFacts
+    findings: tuple[Finding, ...]
+    recent: tuple[RecentSet | RecentDrop, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    batch: Batch
+    counts: tuple[InputCounts, ...]
+    sets: int
+    recent: tuple[RecentSet | RecentDrop, ...]
+
+
+class Monitor:
+    """Makes a report of every group at each look, and logs what is worth a line. On the main thread."""
+
+    def __init__(self, wirings: Sequence[Wiring], *, node: Any, loop: ReceiveLoop, simulated: bool) -> None:
+        self.reports: tuple[GroupReport, ...] = ()
+        self.new_sets: tuple[SentSets, ...] = ()
+        self._node = node
+        self._loop = loop
+        self._clock = _ClockWatch(node) if simulated else None
+        now = time.time_ns()
+        self._wirings = wirings
+        self._watches = [GroupWatch(wiring.group.config, began=now) for wiring in wirings]
+        self._silences = [Silence() for _ in wirings]
+        self._losses = {each: deque([0], maxlen=_LOSS_LOOKS) for wiring in wirings for each in wiring.inputs}
+        self._subscribers: dict[tuple[str, int], Any] = {}
+        self._looks = 0
+
+    def look(self) -> None:
+        """Gather, find, log. Raises CancelledError where the receive loop has ended."""
+        waited, seen = self._loop.call(self._gather).result()
+        now = time.time_ns()
+        stopped = self._clock.stopped_for(now) if self._clock else None
+        for topic_input, losses in self._losses.items():
+            losses.append(topic_input.lost())
+        reports = []
+        for wiring, watch, silence, gathered in zip(self._wirings, self._watches, self._silences, seen, strict=True):
+            batch = gathered.batch
+            watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
+            shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
+            facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=waited)
+            findings = find(facts)
+            reports.append(GroupReport(facts, findings, gathered.recent))
+            for severity, text in silence.look(facts, findings):
+                _LOG.log(_LEVELS[severity], "%s: %s", facts.name, text, extra={"group": facts.name})
+        self.reports = tuple(reports)
+        self.new_sets = tuple(gathered.batch.sets for gathered in seen)
+        self._looks += 1
+
+    def _gather(self) -> tuple[int, list[_Seen]]:
+        """Take what came and left, between two messages. On the loop's thread."""
+        groups = [wiring.group for wiring in self._wirings]
+        return self._loop.longest_wait(), [
+            _Seen(group.watched(), group.engine.counts(), group.engine.sets, tuple(group.recent)) for group in groups
+        ]
+
+    def _graph(self, group: GroupRelay, index: int, topic_input: TopicInput) -> InputGraph:
+        key = (group.config.name, index)
+        if self._looks % _SUBSCRIBERS_EVERY == 0 or key not in self._subscribers:
+            self._subscribers[key] = topic_input.subscribers(group, index)
+        losses = self._losses[topic_input]
+        return InputGraph(
+            name=topic_input.name,
+            output=self._node.resolve_topic_name(group.config.topics[index].output),
+            publishers=topic_input.publishers,
+            subscribers=self._subscribers[key],
+            alike=() if topic_input.publishers else self._alike(topic_input),
+            not_importable=topic_input.not_importable,
+            lost=losses[-1] - losses[0],
+        )
+
+    def _alike(self, topic_input: TopicInput) -> tuple[str, ...]:
+        """Find what may have been meant: our own outputs are not it."""
+        outputs = {topic.output for wiring in self._wirings for topic in wiring.group.config.topics}
+        topics = self._node.get_topic_names_and_types()
+        published = [
+            (name, types) for name, types in topics if name not in outputs and self._node.count_publishers(name)
+        ]
+        return topics_alike(topic_input.name, topic_input.type, published)
+
+
+class _ClockWatch:
+    """Sees whether simulated time moves."""
+
+    def __init__(self, node: Any) -> None:
+        self._clock = node.get_clock()
+        self._time = -1
+        self._moved_at = time.time_ns()
+
+    def stopped_for(self, now: int) -> int | None:
+        """Return for how many nanoseconds the simulated time has stood still, None if it moves."""
+        simulated = self._clock.now().nanoseconds
+        if simulated != self._time:
+            self._time, self._moved_at = simulated, now
+        still = now - self._moved_at
+        return still if still >= _CLOCK_STOPPED_NS else None
