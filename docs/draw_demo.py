@@ -10,7 +10,8 @@ from syncrelay.cli.demo import prepare_ros, relay_rig
 from syncrelay.cli.live import Moment, frame
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.strip import Sweep, newest_stamp
-from syncrelay.ros.snapshot import RecentDrop, RelaySnapshot
+from syncrelay.explain import RecentDrop
+from syncrelay.ros.snapshot import RelaySnapshot
 
 _COLUMNS, _LINES = 80, 24
 _STRIP = 65

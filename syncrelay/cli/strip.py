@@ -7,7 +7,8 @@ from types import MappingProxyType
 
 from rich.text import Text
 
-from syncrelay.ros.snapshot import GroupSnapshot, RecentDrop, RecentSet, RelaySnapshot
+from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.ros.snapshot import GroupSnapshot, RelaySnapshot
 from syncrelay.sync.messages import DropReason
 
 # A 100 Hz input gives two messages a column, a set of a 10 Hz group has five for its letter and its span.

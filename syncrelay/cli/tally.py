@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from statistics import median, quantiles
 
-from syncrelay.ros.snapshot import GroupSnapshot, RecentDrop, RecentSet, RelaySnapshot
+from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.ros.snapshot import GroupSnapshot, RelaySnapshot
 
 # Long enough that one message of a 10 Hz input is 2.5 % of the rate, short enough to follow a change.
 _WINDOW_S = 4.0

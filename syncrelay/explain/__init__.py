@@ -8,6 +8,7 @@ from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Mismatch, 
 from syncrelay.explain.find import explanation, find
 from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.observation import GroupFigures, InputFigures, Observation, SentSets
+from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet
 from syncrelay.explain.silence import Silence, in_words
 from syncrelay.explain.watch import GroupWatch, InputGraph
 
@@ -18,12 +19,15 @@ __all__ = [
     "Finding",
     "GroupFacts",
     "GroupFigures",
+    "GroupReport",
     "GroupWatch",
     "InputFacts",
     "InputFigures",
     "InputGraph",
     "Mismatch",
     "Observation",
+    "RecentDrop",
+    "RecentSet",
     "SentSets",
     "Severity",
     "Silence",

@@ -3,7 +3,7 @@
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from statistics import median
 from types import MappingProxyType
 from typing import Final, NamedTuple, TypeAlias
@@ -27,6 +27,7 @@ _JUMP_NS: Final = 1_000_000_000
 _SILENT_NS: Final = 5_000_000_000
 _SILENT_PERIODS: Final = 5
 _LAST_SETS: Final = 500
+_SHOWN_SETS: Final = 100
 _LAST_MESSAGES: Final = 200
 # Of a slow input, so many messages tell the rate, however long ago they came.
 _RATE_FROM: Final = 5
@@ -61,7 +62,7 @@ class InputFigures:
 
 @dataclass(frozen=True, slots=True)
 class GroupFigures:
-    """A group. `best_hz` is the rate of the slowest required input: no more sets are possible.
+    """A group. `last_sets` are spans and latencies, the newest first; `best_hz` is the rate of the slowest required input: no more sets are possible.
 
     `nearest` holds the span of the tightest set that each message of the slowest input could have had; `missing` is
     the share of the window's sets, 0 to 1, that each input was missing from.
@@ -73,6 +74,7 @@ class GroupFigures:
     rate_hz: float = 0.0
     best_hz: float = 0.0
     last_set: int | None = None
+    last_sets: tuple[tuple[int, int], ...] = ()
     spans: Distribution = NOTHING
     latencies: Distribution = NOTHING
     nearest: Distribution = NOTHING
@@ -129,6 +131,7 @@ class Observation:
             rate_hz=(last.sets - first.sets) * _SECOND / max(1, last.at - first.at) if first and last else 0.0,
             best_hz=min(inputs[index].rate_hz for index in counted),
             last_set=self._sets[-1].at if self._sets else None,
+            last_sets=tuple((each.span, each.latency) for each in islice(reversed(self._sets), _SHOWN_SETS)),
             spans=Distribution(each.span for each in self._sets),
             latencies=Distribution(each.latency for each in self._sets),
             nearest=Distribution(self._nearest),

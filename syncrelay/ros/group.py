@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from syncrelay.cdr import patch_stamp
 from syncrelay.config import GroupConfig
-from syncrelay.ros.snapshot import RecentDrop, RecentSet
+from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.sync import Drop, DropReason, Match, Message
 
 # Enough for the widest terminal's strip of recent sets.

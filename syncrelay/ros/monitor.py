@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from syncrelay.explain import Finding, GroupFacts, GroupWatch, InputGraph, SentSets, Severity, Silence, find
+from syncrelay.explain import GroupReport, GroupWatch, InputGraph, SentSets, Severity, Silence, find
 from syncrelay.ros.graph import topics_alike
 from syncrelay.ros.group import Batch, GroupRelay
 from syncrelay.ros.inputs import TopicInput, Wiring
 from syncrelay.ros.receive import ReceiveLoop
-from syncrelay.ros.snapshot import RecentDrop, RecentSet
+from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
@@ -25,15 +25,6 @@ _LOSS_LOOKS: Final = 10
 _SUBSCRIBERS_EVERY: Final = 5
 # A /clock at 1 Hz stands still for a second between two ticks.
 _CLOCK_STOPPED_NS: Final = 2_500_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class GroupReport:
-    """A group at the last look: the facts, what follows from them, and what happened last, oldest first."""
-
-    facts: GroupFacts
-    findings: tuple[Finding, ...]
-    recent: tuple[RecentSet | RecentDrop, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,24 +1,9 @@
 """What is known of a running relay at one moment: plain values for the summary, the demo and diagnostics."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
+from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.sync.counts import InputCounts
-from syncrelay.sync.messages import DropReason
-
-
-class RecentSet(NamedTuple):
-    """A set that left: its messages' stamps as they came in nanoseconds, in input order, None where one was missing."""
-
-    stamps: tuple[int | None, ...]
-
-
-class RecentDrop(NamedTuple):
-    """A message that left unmatched; its stamp as it came, in nanoseconds."""
-
-    input: int
-    stamp: int
-    reason: DropReason
 
 
 @dataclass(frozen=True, slots=True)

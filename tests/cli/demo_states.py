@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from syncrelay.cli.tally import GroupPlan
-from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RecentDrop, RecentSet
+from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 

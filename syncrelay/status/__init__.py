@@ -1,0 +1,6 @@
+"""The state of a running relay for programs: as JSON and as metrics, over HTTP."""
+
+from syncrelay.status.document import document
+from syncrelay.status.state import Level, Phase, RelayState, is_ready, level
+
+__all__ = ["Level", "Phase", "RelayState", "document", "is_ready", "level"]

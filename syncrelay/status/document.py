@@ -1,0 +1,122 @@
+"""The state of a relay as JSON: what /status gives and `syncrelay top` reads."""
+
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Final
+
+from syncrelay.explain import (
+    Distribution,
+    Endpoint,
+    Finding,
+    GroupFacts,
+    GroupReport,
+    InputFacts,
+    RecentDrop,
+    RecentSet,
+)
+from syncrelay.status.state import RelayState, is_ready, level
+
+_NS_PER_MS: Final = 1_000_000
+
+
+def document(state: RelayState) -> dict[str, Any]:
+    """Return the state as what json.dumps takes. Durations in milliseconds, stamps in nanoseconds."""
+    return {
+        "relay": {
+            "node": state.node,
+            "version": own_version(),
+            "config": state.config,
+            "phase": state.phase.value,
+            "ready": is_ready(state),
+            "uptime_s": round(state.uptime_s, 1),
+            "receives_by": state.receives_by,
+            "reloads": state.reloads,
+        },
+        "groups": [_group(report) for report in state.groups],
+    }
+
+
+def own_version() -> str:
+    """Return the installed version of syncrelay."""
+    try:
+        return version("syncrelay")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _group(report: GroupReport) -> dict[str, Any]:
+    facts, figures = report.facts, report.facts.figures
+    return {
+        "name": facts.name,
+        "policy": facts.policy,
+        "level": level(report).value,
+        "queue_size": facts.queue_size,
+        "tolerance": facts.tolerance and {"key": facts.tolerance.key, "ms": _ms(facts.tolerance.ns)},
+        "max_wait_ms": _ms(facts.max_wait),
+        "sets": figures.sets,
+        "rate_hz": round(figures.rate_hz, 3),
+        "possible_hz": round(facts.possible_hz, 3),
+        "since_last_set_ms": _ms(None if figures.last_set is None else figures.now - figures.last_set),
+        "span_ms": _percentiles(figures.spans),
+        "latency_ms": _percentiles(figures.latencies),
+        "nearest_ms": _percentiles(figures.nearest),
+        "last_sets": [{"span_ms": _ms(span), "latency_ms": _ms(late)} for span, late in reversed(figures.last_sets)],
+        "inputs": [_input(facts, index, each) for index, each in enumerate(facts.inputs)],
+        "findings": [_finding(facts, finding) for finding in report.findings],
+        "recent": [_recent(outcome) for outcome in report.recent],
+    }
+
+
+def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
+    figures, counts = each.figures, each.counts
+    return {
+        "topic": each.name,
+        "type": each.type,
+        "output": each.output,
+        "required": each.required,
+        "rate_hz": round(figures.rate_hz, 3),
+        "age_ms": _ms(None if figures.last_received is None else facts.figures.now - figures.last_received),
+        "lag_ms": _ms(figures.delay),
+        "jitter_ms": _ms(figures.jitter),
+        "drift_ppm": figures.drift and round(figures.drift.slope * 1e6, 1),
+        "received": counts.fed,
+        "matched": counts.matched,
+        "buffered": counts.buffered,
+        "dropped": {reason.value: count for reason, count in counts.dropped.items()},
+        "dropped_lately": {reason.value: count for reason, count in figures.dropped.items()},
+        "lost": each.lost,
+        "missing": round(facts.figures.missing[index], 3),
+        "publishers": [_endpoint(publisher) for publisher in each.publishers],
+        "subscribers": [_endpoint(subscriber) for subscriber in each.subscribers],
+    }
+
+
+def _endpoint(endpoint: Endpoint) -> dict[str, Any]:
+    why = endpoint.mismatch
+    mismatch = why and {"policy": why.policy, "offered": why.offered, "requested": why.requested}
+    return {"node": endpoint.node, "type": endpoint.type, "mismatch": mismatch}
+
+
+def _finding(facts: GroupFacts, finding: Finding) -> dict[str, Any]:
+    return {
+        "code": finding.code.value,
+        "severity": finding.severity.name.lower(),
+        "text": finding.text,
+        "suggestion": finding.suggestion,
+        "topic": None if finding.input is None else facts.inputs[finding.input].name,
+    }
+
+
+def _recent(outcome: RecentSet | RecentDrop) -> dict[str, Any]:
+    if isinstance(outcome, RecentSet):
+        return {"set": list(outcome.stamps)}
+    return {"drop": {"input": outcome.input, "stamp": outcome.stamp, "reason": outcome.reason.value}}
+
+
+def _percentiles(sample: Distribution) -> dict[str, float | None] | None:
+    if not sample:
+        return None
+    return {"p50": _ms(sample.quantile(0.5)), "p95": _ms(sample.quantile(0.95)), "max": _ms(sample.quantile(1))}
+
+
+def _ms(nanoseconds: int | None) -> float | None:
+    return None if nanoseconds is None else round(nanoseconds / _NS_PER_MS, 3)

@@ -1,0 +1,60 @@
+"""What a running relay tells of itself."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from syncrelay.explain import Endpoint, GroupReport
+
+
+class Phase(Enum):
+    """Where a relay is in its life."""
+
+    STARTING = "starting"
+    RUNNING = "running"
+    DRAINING = "draining"
+
+
+@dataclass(frozen=True, slots=True)
+class RelayState:
+    """A relay at one moment. `turned_s` is how long ago its receive loop last turned, `uptime_s` since its start.
+
+    `receives_by` names the way by which messages are taken and published, `reloads` counts how often the file was
+    read again.
+    """
+
+    node: str
+    config: str
+    phase: Phase
+    uptime_s: float
+    turned_s: float
+    receives_by: str
+    groups: tuple[GroupReport, ...]
+    reloads: int = 0
+
+
+class Level(Enum):
+    """How a group fares, in DiagnosticStatus's words: STALE where nothing comes in at all."""
+
+    OK = "ok"
+    WARN = "warn"
+    ERROR = "error"
+    STALE = "stale"
+
+
+def level(report: GroupReport) -> Level:
+    """Return how a group fares."""
+    facts = report.facts
+    if facts.is_silent and not any(each.figures.rate_hz for each in facts.inputs):
+        return Level.STALE
+    return [Level.OK, Level.WARN, Level.ERROR][max(finding.severity for finding in report.findings)]
+
+
+def is_ready(state: RelayState) -> bool:
+    """Whether every required input of every group has a publisher that serves it, and the relay runs."""
+    inputs = [each for report in state.groups for each in report.facts.inputs if each.required]
+    matched = all(any(_serves(publisher, each.type) for publisher in each.publishers) for each in inputs)
+    return state.phase is Phase.RUNNING and bool(state.groups) and matched
+
+
+def _serves(publisher: Endpoint, type_name: str) -> bool:
+    return publisher.type == type_name and publisher.mismatch is None
