@@ -9,9 +9,8 @@ from rich.terminal_theme import TerminalTheme
 from syncrelay.cli.demo import prepare_ros, relay_rig
 from syncrelay.cli.live import Moment, frame
 from syncrelay.cli.stop import StopRequest
-from syncrelay.cli.strip import Sweep, newest_stamp
 from syncrelay.explain import RecentDrop
-from syncrelay.ros.snapshot import RelaySnapshot
+from syncrelay.top.strip import Sweep, newest_stamp
 
 _COLUMNS, _LINES = 80, 24
 _STRIP = 65
@@ -62,7 +61,7 @@ def main() -> None:
 def _fullness(moment: Moment) -> tuple[bool, int]:
     """Prefer a moment that shows a lost set, and then one at which the sweep is about to begin again."""
     states = tuple(figures.state for figures in moment.groups)
-    sweep = Sweep(head=newest_stamp(RelaySnapshot(states)), width=_STRIP)
+    sweep = Sweep(head=newest_stamp(outcome for state in states for outcome in state.recent), width=_STRIP)
     lidar = next(index for index, each in enumerate(states[0].inputs) if "lidar" in each.topic)
     lost = [one for one in states[0].recent if isinstance(one, RecentDrop) and one.input == lidar]
     return any(sweep.column(one.stamp) for one in lost), sweep.column(sweep.head) or 0

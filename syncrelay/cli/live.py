@@ -7,10 +7,10 @@ from types import MappingProxyType
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from syncrelay.cli.strip import COLUMN_NS, MARKS, Sweep, drop_style, letter_style, newest_stamp, strip
 from syncrelay.cli.tally import GroupFigures
 from syncrelay.ros.snapshot import GroupSnapshot, RelaySnapshot
 from syncrelay.sync.messages import DropReason
+from syncrelay.top.strip import COLUMN_NS, MARKS, Lanes, Sweep, drop_style, letter_style, newest_stamp, strip
 
 _LABEL = 13
 _BAR = 26
@@ -51,7 +51,8 @@ class Moment:
 def frame(moment: Moment, *, width: int, height: int) -> RenderableType:
     """Draw a moment for a terminal of so many columns and lines; 80x24 shows all of two groups of two inputs."""
     snapshot = RelaySnapshot(tuple(figures.state for figures in moment.groups))
-    sweep = Sweep(head=newest_stamp(snapshot), width=min(width - _LABEL - 2, _MAX_STRIP))
+    recent = (outcome for group in snapshot.groups for outcome in group.recent)
+    sweep = Sweep(head=newest_stamp(recent), width=min(width - _LABEL - 2, _MAX_STRIP))
     blocks = [
         [_title(moment, width)],
         *(_group_block(figures, sweep) for figures in moment.groups),
@@ -137,7 +138,8 @@ def ms(nanoseconds: int) -> str:
 
 
 def _lanes(figures: GroupFigures, names: Sequence[str], sweep: Sweep) -> Iterator[Text]:
-    drawn = strip(figures.state, sweep)
+    state = figures.state
+    drawn = strip(Lanes(_fed(state), state.sets, state.recent), sweep)
     for index, (name, offset) in enumerate(zip(names, figures.plan.offsets, strict=True)):
         shift = f" {offset / 1e6:+.0f} ms" if offset else ""
         yield _line((f"{name[: _LABEL - len(shift)]}{shift}".rjust(_LABEL), "bold"), (" ▏", "dim"), drawn[2 * index])
@@ -147,9 +149,13 @@ def _lanes(figures: GroupFigures, names: Sequence[str], sweep: Sweep) -> Iterato
 
 def _fate_line(figures: GroupFigures, lane: int, name: str) -> Text:
     counts = figures.state.inputs[lane].counts
-    style = drop_style(figures.state, lane)
+    style = drop_style(_fed(figures.state), lane)
     line = _line(f"{name:>{_LABEL}}  {figures.input_hz[lane]:5.1f}/s, {counts.matched} in sets, dropped: ")
     return line.append_text(Text(", ").join(_drops(counts.dropped, style)) if counts.dropped else Text("none"))
+
+
+def _fed(state: GroupSnapshot) -> tuple[int, ...]:
+    return tuple(each.counts.fed for each in state.inputs)
 
 
 def _drops(dropped: Mapping[DropReason, int], style: str) -> Iterator[Text]:

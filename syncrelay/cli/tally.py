@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from statistics import median, quantiles
 
-from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.explain import RecentSet
 from syncrelay.ros.snapshot import GroupSnapshot, RelaySnapshot
 
 # Long enough that one message of a 10 Hz input is 2.5 % of the rate, short enough to follow a change.
@@ -78,7 +78,7 @@ class Tally:
         self._sets_seen[index] = group.sets
         newest_first = (entry for entry in reversed(group.recent) if isinstance(entry, RecentSet))
         for a_set in islice(newest_first, new):
-            self._spans[index].append(_span(_shifted(a_set.stamps, self._plans[index].offsets)))
+            self._spans[index].append(_span(a_set.shifted(self._plans[index].offsets).stamps))
             self._unshifted[index].append(_span(a_set.stamps))
 
     def figures(self) -> tuple[GroupFigures, ...]:
@@ -124,18 +124,7 @@ def _span(stamps: Sequence[int | None]) -> int:
 
 
 def _as_matched(group: GroupSnapshot, offsets: Sequence[int]) -> GroupSnapshot:
-    recent = (
-        outcome._replace(stamp=outcome.stamp + offsets[outcome.input])
-        if isinstance(outcome, RecentDrop)
-        else RecentSet(_shifted(outcome.stamps, offsets))
-        for outcome in group.recent
-    )
-    return replace(group, recent=tuple(recent))
-
-
-def _shifted(stamps: Sequence[int | None], offsets: Sequence[int]) -> tuple[int | None, ...]:
-    pairs = zip(stamps, offsets, strict=True)
-    return tuple(None if stamp is None else stamp + offset for stamp, offset in pairs)
+    return replace(group, recent=tuple(outcome.shifted(offsets) for outcome in group.recent))
 
 
 def _rate(count: int, seconds: float) -> float:

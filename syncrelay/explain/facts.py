@@ -43,6 +43,7 @@ class InputFacts:
 
     `name` is the topic's in the graph, `not_importable` says why its type cannot be used here, `alike` are topics of
     the graph that may have been meant, `lost` counts what DDS lost on the way of late. `key` is the newest message's.
+    `offset` is added to stamps for matching, in nanoseconds.
     """
 
     name: str
@@ -57,6 +58,7 @@ class InputFacts:
     not_importable: str | None = None
     lost: int = 0
     key: Hashable = None
+    offset: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,6 +78,7 @@ class GroupWatch:
                     not_importable=shown.not_importable,
                     lost=shown.lost,
                     key=key,
+                    offset=topic.offset_ns,
                 )
                 for topic, shown, counts, seen, key in rows
             ),

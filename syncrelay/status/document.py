@@ -73,6 +73,7 @@ def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
         "type": each.type,
         "output": each.output,
         "required": each.required,
+        "offset_ms": _ms(each.offset),
         "rate_hz": round(figures.rate_hz, 3),
         "age_ms": _ms(None if figures.last_received is None else facts.figures.now - figures.last_received),
         "lag_ms": _ms(figures.delay),

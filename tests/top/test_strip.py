@@ -1,20 +1,28 @@
-"""Strips of hand-written states, drawn as they are seen."""
+"""Strips of hand-written groups, drawn as they are seen."""
 
 # ruff: noqa: RUF001  the marks are what they look like
 
 import pytest
 
-from syncrelay.cli.strip import MARKS, Sweep, drop_style, newest_stamp, strip
-from syncrelay.ros.snapshot import RelaySnapshot
 from syncrelay.sync.messages import DropReason
-from tests.cli.demo_states import MS, a_drop, a_group, a_set, an_input
+from syncrelay.top.strip import MARKS, Lanes, Sweep, Window, drop_style, newest_stamp, strip, window_of
+from tests.cli.demo_states import MS, a_drop, a_set
 
 # A column is 20 ms.
 _HEAD = 340 * MS
 
 
-def drawn(group, *, head=_HEAD, width=20):
-    return [line.plain.rstrip() for line in strip(group, Sweep(head=head, width=width))]
+def lanes_of(recent, *, fed=(10, 10), sets=None):
+    """Lanes that have given just their recent sets, unless said otherwise."""
+    return Lanes(fed, sum(hasattr(each, "stamps") for each in recent) if sets is None else sets, tuple(recent))
+
+
+def drawn(lanes, *, head=_HEAD, width=20):
+    return plain(lanes, Sweep(head=head, width=width))
+
+
+def plain(lanes, axis):
+    return [line.plain.rstrip() for line in strip(lanes, axis)]
 
 
 @pytest.mark.parametrize(
@@ -83,12 +91,12 @@ def drawn(group, *, head=_HEAD, width=20):
     ],
 )
 def test_messages_stand_on_their_lanes_by_their_stamps(recent, lanes):
-    assert drawn(a_group(recent)) == lanes
+    assert drawn(lanes_of(recent)) == lanes
 
 
 def test_time_begins_again_at_the_left_and_messages_stay_where_they_were():
-    group = a_group([a_set(245, 245), a_set(345, 345), a_set(445, 445)])
-    assert drawn(group, head=445 * MS) == [
+    lanes = lanes_of([a_set(245, 245), a_set(345, 345), a_set(445, 445)])
+    assert drawn(lanes, head=445 * MS) == [
         "  C         A    B",
         "  │         │    │",
         "  C         A    B",
@@ -97,7 +105,7 @@ def test_time_begins_again_at_the_left_and_messages_stay_where_they_were():
 
 
 def test_a_set_across_the_end_of_the_strip_has_no_joint():
-    assert drawn(a_group([a_set(399, 401)]), head=401 * MS) == [
+    assert drawn(lanes_of([a_set(399, 401)]), head=401 * MS) == [
         "                   A",
         "",
         "A",
@@ -106,13 +114,12 @@ def test_a_set_across_the_end_of_the_strip_has_no_joint():
 
 
 def test_a_set_keeps_its_letter_when_older_ones_are_forgotten():
-    group = a_group([a_set(45, 45), a_set(145, 145)], sets=28)
-    assert drawn(group)[0] == "  A    B"
+    lanes = lanes_of([a_set(45, 45), a_set(145, 145)], sets=28)
+    assert drawn(lanes)[0] == "  A    B"
 
 
 def test_three_inputs_have_three_lanes():
-    inputs = [an_input("/a"), an_input("/b"), an_input("/c")]
-    assert drawn(a_group([a_set(40, 60, 60)], inputs=inputs)) == ["  A", "  ╰╮", "   A", "   │", "   A", "  20.0"]
+    assert drawn(lanes_of([a_set(40, 60, 60)], fed=(10, 10, 10))) == ["  A", "  ╰╮", "   A", "   │", "   A", "  20.0"]
 
 
 def test_each_reason_has_a_mark_of_its_own():
@@ -121,10 +128,9 @@ def test_each_reason_has_a_mark_of_its_own():
     assert all(len(mark) == 1 and not mark.isupper() for mark in MARKS.values())
 
 
-def test_the_newest_stamp_is_looked_for_in_all_groups():
-    groups = (a_group([a_set(45, None)]), a_group([a_drop(0, 50)]), a_group())
-    assert newest_stamp(RelaySnapshot(groups)) == 50 * MS
-    assert newest_stamp(RelaySnapshot(())) == 0
+def test_the_newest_stamp_is_looked_for_in_sets_and_drops():
+    assert newest_stamp([a_set(45, None), a_drop(0, 50)]) == 50 * MS
+    assert newest_stamp([]) == 0
 
 
 @pytest.mark.parametrize(
@@ -132,11 +138,35 @@ def test_the_newest_stamp_is_looked_for_in_all_groups():
     [((30, 10), ["dim", "bold red"]), ((100, 100), ["bold red", "bold red"]), ((14, 10), ["bold red", "bold red"])],
 )
 def test_a_drop_stands_out_where_it_costs_a_set(fed, styles):
-    group = a_group(inputs=[an_input("/a", fed=fed[0]), an_input("/b", fed=fed[1])])
-    assert [drop_style(group, lane) for lane in range(2)] == styles
+    assert [drop_style(fed, lane) for lane in range(2)] == styles
 
 
 def test_sets_are_told_apart_by_colour_and_by_letter():
-    lane = strip(a_group([a_set(45, 45), a_set(145, 145)]), Sweep(head=_HEAD, width=20))[0]
+    lane = strip(lanes_of([a_set(45, 45), a_set(145, 145)]), Sweep(head=_HEAD, width=20))[0]
     letters = {lane.plain[span.start : span.end].strip(): str(span.style) for span in lane.spans}
     assert letters["A"] != letters["B"]
+
+
+def test_a_window_has_the_newest_at_its_right_end_and_joints_of_any_width():
+    lanes = lanes_of([a_set(100, 130), a_set(400, 200)])
+    assert plain(lanes, Window(head=400 * MS, width=32, column_ns=10 * MS)) == [
+        " A                             B",
+        " ╰──╮      ╭───────────────────╯",
+        "    A      B",
+        "   30.0  200.0",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("recent", "column_ms"),
+    [
+        pytest.param([a_set(n * 100, n * 100 - 3) for n in range(9)], 20, id="10 Hz"),
+        pytest.param([a_set(n * 5, n * 5) for n in range(9)], 1, id="200 Hz"),
+        pytest.param([a_set(n * 1000, n * 990) for n in range(9)], 200, id="1 Hz"),
+        pytest.param([a_set(n * 60_000, n * 60_000) for n in range(9)], 10_000, id="one a minute"),
+        pytest.param([a_drop(0, n * 33) for n in range(31)], 50, id="no sets: all that happened"),
+        pytest.param([], 1, id="nothing yet"),
+    ],
+)
+def test_a_window_is_scaled_to_how_often_sets_leave(recent, column_ms):
+    assert window_of(recent, 20).column_ns == column_ms * MS

@@ -1,18 +1,24 @@
 """A group's recent messages as lanes of text: a letter per set, a mark per message that left without one."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import median
 from types import MappingProxyType
+from typing import Protocol, TypeAlias
 
 from rich.text import Text
 
 from syncrelay.explain import RecentDrop, RecentSet
-from syncrelay.ros.snapshot import GroupSnapshot, RelaySnapshot
 from syncrelay.sync.messages import DropReason
+
+Outcome: TypeAlias = RecentSet | RecentDrop
 
 # A 100 Hz input gives two messages a column, a set of a 10 Hz group has five for its letter and its span.
 COLUMN_NS = 20_000_000
+# Columns for a set's letter and its span, where the scale may be chosen.
+_COLUMNS_PER_SET = 6
+_FINEST_NS = 1_000_000
 # Columns kept blank ahead of the newest message, where the lanes begin to be written over.
 _GAP = 3
 
@@ -46,22 +52,44 @@ def letter_style(number: int) -> str:
     return f"color(16) on {_COLOURS[number % len(_COLOURS)]}"
 
 
-def drop_style(group: GroupSnapshot, lane: int) -> str:
-    """Return the style of an input's drops: what a faster input has too much of is dim, a lost set stands out.
+def drop_style(fed: Sequence[int], lane: int) -> str:
+    """Return the style of an input's drops, from how many messages each input was given.
 
-    Sets are lost by drops of the slowest input, and of those hardly faster.
+    What a faster input has too much of is dim, a lost set stands out: sets are lost by drops of the slowest input, and
+    of those hardly faster.
     """
-    fed = [each.counts.fed for each in group.inputs]
     return "bold red" if fed[lane] <= 1.5 * min(fed) else "dim"
 
 
 @dataclass(frozen=True, slots=True)
-class Sweep:
-    """Which stamps are on the strip and where.
+class Lanes:
+    """A group as the strip draws it: what each input was `fed`, how many `sets` left, what happened last."""
 
-    As on an oscilloscope, time runs to the right and begins again at the left: a message stays where it was
-    drawn until the sweep comes round. `head` is the newest stamp, in nanoseconds; one for all groups, so that
-    a message is in the same column in each of them.
+    fed: tuple[int, ...]
+    sets: int
+    recent: tuple[Outcome, ...]
+
+
+class Axis(Protocol):
+    """Which stamps are on the strip and where."""
+
+    @property
+    def width(self) -> int:
+        """How many columns there are."""
+
+    def column(self, stamp: int) -> int | None:
+        """Return the column of a stamp in nanoseconds; None where it is not on the strip."""
+
+    def joins(self, one: int, other: int) -> bool:
+        """Whether the way from one column to another is all on the strip."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """As on an oscilloscope, time runs to the right and begins again at the left.
+
+    A message stays where it was drawn until the sweep comes round. `head` is the newest stamp, in nanoseconds; one for
+    all groups, so that a message is in the same column in each of them.
     """
 
     head: int
@@ -74,57 +102,100 @@ class Sweep:
             return None
         return stamp // COLUMN_NS % self.width
 
-
-def newest_stamp(snapshot: RelaySnapshot) -> int:
-    """Return the newest stamp in any group's recent outcomes, in nanoseconds; 0 where nothing happened yet."""
-    return max((stamp for group in snapshot.groups for stamp in _stamps(group)), default=0)
-
-
-def _stamps(group: GroupSnapshot) -> Iterator[int]:
-    for outcome in group.recent:
-        if isinstance(outcome, RecentDrop):
-            yield outcome.stamp
-        else:
-            yield from (stamp for stamp in outcome.stamps if stamp is not None)
+    def joins(self, one: int, other: int) -> bool:
+        """Whether the way between two columns does not lie across the strip's end."""
+        return abs(one - other) <= self.width // 2
 
 
-def strip(group: GroupSnapshot, sweep: Sweep) -> list[Text]:
+@dataclass(frozen=True, slots=True)
+class Window:
+    """The newest stamp, `head`, is in the last column, and what is older to the left of it; in nanoseconds."""
+
+    head: int
+    width: int
+    column_ns: int
+
+    def column(self, stamp: int) -> int | None:
+        """Return the column of a stamp; None when it is too old, or newer than the head."""
+        behind = self.head // self.column_ns - stamp // self.column_ns
+        return self.width - 1 - behind if 0 <= behind < self.width else None
+
+    def joins(self, _one: int, _other: int) -> bool:
+        """Whether the way between two columns is on the strip: always."""
+        return True
+
+
+def window_of(recent: Sequence[Outcome], width: int) -> Window:
+    """Return a window that gives every set the columns that it needs, or, without sets, holds all that happened."""
+    head = newest_stamp(recent)
+    ends = sorted(max(_stamps(outcome)) for outcome in recent if isinstance(outcome, RecentSet))
+    if len(ends) > 1:
+        wanted = median(after - before for before, after in pairwise(ends)) / _COLUMNS_PER_SET
+    else:
+        oldest = min((stamp for outcome in recent for stamp in _stamps(outcome)), default=head)
+        wanted = (head - oldest) / width
+    return Window(head, width, _round_step(wanted))
+
+
+def _round_step(wanted: float) -> int:
+    """Return the least of 1, 2 and 5 times a power of ten milliseconds that is not less."""
+    decade = _FINEST_NS
+    while True:
+        for step in (decade, 2 * decade, 5 * decade):
+            if step >= wanted:
+                return step
+        decade *= 10
+
+
+def newest_stamp(recent: Iterable[Outcome]) -> int:
+    """Return the newest stamp of what happened, in nanoseconds; 0 where nothing did yet."""
+    return max((stamp for outcome in recent for stamp in _stamps(outcome)), default=0)
+
+
+def _stamps(outcome: Outcome) -> Iterator[int]:
+    if isinstance(outcome, RecentDrop):
+        yield outcome.stamp
+    else:
+        yield from (stamp for stamp in outcome.stamps if stamp is not None)
+
+
+def strip(lanes: Lanes, axis: Axis) -> list[Text]:
     """Draw a lane per input with the joints of the sets between them, and below all the sets' spans in milliseconds.
 
     Two inputs make four lines, each input more makes two more.
     """
-    drawing = _Drawing(lanes=len(group.inputs), width=sweep.width)
-    styles = [drop_style(group, lane) for lane in range(len(group.inputs))]
-    for outcome in group.recent:
+    drawing = _Drawing(lanes=len(lanes.fed), width=axis.width)
+    styles = [drop_style(lanes.fed, lane) for lane in range(len(lanes.fed))]
+    for outcome in lanes.recent:
         if isinstance(outcome, RecentDrop):
-            _draw_drop(drawing, outcome, sweep, styles[outcome.input])
-    for number, a_set in _numbered_sets(group):
-        _draw_set(drawing, number, a_set, sweep)
+            _draw_drop(drawing, outcome, axis, styles[outcome.input])
+    for number, a_set in _numbered_sets(lanes):
+        _draw_set(drawing, number, a_set, axis)
     return drawing.lines()
 
 
-def _numbered_sets(group: GroupSnapshot) -> Iterator[tuple[int, RecentSet]]:
+def _numbered_sets(lanes: Lanes) -> Iterator[tuple[int, RecentSet]]:
     """Number the sets since the group's start, so that a set keeps its letter from frame to frame."""
-    recent = [outcome for outcome in group.recent if isinstance(outcome, RecentSet)]
-    return enumerate(recent, start=group.sets - len(recent))
+    recent = [outcome for outcome in lanes.recent if isinstance(outcome, RecentSet)]
+    return enumerate(recent, start=lanes.sets - len(recent))
 
 
-def _draw_drop(drawing: "_Drawing", drop: RecentDrop, sweep: Sweep, style: str) -> None:
-    column = sweep.column(drop.stamp)
+def _draw_drop(drawing: "_Drawing", drop: RecentDrop, axis: Axis, style: str) -> None:
+    column = axis.column(drop.stamp)
     # Where several share a column, it is the unusual that must be seen.
     if column is None or (drop.reason in _USUAL and drawing.taken(2 * drop.input, column)):
         return
     drawing.put(2 * drop.input, column, MARKS[drop.reason], style)
 
 
-def _draw_set(drawing: "_Drawing", number: int, a_set: RecentSet, sweep: Sweep) -> None:
+def _draw_set(drawing: "_Drawing", number: int, a_set: RecentSet, axis: Axis) -> None:
     colour = _COLOURS[number % len(_COLOURS)]
-    columns = [None if stamp is None else sweep.column(stamp) for stamp in a_set.stamps]
+    columns = [None if stamp is None else axis.column(stamp) for stamp in a_set.stamps]
     for lane, column in enumerate(columns):
         if column is not None:
             drawing.put(2 * lane, column, _LETTERS[number % len(_LETTERS)], letter_style(number))
     for lane, (above, below) in enumerate(pairwise(columns)):
-        if above is not None and below is not None:
+        if above is not None and below is not None and axis.joins(above, below):
             _draw_joint(drawing, 2 * lane + 1, above, below, colour)
     last = next((column for column in reversed(columns) if column is not None), None)
     if last is not None:
@@ -135,8 +206,6 @@ def _draw_set(drawing: "_Drawing", number: int, a_set: RecentSet, sweep: Sweep) 
 def _draw_joint(drawing: "_Drawing", line: int, above: int, below: int, style: str) -> None:
     if above == below:
         drawing.put(line, above, "│", style)
-    elif abs(above - below) > drawing.width // 2:
-        return  # the set lies across the strip's end
     else:
         falls = above < below
         drawing.put(line, above, "╰" if falls else "╯", style)
