@@ -15,3 +15,7 @@ class RosUnavailableError(SyncRelayError):
 
 class UsageError(SyncRelayError):
     """The command line asks for something that is not there."""
+
+
+class ListenError(SyncRelayError):
+    """The relay cannot listen where the file says."""

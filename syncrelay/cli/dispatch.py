@@ -51,6 +51,12 @@ def _relay(words: Sequence[str], stop: StopRequest) -> int:
         "--group", metavar="NAME", action="append", default=[], help="relay this group only; may be repeated"
     )
     options.add_argument(
+        "--explain",
+        metavar="N",
+        type=_positive,
+        help="run for N seconds, then print how every group fares and why; exit code 1 unless all are healthy",
+    )
+    options.add_argument(
         "--log-level",
         choices=("debug", "info", "warning", "error"),
         default="info",
@@ -79,7 +85,15 @@ def _relay(words: Sequence[str], stop: StopRequest) -> int:
         parser.error("--config FILE is missing")
     from syncrelay.cli.run import run
 
-    return run(arguments.config, arguments.group, arguments.log_level, arguments.log_format, ros_args, stop=stop)
+    return run(
+        arguments.config,
+        arguments.group,
+        arguments.log_level,
+        arguments.log_format,
+        ros_args,
+        explain_s=arguments.explain,
+        stop=stop,
+    )
 
 
 def _validate(words: Sequence[str], _stop: StopRequest) -> int:

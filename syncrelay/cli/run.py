@@ -4,10 +4,15 @@ import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
 from syncrelay.cli.stop import StopRequest
-from syncrelay.errors import UsageError
+from syncrelay.errors import ListenError, UsageError
+
+if TYPE_CHECKING:
+    from syncrelay.config import Listen
+    from syncrelay.status import Server
 
 
 def run(
@@ -17,9 +22,12 @@ def run(
     log_format: str,
     ros_args: Sequence[str],
     *,
+    explain_s: float | None = None,
     stop: StopRequest,
 ) -> int:
     """Relay the groups of a file, all of them if `groups` is empty; 0 after an orderly end.
+
+    With `explain_s`, end after so many seconds with the findings, and 1 unless all groups are healthy.
 
     Raises ConfigError for a faulty file, UsageError for a group that it lacks, RosUnavailableError where ROS
     cannot be used.
@@ -32,15 +40,28 @@ def run(
     config = load(config_path, package_missing=Severity.NOTE)
     _require_groups(groups, [group.name for group in config.groups], config_path)
     require_rclpy()
+    from syncrelay.cli.explain import explain
     from syncrelay.cli.summary import summarize
     from syncrelay.ros.relay import Relay
 
     stop.defer()
     with (
         _heartbeat(os.environ.get(VARIABLE)) as heartbeat,
-        Relay(config, groups=groups or None, ros_args=ros_args, beat=heartbeat.beat if heartbeat else None) as relay,
+        _server(config.listen if explain_s is None else None) as server,
+        Relay(
+            config,
+            config_path=config_path,
+            groups=groups or None,
+            ros_args=ros_args,
+            beat=heartbeat.beat if heartbeat else None,
+        ) as relay,
     ):
         stop.wake_with(relay.wake)
+        if server is not None:
+            server.serve(relay.state)
+            LOGGER.info("status and metrics: http://%s/", server.address)
+        if explain_s is not None:
+            return explain(relay, explain_s, stop=stop)
         while not stop.requested:
             relay.step()
         for group in relay.drain().groups:
@@ -58,6 +79,21 @@ def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:
         return Heartbeat(Path(named))
     except OSError as error:
         LOGGER.warning("%s=%s cannot be written, so there is no heartbeat: %s", VARIABLE, named, error.strerror)
+        return nullcontext()
+
+
+def _server(listen: "Listen | None") -> "AbstractContextManager[Server | None]":
+    from syncrelay.ros.logs import LOGGER
+    from syncrelay.status import Server
+
+    if listen is None:
+        return nullcontext()
+    try:
+        return Server(listen)
+    except ListenError as error:
+        if listen.is_asked_for:
+            raise
+        LOGGER.warning("no /status and no /metrics: %s", error)
         return nullcontext()
 
 

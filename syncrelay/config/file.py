@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, 
 from pydantic.fields import FieldInfo
 
 from syncrelay.config.keys import Keys
-from syncrelay.config.models import NodeConfig, Topic
+from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, Topic
 from syncrelay.config.names import check_group_name
 from syncrelay.config.policies import GROUP_MODELS, AnyGroup, Topics
 from syncrelay.config.wording import describe
@@ -93,6 +93,16 @@ class FileKeys(Keys):
 
     version: Annotated[Literal[1], BeforeValidator(_version)] = Field(description="Version of this format: 1.")
     node: NodeConfig = Field(default_factory=NodeConfig, description="The ROS node.")
+    metrics: MetricsConfig | None = Field(
+        default_factory=MetricsConfig,
+        description="HTTP for programs and people, null for none.",
+        json_schema_extra={"nullable": True},
+    )
+    diagnostics: DiagnosticsConfig | None = Field(
+        default_factory=DiagnosticsConfig,
+        description="What is published about the relay, null for nothing.",
+        json_schema_extra={"nullable": True},
+    )
     defaults: Keys | None = None
     groups: dict[str, AnyGroup]
 

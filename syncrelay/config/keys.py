@@ -4,6 +4,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
+from syncrelay.config.listen import check_listen
 from syncrelay.config.names import (
     LONGEST_TOPIC,
     check_namespace,
@@ -43,6 +44,7 @@ def _refuse_null(value: Any) -> Any:
 NOT_NULL: Final = BeforeValidator(_refuse_null)
 """For a field that is None where its key is absent: `key:` without a value is no way to say so."""
 
+ListenAddress = Annotated[str, AfterValidator(check_listen)]
 _NUMBER: Final = r"([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"
 _UNIT: Final = "(ns|us|µs|μs|ms|s|min)"
 _TOKENS: Final = "[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"

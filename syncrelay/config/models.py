@@ -9,6 +9,7 @@ from syncrelay.config.keys import (
     Duration,
     FieldPath,
     Keys,
+    ListenAddress,
     Namespace,
     NodeName,
     OutputPrefix,
@@ -36,6 +37,31 @@ class NodeConfig(Keys):
     use_sim_time: bool = Field(
         default=False,
         description="Take the time from /clock, as with a simulation or a bag played with --clock. Default: false.",
+    )
+
+
+class MetricsConfig(Keys):
+    """HTTP for programs and people: /status, which `syncrelay top` shows, /metrics, /livez and /readyz."""
+
+    listen: Annotated[ListenAddress | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "Where to listen, HOST:PORT; 0.0.0.0 is every interface, port 0 any free one."
+            " Default: the first free port of 127.0.0.1:9464 to 9473."
+        ),
+        examples=["127.0.0.1:9464"],
+    )
+
+
+class DiagnosticsConfig(Keys):
+    """What is published about the relay: /diagnostics once a second, with a status for each group."""
+
+    scalars: bool = Field(
+        default=False,
+        description=(
+            "Publish figures of each group as std_msgs/msg/Float64 too, for plotting: ~/GROUP/sets_hz, ~/GROUP/span_ms"
+            " and ~/GROUP/latency_ms. Default: false."
+        ),
     )
 
 

@@ -3,7 +3,16 @@
 from dataclasses import dataclass
 
 from syncrelay.config.file import FileKeys
-from syncrelay.config.models import KeyedTopic, NodeConfig, PacedTopic, StampSource, Topic
+from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
+from syncrelay.config.models import (
+    DiagnosticsConfig,
+    KeyedTopic,
+    MetricsConfig,
+    NodeConfig,
+    PacedTopic,
+    StampSource,
+    Topic,
+)
 from syncrelay.config.names import default_output
 from syncrelay.config.policies import AnyGroup, EqualKeyGroup, Inputs
 from syncrelay.config.problems import Problem
@@ -55,17 +64,32 @@ class GroupConfig:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """A file that is in order. `notes` say what could not be checked."""
+    """A file that is in order. `notes` say what could not be checked.
+
+    `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published.
+    """
 
     node: NodeConfig
     groups: tuple[GroupConfig, ...]
+    listen: Listen | None
+    diagnostics: DiagnosticsConfig | None
     notes: tuple[Problem, ...] = ()
 
 
 def resolve(file: FileKeys, *, notes: tuple[Problem, ...]) -> Config:
     """Return a validated file with every default filled in."""
     groups = tuple(_group(name, group, file.node) for name, group in file.groups.items())
-    return Config(file.node, groups, notes)
+    return Config(file.node, groups, _listen(file.metrics), file.diagnostics, notes)
+
+
+def _listen(metrics: MetricsConfig | None) -> Listen | None:
+    if metrics is None:
+        return None
+    return (
+        Listen(DEFAULT_HOST, DEFAULT_PORTS, is_asked_for=False)
+        if metrics.listen is None
+        else parse_listen(metrics.listen)
+    )
 
 
 def _group(name: str, group: AnyGroup, node: NodeConfig) -> GroupConfig:

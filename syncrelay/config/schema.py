@@ -76,7 +76,10 @@ def _mapping(model: Schema) -> Schema:
 
 def _key(generated: Schema) -> Schema:
     said = {key: generated[key] for key in _ANNOTATIONS if generated.get(key) is not None}
+    is_nullable = generated.pop("nullable", False)
     kinds = _kinds({key: value for key, value in generated.items() if key not in (*_ANNOTATIONS, "title")})
+    if is_nullable:
+        kinds.append({"type": "null"})
     if any(_is_written_as_one_word(kind) for kind in kinds):
         kinds.append({"$ref": f"{_REF}Variable"})
     if len(kinds) > 1:
@@ -86,7 +89,7 @@ def _key(generated: Schema) -> Schema:
 
 
 def _kinds(schema: Schema) -> list[Schema]:
-    """Return the kinds of value that a key may have. None is in the models for keys that are absent."""
+    """Return the kinds of value that a key may have. None is in most models for keys that are absent."""
     union: list[Schema] = schema.get("anyOf") or schema.get("oneOf") or [schema]
     return [kind for kind in union if kind.get("type") != "null"]
 

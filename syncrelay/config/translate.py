@@ -15,7 +15,7 @@ from syncrelay.config.file import (
     TopicOfAnyPolicy,
     topic_model,
 )
-from syncrelay.config.models import NodeConfig, StampField
+from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.qos import QosOverrides
 from syncrelay.config.scalars import read_plain
@@ -27,6 +27,8 @@ Location: TypeAlias = tuple[str | int, ...]
 _LEVELS: Final[dict[str, type[BaseModel]]] = {
     "the file": File,
     "`node`": NodeConfig,
+    "`metrics`": MetricsConfig,
+    "`diagnostics`": DiagnosticsConfig,
     "a group": GroupOfAnyPolicy,
     "a topic": TopicOfAnyPolicy,
     "a topic's `qos`": QosOverrides,
@@ -34,6 +36,8 @@ _LEVELS: Final[dict[str, type[BaseModel]]] = {
 _MODEL_AT: Final[dict[Location, type[BaseModel]]] = {
     (): File,
     ("node",): NodeConfig,
+    ("metrics",): MetricsConfig,
+    ("diagnostics",): DiagnosticsConfig,
     ("defaults",): Defaults,
 }
 _TOPIC_MODEL_OF: Final = {policy: topic_model(group) for policy, group in GROUP_MODEL_OF.items()}

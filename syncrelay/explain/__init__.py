@@ -7,12 +7,14 @@ from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Mismatch, Tolerance
 from syncrelay.explain.find import explanation, find
 from syncrelay.explain.findings import Code, Finding, Severity
+from syncrelay.explain.histogram import BOUNDS_NS, Histogram
 from syncrelay.explain.observation import GroupFigures, InputFigures, Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet
 from syncrelay.explain.silence import Silence, in_words
 from syncrelay.explain.watch import GroupWatch, InputGraph
 
 __all__ = [
+    "BOUNDS_NS",
     "Code",
     "Distribution",
     "Endpoint",
@@ -21,6 +23,7 @@ __all__ = [
     "GroupFigures",
     "GroupReport",
     "GroupWatch",
+    "Histogram",
     "InputFacts",
     "InputFigures",
     "InputGraph",

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.explain.distribution import NOTHING, Distribution
 from syncrelay.explain.drift import Drift, drift
+from syncrelay.explain.histogram import EMPTY, Histogram, Tallied
 from syncrelay.explain.nearest import NearestSpans
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
@@ -62,7 +63,9 @@ class InputFigures:
 
 @dataclass(frozen=True, slots=True)
 class GroupFigures:
-    """A group. `last_sets` are spans and latencies, the newest first; `best_hz` is the rate of the slowest required input: no more sets are possible.
+    """A group. `best_hz` is the rate of the slowest required input: no more sets are possible.
+
+    `last_sets` are spans and latencies, the newest first.
 
     `nearest` holds the span of the tightest set that each message of the slowest input could have had; `missing` is
     the share of the window's sets, 0 to 1, that each input was missing from.
@@ -75,6 +78,8 @@ class GroupFigures:
     best_hz: float = 0.0
     last_set: int | None = None
     last_sets: tuple[tuple[int, int], ...] = ()
+    span_histogram: Histogram = EMPTY
+    latency_histogram: Histogram = EMPTY
     spans: Distribution = NOTHING
     latencies: Distribution = NOTHING
     nearest: Distribution = NOTHING
@@ -97,6 +102,7 @@ class Observation:
         self._trigger = trigger
         self._inputs = [_Input() for _ in offsets_ns]
         self._looks: deque[_Look] = deque()
+        self._span_histogram, self._latency_histogram = Tallied(), Tallied()
         self._sets: deque[_Set] = deque(maxlen=_LAST_SETS)
         self._nearest_spans = NearestSpans(
             len(self._required), trigger=None if trigger is None else self._required.index(trigger)
@@ -113,7 +119,11 @@ class Observation:
         elif len(self._required) > 1:
             shifted = [[stamp + self._offsets[index] for stamp, _ in arrivals[index]] for index in self._required]
             self._nearest.extend(self._nearest_spans.add(shifted))
-        self._sets.extend(_Set(now, stamps, self._span(stamps), latency) for stamps, latency in sets)
+        for stamps, latency in sets:
+            span = self._span(stamps)
+            self._sets.append(_Set(now, stamps, span, latency))
+            self._span_histogram.add(span)
+            self._latency_histogram.add(latency)
         self._looks.append(_Look(now, tuple(counts), total_sets))
         while len(self._looks) > 1 and self._looks[1].at <= now - WINDOW_NS:
             self._looks.popleft()
@@ -132,6 +142,8 @@ class Observation:
             best_hz=min(inputs[index].rate_hz for index in counted),
             last_set=self._sets[-1].at if self._sets else None,
             last_sets=tuple((each.span, each.latency) for each in islice(reversed(self._sets), _SHOWN_SETS)),
+            span_histogram=self._span_histogram.histogram(),
+            latency_histogram=self._latency_histogram.histogram(),
             spans=Distribution(each.span for each in self._sets),
             latencies=Distribution(each.latency for each in self._sets),
             nearest=Distribution(self._nearest),

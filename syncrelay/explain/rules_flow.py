@@ -105,4 +105,4 @@ def fates(an_input: InputFacts) -> str:
     if not dropped:
         return f"of {an_input.name}'s last {figures.fed} messages none was dropped"
     parts = " and ".join(f"{count} as {reason.value}" for reason, count in dropped)
-    return f"of {an_input.name}'s last {figures.fed} messages {parts} were dropped"
+    return f"of {an_input.name}'s last {figures.fed} messages were dropped {parts}"

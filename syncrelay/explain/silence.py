@@ -1,7 +1,7 @@
 """When to say that a group is silent: not at once, not at every look, and once when it is over."""
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 from syncrelay.explain import words
 from syncrelay.explain.facts import GroupFacts
@@ -15,8 +15,16 @@ _LASTING: Final = 5 * _SECOND
 _FORGOTTEN: Final = 60 * _SECOND
 
 
+class Remark(NamedTuple):
+    """A line for the log, and what it is about."""
+
+    severity: Severity
+    text: str
+    code: Code | None
+
+
 class Silence:
-    """Turns the findings of one group, look by look, into what is worth saying: its severity and a text."""
+    """Turns the findings of one group, look by look, into what is worth saying."""
 
     def __init__(self) -> None:
         self._told_at: int | None = None
@@ -24,7 +32,7 @@ class Silence:
         self._quiet_since = 0
         self._warned: dict[tuple[Code, int | None], _Warning] = {}
 
-    def look(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[tuple[Severity, str]]:
+    def look(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
         """Yield what is to be said now."""
         now = facts.figures.now
         if facts.is_silent:
@@ -32,10 +40,10 @@ class Silence:
             return
         if self._told_at is not None:
             self._told_at = None
-            yield Severity.OK, f"sets leave again, after {words.seconds(now - self._quiet_since)}"
+            yield Remark(Severity.OK, f"sets leave again, after {words.seconds(now - self._quiet_since)}", None)
         yield from self._warnings(findings, now)
 
-    def _silent(self, facts: GroupFacts, finding: Finding, now: int) -> Iterator[tuple[Severity, str]]:
+    def _silent(self, facts: GroupFacts, finding: Finding, now: int) -> Iterator[Remark]:
         if self._told_at is None:
             last = facts.figures.last_set
             self._quiet_since = facts.figures.began if last is None else last
@@ -47,9 +55,9 @@ class Silence:
         self._told_at = now
         quiet = words.seconds(now - self._quiet_since)
         ever = "no set" if facts.figures.last_set is None else "no more sets"
-        yield Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}"
+        yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", finding.code)
 
-    def _warnings(self, findings: tuple[Finding, ...], now: int) -> Iterator[tuple[Severity, str]]:
+    def _warnings(self, findings: tuple[Finding, ...], now: int) -> Iterator[Remark]:
         for finding in findings:
             if finding.severity is Severity.OK:
                 continue
@@ -59,7 +67,7 @@ class Silence:
             warning.seen = now
             if not warning.told and now - warning.began >= _LASTING:
                 warning.told = True
-                yield Severity.WARN, in_words(finding)
+                yield Remark(Severity.WARN, in_words(finding), finding.code)
 
 
 class _Warning:

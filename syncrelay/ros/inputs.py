@@ -106,7 +106,12 @@ class TopicInput:
         for stranger in self.publishers:
             if stranger.type != self.type:
                 self._say_once(logging.WARNING, self._of_another_type(stranger))
-        return None if fitting else f"a publisher of {self.name} ({self.type})"
+        served = [each for each in self.publishers if each.type == self.type]
+        if not served:
+            return f"a publisher of {self.name} ({self.type})"
+        if all(each.mismatch for each in served):
+            return f"a publisher of {self.name} whose QoS fits"
+        return None
 
     def _of_another_type(self, endpoint: Endpoint) -> str:
         return f"{self.name}: {endpoint.node} publishes it as {endpoint.type}, the file says {self.type}"

@@ -9,16 +9,20 @@ from typing import Any
 LOGGER = logging.getLogger("syncrelay")
 
 
+_ROS_LEVELS = {"WARNING": "WARN", "CRITICAL": "FATAL"}
+
+
 class _TextFormatter(logging.Formatter):
     """As ROS prints it, so that it reads on in a launch's output."""
 
     def format(self, record: logging.LogRecord) -> str:
-        text = f"[{record.levelname}] [{record.created:.3f}] [{record.name}]: {record.getMessage()}"
+        level = _ROS_LEVELS.get(record.levelname, record.levelname)
+        text = f"[{level}] [{record.created:.3f}] [{record.name}]: {record.getMessage()}"
         return f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text
 
 
 class _JsonFormatter(logging.Formatter):
-    """One object a line: time (ISO 8601, UTC), level, logger, message, and group where one is meant."""
+    """One object a line: time (ISO 8601, UTC), level, logger, message; group and finding where one is meant."""
 
     def format(self, record: logging.LogRecord) -> str:
         line = {
@@ -27,8 +31,9 @@ class _JsonFormatter(logging.Formatter):
             "logger": record.name,
             "message": record.getMessage(),
         }
-        if group := getattr(record, "group", None):
-            line["group"] = group
+        for key in ("group", "finding"):
+            if value := getattr(record, key, None):
+                line[key] = value
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
         return json.dumps(line)

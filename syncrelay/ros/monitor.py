@@ -7,12 +7,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from syncrelay.explain import GroupReport, GroupWatch, InputGraph, SentSets, Severity, Silence, find
+from syncrelay.explain import (
+    GroupReport,
+    GroupWatch,
+    InputGraph,
+    RecentDrop,
+    RecentSet,
+    SentSets,
+    Severity,
+    Silence,
+    find,
+)
 from syncrelay.ros.graph import topics_alike
 from syncrelay.ros.group import Batch, GroupRelay
 from syncrelay.ros.inputs import TopicInput, Wiring
 from syncrelay.ros.receive import ReceiveLoop
-from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
@@ -67,8 +76,9 @@ class Monitor:
             facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=waited)
             findings = find(facts)
             reports.append(GroupReport(facts, findings, gathered.recent))
-            for severity, text in silence.look(facts, findings):
-                _LOG.log(_LEVELS[severity], "%s: %s", facts.name, text, extra={"group": facts.name})
+            for remark in silence.look(facts, findings):
+                about = {"group": facts.name, "finding": remark.code and remark.code.value}
+                _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
         self.reports = tuple(reports)
         self.new_sets = tuple(gathered.batch.sets for gathered in seen)
         self._looks += 1

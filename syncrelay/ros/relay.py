@@ -16,8 +16,10 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.signals import SignalHandlerOptions
 
-from syncrelay.config import Config
+from syncrelay.config import Config, GroupConfig
 from syncrelay.errors import RosUnavailableError, UsageError
+from syncrelay.explain import GroupReport
+from syncrelay.ros.diagnostics import Diagnostics, Scalars
 from syncrelay.ros.environment import log_arguments
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.inputs import Wiring, wire
@@ -25,6 +27,7 @@ from syncrelay.ros.logs import RosoutHandler
 from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
+from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
 
 _LOG = logging.getLogger("syncrelay")
@@ -53,25 +56,34 @@ class Relay:
         self,
         config: Config,
         *,
+        config_path: str = "",
         groups: Collection[str] | None = None,
         ros_args: Sequence[str] = (),
         beat: Callable[[], None] | None = None,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
 
-        `beat` is called on the receive thread for as long as that turns, once a second at least.
+        `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
+        turns, once a second at least.
         """
+        self._beat = beat
         self._context = _init(config, ros_args)
         self.node = rclpy.create_node(config.node.name, namespace=config.node.namespace, context=self._context)
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
         chosen = [group for group in config.groups if groups is None or group.name in groups]
-        self._loop = ReceiveLoop(self._context, now=self._now, deadline=self._deadline, expire=self._expire, beat=beat)
+        self._loop = ReceiveLoop(
+            self._context, now=self._now, deadline=self._deadline, expire=self._expire, beat=self._turn
+        )
         self._groups = [GroupRelay(group, now=self._now) for group in chosen]
         self._wirings = wire(self._groups, node=self.node, loop=self._loop)
         self._inputs = list(dict.fromkeys(each for wiring in self._wirings for each in wiring.inputs))
         self.monitor = Monitor(self._wirings, node=self.node, loop=self._loop, simulated=self._sim_time)
+        self._tellers = _tellers(config, self.node, chosen)
+        self._config_path = config_path
+        self._phase = Phase.STARTING
+        self._turned = time.monotonic()
         self._next_look = time.monotonic() + LOOK_S
         self._announced: dict[str, str] = {}
         self._started = time.monotonic()
@@ -110,18 +122,41 @@ class Relay:
             topic_input.look()
         self._announce()
         if time.monotonic() >= self._next_look:
-            self._next_look += LOOK_S
-            self._monitor()
+            self.look()
         is_waiting = any(wiring.waiting_for for wiring in self._wirings)
         until_look = max(0.0, self._next_look - time.monotonic())
         self._wake.wait(min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S))
 
-    def _monitor(self) -> None:
+    def look(self) -> tuple[GroupReport, ...]:
+        """Look at all groups now, tell of it, and give what there is to say."""
+        self._next_look = time.monotonic() + LOOK_S
         try:
             self.monitor.look()
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
-            return
+            return self.monitor.reports
+        self._phase = Phase.RUNNING
+        for teller in self._tellers:
+            teller.publish(self.monitor.reports)
+        return self.monitor.reports
+
+    def state(self) -> RelayState:
+        """What there is to tell of the relay, as of its last look. Any thread."""
+        now = time.monotonic()
+        return RelayState(
+            node=self.node.get_fully_qualified_name(),
+            config=self._config_path,
+            phase=self._phase,
+            uptime_s=now - self._started,
+            turned_s=now - self._turned,
+            receives_by="rclpy",
+            groups=self.monitor.reports,
+        )
+
+    def _turn(self) -> None:
+        self._turned = time.monotonic()
+        if self._beat is not None:
+            self._beat()
 
     def snapshot(self) -> RelaySnapshot:
         """What is known of all groups, taken between two messages. Any thread."""
@@ -133,6 +168,7 @@ class Relay:
     def drain(self) -> RelaySnapshot:
         """Take in what has arrived, let go of what is buffered, stop receiving; what became of it all."""
         receiving, self._receiving = self._receiving, None
+        self._phase = Phase.DRAINING
         if receiving is not None:
             self._loop.stop()
             receiving.result()
@@ -217,6 +253,15 @@ class Relay:
             if self._announced.get(name) != text:
                 self._announced[name] = text
                 _LOG.info("%s: %s", name, text, extra={"group": name})
+
+
+def _tellers(config: Config, node: Any, groups: Sequence[GroupConfig]) -> list[Diagnostics | Scalars]:
+    """Make what publishes about the relay, as the file asks for it."""
+    if config.diagnostics is None:
+        return []
+    if not config.diagnostics.scalars:
+        return [Diagnostics(node)]
+    return [Diagnostics(node), Scalars(node, [group.name for group in groups])]
 
 
 def _describe(wiring: Wiring) -> GroupSnapshot:

@@ -8,7 +8,7 @@ import pytest
 
 from syncrelay.config import Config, load_text
 from syncrelay.config.file import Defaults, File, GroupOfAnyPolicy, TopicOfAnyPolicy
-from syncrelay.config.models import NodeConfig, StampField
+from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.qos import QosOverrides
 from syncrelay.sync import Match, Message
 
@@ -125,6 +125,10 @@ OPTIONS = {
     "namespace": (file(), file(node={"namespace": "/z"}), lambda config: config.node.namespace),
     "use_sim_time": (file(), file(node={"use_sim_time": True}), lambda config: config.node.use_sim_time),
     "node": (file(), file(node={"name": "z"}), lambda config: config.node),
+    "metrics": (file(), file(metrics=None), lambda config: config.listen),
+    "listen": (file(), file(metrics={"listen": "0.0.0.0:80"}), lambda config: config.listen),
+    "diagnostics": (file(), file(diagnostics=None), lambda config: config.diagnostics),
+    "scalars": (file(), file(diagnostics={"scalars": True}), lambda config: config.diagnostics),
     "defaults": (file(), file(defaults={"output_prefix": "/z"}), outputs),
 }
 QOS_POLICIES = {
@@ -149,7 +153,17 @@ def test_changing_an_option_changes_what_comes_out(one, other, outcome, environ)
 
 
 def test_every_key_of_the_file_is_an_option_under_test():
-    models = (File, NodeConfig, Defaults, GroupOfAnyPolicy, TopicOfAnyPolicy, StampField, QosOverrides)
+    models = (
+        File,
+        NodeConfig,
+        MetricsConfig,
+        DiagnosticsConfig,
+        Defaults,
+        GroupOfAnyPolicy,
+        TopicOfAnyPolicy,
+        StampField,
+        QosOverrides,
+    )
     keys = {key for model in models for key in model.model_fields}
     assert keys - OPTIONS.keys() == {"version"}
 

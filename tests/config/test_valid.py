@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.config import QosOverrides, QosPreset, load, load_text
+from syncrelay.config import DiagnosticsConfig, Listen, QosOverrides, QosPreset, load, load_text
 from syncrelay.sync import Restamp
 
 FOLDER = Path(__file__).parent / "valid"
@@ -23,6 +23,8 @@ def test_every_example_is_in_order(file):
 def test_every_key_arrives_where_it_is_used(environ):
     config = load(str(FOLDER / "all_keys.yaml"), environ=environ)
     assert (config.node.name, config.node.namespace, config.node.use_sim_time) == ("fusion", "/robot1", True)
+    assert config.listen == Listen("127.0.0.1", range(9500, 9501))
+    assert config.diagnostics == DiagnosticsConfig(scalars=True)
     front, back = config.groups
     assert (front.name, back.name) == ("front", "back")
     assert front.restamp == 1

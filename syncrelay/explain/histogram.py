@@ -1,0 +1,36 @@
+"""How often a quantity fell below each of a few bounds, ever: what Prometheus calls a histogram."""
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from typing import Final
+
+BOUNDS_NS: Final = tuple(step * 10**power for power in range(5, 10) for step in (1, 2, 5))
+"""0.1 ms to 5 s: from two stamps of one trigger to what no fusion can use."""
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """`counts` of values in nanoseconds up to each of BOUNDS_NS, from the bound before; the last of those beyond."""
+
+    counts: tuple[int, ...]
+    sum: int
+
+
+EMPTY: Final = Histogram((0,) * (len(BOUNDS_NS) + 1), 0)
+
+
+class Tallied:
+    """Counts values as they come."""
+
+    def __init__(self) -> None:
+        self._counts = [0] * (len(BOUNDS_NS) + 1)
+        self._sum = 0
+
+    def add(self, value: int) -> None:
+        """Count one value, in nanoseconds."""
+        self._counts[bisect_left(BOUNDS_NS, value)] += 1
+        self._sum += value
+
+    def histogram(self) -> Histogram:
+        """Give all so far."""
+        return Histogram(tuple(self._counts), self._sum)

@@ -1,0 +1,98 @@
+"""The state of a relay as Prometheus metrics."""
+
+import platform
+from collections.abc import Callable, Iterator
+from itertools import accumulate
+
+from prometheus_client import CollectorRegistry
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, InfoMetricFamily
+from prometheus_client.metrics_core import Metric
+from prometheus_client.registry import Collector
+
+from syncrelay.explain import BOUNDS_NS, Histogram
+from syncrelay.status.document import own_version
+from syncrelay.status.state import RelayState, is_ready
+
+_NS_PER_SECOND = 1e9
+
+
+def registry(state: Callable[[], RelayState]) -> CollectorRegistry:
+    """Return a registry that asks for the state at every scrape."""
+    metrics = CollectorRegistry()
+    metrics.register(_OfState(state))
+    return metrics
+
+
+class _OfState(Collector):
+    def __init__(self, state: Callable[[], RelayState]) -> None:
+        self._state = state
+
+    def describe(self) -> list[Metric]:
+        """Let nothing be collected before the first scrape."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        state = self._state()
+        yield _build(state)
+        yield GaugeMetricFamily("syncrelay_ready", "Whether every required input is matched.", value=is_ready(state))
+        yield CounterMetricFamily("syncrelay_reloads", "Times that the file was read again.", value=state.reloads)
+        yield from _of_inputs(state)
+        yield from _of_groups(state)
+        yield _findings(state)
+
+
+def _build(state: RelayState) -> Metric:
+    info = InfoMetricFamily("syncrelay_build", "What runs.")
+    values = {"version": own_version(), "python": platform.python_version(), "receives_by": state.receives_by}
+    info.add_metric([], values)
+    return info
+
+
+def _of_inputs(state: RelayState) -> Iterator[Metric]:
+    received = CounterMetricFamily("syncrelay_messages_received", "Messages that came in.", labels=("group", "topic"))
+    outcomes = CounterMetricFamily(
+        "syncrelay_messages",
+        "Messages by what became of them: matched, or the reason why they were dropped.",
+        labels=("group", "topic", "outcome"),
+    )
+    buffered = GaugeMetricFamily("syncrelay_queue_length", "Messages that wait.", labels=("group", "topic"))
+    for report in state.groups:
+        for each in report.facts.inputs:
+            labels = [report.facts.name, each.name]
+            received.add_metric(labels, each.counts.fed)
+            buffered.add_metric(labels, each.counts.buffered)
+            outcomes.add_metric([*labels, "matched"], each.counts.matched)
+            for reason, count in each.counts.dropped.items():
+                outcomes.add_metric([*labels, reason.value], count)
+    yield from (received, outcomes, buffered)
+
+
+def _of_groups(state: RelayState) -> Iterator[Metric]:
+    sets = CounterMetricFamily("syncrelay_sets", "Sets that left.", labels=("group",))
+    spans = HistogramMetricFamily("syncrelay_set_span_seconds", "Spans of the sets.", labels=("group",))
+    latencies = HistogramMetricFamily(
+        "syncrelay_set_latency_seconds",
+        "From the receipt of a set's newest message until the set was published.",
+        labels=("group",),
+    )
+    for report in state.groups:
+        figures = report.facts.figures
+        sets.add_metric([report.facts.name], figures.sets)
+        _add(spans, report.facts.name, figures.span_histogram)
+        _add(latencies, report.facts.name, figures.latency_histogram)
+    yield from (sets, spans, latencies)
+
+
+def _add(family: HistogramMetricFamily, group: str, histogram: Histogram) -> None:
+    bounds = [f"{bound / _NS_PER_SECOND:g}" for bound in BOUNDS_NS]
+    buckets = list(zip([*bounds, "+Inf"], accumulate(histogram.counts), strict=True))
+    family.add_metric([group], buckets=buckets, sum_value=histogram.sum / _NS_PER_SECOND)
+
+
+def _findings(state: RelayState) -> Metric:
+    family = GaugeMetricFamily("syncrelay_finding", "What is so now.", labels=("group", "code", "severity", "topic"))
+    for report in state.groups:
+        for finding in report.findings:
+            topic = "" if finding.input is None else report.facts.inputs[finding.input].name
+            family.add_metric([report.facts.name, finding.code.value, finding.severity.name.lower(), topic], 1)
+    return family

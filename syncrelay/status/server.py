@@ -1,0 +1,150 @@
+"""The relay's HTTP: /status, /metrics, /livez and /readyz, on threads of its own.
+
+waitress reads and writes without blocking, so a client that stalls or never ends its request takes a place among
+the connections for a while, and nothing else.
+"""
+
+import errno
+import json
+import logging
+import socket
+from collections.abc import Callable, Iterable
+from threading import Thread
+from types import TracebackType
+from typing import Any, Final, Self
+
+from prometheus_client import make_wsgi_app
+from waitress.server import create_server
+from waitress.wasyncore import close_all
+
+from syncrelay.config import Listen
+from syncrelay.errors import ListenError
+from syncrelay.status.document import document
+from syncrelay.status.metrics import registry
+from syncrelay.status.state import RelayState, is_ready
+
+# An idle loop turns once a second; what has not turned for this long hangs.
+_STALLED_S: Final = 5.0
+# A reader of /status takes milliseconds.
+_CLIENT_TIMEOUT_S: Final = 10
+_CONNECTIONS: Final = 64
+_HEADER_BYTES: Final = 16_384
+
+_Start = Callable[[str, list[tuple[str, str]]], Any]
+
+
+class Server:
+    """Holds a port from its making on and answers once it serves; a context manager that ends both."""
+
+    def __init__(self, listen: Listen) -> None:
+        """Take the port, or the first free one of those that the file leaves open. Raises ListenError."""
+        # waitress warns of clients that go away, which is no concern of the robot's operator.
+        logging.getLogger("waitress").setLevel(logging.CRITICAL)
+        self._socket = _bound(listen)
+        self.address: str = "{}:{}".format(*self._socket.getsockname()[:2])
+        self._server: Any = None
+        self._thread: Thread | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._thread is not None:
+            self._server.trigger.pull_trigger(lambda: close_all(self._server._map))  # noqa: SLF001  it has no stop of its own
+            self._thread.join()
+            self._server.task_dispatcher.shutdown()
+        self._socket.close()
+
+    def serve(self, state: Callable[[], RelayState]) -> None:
+        """Answer from now on; `state` is called on other threads."""
+        self._server = create_server(
+            _application(state),
+            sockets=[self._socket],
+            threads=2,
+            connection_limit=_CONNECTIONS,
+            channel_timeout=_CLIENT_TIMEOUT_S,
+            cleanup_interval=_CLIENT_TIMEOUT_S // 2,
+            max_request_header_size=_HEADER_BYTES,
+            max_request_body_size=_HEADER_BYTES,
+            asyncore_use_poll=True,
+            ident=None,
+            clear_untrusted_proxy_headers=True,
+        )
+        self._thread = Thread(target=self._server.asyncore.loop, kwargs=self._loop_settings(), name="syncrelay-http")
+        self._thread.start()
+
+    def _loop_settings(self) -> dict[str, Any]:
+        return {"timeout": 1, "map": self._server._map, "use_poll": True}  # noqa: SLF001
+
+
+def _bound(listen: Listen) -> socket.socket:
+    family = socket.AF_INET6 if ":" in listen.host else socket.AF_INET
+    for port in listen.ports:
+        bound = socket.socket(family, socket.SOCK_STREAM)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            bound.bind((listen.host, port))
+            bound.listen()
+        except OSError as error:
+            bound.close()
+            if error.errno != errno.EADDRINUSE:
+                raise ListenError(f"cannot listen on {listen}: {error.strerror}") from error
+        else:
+            return bound
+    raise ListenError(
+        f"cannot listen on {listen}: another process does;"
+        " give `metrics` another `listen`, or write `metrics: null` to go without"
+    )
+
+
+def _application(state: Callable[[], RelayState]) -> Callable[[dict[str, Any], _Start], Iterable[bytes]]:
+    metrics: Any = make_wsgi_app(registry(state))
+
+    def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
+        answer: Iterable[bytes] = metrics(environ, start)
+        return answer
+
+    answers: dict[str, Callable[[dict[str, Any], _Start], Iterable[bytes]]] = {
+        "/": lambda _, start: _text(start, "200 OK", "syncrelay: /status /metrics /livez /readyz"),
+        "/metrics": answer_metrics,
+        "/status": lambda _, start: _json(start, document(state())),
+        "/livez": lambda _, start: _liveness(start, state()),
+        "/readyz": lambda _, start: _readiness(start, state()),
+    }
+
+    def application(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
+        if environ["REQUEST_METHOD"] not in ("GET", "HEAD"):
+            return _text(start, "405 Method Not Allowed", "only GET")
+        answer = answers.get(environ["PATH_INFO"])
+        if answer is None:
+            return _text(start, "404 Not Found", "there are /status, /metrics, /livez and /readyz")
+        return answer(environ, start)
+
+    return application
+
+
+def _liveness(start: _Start, state: RelayState) -> list[bytes]:
+    if state.turned_s < _STALLED_S:
+        return _text(start, "200 OK", "receiving")
+    return _text(start, "503 Service Unavailable", f"the receive loop last turned {state.turned_s:.0f} s ago")
+
+
+def _readiness(start: _Start, state: RelayState) -> list[bytes]:
+    if is_ready(state):
+        return _text(start, "200 OK", "ready")
+    return _text(start, "503 Service Unavailable", f"not ready: {state.phase.value}, see /status")
+
+
+def _json(start: _Start, value: object) -> list[bytes]:
+    return _answer(start, "200 OK", json.dumps(value).encode(), "application/json")
+
+
+def _text(start: _Start, status: str, text: str) -> list[bytes]:
+    return _answer(start, status, f"{text}\n".encode(), "text/plain; charset=utf-8")
+
+
+def _answer(start: _Start, status: str, body: bytes, content_type: str) -> list[bytes]:
+    start(status, [("Content-Type", content_type), ("Content-Length", str(len(body))), ("Cache-Control", "no-store")])
+    return [body]
