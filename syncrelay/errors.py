@@ -13,6 +13,10 @@ class RosUnavailableError(SyncRelayError):
     """ROS cannot be used here: rclpy, its middleware or its environment is missing."""
 
 
+class BagError(SyncRelayError):
+    """A recording cannot be read, or not as the file asks for."""
+
+
 class UsageError(SyncRelayError):
     """The command line asks for something that is not there."""
 

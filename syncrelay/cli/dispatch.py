@@ -18,6 +18,7 @@ _COMMANDS_HELP: Final = """\
 commands:
   validate FILE...      check files and report everything that is wrong with them
   schema                print the JSON Schema of the file, for editors
+  replay BAG...         show what a file makes of a recording; write its outputs as one
   demo                  show it all on a simulated rig, without a robot
   healthcheck           tell whether the relay receives, by its heartbeat
   syncrelay COMMAND --help says more
@@ -133,6 +134,33 @@ def _schema(words: Sequence[str], _stop: StopRequest) -> int:
     return schema()
 
 
+def _replay(words: Sequence[str], _stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay replay",
+        description="Feeds a recording to the groups of a file, without ROS, and prints where every message went: the\n"
+        "sets are those that the relay would have given. Exit code 1 if a required topic is not in the recording.",
+    )
+    parser.add_argument(
+        "bags",
+        metavar="BAG",
+        nargs="+",
+        help="a rosbag2 folder, an MCAP, sqlite3 or ROS 1 bag file, also compressed; several are read as one",
+    )
+    parser.add_argument("--config", metavar="FILE", required=True, help="the file whose groups get the messages")
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
+    )
+    parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
+    parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    arguments = parser.read(words)
+    from syncrelay.cli.replay import Wanted, replay
+
+    return replay(arguments.bags, arguments.config, Wanted(arguments.json, arguments.drops, arguments.output))
+
+
 def _demo(words: Sequence[str], stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay demo",
@@ -168,6 +196,7 @@ def _healthcheck(words: Sequence[str], _stop: StopRequest) -> int:
 _COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
     "validate": _validate,
     "schema": _schema,
+    "replay": _replay,
     "demo": _demo,
     "healthcheck": _healthcheck,
 }

@@ -8,7 +8,16 @@ from tests.cli.command import BAD, GOOD, run, run_python
 def test_help_names_every_command_and_option_on_stdout(tmp_path):
     done = run("--help", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    for word in ("--config FILE", "--group NAME", "--log-level", "--log-format", "--ros-args", "validate FILE", "demo"):
+    for word in (
+        "--config FILE",
+        "--group NAME",
+        "--log-level",
+        "--log-format",
+        "--ros-args",
+        "validate FILE",
+        "replay BAG",
+        "demo",
+    ):
         assert word in done.stdout
     assert run("help", folder=tmp_path).stdout == run("-h", folder=tmp_path).stdout == done.stdout
 
@@ -18,6 +27,7 @@ def test_help_names_every_command_and_option_on_stdout(tmp_path):
     [
         ("validate", ["FILE", "--format"]),
         ("schema", ["JSON Schema"]),
+        ("replay", ["BAG", "--config", "--output", "--json", "--drops"]),
         ("demo", ["--seconds", "--seed", "--show-config"]),
     ],
 )

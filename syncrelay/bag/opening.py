@@ -1,0 +1,187 @@
+"""From paths to a recording: files by what they begin with, folders, splits, and files compressed as a whole."""
+
+import bz2
+import gzip
+import heapq
+import re
+import shutil
+import zlib
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from errno import ENOSPC
+from itertools import chain, pairwise
+from operator import itemgetter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import zstandard
+
+from syncrelay.bag import mcap_file, ros1_file, sqlite_file
+from syncrelay.bag.recording import Channel, RawMessage, Recording
+from syncrelay.config.wording import did_you_mean
+from syncrelay.errors import BagError
+
+_SUFFIXES: Final = (".mcap", ".db3", ".bag", ".active")
+_COMPRESSED: Final = (".bz2", ".zstd", ".zst", ".gz")
+_OPENERS: Final[Mapping[bytes, Callable[[Path, str], Recording]]] = {
+    mcap_file.MAGIC: mcap_file.open_mcap,
+    sqlite_file.MAGIC: sqlite_file.SqliteFile,
+    ros1_file.MAGIC: ros1_file.open_ros1,
+}
+
+
+def _zstd(path: Path) -> Any:
+    return zstandard.open(path, "rb")
+
+
+_DECOMPRESSORS: Final[Mapping[bytes, Callable[[Path], Any]]] = {
+    b"BZh": bz2.open,
+    b"\x28\xb5\x2f\xfd": _zstd,
+    b"\x1f\x8b": gzip.open,
+}
+_LONGEST_MAGIC: Final = 16
+_PIECE: Final = 1_000_000
+_METADATA: Final = "metadata.yaml"
+
+
+def open_recording(paths: Sequence[str]) -> Recording:
+    """Open a recording: files, and folders of which all files are one recording.
+
+    Of several files, those that cannot be read are faults of the recording. Raises BagError where none can.
+    """
+    with ExitStack() as opened:
+        files: list[Recording] = []
+        unreadable: list[BagError] = []
+        for path in _files(paths):
+            try:
+                file = _open(path, opened)
+            except BagError as error:
+                unreadable.append(error)
+                continue
+            opened.callback(file.close)
+            files.append(file)
+        if not files:
+            raise unreadable[0]
+        return Files(files, opened.pop_all(), faults=[str(error) for error in unreadable])
+
+
+class Files:
+    """Recordings of one drive as one; see Recording."""
+
+    def __init__(self, files: Sequence[Recording], opened: ExitStack, *, faults: Sequence[str]) -> None:
+        """Read from files that `opened` closes; `faults` are those of files that are not among them."""
+        self._files = sorted(files, key=lambda file: file.begin)
+        self._opened = opened
+        self._faults = list(faults)
+        self.channels = tuple(channel for file in self._files for channel in file.channels)
+        self.size = sum(file.size for file in files)
+        self.begin = min((file.begin for file in self._files if file.end), default=0)
+        self.end = max((file.end for file in self._files), default=0)
+
+    @property
+    def faults(self) -> list[str]:
+        """See Recording."""
+        return [*self._faults, *(fault for file in self._files for fault in file.faults)]
+
+    @property
+    def position(self) -> int:
+        """See Recording."""
+        return sum(file.position for file in self._files)
+
+    def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
+        """See Recording."""
+        streams = [file.messages(wanted) for file in self._files]
+        if any(earlier.end > later.begin for earlier, later in pairwise(self._files)):
+            return heapq.merge(*streams, key=itemgetter(1))
+        return chain.from_iterable(streams)
+
+    def close(self) -> None:
+        """See Recording."""
+        self._opened.close()
+
+
+def _files(named: Sequence[str]) -> Iterator[Path]:
+    for name in named:
+        path = Path(name)
+        if path.name == _METADATA and path.is_file():
+            path = path.parent
+        if path.is_dir():
+            yield from _files_in(path)
+        elif path.exists():
+            yield path
+        else:
+            raise BagError(f"{name}: no such file or folder{_similar(path)}")
+
+
+def _files_in(folder: Path) -> list[Path]:
+    files = sorted((path for path in folder.iterdir() if _bare_suffix(path) in _SUFFIXES), key=_natural)
+    if not files:
+        raise BagError(f"{folder}: holds no recording, expected files that end in {', '.join(_SUFFIXES)}")
+    return files
+
+
+def _bare_suffix(path: Path) -> str:
+    return Path(path.stem).suffix if path.suffix in _COMPRESSED else path.suffix
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sort split files by their numbers: _9 before _10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
+
+
+def _similar(path: Path) -> str:
+    try:
+        beside = [each.name for each in path.parent.iterdir() if each.is_dir() or _bare_suffix(each) in _SUFFIXES]
+    except OSError:
+        return ""
+    return did_you_mean(path.name, beside)
+
+
+def _open(path: Path, opened: ExitStack) -> Recording:
+    """Open one file by its content, decompressed into a temporary one if it is compressed as a whole."""
+    magic = _magic(path)
+    for begin, decompressor in _DECOMPRESSORS.items():
+        if magic.startswith(begin):
+            content, faults = _decompressed(path, decompressor, opened)
+            if faults and not content.stat().st_size:
+                raise BagError(faults[0])
+            file = _open_plain(content, _magic(content), str(path))
+            file.faults.extend(faults)
+            return file
+    return _open_plain(path, magic, str(path))
+
+
+def _open_plain(path: Path, magic: bytes, name: str) -> Recording:
+    for begin, opener in _OPENERS.items():
+        if magic.startswith(begin):
+            return opener(path, name)
+    if not magic:
+        raise BagError(f"{name}: is empty")
+    if magic.startswith(b"#ROSBAG V"):
+        raise BagError(f"{name}: is a bag of another format than 2.0: `rosbag migrate` turns it into one")
+    raise BagError(f"{name}: is no recording, expected MCAP, a sqlite3 file of rosbag2 or a ROS 1 bag")
+
+
+def _magic(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(_LONGEST_MAGIC)
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _decompressed(path: Path, decompressor: Callable[[Path], Any], opened: ExitStack) -> tuple[Path, list[str]]:
+    """Return a temporary file of the content, and what is wrong with it."""
+    folder = opened.enter_context(TemporaryDirectory(prefix="syncrelay-"))
+    content = Path(folder) / path.stem
+    with decompressor(path) as packed, content.open("wb") as plain:
+        try:
+            shutil.copyfileobj(packed, plain, _PIECE)
+        except (EOFError, OSError, zlib.error, zstandard.ZstdError) as error:
+            if isinstance(error, OSError) and error.errno == ENOSPC:
+                raise BagError(
+                    f"{path}: no space in {folder} to decompress it, set TMPDIR to another folder"
+                ) from error
+            return content, [f"{path}: cut off or damaged, what is before that is read: {error}"]
+    return content, []

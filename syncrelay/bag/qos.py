@@ -1,0 +1,115 @@
+"""QoS as recordings carry it: read, matched to what a file asks for, and written (rosbag2's metadata, version 9)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Final
+
+import yaml
+
+from syncrelay.config import QosOverrides, QosPreset
+
+# rclpy's default for every duration is 0, which is unset; rosbag2 writes it so, too.
+_UNSET: Final = 0
+_NS_PER_SECOND: Final = 1_000_000_000
+# As the relay's subscriptions (syncrelay.ros.qos).
+_DEPTH: Final = 100
+# Older files have rmw's numbers in place of names (rmw/types.h).
+_NAMES: Final[Mapping[str, Sequence[str]]] = {
+    "history": ("system_default", "keep_last", "keep_all", "unknown"),
+    "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
+    "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
+    "liveliness": ("system_default", "automatic", "manual_by_node", "manual_by_topic", "unknown", "best_available"),
+}
+_DURATIONS: Final = ("deadline", "lifespan", "liveliness_lease_duration")
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A QoS profile by rosbag2's keys; durations in nanoseconds, 0 where there is no limit."""
+
+    history: str = "keep_last"
+    depth: int = 10
+    reliability: str = "reliable"
+    durability: str = "volatile"
+    deadline: int = _UNSET
+    lifespan: int = _UNSET
+    liveliness: str = "system_default"
+    liveliness_lease_duration: int = _UNSET
+    avoid_ros_namespace_conventions: bool = False
+
+
+_BEST_AVAILABLE_NS: Final = 9_223_372_036_854_775_806
+# rclpy's presets (rclpy.qos.QoSPresetProfiles).
+PRESETS: Final[Mapping[str, Profile]] = {
+    "system_default": Profile("system_default", 0, "system_default", "system_default"),
+    "default": Profile(),
+    "sensor_data": Profile(depth=5, reliability="best_effort"),
+    "services_default": Profile(),
+    "parameters": Profile(depth=1000),
+    "parameter_events": Profile(depth=1000),
+    "action_status_default": Profile(depth=1, durability="transient_local"),
+    "best_available": Profile(
+        reliability="best_available",
+        durability="best_available",
+        deadline=_BEST_AVAILABLE_NS,
+        liveliness="best_available",
+        liveliness_lease_duration=_BEST_AVAILABLE_NS,
+    ),
+}
+"""The presets that a file may name."""
+
+
+def output_profile(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) -> Profile:
+    """Return what the relay's output would offer: what the file asks for, the rest as all publishers can serve it."""
+    if isinstance(asked, QosPreset):
+        return PRESETS[asked.name]
+    served = Profile(
+        depth=_DEPTH,
+        reliability="reliable" if all(each.reliability != "best_effort" for each in offered) else "best_effort",
+        durability="transient_local"
+        if offered and all(each.durability == "transient_local" for each in offered)
+        else "volatile",
+    )
+    return replace(served, **asked.model_dump(exclude_none=True))
+
+
+def read_profiles(recorded: Any) -> tuple[Profile, ...]:
+    """Return the profiles of `offered_qos_profiles`, a YAML text or what it holds; none where it makes no sense."""
+    try:
+        listed = yaml.safe_load(recorded) if isinstance(recorded, str) else recorded
+    except yaml.YAMLError:
+        return ()
+    if not isinstance(listed, list):
+        return ()
+    return tuple(_read_profile(each) for each in listed if isinstance(each, dict))
+
+
+def write_profile(profile: Profile) -> dict[str, Any]:
+    """Return a profile as rosbag2 writes it."""
+    written = asdict(profile)
+    for key in _DURATIONS:
+        seconds, nanoseconds = divmod(written[key], _NS_PER_SECOND)
+        written[key] = {"sec": seconds, "nsec": nanoseconds}
+    return written
+
+
+def _read_profile(recorded: Mapping[str, Any]) -> Profile:
+    known: dict[str, Any] = {key: _name(key, recorded[key]) for key in _NAMES if key in recorded}
+    known |= {key: _nanoseconds(recorded[key]) for key in _DURATIONS if key in recorded}
+    if isinstance(recorded.get("depth"), int):
+        known["depth"] = recorded["depth"]
+    return Profile(**known)
+
+
+def _name(key: str, value: Any) -> str:
+    names = _NAMES[key]
+    if isinstance(value, int):
+        return names[value] if 0 <= value < len(names) else "unknown"
+    return str(value)
+
+
+def _nanoseconds(value: Any) -> int:
+    try:
+        return int(value["sec"]) * _NS_PER_SECOND + int(value["nsec"])
+    except (KeyError, TypeError, ValueError):
+        return _UNSET

@@ -1,0 +1,90 @@
+"""What every kind of recording offers: channels, and their messages in the order in which they were received."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol, TypeAlias
+
+from syncrelay.bag.qos import Profile
+
+
+class Encoding(Enum):
+    """How the payloads of a channel are serialized."""
+
+    CDR = "cdr"
+    ROS1 = "ros1"
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """A type's definition as recorded, with those of the types that it is made of.
+
+    `format` is MCAP's name of a schema encoding: ros2msg, ros2idl or ros1msg.
+    """
+
+    format: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """A topic of a recording as one publisher, or a set of alike ones, filled it. Two channels are never equal.
+
+    `type` is a full type name (`pkg/msg/Name`), also in a ROS 1 bag. `qos` is what the publishers offered,
+    empty where that was not recorded. `type_hash` is the RIHS01 hash of REP 2016, empty if it was not recorded.
+    An encoding that is not known here stands as it was recorded.
+    """
+
+    id: int
+    topic: str
+    type: str
+    encoding: Encoding | str
+    definition: Definition | None = None
+    qos: tuple[Profile, ...] = ()
+    type_hash: str = ""
+
+
+RawMessage: TypeAlias = tuple[Channel, int, bytes]
+"""A channel, when the message was received in nanoseconds, and its payload."""
+
+
+class Recording(Protocol):
+    """A recording that is open for reading. Messages are read once, from the begin to the end."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What was recorded."""
+        ...
+
+    @property
+    def faults(self) -> list[str]:
+        """What could not be read, a sentence each; complete when all messages are read."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Bytes that `messages` has to go through."""
+        ...
+
+    @property
+    def position(self) -> int:
+        """Bytes that `messages` has gone through."""
+        ...
+
+    @property
+    def begin(self) -> int:
+        """When the first message was received in nanoseconds; 0 if there is none."""
+        ...
+
+    @property
+    def end(self) -> int:
+        """When the last message was received in nanoseconds; 0 if there is none."""
+        ...
+
+    def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
+        """Yield the messages of some channels by their receive time; of equal times, as they were written."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the files."""
+        ...

@@ -1,0 +1,77 @@
+"""A file's topics and a recording's channels, brought together; and what does not fit."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from syncrelay.bag.recording import Channel, Encoding, Recording
+from syncrelay.config import Config, GroupConfig, TopicConfig
+from syncrelay.config.names import expand
+from syncrelay.config.wording import nearest, quoted
+
+_MOST_LISTED = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One input of a group: its full name, that of its output, and the channels that fill it."""
+
+    config: TopicConfig
+    topic: str
+    output: str
+    channels: tuple[Channel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """A group, its inputs in the file's order, and why an input has no channel, a sentence each."""
+
+    group: GroupConfig
+    inputs: tuple[Input, ...]
+    problems: tuple[str, ...]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every required input has a channel, so that sets can come."""
+        return all(each.channels for each in self.inputs if each.config.required)
+
+
+def wire(config: Config, recording: Recording) -> tuple[Wiring, ...]:
+    """Return each group's wiring, in the file's order."""
+    return tuple(_wire(group, config, recording.channels) for group in config.groups)
+
+
+def full_name(topic: str, config: Config) -> str:
+    """Return the absolute name that the file's node gives a topic."""
+    return expand(topic, node=config.node.name, namespace=config.node.namespace)
+
+
+def _wire(group: GroupConfig, config: Config, channels: Sequence[Channel]) -> Wiring:
+    inputs, problems = [], []
+    for topic in group.topics:
+        name = full_name(topic.topic, config)
+        found = tuple(channel for channel in channels if channel.topic == name)
+        fitting = tuple(channel for channel in found if channel.type == topic.type and _is_ros(channel))
+        problems += [f"{group.name}: {_misfit(channel, topic)}" for channel in found if channel not in fitting]
+        if not found:
+            problems.append(f"{group.name}: {_missing(name, channels)}")
+        inputs.append(Input(topic, name, full_name(topic.output, config), fitting))
+    return Wiring(group, tuple(inputs), tuple(dict.fromkeys(problems)))
+
+
+def _is_ros(channel: Channel) -> bool:
+    return isinstance(channel.encoding, Encoding)
+
+
+def _misfit(channel: Channel, topic: TopicConfig) -> str:
+    if not _is_ros(channel):
+        return f"{channel.topic} is recorded as {channel.encoding or 'bytes of no named encoding'}, expected cdr"
+    return f"{channel.topic} is recorded as {channel.type or 'a type without a name'}, the file says {topic.type}"
+
+
+def _missing(name: str, channels: Sequence[Channel]) -> str:
+    topics = list(dict.fromkeys(channel.topic for channel in channels))
+    close = nearest(name, topics)
+    if close is not None:
+        return f"{name} is not in the recording, did you mean {quoted(close)}?"
+    more = ", ..." if len(topics) > _MOST_LISTED else ""
+    return f"{name} is not in the recording, it has {', '.join(topics[:_MOST_LISTED])}{more}"

@@ -1,0 +1,82 @@
+"""`syncrelay replay BAG...`: what a file makes of a recording."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from syncrelay.bag import Encoding, open_recording
+from syncrelay.bag.lines import drop_line, set_line
+from syncrelay.bag.replay import Listener
+from syncrelay.bag.replay import replay as replay_groups
+from syncrelay.bag.wiring import Wiring, wire
+from syncrelay.bag.writing import RecordingWriter
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.progress import progress_of
+from syncrelay.cli.summary import summarize
+from syncrelay.config import Severity, load
+from syncrelay.sync import Match, Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a replay gives beside its summary: a line a set, a line a drop, the outputs in a recording."""
+
+    sets: bool
+    drops: bool
+    output: str | None
+
+
+def replay(bags: Sequence[str], config_path: str, wanted: Wanted) -> int:
+    """Feed recordings to the groups of a file and print what became of them; 1 if a required topic is not there.
+
+    Lines go to stdout, and the summary then to stderr. Raises ConfigError for a faulty file, BagError for a
+    recording that cannot be read, or has not the stamps that the file names.
+    """
+    config = load(config_path, package_missing=Severity.NOTE)
+    with ExitStack() as opened:
+        recording = open_recording(bags)
+        opened.callback(recording.close)
+        wirings = wire(config, recording)
+        _say_all(problem for wiring in wirings for problem in wiring.problems)
+        listeners = [*_printing(wanted), *_writing(wanted, wirings, opened)]
+        with progress_of(recording):
+            results = replay_groups(recording, wirings, listeners=listeners)
+        _say_all(recording.faults)
+    tell = say if wanted.sets or wanted.drops else put
+    for result in results:
+        for line in summarize(result):
+            tell(line)
+    return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
+
+
+def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:
+    for sentence in sentences:
+        say(f"syncrelay: {sentence}")
+
+
+def _printing(wanted: Wanted) -> Iterator[Listener]:
+    def print_set(wiring: Wiring, outcome: Outcome, now: int) -> None:
+        if isinstance(outcome, Match):
+            put(set_line(wiring, outcome, now))
+
+    def print_drop(wiring: Wiring, outcome: Outcome, now: int) -> None:
+        if not isinstance(outcome, Match):
+            put(drop_line(wiring, outcome, now))
+
+    if wanted.sets:
+        yield print_set
+    if wanted.drops:
+        yield print_drop
+
+
+def _writing(wanted: Wanted, wirings: Sequence[Wiring], opened: ExitStack) -> Iterator[Listener]:
+    if wanted.output is None:
+        return
+    writer = opened.enter_context(RecordingWriter(Path(wanted.output)))
+    for wiring in wirings:
+        writer.begin(wiring)
+    channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)
+    if any(channel.encoding is Encoding.ROS1 for channel in channels):
+        say("syncrelay: the recording is of ROS 1, what is written is CDR as ROS 2 has it, without header.seq")
+    yield writer.take

@@ -1,0 +1,153 @@
+import json
+import os
+import pty
+import subprocess
+import sys
+
+import pytest
+
+from tests.bag.making import rig, write_mcap, write_ros1
+from tests.cli.command import ROOT, run
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.summary import read_summary
+
+_SUMMARY = """\
+front: 39 sets
+front:   /camera: 40 received, 39 in sets, 1 dropped (shutdown 1)
+front:   /lidar: 40 received, 39 in sets, 1 dropped (shutdown 1)
+"""
+
+
+def _file(**keys) -> str:
+    topics = inputs({"/camera": VECTOR, "/lidar": VECTOR})
+    return config({"front": {"policy": "approximate_time", "slop": "5ms", "topics": topics, **keys}})
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "f.yaml").write_text(_file())
+    write_mcap(tmp_path / "rig.mcap", rig())
+    return tmp_path
+
+
+def test_it_prints_the_summary_of_the_relay(folder):
+    done = run("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, _SUMMARY, "")
+    assert read_summary(done.stdout)["front"].sets == 39
+
+
+def test_with_json_there_is_a_line_a_set_and_the_summary_is_talk(folder):
+    done = run("replay", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    assert (len(lines), done.stderr) == (39, _SUMMARY)
+    camera, lidar = (frame.time - 5_000_000 for frame in reversed(rig()[:2]))
+    assert lines[0] == {
+        "group": "front",
+        "time": rig()[2].time,
+        "stamps": {"/camera": camera, "/lidar": lidar},
+        "span": 3_000_000,
+        "latency": 97_000_000,
+        "missing": [],
+    }
+
+
+def test_with_drops_there_is_a_line_a_drop_with_its_reason(folder):
+    (folder / "f.yaml").write_text(_file(slop="1ms"))
+    done = run("replay", "rig.mcap", "--config", "f.yaml", "--drops", folder=folder)
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(lines) == 80
+    assert lines[0].keys() == {"group", "time", "topic", "stamp", "received", "reason"}
+    assert {line["reason"] for line in lines} <= {"too_far", "superseded", "shutdown"}
+
+
+def test_a_set_without_an_optional_input_says_what_is_missing(folder):
+    topics = [*inputs({"/camera": VECTOR, "/lidar": VECTOR}), {"topic": "/imu", "type": VECTOR, "required": False}]
+    (folder / "f.yaml").write_text(_file(topics=topics, max_wait="10ms"))
+    done = run("replay", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
+    line = json.loads(done.stdout.splitlines()[0])
+    assert (line["missing"], line["stamps"]["/imu"], line["latency"]) == (["/imu"], None, 10_000_000)
+    assert done.returncode == 0
+    assert "/imu is not in the recording" in done.stderr
+
+
+def test_a_required_topic_that_is_not_there_is_a_fault_of_the_data(folder):
+    (folder / "f.yaml").write_text(_file().replace('"/camera"', '"/camra"'))
+    done = run("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
+    assert done.returncode == 1
+    assert "front: /camra is not in the recording, did you mean `/camera`?" in done.stderr
+    assert done.stdout.startswith("front: 0 sets\n")
+
+
+@pytest.mark.parametrize("output", ["out.mcap", "out"])
+def test_what_is_written_can_be_replayed(output, folder):
+    done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", output, folder=folder)
+    assert (done.returncode, done.stdout) == (0, _SUMMARY)
+    (folder / "g.yaml").write_text(_file().replace('"/', '"/front/'))
+    again = run("replay", output, "--config", "g.yaml", folder=folder)
+    assert read_summary(again.stdout)["front"].inputs["/front/camera"].received == 39
+
+
+def test_that_ros1_is_written_as_ros2_is_said(folder):
+    write_ros1(folder / "rig.bag", rig())
+    done = run("replay", "rig.bag", "--config", "f.yaml", "-o", "out.mcap", folder=folder)
+    assert (done.returncode, done.stdout) == (0, _SUMMARY)
+    assert "the recording is of ROS 1, what is written is CDR" in done.stderr
+
+
+def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
+    write_mcap(folder / "rig.mcap", rig(), chunk_size=1000)
+    with (folder / "rig.mcap").open("r+b") as file:
+        file.truncate(8000)
+    done = run("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
+    assert done.returncode == 0
+    assert "syncrelay: rig.mcap: cut off at byte" in done.stderr
+    assert 0 < read_summary(done.stdout)["front"].sets < 39
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["none.mcap", "--config", "f.yaml"], 1, "syncrelay: none.mcap: no such file or folder"),
+        (["f.yaml", "--config", "f.yaml"], 1, "syncrelay: f.yaml: is no recording"),
+        (["rig.mcap", "--config", "g.yaml"], 1, "g.yaml: no such file"),
+        (["rig.mcap"], 2, "syncrelay: the following arguments are required: --config"),
+        (["--config", "f.yaml"], 2, "syncrelay: the following arguments are required: BAG"),
+        (["rig.mcap", "--config", "f.yaml", "-o", "f.yaml"], 1, "syncrelay: f.yaml: exists already"),
+    ],
+)
+def test_what_is_wrong_is_said(words, code, said, folder):
+    done = run("replay", *words, folder=folder)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert done.stderr.startswith(said)
+
+
+def test_it_needs_no_ros(folder):
+    script = "import sys; sys.modules['rclpy'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
+    done = subprocess.run(
+        [sys.executable, "-c", script, "replay", "rig.mcap", "--config", "f.yaml"],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (0, _SUMMARY)
+
+
+def test_a_terminal_gets_a_bar_on_stderr_that_leaves_no_trace_on_stdout(folder):
+    ours, theirs = pty.openpty()
+    done = subprocess.run(
+        [sys.executable, "-m", "syncrelay", "replay", "rig.mcap", "--config", "f.yaml"],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"},
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        text=True,
+        check=False,
+    )
+    os.close(theirs)
+    shown = os.read(ours, 4096)
+    os.close(ours)
+    assert b"reading" in shown
+    assert done.stdout == _SUMMARY
