@@ -80,6 +80,12 @@ def as_ros2(channel: Channel) -> tuple[Definition | None, str]:
     return Definition("ros2msg", text), channel.type_hash or store.hash_rihs01(channel.type)
 
 
+def jazzy_definition(type_name: str) -> tuple[Definition, str]:
+    """Return the definition and the hash of a type of ROS 2 Jazzy's common packages."""
+    text, _ = _jazzy().generate_msgdef(type_name, ros_version=2)
+    return Definition("ros2msg", text), _jazzy().hash_rihs01(type_name)
+
+
 @lru_cache(maxsize=256)
 def _store_of(type_name: str, definition: Definition | None) -> Typestore:
     """A store of what a definition holds: the type and all that it is made of; Jazzy's where there is none."""

@@ -22,4 +22,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _runs_until_stopped(words: Sequence[str]) -> bool:
     """Tell the relay, which has options and no command, and the demo from commands that end by themselves."""
-    return bool(words) and (words[0].startswith("-") or words[0] == "demo")
+    if not words or words[0] != "demo":
+        return bool(words) and words[0].startswith("-")
+    return not any(word.startswith("--record") for word in words)

@@ -169,10 +169,20 @@ def _demo(words: Sequence[str], stop: StopRequest) -> int:
     parser.add_argument("--seconds", metavar="N", type=_positive, help="end after N seconds, with a summary")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
     parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays")
+    parser.add_argument(
+        "--record",
+        metavar="OUT",
+        help="write what the rig sends in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT as a"
+        " rosbag2 folder",
+    )
     _add_help(parser)
     if _asks_for_help(words):
         return _print(parser.format_help())
     arguments = parser.read(words)
+    if arguments.record is not None:
+        from syncrelay.cli.demo_recording import record
+
+        return record(arguments.record, arguments.seconds, arguments.seed)
     from syncrelay.cli.demo import demo
 
     return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)

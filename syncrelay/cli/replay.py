@@ -7,10 +7,11 @@ from pathlib import Path
 
 from syncrelay.bag import Encoding, open_recording
 from syncrelay.bag.lines import drop_line, set_line
+from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import Listener
 from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.wiring import Wiring, wire
-from syncrelay.bag.writing import RecordingWriter
+from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
 from syncrelay.cli.progress import progress_of
 from syncrelay.cli.summary import summarize
@@ -73,7 +74,7 @@ def _printing(wanted: Wanted) -> Iterator[Listener]:
 def _writing(wanted: Wanted, wirings: Sequence[Wiring], opened: ExitStack) -> Iterator[Listener]:
     if wanted.output is None:
         return
-    writer = opened.enter_context(RecordingWriter(Path(wanted.output)))
+    writer = SetWriter(opened.enter_context(McapOutput(Path(wanted.output))))
     for wiring in wirings:
         writer.begin(wiring)
     channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)

@@ -6,9 +6,10 @@ import pytest
 from rosbags.rosbag2 import Reader
 
 from syncrelay.bag import open_recording
+from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import replay
 from syncrelay.bag.wiring import wire
-from syncrelay.bag.writing import RecordingWriter
+from syncrelay.bag.writing import SetWriter
 from syncrelay.config import load_text
 from tests.bag.making import write_mcap
 from tests.ros import recordings, relaying, test_recordings
@@ -42,7 +43,8 @@ def test_the_sets_of_a_replay_are_those_that_the_relay_gives(case, real_data: Pa
     group = {**case.group, "topics": inputs({topic: types[topic] for topic in case.topics})}
     recording = open_recording([str(bag)])
     wirings = wire(load_text(config({case.name: group}), environ={}), recording)
-    with RecordingWriter(tmp_path / "out") as writer:
+    with McapOutput(tmp_path / "out") as output:
+        writer = SetWriter(output)
         for wiring in wirings:
             writer.begin(wiring)
         (result,) = replay(recording, wirings, listeners=[writer.take])

@@ -9,10 +9,11 @@ from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
 from syncrelay.bag import open_recording
+from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.qos import PRESETS, Profile, output_profile, read_profiles, write_profile
 from syncrelay.bag.replay import replay
 from syncrelay.bag.wiring import wire
-from syncrelay.bag.writing import RecordingWriter
+from syncrelay.bag.writing import SetWriter
 from syncrelay.config import AUTO, QosOverrides, QosPreset, Severity, load_text
 from syncrelay.errors import BagError
 from tests.bag.making import BEST_EFFORT, CUSTOM, CUSTOM_STORE, CUSTOM_TEXT, blip, rig, write_mcap, write_ros1
@@ -29,7 +30,8 @@ _RIG = rig(10)
 def _written(bag: Path, output: Path, **keys) -> list[Frame]:
     """What a replay with a group of a camera and a lidar writes, as rosbags reads it."""
     group = {"policy": "approximate_time", "slop": "5ms", "topics": inputs(_PAIR), **keys}
-    with closing(open_recording([str(bag)])) as recording, RecordingWriter(output) as writer:
+    with closing(open_recording([str(bag)])) as recording, McapOutput(output) as written:
+        writer = SetWriter(written)
         wirings = wire(load_text(config({"front": group}), package_missing=Severity.NOTE), recording)
         for wiring in wirings:
             writer.begin(wiring)

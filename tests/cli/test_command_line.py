@@ -28,7 +28,7 @@ def test_help_names_every_command_and_option_on_stdout(tmp_path):
         ("validate", ["FILE", "--format"]),
         ("schema", ["JSON Schema"]),
         ("replay", ["BAG", "--config", "--output", "--json", "--drops"]),
-        ("demo", ["--seconds", "--seed", "--show-config"]),
+        ("demo", ["--seconds", "--seed", "--show-config", "--record"]),
     ],
 )
 def test_every_command_explains_itself(command, words, tmp_path):

@@ -50,13 +50,16 @@ def _publish(name: str, shots: Iterator[Shot], stop: threading.Event) -> None:
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
     from syncrelay.ros.rig.scene import SCENES  # noqa: PLC0415
+    from syncrelay.ros.types import import_type  # noqa: PLC0415
 
-    sensor, (message_type, make_frames) = SENSORS[name], SCENES[name]
+    sensor, (type_name, make_frames) = SENSORS[name], SCENES[name]
     frames = make_frames()
     reliability = ReliabilityPolicy.RELIABLE if sensor.reliable else ReliabilityPolicy.BEST_EFFORT
     rclpy.init(args=["--ros-args", *log_arguments()], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(name, namespace="/demo", start_parameter_services=False, enable_rosout=False)
-    publisher = node.create_publisher(message_type, sensor.topic, QoSProfile(depth=5, reliability=reliability))
+    publisher = node.create_publisher(
+        import_type(type_name), sensor.topic, QoSProfile(depth=5, reliability=reliability)
+    )
     up = time.time_ns()
     for shot in shots:
         if shot.sent < up:

@@ -1,17 +1,30 @@
-"""What the simulated sensors see, serialized once: colours that slide, a beam that sweeps a room, an IMU that turns."""
+"""What the simulated sensors see, serialized once: colours that slide, a beam that sweeps a room, an IMU that turns.
+
+No ROS is needed: rosbags serializes, so that the rig can be recorded where none is installed.
+"""
 
 import math
 import sys
 from array import array
 from collections.abc import Callable, Mapping
+from functools import cache
 from types import MappingProxyType
+from typing import Any, Final
 
-from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Image, Imu, PointCloud2, PointField
-from std_msgs.msg import Header
+import numpy as np
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+IMAGE: Final = "sensor_msgs/msg/Image"
+POINT_CLOUD: Final = "sensor_msgs/msg/PointCloud2"
+IMU: Final = "sensor_msgs/msg/Imu"
 
 WIDTH, HEIGHT = 640, 480
 RINGS, POINTS_PER_RING = 16, 1250
+
+_FIELDS: Final = ("x", "y", "z", "intensity")
+# sensor_msgs/msg/PointField.FLOAT32
+_FLOAT32: Final = 7
 
 # The scene turns once in two seconds for lidar and IMU; of the big images fewer are kept, and they slide faster.
 _IMAGES = 15
@@ -32,9 +45,7 @@ def _rainbow(turn: float) -> bytes:
 def _image(row: bytes, *, shift: int) -> bytes:
     step = 3 * WIDTH
     pixels = b"".join(row[3 * (shift + y) : 3 * (shift + y) + step] for y in range(HEIGHT))
-    message = Image(header=Header(frame_id="camera"), height=HEIGHT, width=WIDTH, encoding="rgb8", step=step)
-    message.data = array("B", pixels)
-    return bytes(serialize_message(message))
+    return _serialized(IMAGE, _header("camera"), HEIGHT, WIDTH, "rgb8", 0, step, np.frombuffer(pixels, np.uint8))
 
 
 def clouds() -> tuple[bytes, ...]:
@@ -62,15 +73,11 @@ def _room() -> "array[float]":
 def _cloud(room: "array[float]", *, beam: float) -> bytes:
     points = room[:]
     points[3::4] = array("f", [255 * (0.5 + 0.5 * math.cos(azimuth - beam)) ** 8 for azimuth in _azimuths()] * RINGS)
-    message = PointCloud2(header=Header(frame_id="lidar"), height=RINGS, width=POINTS_PER_RING, is_dense=True)
-    message.fields = [
-        PointField(name=name, offset=4 * place, datatype=PointField.FLOAT32, count=1)
-        for place, name in enumerate(("x", "y", "z", "intensity"))
-    ]
-    message.point_step, message.row_step = 16, 16 * POINTS_PER_RING
-    message.is_bigendian = sys.byteorder == "big"
-    message.data = array("B", points.tobytes())
-    return bytes(serialize_message(message))
+    fields = [_message("PointField", name, 4 * place, _FLOAT32, 1) for place, name in enumerate(_FIELDS)]
+    content = np.frombuffer(points.tobytes(), np.uint8)
+    is_bigendian = sys.byteorder == "big"
+    shape = (RINGS, POINTS_PER_RING, fields, is_bigendian, 16, 16 * POINTS_PER_RING, content, True)
+    return _serialized(POINT_CLOUD, _header("lidar"), *shape)
 
 
 def imu_samples() -> tuple[bytes, ...]:
@@ -79,13 +86,31 @@ def imu_samples() -> tuple[bytes, ...]:
 
 
 def _imu_sample(yaw: float) -> bytes:
-    message = Imu(header=Header(frame_id="imu"))
-    message.orientation.z, message.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
-    message.angular_velocity.z = math.tau / 2
-    message.linear_acceleration.z = 9.81
-    return bytes(serialize_message(message))
+    orientation = _message("Quaternion", 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2), package="geometry_msgs")
+    turning = _message("Vector3", 0.0, 0.0, math.tau / 2, package="geometry_msgs")
+    gravity = _message("Vector3", 0.0, 0.0, 9.81, package="geometry_msgs")
+    unknown = np.zeros(9)
+    return _serialized(IMU, _header("imu"), orientation, unknown, turning, unknown, gravity, unknown)
 
 
-SCENES: Mapping[str, tuple[type, Callable[[], tuple[bytes, ...]]]] = MappingProxyType(
-    {"camera": (Image, images), "lidar": (PointCloud2, clouds), "imu": (Imu, imu_samples)}
+@cache
+def _types() -> Typestore:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def _message(name: str, *fields: Any, package: str = "sensor_msgs") -> Any:
+    return _types().types[f"{package}/msg/{name}"](*fields)
+
+
+def _header(frame_id: str) -> Any:
+    return _message("Header", _message("Time", 0, 0, package="builtin_interfaces"), frame_id, package="std_msgs")
+
+
+def _serialized(type_name: str, *fields: Any) -> bytes:
+    return bytes(_types().serialize_cdr(_types().types[type_name](*fields), type_name))
+
+
+SCENES: Mapping[str, tuple[str, Callable[[], tuple[bytes, ...]]]] = MappingProxyType(
+    {"camera": (IMAGE, images), "lidar": (POINT_CLOUD, clouds), "imu": (IMU, imu_samples)}
 )
+"""The type of each sensor's messages, and what makes them."""
