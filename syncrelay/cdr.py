@@ -13,6 +13,9 @@ Payload: TypeAlias = bytes | bytearray | memoryview
 _NS_PER_SECOND: Final = 1_000_000_000
 _STAMP_AT: Final = 4
 _STAMP_END: Final = 12
+STAMP_BYTES: Final = slice(_STAMP_AT, _STAMP_END)
+"""Where the stamp of a leading Header lies in a payload."""
+
 _MIN_SECONDS: Final = -(2**31)
 _MAX_SECONDS: Final = 2**31 - 1
 _BIG_ENDIAN: Final = Struct(">iI")
@@ -49,11 +52,19 @@ def patch_stamp(payload: Payload, stamp: int) -> bytes:
 
     Raises ValueError where `read_stamp` would give None, and for a stamp whose seconds don't fit an int32.
     """
+    whole = memoryview(payload)
+    return b"".join((whole[:_STAMP_AT], _stamp_bytes(payload, stamp), whole[_STAMP_END:]))
+
+
+def write_stamp(payload: bytearray | memoryview, stamp: int) -> None:
+    """Set the stamp of the payload's leading Header in place; otherwise as `patch_stamp`."""
+    payload[STAMP_BYTES] = _stamp_bytes(payload, stamp)
+
+
+def _stamp_bytes(payload: Payload, stamp: int) -> bytes:
     if read_stamp(payload) is None:
         raise ValueError("the payload has no stamp to patch")
     seconds, nanoseconds = divmod(stamp, _NS_PER_SECOND)
     if not _MIN_SECONDS <= seconds <= _MAX_SECONDS:
         raise ValueError(f"a stamp of {stamp} ns does not fit builtin_interfaces/Time")
-    whole = memoryview(payload)
-    stamp_bytes = _STAMP_LAYOUTS[payload[1]].pack(seconds, nanoseconds)
-    return b"".join((whole[:_STAMP_AT], stamp_bytes, whole[_STAMP_END:]))
+    return _STAMP_LAYOUTS[payload[1]].pack(seconds, nanoseconds)

@@ -5,9 +5,9 @@ from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from typing import Any, NamedTuple
 
-from syncrelay.cdr import patch_stamp
 from syncrelay.config import GroupConfig
 from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.ros.path import Outlet
 from syncrelay.sync import Drop, DropReason, Match, Message
 
 # Enough for the widest terminal's strip of recent sets.
@@ -19,7 +19,7 @@ _WATCHED = 10_000
 class Received(NamedTuple):
     """What the engine carries: a payload, and when DDS received it, in nanoseconds of the system clock."""
 
-    payload: bytes
+    payload: Any
     at: int
 
 
@@ -47,17 +47,17 @@ class GroupRelay:
         self._keys: list[Hashable] = [None] * self._n_inputs
         self._watch()
         self._restamped = [False] * len(config.topics)
-        self._publish: list[Callable[[bytes], None] | None] = [None] * len(config.topics)
+        self._outlets: list[Outlet | None] = [None] * len(config.topics)
 
-    def connect(self, index: int, publisher: Any, *, restamped: bool) -> None:
-        """Publish one input's messages through an rclpy publisher from now on.
+    def connect(self, index: int, outlet: Outlet, *, restamped: bool) -> None:
+        """Publish one input's messages through an outlet from now on.
 
         `restamped` says that its payloads begin with a Header, whose stamp the set's common stamp replaces.
         """
-        self._publish[index] = publisher.handle.publish_raw
+        self._outlets[index] = outlet
         self._restamped[index] = restamped
 
-    def receive(self, index: int, payload: bytes, received: int, stamp: int | None) -> None:
+    def receive(self, index: int, payload: Any, received: int, stamp: int | None) -> None:
         """Take in a message of one input by its stamp, None where none could be read; times in nanoseconds."""
         if stamp is None:
             self._reject(index, payload, received)
@@ -65,7 +65,7 @@ class GroupRelay:
         self._arrivals[index].append((stamp, received))
         self._settle(self.engine.add(Message(index, stamp, Received(payload, received)), now=self._now()))
 
-    def receive_keyed(self, index: int, payload: bytes, received: int, stamp: int | None, key: Hashable) -> None:
+    def receive_keyed(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable) -> None:
         """Take in a message that is matched by its key; None where none could be read."""
         if stamp is None or key is None:
             self._reject(index, payload, received)
@@ -84,7 +84,7 @@ class GroupRelay:
         self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
         self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
 
-    def _reject(self, index: int, payload: bytes, received: int) -> None:
+    def _reject(self, index: int, payload: Any, received: int) -> None:
         self._settle([self.engine.reject(Message(index, 0, Received(payload, received)), DropReason.MALFORMED)])
 
     def expire(self, now: int) -> None:
@@ -109,14 +109,15 @@ class GroupRelay:
     def _send(self, match: Match) -> int:
         """Publish a set; when its newest message was received."""
         newest = 0
-        for message, publish, restamped in zip(match.messages, self._publish, self._restamped, strict=True):
+        for message, outlet, restamped in zip(match.messages, self._outlets, self._restamped, strict=True):
             if message is None:
                 continue
             payload, received = message.payload
             newest = max(newest, received)
-            if publish is None:
+            if outlet is None:
                 continue
             if match.stamp is not None and restamped:
-                payload = patch_stamp(payload, match.stamp)
-            publish(payload)
+                outlet.send_stamped(payload, match.stamp)
+            else:
+                outlet.send(payload)
         return newest

@@ -15,8 +15,8 @@ from syncrelay.config import TopicConfig
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint
 from syncrelay.ros import graph
-from syncrelay.ros.backlog import Deliver, Subscription
 from syncrelay.ros.group import GroupRelay
+from syncrelay.ros.path import Content, Deliver, Path, Source
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.types import begins_with_header, import_type, stamp_reader, value_reader
@@ -43,13 +43,14 @@ class TopicInput:
     Looked at on the main thread; its entities are swapped on the receive thread.
     """
 
-    def __init__(self, config: TopicConfig, *, name: str, node: Any, loop: ReceiveLoop) -> None:
+    def __init__(self, config: TopicConfig, *, name: str, node: Any, path: Path, loop: ReceiveLoop) -> None:
         self._topic = config.topic
         self.type = config.type
         self.publishers: tuple[Endpoint, ...] = ()
         self.not_importable: str | None = None
         self._qos = config.qos
         self._node = node
+        self._path = path
         self._loop = loop
         self.name = name
         self.missing: str | None = f"a publisher of {self.name} ({self.type})"
@@ -59,6 +60,7 @@ class TopicInput:
         self._message_type: Any = None
         self._profile: Any = None
         self._subscription: Any = None
+        self._source: Source | None = None
         self._publishers: list[Any] = []
         self._lost: Any = None
         self._said: set[str] = set()
@@ -87,7 +89,7 @@ class TopicInput:
         importlib.invalidate_caches()
         try:
             message_type = import_type(self.type)
-            self._takers = [_taker(group, index, message_type) for group, index in self._users]
+            self._takers = [taker(group, index, message_type) for group, index in self._users]
         except TypeImportError as error:
             self.not_importable = str(error)
             self._say_once(logging.ERROR, f"{self.name}: {error}")
@@ -157,18 +159,19 @@ class TopicInput:
     def _swap(self, subscription: Any, publishers: list[Any]) -> None:
         with_header = begins_with_header(self._message_type)
         for (group, index), publisher in zip(self._users, publishers, strict=True):
-            group.connect(index, publisher, restamped=with_header)
-        if self._subscription is not None:
-            self._loop.remove(self._subscription)
+            group.connect(index, self._path.outlet(publisher), restamped=with_header)
+        if self._source is not None:
+            self._loop.remove(self._source)
             self._node.destroy_subscription(self._subscription)
         for publisher in self._publishers:
             self._node.destroy_publisher(publisher)
         self._subscription, self._publishers = subscription, publishers
-        self._loop.add(Subscription(subscription, self._takers[0] if len(self._takers) == 1 else self._deliver))
+        self._source = self._path.source(subscription, self._takers[0] if len(self._takers) == 1 else self._deliver)
+        self._loop.add(self._source)
 
-    def _deliver(self, payload: bytes, received: int) -> None:
+    def _deliver(self, payload: Any, content: Content, received: int) -> None:
         for take in self._takers:
-            take(payload, received)
+            take(payload, content, received)
 
     def wait_until_acknowledged(self, deadline: int) -> None:
         """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
@@ -177,17 +180,18 @@ class TopicInput:
             publisher.wait_for_all_acked(Duration(nanoseconds=left))
 
 
-def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
+def taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
+    """What feeds one input of a group from messages of a type; raises TypeImportError where a field is not there."""
     topic = group.config.topics[index]
     read_stamp = stamp_reader(topic.stamp, message_type)
     if topic.key is not None:
         read_key = value_reader(message_type, topic.key)
-        return lambda payload, received: group.receive_keyed(
-            index, payload, received, read_stamp(payload) if read_stamp else received, read_key(payload)
+        return lambda payload, content, received: group.receive_keyed(
+            index, payload, received, read_stamp(content) if read_stamp else received, read_key(content)
         )
     if read_stamp is None:
-        return lambda payload, received: group.receive(index, payload, received, received)
-    return lambda payload, received: group.receive(index, payload, received, read_stamp(payload))
+        return lambda payload, _, received: group.receive(index, payload, received, received)
+    return lambda payload, content, received: group.receive(index, payload, received, read_stamp(content))
 
 
 def _never_called(_: bytes) -> None:
@@ -208,13 +212,13 @@ class Wiring:
         return ", ".join(each.missing for topic, each in inputs if each.missing and topic.required) or None
 
 
-def wire(groups: Sequence[GroupRelay], *, node: Any, loop: ReceiveLoop) -> list[Wiring]:
+def wire(groups: Sequence[GroupRelay], *, node: Any, path: Path, loop: ReceiveLoop) -> list[Wiring]:
     """Make one input per topic, however many groups use it and whatever they call it."""
     inputs: dict[str, TopicInput] = {}
 
     def input_of(topic: TopicConfig) -> TopicInput:
         name = node.resolve_topic_name(topic.topic)
-        return inputs.setdefault(name, TopicInput(topic, name=name, node=node, loop=loop))
+        return inputs.setdefault(name, TopicInput(topic, name=name, node=node, path=path, loop=loop))
 
     wirings = [Wiring(group, tuple(input_of(topic) for topic in group.config.topics)) for group in groups]
     for wiring in wirings:

@@ -1,7 +1,7 @@
 """The receive loop: one thread that takes every message as bytes and hands it on, in the order of arrival.
 
 rclpy's executors rebuild their wait set for every callback, which is most of the cost of a small message.
-Here a wake drains all subscriptions that are ready.
+Here a wake drains all sources that are ready.
 """
 
 import time
@@ -10,10 +10,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
-from rclpy.guard_condition import GuardCondition
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-
-from syncrelay.ros.backlog import Backlog, Subscription
+from syncrelay.ros.backlog import Backlog
+from syncrelay.ros.path import Source, Watch
 
 _Result = TypeVar("_Result")
 
@@ -22,7 +20,7 @@ _BEAT_NS = 1_000_000_000
 
 
 class ReceiveLoop:
-    """Drains raw subscriptions on the thread that calls `run`.
+    """Drains sources of one path on the thread that calls `run`.
 
     Only `call` and `stop` may be used from other threads. `deadline` says when `expire` wants to be called
     next, by the clock of `now`, in nanoseconds; None for never. `beat` is called at every turn, at least once
@@ -31,23 +29,22 @@ class ReceiveLoop:
 
     def __init__(
         self,
-        context: Any,
+        watch: Watch,
         *,
         now: Callable[[], int],
         deadline: Callable[[], int | None],
         expire: Callable[[int], None],
         beat: Callable[[], None] | None = None,
     ) -> None:
-        self._context = context
+        self._watch = watch
         self._now = now
         self._deadline = deadline
         self._expire = expire
         self._beat = beat
-        self._subscriptions: list[Subscription] = []
+        self._sources: list[Source] = []
         self._backlog = Backlog()
-        self._wait_set: Any = None
-        self._guard = GuardCondition(callback=None, callback_group=None, context=context)
         self._calls: deque[tuple[Future[Any], Callable[[], None]]] = deque()
+        self._next_deadline: int | None = None
         self._stopping = False
         self._ended = False
 
@@ -80,38 +77,36 @@ class ReceiveLoop:
 
     def wake(self) -> None:
         """Have the loop look at its calls and deadlines now."""
-        self._guard.trigger()
+        self._watch.wake()
 
     def stop(self) -> None:
         """Have `run` take what has arrived, carry out the calls still due, and return."""
         self._stopping = True
         self.wake()
 
-    def add(self, subscription: Subscription) -> None:
-        """Drain one more subscription. On the loop's thread, or before it runs."""
-        self._replace_all([*self._subscriptions, subscription])
+    def add(self, source: Source) -> None:
+        """Drain one more source. On the loop's thread, or before it runs."""
+        self._watch.add(source)
+        self._sources.append(source)
 
-    def remove(self, subscription: Any) -> None:
-        """Take what a subscription has, then stop draining it: it may be destroyed. On the loop's thread."""
-        self._backlog.deliver(self._subscriptions, seen_until=time.time_ns())
-        self._backlog.forget(subscription)
-        self._replace_all([kept for kept in self._subscriptions if kept.subscription is not subscription])
-
-    def _replace_all(self, subscriptions: list[Subscription]) -> None:
-        self._subscriptions = subscriptions
-        self._wait_set = None
+    def remove(self, source: Source) -> None:
+        """Take what a source has, then stop draining it: it may be destroyed. On the loop's thread."""
+        self._backlog.deliver_until(time.time_ns(), self._sources)
+        self._backlog.forget(source)
+        self._watch.remove(source)
+        self._sources.remove(source)
 
     def run(self) -> None:
         """Receive until `stop` is called."""
         try:
             while not self._stopping:
                 self._carry_out_calls()
-                asked_at = time.time_ns()
-                self._backlog.deliver(self._wait(), seen_until=asked_at)
                 self._expire_due()
+                self._backlog.deliver(self._watch.wait(self._timeout()))
                 if self._beat is not None:
                     self._beat()
-            self._backlog.deliver_all(self._subscriptions, until=time.time_ns())
+            self._backlog.deliver_until(time.time_ns(), self._sources)
+            self._backlog.deliver_held()
             self._carry_out_calls()
         finally:
             self._ended = True
@@ -119,8 +114,7 @@ class ReceiveLoop:
 
     def close(self) -> None:
         """Free what the loop holds of rcl. After `run` has returned."""
-        self._wait_set = None
-        self._guard.destroy()
+        self._watch.close()
 
     def _carry_out_calls(self) -> None:
         while self._calls:
@@ -131,34 +125,17 @@ class ReceiveLoop:
             self._calls.popleft()[0].cancel()
 
     def _expire_due(self) -> None:
-        deadline = self._deadline()
-        if deadline is not None and (now := self._now()) >= deadline:
+        self._next_deadline = self._deadline()
+        if self._next_deadline is not None and (now := self._now()) >= self._next_deadline:
             self._expire(now)
-
-    def _wait(self) -> list[Subscription]:
-        """Sleep until something is there; the subscriptions that are ready."""
-        if self._wait_set is None:
-            self._wait_set = _rclpy.WaitSet(len(self._subscriptions), 1, 0, 0, 0, 0, self._context.handle)
-        wait_set = self._wait_set
-        # rcl forgets the entities that were not ready, so all are named again for every wait.
-        wait_set.clear_entities()
-        wait_set.add_guard_condition(self._guard.handle)
-        for subscription in self._subscriptions:
-            wait_set.add_subscription(subscription.subscription.handle)
-        wait_set.wait(self._timeout())
-        return [
-            subscription
-            for index, subscription in enumerate(self._subscriptions)
-            if wait_set.is_ready("subscription", index)
-        ]
+            self._next_deadline = self._deadline()
 
     def _timeout(self) -> int:
         """Nanoseconds until the next deadline, none while messages are held; negative waits for ever."""
         if self._backlog:
             return 0
-        deadline = self._deadline()
         longest = -1 if self._beat is None else _BEAT_NS
-        if deadline is None:
+        if self._next_deadline is None:
             return longest
-        left = max(0, deadline - self._now())
+        left = max(0, self._next_deadline - self._now())
         return left if self._beat is None else min(left, longest)

@@ -1,6 +1,7 @@
 """The node: subscribes to what the file names as it appears, and keeps its groups at work."""
 
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable, Collection, Sequence
@@ -25,6 +26,7 @@ from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.inputs import Wiring, wire
 from syncrelay.ros.logs import RosoutHandler
 from syncrelay.ros.monitor import LOOK_S, Monitor
+from syncrelay.ros.path_choice import VARIABLE, choose_path
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.status import Phase, RelayState
@@ -73,11 +75,13 @@ class Relay:
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
         chosen = [group for group in config.groups if groups is None or group.name in groups]
+        path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
+        self.receive_path = path.name
         self._loop = ReceiveLoop(
-            self._context, now=self._now, deadline=self._deadline, expire=self._expire, beat=self._turn
+            path.watch(), now=self._now, deadline=self._deadline, expire=self._expire, beat=self._turn
         )
         self._groups = [GroupRelay(group, now=self._now) for group in chosen]
-        self._wirings = wire(self._groups, node=self.node, loop=self._loop)
+        self._wirings = wire(self._groups, node=self.node, path=path, loop=self._loop)
         self._inputs = list(dict.fromkeys(each for wiring in self._wirings for each in wiring.inputs))
         self.monitor = Monitor(self._wirings, node=self.node, loop=self._loop, simulated=self._sim_time)
         self._tellers = _tellers(config, self.node, chosen)

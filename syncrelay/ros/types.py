@@ -8,8 +8,9 @@ from syncrelay.cdr import read_stamp
 from syncrelay.cdr_fields import UnreadableFieldError, field_reader
 from syncrelay.config import StampField, StampSource
 from syncrelay.errors import TypeImportError
+from syncrelay.ros.path import Content
 
-StampReader: TypeAlias = Callable[[bytes], int | None]
+StampReader: TypeAlias = Callable[[Content], int | None]
 """From a payload to its stamp in nanoseconds; None where none can be read."""
 
 
@@ -42,7 +43,7 @@ def stamp_reader(source: StampSource, message_type: Any) -> StampReader | None:
     return read_stamp if source == "header" else None
 
 
-def value_reader(message_type: Any, path: str) -> Callable[[bytes], Any]:
+def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:
     """What reads the field at a dotted path: a number, a text, or a time in nanoseconds; None where it cannot.
 
     Raises TypeImportError where the type has no such field.

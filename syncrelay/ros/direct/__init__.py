@@ -1,0 +1,1 @@
+"""The direct path: serialized messages taken and published in librcl, without a copy in Python."""

@@ -1,0 +1,69 @@
+"""Which subscriptions have messages: told by the kernel, at a cost that does not grow with their number.
+
+An rcl wait set is filled, attached to every reader and taken apart again for each wait. Here DDS writes to an eventfd
+of the subscription when a message arrives, and an edge-triggered epoll gives those that were written to.
+"""
+
+import os
+import select
+import time
+from ctypes import c_void_p, cast
+from typing import Final
+
+from syncrelay.ros.direct.messages import DirectSource
+from syncrelay.ros.direct.rcl import Rcl
+from syncrelay.ros.path import Look
+
+_NS_PER_SECOND: Final = 1_000_000_000
+_EDGE: Final = select.EPOLLIN | select.EPOLLET
+_FLAGS: Final = os.EFD_NONBLOCK | os.EFD_CLOEXEC
+
+
+class EventWatch:
+    """Waits for the arrival of messages. Times out to the millisecond, late rather than early."""
+
+    def __init__(self, rcl: Rcl) -> None:
+        self._rcl = rcl
+        self._notify = cast(rcl.eventfd_write, c_void_p)
+        self._epoll = select.epoll()
+        self._sources: dict[int, DirectSource] = {}
+        self._wake = os.eventfd(0, _FLAGS)
+        self._epoll.register(self._wake, _EDGE)
+
+    def add(self, source: DirectSource) -> None:
+        """Watch one more source; what it has already is found by the next wait. Raises RclCallError."""
+        event = os.eventfd(0, _FLAGS)
+        self._epoll.register(event, _EDGE)
+        self._sources[event] = source
+        code = self._rcl.set_on_new_message(source.address, self._notify, event)
+        self._rcl.require(code, "rcl_subscription_set_on_new_message_callback")
+        os.eventfd_write(event, 1)
+
+    def remove(self, source: DirectSource) -> None:
+        """Watch it no longer. Raises RclCallError."""
+        event = next(event for event, each in self._sources.items() if each is source)
+        # Before the number of the eventfd may stand for another file.
+        code = self._rcl.set_on_new_message(source.address, None, None)
+        self._rcl.require(code, "rcl_subscription_set_on_new_message_callback")
+        del self._sources[event]
+        self._epoll.unregister(event)
+        os.close(event)
+
+    def wait(self, timeout_ns: int) -> Look:
+        """Wait until a source gets messages, for the timeout at most, or until a wake."""
+        events = self._epoll.poll(None if timeout_ns < 0 else timeout_ns / _NS_PER_SECOND)
+        # What woke us says nothing of the sources that were written to a moment later.
+        seen_until = time.time_ns()
+        events += self._epoll.poll(0)
+        return Look([self._sources[event] for event, _ in events if event != self._wake], seen_until)
+
+    def wake(self) -> None:
+        """Have `wait` return. Any thread."""
+        os.eventfd_write(self._wake, 1)
+
+    def close(self) -> None:
+        """Leave the sources that are left, and free all files."""
+        for source in list(self._sources.values()):
+            self.remove(source)
+        self._epoll.close()
+        os.close(self._wake)

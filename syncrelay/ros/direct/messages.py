@@ -1,0 +1,63 @@
+"""Messages taken and published from where they lie."""
+
+from ctypes import addressof
+from typing import Any, Final
+
+from syncrelay.cdr import STAMP_BYTES, write_stamp
+from syncrelay.ros.direct.buffers import Payload, Pool
+from syncrelay.ros.direct.rcl import NOTHING_TAKEN, MessageInfo, Rcl
+from syncrelay.ros.path import Deliver, Taken
+
+
+class DirectSource:
+    """A subscription drained by librcl."""
+
+    def __init__(self, rcl: Rcl, pool: Pool, subscription: Any, deliver: Deliver) -> None:
+        self.deliver = deliver
+        self._pool = pool
+        self.address: Final[int] = subscription.handle.pointer
+        # It owns what the address points to.
+        self._subscription = subscription
+        self._rcl = rcl
+        self._call = rcl.take
+        self._info = MessageInfo()
+        self._info_address = addressof(self._info)
+        self._next = self._pool.lend()
+
+    def take(self) -> Taken | None:
+        """Take its oldest message; None if there is none. Raises RclCallError."""
+        memory = self._next
+        code = self._call(self.address, memory.address, self._info_address, None)
+        if code:
+            if code != NOTHING_TAKEN:
+                self._rcl.require(code, "rcl_take_serialized_message")
+            return None
+        self._next = self._pool.lend()
+        return self._info.received_timestamp, Payload(memory, self._pool), memory.content()
+
+
+class DirectOutlet:
+    """A publisher that librcl sends through."""
+
+    def __init__(self, rcl: Rcl, publisher: Any) -> None:
+        self._rcl = rcl
+        self._call = rcl.publish
+        # It owns what the address points to.
+        self._publisher = publisher
+        self._address: Final[int] = publisher.handle.pointer
+
+    def send(self, payload: Payload) -> None:
+        """Publish a payload unchanged. Raises RclCallError."""
+        code = self._call(self._address, payload.memory.address, None)
+        if code:
+            self._rcl.require(code, "rcl_publish_serialized_message")
+
+    def send_stamped(self, payload: Payload, stamp: int) -> None:
+        """Publish a payload with this stamp, and put its own back: another set may hold it too."""
+        content = payload.memory.content()
+        own = bytes(content[STAMP_BYTES])
+        write_stamp(content, stamp)
+        try:
+            self.send(payload)
+        finally:
+            content[STAMP_BYTES] = own

@@ -1,0 +1,94 @@
+"""How serialized messages come out of rcl and go back into it: what every path offers to the receive loop."""
+
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+Content: TypeAlias = bytes | memoryview
+"""A message's bytes, to read fields from at once; they are not kept."""
+Deliver: TypeAlias = Callable[[Any, Content, int], None]
+"""Takes a payload, its content, and the time DDS received it, in nanoseconds of the system clock."""
+Taken: TypeAlias = tuple[int, Any, Content]
+"""The time of receipt, the payload as the engine carries it, and its content."""
+
+
+class PathName(Enum):
+    """The paths there are, by the names that users give them."""
+
+    DIRECT = "direct"
+    RCLPY = "rclpy"
+
+
+class Source(Protocol):
+    """A subscription that is drained."""
+
+    deliver: Deliver
+
+    def take(self) -> Taken | None:
+        """Take its oldest message; None if there is none."""
+        ...
+
+
+class Outlet(Protocol):
+    """A publisher of payloads as they came."""
+
+    def send(self, payload: Any) -> None:
+        """Publish a payload unchanged."""
+        ...
+
+    def send_stamped(self, payload: Any, stamp: int) -> None:
+        """Publish a payload with another stamp, in nanoseconds, in its leading Header; the payload keeps its own."""
+        ...
+
+
+class Look(NamedTuple):
+    """Sources that may have got messages since they were drained.
+
+    Whatever was received up to `seen_until`, in nanoseconds of the system clock, is in one of them, or in one that
+    was not drained. A source is drained when `take` gave None.
+    """
+
+    sources: Sequence[Source]
+    seen_until: int
+
+
+class Watch(Protocol):
+    """Tells which sources have messages."""
+
+    def add(self, source: Any) -> None:
+        """Watch one more source, of the same path."""
+        ...
+
+    def remove(self, source: Any) -> None:
+        """Watch it no longer."""
+        ...
+
+    def wait(self, timeout_ns: int) -> Look:
+        """Wait until a source gets messages, for the timeout at most, or until a wake; a negative one is for ever."""
+        ...
+
+    def wake(self) -> None:
+        """Have `wait` return. Any thread."""
+        ...
+
+    def close(self) -> None:
+        """Free what the watch holds."""
+        ...
+
+
+class Path(Protocol):
+    """One way through rcl. What its sources give, its outlets take."""
+
+    name: PathName
+
+    def source(self, subscription: Any, deliver: Deliver) -> Any:
+        """Drain a raw rclpy subscription from now on."""
+        ...
+
+    def outlet(self, publisher: Any) -> Outlet:
+        """Publish through an rclpy publisher."""
+        ...
+
+    def watch(self) -> Watch:
+        """Make a watch, with no sources yet."""
+        ...

@@ -1,0 +1,264 @@
+"""The direct path from within: whose memory a message is, and what of it Python gets to see."""
+
+import ctypes
+import gc
+import threading
+import tracemalloc
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import pytest
+
+from syncrelay.config import load
+from syncrelay.errors import RosUnavailableError, UsageError
+from syncrelay.ros.group import GroupRelay
+from syncrelay.ros.path import PathName
+from syncrelay.sync import DropReason
+from tests.ros.cdr_messages import VECTOR, padded, stamp_of, vector, with_stamp
+from tests.ros.configs import config, inputs
+from tests.ros.streams import BEGIN, MS
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+qos = pytest.importorskip("rclpy.qos")
+Vector3Stamped = pytest.importorskip("geometry_msgs.msg").Vector3Stamped
+check = pytest.importorskip("syncrelay.ros.direct.check")
+messages = pytest.importorskip("syncrelay.ros.direct.messages")
+rcl = pytest.importorskip("syncrelay.ros.direct.rcl")
+buffers = pytest.importorskip("syncrelay.ros.direct.buffers")
+choose_path = pytest.importorskip("syncrelay.ros.path_choice").choose_path
+taker = pytest.importorskip("syncrelay.ros.inputs").taker
+
+pytestmark = pytest.mark.ros
+
+_IMAGE_BYTES = 1_000_000
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+
+
+@pytest.fixture
+def here(ros_domain: int) -> Iterator[SimpleNamespace]:
+    """A node of this process, and the direct path as it proved itself on it."""
+
+    context = rclpy.context.Context()
+    rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
+    node = rclpy.create_node("here", context=context)
+    try:
+        yield SimpleNamespace(node=node, context=context, path=check.checked_path(node), rcl=rcl.Rcl())
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+
+
+@pytest.fixture
+def topic(here) -> Iterator[SimpleNamespace]:
+    """A topic with a subscription and a publisher that keep all."""
+
+    profile = qos.QoSProfile(history=qos.HistoryPolicy.KEEP_ALL)
+    subscription = here.node.create_subscription(Vector3Stamped, "/t", print, profile, raw=True)
+    publisher = here.node.create_publisher(Vector3Stamped, "/t", profile)
+    yield SimpleNamespace(subscription=subscription, publisher=publisher)
+    here.node.destroy_subscription(subscription)
+    here.node.destroy_publisher(publisher)
+
+
+def _group(tmp_path, **keys):
+    path = tmp_path / "group.yaml"
+    path.write_text(config({"front": {"policy": "exact_time", "topics": inputs(_PAIR), **keys}}))
+    return GroupRelay(load(str(path)).groups[0], now=lambda: 0)
+
+
+class _CountingPool(buffers.Pool):
+    """Refuses to lend what is out, and to take back what is not."""
+
+    def __init__(self, functions):
+        super().__init__(functions)
+        self.out = set()
+        self.lendings = self.most = 0
+
+    def lend(self):
+        memory = super().lend()
+        assert memory.address not in self.out
+        self.out.add(memory.address)
+        self.lendings += 1
+        self.most = max(self.most, len(self.out))
+        return memory
+
+    def give_back(self, memory):
+        self.out.remove(memory.address)
+        super().give_back(memory)
+
+
+def _source(here, topic, deliver, pool=None):
+    return messages.DirectSource(here.rcl, pool or buffers.Pool(here.rcl), topic.subscription, deliver)
+
+
+def test_a_message_comes_out_as_it_went_in(here, topic):
+    source = here.path.source(topic.subscription, print)
+    payload = vector(BEGIN, frame_id="a frame")
+    topic.publisher.publish(payload)
+    received, _, content = source.take()
+    assert bytes(content) == padded(payload)
+    assert received > BEGIN
+    assert source.take() is None
+
+
+def test_every_memory_comes_back_once_whatever_became_of_its_message(here, topic, tmp_path):
+    # One topic feeds both inputs of two groups: each message has up to four owners at a time.
+    pool = _CountingPool(here.rcl)
+    groups = [_group(tmp_path, queue_size=5), _group(tmp_path, queue_size=20)]
+    for group in groups:
+        for index in range(2):
+            group.connect(index, here.path.outlet(topic.publisher), restamped=True)
+
+    def deliver(payload, content, received):
+        stamp = stamp_of(bytes(content))
+        for group in groups:
+            group.receive(stamp // MS % 2, payload, received, stamp)
+
+    source = _source(here, topic, deliver, pool)
+    for n in range(2000):
+        # Even and odd stamps never match, so the queues are always full and most overflow.
+        topic.publisher.publish(vector(BEGIN + n * MS))
+        received, payload, content = source.take()
+        source.deliver(payload, content, received)
+    assert pool.lendings == 2001
+    # Both groups keep twenty of each input at most; one is being delivered and one is for the next message.
+    assert pool.most <= 2 * 20 + 2
+    del payload, content
+    for group in groups:
+        group.flush(DropReason.SHUTDOWN)
+    gc.collect()
+    assert pool.lent == len(pool.out) == 1
+
+
+def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, topic):
+    source = _source(here, topic, print)
+    outlet = here.path.outlet(topic.publisher)
+    original = padded(vector(BEGIN))
+    topic.publisher.publish(original)
+    _, payload, content = source.take()
+    outlet.send_stamped(payload, BEGIN + 5)
+    assert bytes(content) == original
+    outlet.send(payload)
+    _, stamped, stamped_content = source.take()
+    _, unchanged, unchanged_content = source.take()
+    assert bytes(stamped_content) == with_stamp(original, BEGIN + 5)
+    assert bytes(unchanged_content) == original
+    assert len({payload.memory.address, stamped.memory.address, unchanged.memory.address}) == 3
+
+
+def test_a_burst_takes_no_more_memory_than_the_queues_and_gives_it_back(here, topic, tmp_path):
+    pool = _CountingPool(here.rcl)
+    group = _group(tmp_path, queue_size=30)
+    source = _source(here, topic, lambda *_: None, pool)
+    for n in range(500):
+        topic.publisher.publish(vector(BEGIN + n * MS))
+    while (taken := source.take()) is not None:
+        received, payload, content = taken
+        group.receive(0, payload, received, stamp_of(bytes(content)))
+    counts = group.engine.counts()[0]
+    assert counts.fed == 500
+    assert counts.dropped == {DropReason.OVERFLOW: 470}
+    assert pool.most <= 30 + 2
+    del taken, payload, content
+    group.flush(DropReason.SHUTDOWN)
+    assert pool.made - pool.freed <= 10
+
+
+def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):
+    """Nor are they deserialized: behind the stamp there is nothing that any type could be read from."""
+    payload = padded(vector(BEGIN)[:12] + b"\xff" * _IMAGE_BYTES)
+    stamps = [BEGIN + n * MS for n in range(20)]
+    group = _group(tmp_path, restamp="latest")
+    kept = _source(here, topic, print)
+    for index in range(2):
+        group.connect(index, here.path.outlet(topic.publisher), restamped=True)
+    takers = _takers(group)
+    for stamp in [stamp for stamp in stamps for _ in range(2)]:
+        topic.publisher.publish(with_stamp(payload, stamp))
+    tracemalloc.start()
+    for n in range(2 * len(stamps)):
+        received, message, content = kept.take()
+        takers[n % 2](message, content, received)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert group.engine.sets == len(stamps)
+    assert peak < _IMAGE_BYTES / 10
+    sent = [bytes(kept.take()[2]) for _ in range(2 * len(stamps))]
+    assert sent == [with_stamp(payload, stamp) for stamp in stamps for _ in range(2)]
+
+
+def _takers(group):
+    return [taker(group, index, Vector3Stamped) for index in range(2)]
+
+
+def test_a_watch_sees_what_came_before_it_what_comes_later_and_a_wake(here, topic):
+    source, watch = here.path.source(topic.subscription, print), here.path.watch()
+    topic.publisher.publish(vector(BEGIN))
+    watch.add(source)
+    assert watch.wait(-1).sources == [source]
+    source.take()
+    topic.publisher.publish(vector(BEGIN + MS))
+    look = watch.wait(-1)
+    assert look.sources == [source]
+    assert source.take()[0] <= look.seen_until
+    while watch.wait(0).sources:
+        assert source.take() is None
+    threading.Timer(0, watch.wake).start()
+    assert watch.wait(-1).sources == []
+    watch.remove(source)
+    topic.publisher.publish(vector(BEGIN + 2 * MS))
+    assert watch.wait(0).sources == []
+    watch.close()
+
+
+def _structure(*fields):
+    return type("Other", (ctypes.Structure,), {"_fields_": list(fields)})
+
+
+@pytest.mark.parametrize(
+    ("structure", "other", "reason"),
+    [
+        ("_RoomyMessage", ("message", "buffer length capacity"), "larger"),
+        ("_RoomyMessage", ("message", "length buffer capacity"), "fields|larger"),
+        ("_RoomyInfo", ("info", "source_timestamp received_timestamp"), "larger"),
+        ("_RoomyInfo", ("info", "gid received_timestamp source_timestamp a b c d e"), "timestamp"),
+    ],
+)
+def test_structures_that_are_not_as_expected_are_found_out(here, monkeypatch, structure, other, reason):
+    name, fields = other
+    inner = _structure(*((field, ctypes.c_uint64) for field in fields.split()))
+    monkeypatch.setattr(check, structure, _structure((name, inner), ("margin", ctypes.c_uint8 * 256)))
+    with pytest.raises(check.DirectPathUnusableError, match=reason):
+        check.checked_path(here.node)
+
+
+def test_where_librcl_is_not_as_expected_rclpy_is_used_and_the_log_says_so(here, monkeypatch, caplog):
+    assert choose_path(None, node=here.node, context=here.context).name is PathName.DIRECT
+    empty = _structure(("info", _structure()), ("margin", ctypes.c_uint8 * 256))
+    monkeypatch.setattr(check, "_RoomyInfo", empty)
+    assert choose_path(None, node=here.node, context=here.context).name is PathName.RCLPY
+    assert "messages pass through rclpy, at a higher cost" in caplog.text
+    with pytest.raises(RosUnavailableError, match="SYNCRELAY_RECEIVE=direct: librcl is not as expected here"):
+        choose_path("direct", node=here.node, context=here.context)
+
+
+def test_the_path_can_be_chosen(here, caplog):
+    caplog.set_level("INFO")
+    assert choose_path("rclpy", node=here.node, context=here.context).name is PathName.RCLPY
+    assert "as SYNCRELAY_RECEIVE asks" in caplog.text
+    with pytest.raises(UsageError, match="SYNCRELAY_RECEIVE=dds: expected direct or rclpy"):
+        choose_path("dds", node=here.node, context=here.context)
+
+
+def test_a_call_that_rcl_refuses_says_why(here, topic):
+    outlet = here.path.outlet(topic.publisher)
+    _, payload, _ = _published_and_taken(here, topic)
+    here.context.try_shutdown()
+    with pytest.raises(rcl.RclCallError, match="rcl_publish_serialized_message failed with"):
+        outlet.send(payload)
+
+
+def _published_and_taken(here, topic):
+    source = _source(here, topic, print)
+    topic.publisher.publish(vector(BEGIN))
+    return source.take()
