@@ -20,6 +20,7 @@ commands:
   schema                print the JSON Schema of the file, for editors
   replay BAG...         show what a file makes of a recording; write its outputs as one
   demo                  show it all on a simulated rig, without a robot
+  doctor                tell what can go wrong before a message flows
   healthcheck           tell whether the relay receives, by its heartbeat
   syncrelay COMMAND --help says more
 
@@ -188,6 +189,30 @@ def _demo(words: Sequence[str], stop: StopRequest) -> int:
     return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)
 
 
+def _doctor(words: Sequence[str], stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay doctor",
+        description="Tells what can go wrong before a message flows: what is so, what follows, what to do.\n"
+        "Exit code 1 if something is to be mended.",
+    )
+    parser.add_argument("--config", metavar="FILE", help="check FILE too, and whether its types can be used here")
+    parser.add_argument(
+        "--live", action="store_true", help="join the graph: publishers, types, QoS, stamps of the topics of FILE"
+    )
+    parser.add_argument("--seconds", metavar="N", type=_positive, default=5.0, help="look at the graph for N s (5)")
+    parser.add_argument("--json", action="store_true", help="print it as JSON, for programs")
+    parser.add_argument("--ros-args", action="store_true", help="what follows is what the relay gets: remaps and such")
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    own, ros_args = _split_at_ros_args(words)
+    arguments = parser.read(own)
+    from syncrelay.cli.doctor import doctor
+
+    output_format = "json" if arguments.json else "text"
+    return doctor(arguments.config, arguments.seconds if arguments.live else None, output_format, ros_args, stop=stop)
+
+
 def _healthcheck(words: Sequence[str], _stop: StopRequest) -> int:
     from syncrelay.cli.heartbeat import VARIABLE, healthcheck
 
@@ -208,6 +233,7 @@ _COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
     "schema": _schema,
     "replay": _replay,
     "demo": _demo,
+    "doctor": _doctor,
     "healthcheck": _healthcheck,
 }
 

@@ -83,11 +83,12 @@ def log_arguments() -> list[str]:
 
     rclpy raises at start when HOME is unset or the folder is read-only, as in a container.
     """
-    folder = _log_folder(os.environ)
+    folder = log_folder(os.environ)
     return [] if folder is not None and _writable(folder) else ["--disable-external-lib-logs"]
 
 
-def _log_folder(environ: Mapping[str, str]) -> Path | None:
+def log_folder(environ: Mapping[str, str]) -> Path | None:
+    """Return where ROS writes its log files; None where the environment names no place."""
     if folder := environ.get("ROS_LOG_DIR"):
         return Path(folder)
     if folder := environ.get("ROS_HOME"):

@@ -29,6 +29,7 @@ def test_help_names_every_command_and_option_on_stdout(tmp_path):
         ("schema", ["JSON Schema"]),
         ("replay", ["BAG", "--config", "--output", "--json", "--drops"]),
         ("demo", ["--seconds", "--seed", "--show-config", "--record"]),
+        ("doctor", ["--config", "--live", "--seconds", "--json", "--ros-args"]),
     ],
 )
 def test_every_command_explains_itself(command, words, tmp_path):
@@ -67,6 +68,8 @@ def test_the_version_is_that_of_the_package(tmp_path):
         (["validate", "--formt=json", "f.yaml"], "unknown argument --formt=json, did you mean `--format`?"),
         (["validate", "--format", "xml", "f.yaml"], "argument --format: invalid choice: 'xml'"),
         (["schema", "f.yaml"], "unknown argument f.yaml"),
+        (["doctor", "f.yaml"], "unknown argument f.yaml"),
+        (["doctor", "--live", "--seconds", "0"], "argument --seconds: expected a number above 0, found 0"),
         (["demo", "--seconds", "0"], "argument --seconds: expected a number above 0, found 0"),
         (["demo", "--seconds", "soon"], "argument --seconds: expected a number above 0, found soon"),
         (["demo", "--seed", "x"], "argument --seed: invalid int value: 'x'"),

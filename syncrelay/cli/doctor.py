@@ -1,0 +1,95 @@
+"""`syncrelay doctor`: what can go wrong before a message flows."""
+
+import json
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from syncrelay.cli.boundary import AT_FAULT, DONE, INTERRUPTED, put, say, wants_colour
+from syncrelay.cli.heartbeat import VARIABLE
+from syncrelay.cli.stop import StopRequest
+from syncrelay.doctor.diagnosis import Diagnosis, Severity
+from syncrelay.doctor.examine import Examination, Request, examine
+from syncrelay.doctor.stamps import delay_of
+from syncrelay.doctor.text import diagnosis_lines, sighting_lines, verdict
+
+
+def doctor(
+    config_path: str | None,
+    live_s: float | None,
+    output_format: str,
+    ros_args: Sequence[str],
+    *,
+    stop: StopRequest,
+) -> int:
+    """Examine, print what was found as `text` or `json`; 1 if something is to be mended, else 0."""
+    request = Request(dict(os.environ), VARIABLE, config_path, tuple(ros_args), live_s)
+    if live_s is not None and sys.stderr.isatty():
+        say(f"looking at the graph for {live_s:g} s ...")
+    stop.defer()
+    examination = examine(request, stopped=lambda: stop.requested)
+    if stop.requested and examination.sighting is None:
+        return INTERRUPTED
+    if output_format == "json":
+        put(json.dumps(_as_json(examination), indent=2, ensure_ascii=False))
+    else:
+        _print_text(examination)
+    return AT_FAULT if _to_mend(examination.diagnoses) else DONE
+
+
+def _to_mend(diagnoses: Sequence[Diagnosis]) -> bool:
+    return any(each.severity is Severity.MEND for each in diagnoses)
+
+
+def _print_text(examination: Examination) -> None:
+    colour = wants_colour(sys.stdout.isatty())
+    put(_heading(examination))
+    if examination.sighting is not None:
+        put("\n".join(sighting_lines(examination.sighting)))
+    for diagnosis in examination.diagnoses:
+        put("")
+        put("\n".join(diagnosis_lines(diagnosis, colour=colour)))
+    put("")
+    put(verdict(examination.diagnoses))
+
+
+def _heading(examination: Examination) -> str:
+    installation = examination.installation
+    rclpy = f"rclpy {installation.version or '(version unknown)'}" if installation.rclpy else "no rclpy"
+    return ", ".join(
+        [
+            f"Python {installation.python[0]}.{installation.python[1]}",
+            rclpy,
+            examination.middleware or "no middleware",
+            "no valid domain" if examination.domain is None else f"domain {examination.domain}",
+            f"discovery {examination.discovery_range}",
+        ]
+    )
+
+
+def _as_json(examination: Examination) -> dict[str, Any]:
+    installation = examination.installation
+    return {
+        "ok": not _to_mend(examination.diagnoses),
+        "python": f"{installation.python[0]}.{installation.python[1]}",
+        "rclpy": installation.version,
+        "middleware": examination.middleware or None,
+        "domain": examination.domain,
+        "discovery_range": examination.discovery_range,
+        "diagnoses": [{**asdict(each), "severity": each.severity.value} for each in examination.diagnoses],
+        "graph": _graph_as_json(examination),
+    }
+
+
+def _graph_as_json(examination: Examination) -> dict[str, Any] | None:
+    sighting = examination.sighting
+    if sighting is None:
+        return None
+    topics = []
+    for topic in sighting.topics:
+        written = asdict(topic)
+        del written["delays"]
+        topics.append({**written, "delay_ns": delay_of(topic)})
+    return {**asdict(sighting), "topics": topics}

@@ -1,0 +1,80 @@
+"""The file: what `validate` finds in it, and what remaps make of its names."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from syncrelay.config import Config, Problem, Severity, TopicConfig, render
+from syncrelay.config.wording import all_of
+from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.doctor.words import counted
+
+
+def check_file(file: str, problems: Sequence[Problem]) -> Iterator[Diagnosis]:
+    """Yield what is wrong with a file. A package that is missing is a fault of this environment, not of the file."""
+    errors = [problem for problem in problems if problem.severity is Severity.ERROR]
+    missing = [problem for problem in problems if problem.code == "package_missing" and problem not in errors]
+    unchecked = [problem for problem in problems if problem not in errors and problem not in missing]
+    if errors:
+        yield mend(
+            "file",
+            f"{file} has {counted(len(errors), 'error')}:\n{render(errors)}",
+            so="the relay refuses the file and ends at once",
+            do=f"mend the file; to check it again: syncrelay validate {file}",
+        )
+    if missing:
+        yield mend(
+            "package_missing",
+            f"{file} names types of packages that this environment does not have:\n{render(missing)}",
+            so="the relay starts, but their groups wait until the packages are there",
+            do="build the packages with colcon for this Python, then in this shell: source install/setup.bash\n"
+            "(in the image: put them into docker/messages before it is built)",
+        )
+    if unchecked:
+        yield know(
+            "not_checked",
+            f"{file} could not be checked in full:\n{render(unchecked)}",
+            so="a fault in these places shows only when the relay runs",
+            do="nothing, if you are sure of them",
+        )
+
+
+def check_types(config: Config, unusable: Mapping[str, str]) -> Iterator[Diagnosis]:
+    """Yield types of the file that are installed but cannot be used; `unusable` has the fault of each."""
+    for name, fault in unusable.items():
+        topics = all_of(dict.fromkeys(topic.topic for topic in _topics(config) if topic.type == name))
+        groups = all_of(
+            dict.fromkeys(group.name for group in config.groups if any(topic.type == name for topic in group.topics))
+        )
+        yield mend(
+            "type_unusable",
+            f"{name} is installed but cannot be imported: {fault}",
+            so=f"nothing of {topics} is received: the group {groups} waits",
+            do=f"build {name.partition('/')[0]} anew for this Python and this ROS, and source it in this shell",
+        )
+
+
+def check_remaps(config: Config, names: Mapping[str, str]) -> Iterator[Diagnosis]:
+    """Yield names that meet only after remaps; `names` has what each name of the file becomes."""
+    inputs = {names[topic.topic]: topic for topic in _topics(config)}
+    outputs: dict[str, TopicConfig] = {}
+    for topic in _topics(config):
+        name = names[topic.output]
+        if name in inputs:
+            yield mend(
+                "remap_loop",
+                f"remaps make the output {topic.output} and the input {inputs[name].topic} one topic: {name}",
+                so="the relay receives what it sends, again and again",
+                do="take the remap away, or give the output another name in the file: output: /...",
+            )
+        elif name in outputs and outputs[name].output != topic.output:
+            yield mend(
+                "remap_outputs",
+                f"remaps make the outputs {outputs[name].output} and {topic.output} one topic: {name}",
+                so="messages of two inputs are mixed on it",
+                do="take the remap away, or give one of them another name in the file: output: /...",
+            )
+        outputs.setdefault(name, topic)
+
+
+def _topics(config: Config) -> Iterator[TopicConfig]:
+    for group in config.groups:
+        yield from group.topics

@@ -1,0 +1,165 @@
+"""How nodes find each other: the variables of ROS, as rcl reads them."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from syncrelay.config.wording import did_you_mean, quoted
+from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+
+RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+_LARGEST_DOMAIN: Final = 232
+# rcl reads numbers as C does: a leading 0 is octal, 0x hexadecimal, and what follows the digits is passed over.
+_NUMBER: Final = re.compile(r"\s*\+?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)(.*)", re.DOTALL)
+# DDS: 250 UDP ports for each domain, from 7400 on.
+_FIRST_PORT: Final = 7400
+_PORTS: Final = 250
+_LOCALHOST_ONLY: Final = "ROS_LOCALHOST_ONLY"
+_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_PEERS: Final = "ROS_STATIC_PEERS"
+
+
+@dataclass(frozen=True, slots=True)
+class Discovery:
+    """The environment's variables, the ports that Linux gives out by itself, and peers that have no address."""
+
+    environ: Mapping[str, str]
+    ephemeral_ports: tuple[int, int]
+    unresolved_peers: tuple[str, ...] = ()
+
+
+def domain_of(environ: Mapping[str, str]) -> int | None:
+    """Return the domain that rcl takes from ROS_DOMAIN_ID; None where it takes none and fails."""
+    text = environ.get("ROS_DOMAIN_ID", "")
+    if not text:
+        return 0
+    found = _NUMBER.fullmatch(text)
+    if found is None:
+        return None
+    digits, rest = found.groups()
+    number = int(digits, 16) if digits[:2].lower() == "0x" else int(digits, 8 if digits[0] == "0" else 10)
+    if (number == 0 and rest) or number > _LARGEST_DOMAIN:
+        return None
+    return number
+
+
+def ports_of(domain: int) -> range:
+    """Return the UDP ports of a domain; Fast DDS numbers its ports in shared memory alike."""
+    return range(_FIRST_PORT + _PORTS * domain, _FIRST_PORT + _PORTS * (domain + 1))
+
+
+def peers_of(environ: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the hosts that ROS_STATIC_PEERS names."""
+    return tuple(peer for peer in environ.get(_PEERS, "").split(";") if peer)
+
+
+def range_of(environ: Mapping[str, str]) -> str:
+    """Return how far discovery reaches, as rcl takes it from the environment: one of RANGES."""
+    if environ.get(_LOCALHOST_ONLY) == "1":
+        return "LOCALHOST"
+    asked = environ.get(_RANGE) or "SUBNET"
+    return asked if asked in RANGES else "LOCALHOST"
+
+
+def check_discovery(found: Discovery) -> Iterator[Diagnosis]:
+    """Yield variables that ROS refuses, reads otherwise than meant, or that narrow whom it finds."""
+    yield from _domain(found)
+    yield from _range(found.environ)
+    yield from _localhost_only(found.environ)
+    yield from _peers(found)
+
+
+def _domain(found: Discovery) -> Iterator[Diagnosis]:
+    text = found.environ.get("ROS_DOMAIN_ID", "")
+    domain = domain_of(found.environ)
+    if domain is None:
+        yield mend(
+            "domain_id",
+            f"ROS_DOMAIN_ID={text} is no domain: expected a number from 0 to {_LARGEST_DOMAIN}",
+            so="no node starts with it, or it lands on a domain that nobody meant",
+            do="export ROS_DOMAIN_ID=0    or the number that the other nodes have; 0 to 101 are safe on Linux",
+        )
+        return
+    if text and text.strip() != str(domain):
+        yield mend(
+            "domain_id",
+            f"ROS_DOMAIN_ID={text} is read as {domain}",
+            so=f"ROS reads numbers as C does: these nodes meet only others of domain {domain}",
+            do="write the number in plain digits, without a leading 0 and with nothing behind it",
+        )
+    low, high = found.ephemeral_ports
+    ports = ports_of(domain)
+    # By its first ports: of the last ones of 250 only the hundredth node makes use.
+    if low <= ports[0] <= high:
+        yield know(
+            "domain_ports",
+            f"ROS_DOMAIN_ID={domain} uses UDP ports {ports[0]} to {ports[-1]}, which Linux also gives to any program",
+            so="now and then a node does not start or is not found, because its port is taken",
+            do="choose a domain from 0 to 101 on all machines",
+        )
+
+
+def _range(environ: Mapping[str, str]) -> Iterator[Diagnosis]:
+    asked = environ.get(_RANGE, "")
+    if asked and asked not in RANGES:
+        yield mend(
+            "discovery_range",
+            f"{_RANGE}={asked} is unknown{did_you_mean(asked, RANGES)}",
+            so="ROS takes it as LOCALHOST: nodes on other machines are not found",
+            do=f"export {_RANGE}=SUBNET    (default), LOCALHOST, OFF or SYSTEM_DEFAULT, in capitals",
+        )
+    elif range_of(environ) == "OFF":
+        yield mend(
+            "discovery_off",
+            f"{_RANGE}=OFF",
+            so="nodes find nobody, not even on this machine",
+            do=f"unset {_RANGE}",
+        )
+    elif asked == "SYSTEM_DEFAULT":
+        yield know(
+            "discovery_range",
+            f"{_RANGE}=SYSTEM_DEFAULT leaves discovery to the middleware's own configuration",
+            so="whom nodes find depends on its profiles file, and ROS_STATIC_PEERS has no effect",
+            do=f"nothing if that is meant; else: unset {_RANGE}",
+        )
+    elif asked == "LOCALHOST" and not peers_of(environ):
+        yield know(
+            "discovery_range",
+            f"{_RANGE}=LOCALHOST",
+            so="only nodes on this machine are found",
+            do=f"nothing if the robot is this machine; else: unset {_RANGE}",
+        )
+
+
+def _localhost_only(environ: Mapping[str, str]) -> Iterator[Diagnosis]:
+    if environ.get(_LOCALHOST_ONLY) != "1":
+        return
+    overruled = [
+        name for name in (_RANGE, _PEERS) if environ.get(name) and (name, environ[name]) != (_RANGE, "LOCALHOST")
+    ]
+    if overruled:
+        yield mend(
+            "localhost_only",
+            f"{_LOCALHOST_ONLY}=1 overrules {' and '.join(overruled)}, which are set too",
+            so="only nodes on this machine are found, whatever the other variables say",
+            do=f"unset {_LOCALHOST_ONLY}    (deprecated since Jazzy)",
+        )
+    else:
+        yield know(
+            "localhost_only",
+            f"{_LOCALHOST_ONLY}=1 is deprecated",
+            so="it still works: only nodes on this machine are found",
+            do=f"write {_RANGE}=LOCALHOST instead, or unset it to find other machines",
+        )
+
+
+def _peers(found: Discovery) -> Iterator[Diagnosis]:
+    if found.unresolved_peers:
+        names = ", ".join(map(quoted, found.unresolved_peers))
+        yield mend(
+            "static_peers",
+            f"ROS_STATIC_PEERS names {names}, which has no address here",
+            so="no node starts: every peer must have an address",
+            do="write IP addresses or names that this machine resolves, with ; between them",
+        )

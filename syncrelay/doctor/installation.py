@@ -1,0 +1,161 @@
+"""Python, rclpy and its middleware: whether they are there and belong together."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from syncrelay.config.wording import all_of
+from syncrelay.doctor.diagnosis import Diagnosis, mend
+
+WHEEL_PYTHONS: Final = ((3, 11), (3, 12))
+"""The versions of Python for which the ROS 2 Jazzy wheels are built."""
+WHEEL_MACHINE: Final = "x86_64"
+
+_DEFAULT: Final = "rmw_fastrtps_cpp"
+_INSTALL_WHEELS: Final = "in a clone of syncrelay: pip install '.[ros]' (x86_64, Python 3.11 or 3.12, no ROS sourced)"
+
+
+class Unmet(NamedTuple):
+    """A requirement of an installed wheel that another one does not meet; `found` is None where it is missing."""
+
+    wheel: str
+    needs: str
+    found: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Installation:
+    """What is installed.
+
+    `rclpy` is the folder of the package that Python finds, `version` what its metadata say, `built_for` the versions
+    of Python that its compiled part serves, none where that cannot be told. `wheels` says whether rclpy is installed
+    as a wheel, `sourced` lists other prefixes with a ROS in them that the environment names, `unsourced` those on the
+    disk that it does not. `middlewares` are registered in the ament index.
+    """
+
+    python: tuple[int, int]
+    executable: str
+    machine: str
+    distribution: str | None
+    rclpy: Path | None
+    version: str | None
+    built_for: tuple[tuple[int, int], ...]
+    wheels: bool
+    unmet: tuple[Unmet, ...]
+    sourced: tuple[Path, ...]
+    unsourced: tuple[Path, ...]
+    middlewares: tuple[str, ...]
+    middleware_asked: str | None
+
+
+def middleware_of(found: Installation) -> str:
+    """Return the middleware that ROS takes: what is asked for, else its default, else any; empty for none."""
+    if found.middleware_asked:
+        return found.middleware_asked
+    return _DEFAULT if _DEFAULT in found.middlewares else next(iter(found.middlewares), "")
+
+
+def check_installation(found: Installation) -> Iterator[Diagnosis]:
+    """Yield what keeps rclpy from being used, the first cause first."""
+    if found.rclpy is None:
+        yield _no_rclpy(found)
+        return
+    if found.built_for and found.python not in found.built_for:
+        yield _other_python(found)
+    yield from _two_sets(found)
+    yield from _unmet(found)
+    yield from _middleware(found)
+
+
+def _no_rclpy(found: Installation) -> Diagnosis:
+    what = f"rclpy is not installed in {_python(found)}"
+    so = "nothing of ROS can be used here: the relay does not start, and the graph cannot be looked at"
+    if found.sourced or found.distribution:
+        name = found.distribution or found.sourced[0]
+        return mend(
+            "no_rclpy",
+            f"{what}, though ROS 2 ({name}) is sourced",
+            so=so,
+            do="use the Python that this ROS was built for, in a venv made with:\n"
+            "python3 -m venv --system-site-packages",
+        )
+    if found.unsourced:
+        return mend(
+            "no_rclpy",
+            f"{what}: ROS 2 is installed at {found.unsourced[-1]} but not sourced",
+            so=so,
+            do=f"source {found.unsourced[-1]}/setup.bash    and start syncrelay from that shell",
+        )
+    return mend("no_rclpy", what, so=so, do=_way_to_rclpy(found))
+
+
+def _way_to_rclpy(found: Installation) -> str:
+    if found.machine != WHEEL_MACHINE:
+        return f"source a ROS 2 Jazzy of this machine's packages: there are no wheels for {found.machine}"
+    if found.python not in WHEEL_PYTHONS:
+        versions = " and ".join(f"{major}.{minor}" for major, minor in WHEEL_PYTHONS)
+        return f"make the venv with another Python: the wheels are for {versions}; or source a ROS 2 built for this one"
+    return f"{_INSTALL_WHEELS};\nor, where ROS 2 is installed: source /opt/ros/jazzy/setup.bash"
+
+
+def _other_python(found: Installation) -> Diagnosis:
+    versions = all_of(f"{major}.{minor}" for major, minor in found.built_for)
+    return mend(
+        "other_python",
+        f"rclpy at {found.rclpy} is built for Python {versions}, this is {_python(found)}",
+        so="import rclpy fails: its compiled part does not load",
+        do=f"start syncrelay with Python {versions}, or install rclpy for this one",
+    )
+
+
+def _two_sets(found: Installation) -> Iterator[Diagnosis]:
+    if found.wheels and found.sourced:
+        places = all_of(str(prefix) for prefix in found.sourced)
+        yield mend(
+            "two_ros",
+            f"ROS 2 is sourced ({places}), and its wheels are installed in this Python too",
+            so="two sets of the same libraries meet in one process: it crashes, or types are not found",
+            do="start from a shell without ROS sourced, or use a venv without the wheels:\n"
+            "python3 -m venv --system-site-packages, then pip install . in a clone of syncrelay",
+        )
+
+
+def _unmet(found: Installation) -> Iterator[Diagnosis]:
+    if found.unmet:
+        lines = [
+            f"{each.wheel} needs {each.needs}, {'found ' + each.found if each.found else 'which is missing'}"
+            for each in found.unmet[:5]
+        ]
+        more = len(found.unmet) - len(lines)
+        rest = [f"and {more} more"] if more else []
+        yield mend(
+            "wheels_disagree",
+            "\n".join(["ROS wheels that don't belong together:", *lines, *rest]),
+            so="their libraries do not load together, or crash with messages",
+            do="install them anew in one go, in a clone of syncrelay: pip install --force-reinstall '.[ros]'",
+        )
+
+
+def _middleware(found: Installation) -> Iterator[Diagnosis]:
+    asked, there = found.middleware_asked, found.middlewares
+    if not there:
+        yield mend(
+            "no_middleware",
+            "rclpy is installed without a middleware (no rmw_... in the ament index)",
+            so="import rclpy fails: there is nothing that could send or receive",
+            do="pip install 'ros-jazzy-rclpy[fastrtps]'    where rclpy is a wheel;\n"
+            "else: apt-get install ros-jazzy-rmw-fastrtps-cpp, and source ROS anew",
+        )
+    elif asked and asked not in there:
+        yield mend(
+            "middleware_not_there",
+            f"RMW_IMPLEMENTATION asks for {asked}, which is not installed here; there is {', '.join(there)}",
+            so="ROS ends the whole process when rclpy is imported, without an exception",
+            do=f"unset RMW_IMPLEMENTATION    or install {asked} (ros-jazzy-{asked.replace('_', '-')}).\n"
+            "All nodes of a robot should use one middleware",
+        )
+
+
+def _python(found: Installation) -> str:
+    return f"Python {found.python[0]}.{found.python[1]} ({found.executable})"

@@ -1,0 +1,122 @@
+"""Fast DDS's files in /dev/shm: of whom they are, whether someone lives behind them, and whether there is room."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.doctor.discovery import ports_of
+
+# One participant with the default segment size of 512 kB, and its ports.
+_NEEDED: Final = 600_000
+_TIGHT: Final = 8_000_000
+# Removes only what no process holds a lock on, which is how `fastdds shm clean` decides too.
+_CLEAN: Final = """for f in /dev/shm/fastrtps_*_[es]l; do flock -n "$f" rm -f "$f" "${f%_?l}"; done"""
+
+
+@dataclass(frozen=True, slots=True)
+class ShmFile:
+    """A segment, or the port with this number; `is_live` says whether a process holds it."""
+
+    name: str
+    size: int
+    uid: int
+    owner: str
+    is_live: bool
+    port: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SharedMemory:
+    """Where POSIX shared memory is: why it cannot be used, its bytes, what Fast DDS has in it. `uid` is ours."""
+
+    folder: str
+    fault: str | None
+    total: int
+    free: int
+    uid: int
+    files: tuple[ShmFile, ...] = ()
+
+
+def check_shared_memory(found: SharedMemory, *, domain: int | None) -> Iterator[Diagnosis]:
+    """Yield what keeps messages from passing through shared memory; None for a domain that is not known."""
+    if found.fault:
+        yield know(
+            "shm_unusable",
+            f"{found.folder} cannot be written: {found.fault}",
+            so="Fast DDS goes on over UDP alone; large messages cost more",
+            do="mount a tmpfs there (Docker: --shm-size 64m), or say it: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+        )
+        return
+    yield from _room(found)
+    yield from _foreign(found, ports_of(domain) if domain is not None else range(0))
+    yield from _stale(found)
+
+
+def _room(found: SharedMemory) -> Iterator[Diagnosis]:
+    what = f"{_size(found.free)} of {_size(found.total)} are free in {found.folder}"
+    if found.free < _NEEDED:
+        yield mend(
+            "shm_full",
+            f"{what}; one node needs {_size(_NEEDED)}",
+            so="nodes start without shared memory, and peers that expect it may get no data",
+            do="free it (see `df -h /dev/shm`, `ls -l /dev/shm`), or make it larger\n"
+            "(mount -o remount,size=64M /dev/shm, Docker: --shm-size 64m)",
+        )
+    elif found.free < _TIGHT:
+        yield know(
+            "shm_tight",
+            what,
+            so=f"each node takes {_size(_NEEDED)}, more with a larger segment_size: the next nodes may find none",
+            do="make it larger (mount -o remount,size=64M /dev/shm, Docker: --shm-size 64m)",
+        )
+
+
+def _foreign(found: SharedMemory, ports: range) -> Iterator[Diagnosis]:
+    """Of live ports only: a segment does not tell its domain. Root may open all, but others cannot open root's."""
+    here = [each for each in found.files if each.is_live and each.uid != found.uid]
+    in_domain = sorted({each.owner for each in here if each.port in ports})
+    if in_domain:
+        yield mend(
+            "shm_foreign",
+            f"nodes of another user ({', '.join(in_domain)}) run on this domain and use shared memory",
+            so="their topics are listed but bring no data: neither user may open the other's files in /dev/shm",
+            do="run all nodes as one user, or on both sides: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+        )
+    elsewhere = sorted({each.owner for each in here if each.port is None} - set(in_domain))
+    if elsewhere:
+        yield know(
+            "shm_foreign",
+            f"processes of another user ({', '.join(elsewhere)}) use DDS over shared memory, perhaps on other domains",
+            so="should you need their topics: they are listed but bring no data from user to user",
+            do="nothing if you don't; else on both sides: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+        )
+
+
+def _stale(found: SharedMemory) -> Iterator[Diagnosis]:
+    stale = [each for each in found.files if not each.is_live]
+    if not stale:
+        return
+    owners = sorted({each.owner for each in stale if each.uid != found.uid})
+    whose = f", some of {', '.join(owners)}" if owners else ""
+    yield know(
+        "shm_stale",
+        f"{_counted(stale)} in /dev/shm left by processes that were killed: {_size(_bytes(stale))}{whose}",
+        so="they take room and are never removed by themselves; they keep no message from flowing",
+        do=f"when it suits, in bash{' as root' if owners else ''}; what is in use is left alone:\n{_CLEAN}",
+    )
+
+
+def _bytes(files: Sequence[ShmFile]) -> int:
+    return sum(each.size for each in files)
+
+
+def _counted(files: Sequence[ShmFile]) -> str:
+    return "1 file of Fast DDS" if len(files) == 1 else f"{len(files)} files of Fast DDS"
+
+
+def _size(count: int) -> str:
+    for unit, size in (("GB", 1_000_000_000), ("MB", 1_000_000), ("kB", 1_000)):
+        if count >= size:
+            return f"{count / size:.{0 if count >= 10 * size else 1}f} {unit}"
+    return f"{count} B"

@@ -1,0 +1,36 @@
+"""What came of starting a node for a trial."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from syncrelay.doctor.diagnosis import Diagnosis, Severity, mend
+from syncrelay.ros.trial import Step, Trial
+
+_WHAT: Final = {
+    Step.IMPORT: "rclpy cannot be imported",
+    Step.TYPES: "message types cannot be imported",
+    Step.INIT: "ROS does not start",
+    Step.NODE: "a node does not start here",
+    Step.NAMES: "a node started here does not live",
+}
+
+
+def check_start(trial: Trial, *, ros_args: Sequence[str], before: Sequence[Diagnosis]) -> Iterator[Diagnosis]:
+    """Yield why a node does not start, unless something to mend that was found `before` explains it."""
+    if trial.failed is None or any(found.severity is Severity.MEND for found in before):
+        return
+    if trial.failed is Step.INIT and ros_args:
+        yield mend(
+            "ros_args",
+            f"ROS does not take --ros-args {' '.join(ros_args)}:\n{trial.fault}",
+            so="the relay ends at once with exit code 2",
+            do="mend the arguments behind --ros-args; remaps are written -r FROM:=TO, parameters -p NAME:=VALUE",
+        )
+        return
+    yield mend(
+        "no_start",
+        f"{_WHAT[trial.failed]}:\n{trial.fault}",
+        so="the relay does not start either",
+        do="search for the line above; try in an empty environment: env -i HOME=$HOME PATH=$PATH syncrelay doctor\n"
+        "where that works, a variable of this shell is to blame",
+    )

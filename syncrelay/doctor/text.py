@@ -1,0 +1,69 @@
+"""Diagnoses and the graph as text: aligned, the worst first, the verdict last."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from rich.cells import cell_len
+
+from syncrelay.config.wording import printable
+from syncrelay.doctor.diagnosis import Diagnosis, Severity
+from syncrelay.doctor.graph import summary
+from syncrelay.doctor.stamps import delay_of
+from syncrelay.doctor.words import duration
+from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
+
+_BOLD, _RED, _YELLOW, _DIM, _RESET = "\033[1m", "\033[31m", "\033[33m", "\033[2m", "\033[0m"
+_MARK: Final = {Severity.MEND: _RED, Severity.KNOW: _YELLOW}
+_INDENT: Final = "      "
+
+
+def diagnosis_lines(found: Diagnosis, *, colour: bool) -> Iterator[str]:
+    """Yield a block: what is so, marked with its severity, then what follows and what to do."""
+    mark, bold, dim, reset = (_MARK[found.severity], _BOLD, _DIM, _RESET) if colour else ("", "", "", "")
+    first, *rest = found.what.splitlines()
+    yield f"{mark}{found.severity.value:<6}{reset}{bold}{_shown(first)}{reset}"
+    yield from (f"{_INDENT}{_shown(line)}" for line in rest)
+    yield from _labelled("so", found.so, dim, reset)
+    yield from _labelled("do", found.do, dim, reset)
+
+
+def _labelled(label: str, text: str, dim: str, reset: str) -> Iterator[str]:
+    first, *rest = text.splitlines()
+    yield f"{_INDENT}{dim}{label}{reset}  {_shown(first)}"
+    yield from (f"{_INDENT}    {_shown(line)}" for line in rest)
+
+
+def sighting_lines(sighting: Sighting) -> Iterator[str]:
+    """Yield what was seen of the graph: a line of counts, then a line for each topic of the file."""
+    yield f"seen in {sighting.seconds:.0f} s: {summary(sighting)}"
+    rows = [_row(topic) for topic in sighting.topics]
+    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        padded = [cell + " " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)]
+        yield f"  {'  '.join(padded)}".rstrip()
+
+
+def _row(topic: SeenTopic) -> tuple[str, ...]:
+    delay = delay_of(topic)
+    age = "" if delay is None else f"stamps {duration(abs(delay))} {'old' if delay >= 0 else 'ahead'}"
+    rate = f"{topic.rate_hz:.1f} Hz" if topic.rate_hz else f"{topic.received} received"
+    return topic.name, topic.type, rate, age, _publishers(topic.publishers)
+
+
+def _publishers(publishers: Sequence[SeenPublisher]) -> str:
+    return "; ".join(f"{each.node} ({each.offers})" for each in publishers) or "no publisher"
+
+
+def verdict(diagnoses: Sequence[Diagnosis]) -> str:
+    """Return the last line."""
+    to_mend = sum(1 for each in diagnoses if each.severity is Severity.MEND)
+    to_know = len(diagnoses) - to_mend
+    things = [f"{to_mend} {'thing' if to_mend == 1 else 'things'} to mend"] if to_mend else []
+    things += [f"{to_know} to know"] if to_know else []
+    if not to_mend:
+        things.insert(0, "nothing to mend")
+    return ", ".join(things)
+
+
+def _shown(text: str) -> str:
+    return printable(text)

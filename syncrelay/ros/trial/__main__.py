@@ -1,0 +1,77 @@
+"""The process of a trial: a plan as JSON on stdin, then one object a line on stdout for every step begun or done."""
+
+import json
+import sys
+from typing import Any
+
+from syncrelay.errors import RosUnavailableError, TypeImportError
+from syncrelay.ros.environment import log_arguments, require_rclpy
+from syncrelay.ros.trial import Step
+from syncrelay.ros.types import import_type
+
+
+def main() -> int:
+    """Try, and return 1 at the first step that fails."""
+    plan = json.load(sys.stdin)
+    try:
+        _say(Step.IMPORT)
+        require_rclpy()
+        _import_types(plan["types"])
+        _start(plan)
+    except RosUnavailableError as error:
+        _say(Step.IMPORT, fault=str(error))
+        return 1
+    return 0
+
+
+def _import_types(types: list[str]) -> None:
+    unusable: dict[str, str] = {}
+    for name in types:
+        _say(Step.TYPES, type=name, unusable=unusable)
+        try:
+            import_type(name)
+        except TypeImportError as error:
+            unusable[name] = str(error.__cause__ or error).splitlines()[0]
+    _say(Step.TYPES, type=None, unusable=unusable)
+
+
+def _start(plan: dict[str, Any]) -> None:
+    import rclpy  # noqa: PLC0415  after require_rclpy
+    from rclpy.context import Context  # noqa: PLC0415
+    from rclpy.impl.implementation_singleton import rclpy_implementation  # noqa: PLC0415
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
+    from rclpy.utilities import get_rmw_implementation_identifier  # noqa: PLC0415
+
+    refused = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
+    context = Context()
+    step = Step.INIT
+    _say(step, middleware=get_rmw_implementation_identifier())
+    try:
+        rclpy.init(
+            args=["--ros-args", "--disable-stdout-logs", *log_arguments(), "--", "--ros-args", *plan["ros_args"]],
+            context=context,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        step = Step.NODE
+        _say(step)
+        node = rclpy.create_node(plan["node"], namespace=plan["namespace"], context=context)
+    except refused as error:
+        _say(step, fault=str(error))
+        return
+    _say(
+        Step.NAMES,
+        full_name=node.get_fully_qualified_name(),
+        names={name: node.resolve_topic_name(name) for name in plan["names"]},
+        use_sim_time=bool(node.get_parameter("use_sim_time").value),
+    )
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def _say(step: Step, **facts: Any) -> None:
+    sys.stdout.write(json.dumps({"step": step.value, **facts}) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,282 @@
+"""The doctor in environments that have the fault, from the command line."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+
+import pytest
+
+from tests.cli.command import BAD, GOOD, ROOT, run
+from tests.doctor.environments import OURS, distribution, site_with, unshared
+
+# Nothing that whoever runs the tests has chosen; on a domain of its own the doctor is alone.
+UNSET = ("RMW_IMPLEMENTATION", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "FASTDDS_BUILTIN_TRANSPORTS", "ROS_DOMAIN_ID")
+
+
+@pytest.fixture
+def base(tmp_path):
+    kept = {name: value for name, value in os.environ.items() if name not in UNSET}
+    return {**kept, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(tmp_path / "log"), "NO_COLOR": "1"}
+
+
+def examine(environ, *words, command=None):
+    """The exit code and what the doctor found: severity and text by code."""
+    argv = command or [sys.executable, "-m", "syncrelay", "doctor", "--json", *words]
+    done = subprocess.run(argv, env=environ, capture_output=True, text=True, timeout=120, check=False)
+    assert done.stdout, done.stderr
+    report = json.loads(done.stdout)
+    assert done.returncode == (0 if report["ok"] else 1)
+    found = {each["code"]: each for each in report["diagnoses"]}
+    assert report["ok"] == all(each["severity"] == "know" for each in found.values())
+    return done.returncode, found
+
+
+@pytest.mark.ros
+def test_where_all_is_well_it_says_so_and_exits_with_0(base):
+    done = subprocess.run(
+        [sys.executable, "-m", "syncrelay", "doctor"],
+        env={**base, "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    first, *_, last = done.stdout.splitlines()
+    assert first.startswith("Python 3.")
+    assert "rmw_" in first
+    assert last.startswith("nothing to mend")
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("environ", "code", "severity", "what"),
+    [
+        ({"ROS_DOMAIN_ID": "abc"}, "domain_id", "mend", "expected a number from 0 to 232"),
+        ({"ROS_DOMAIN_ID": "300"}, "domain_id", "mend", "ROS_DOMAIN_ID=300 is no domain"),
+        ({"ROS_DOMAIN_ID": "010"}, "domain_id", "mend", "is read as 8"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "localhost"}, "discovery_range", "mend", "did you mean `LOCALHOST`?"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "discovery_off", "mend", "=OFF"),
+        ({"ROS_LOCALHOST_ONLY": "1"}, "localhost_only", "know", "deprecated"),
+        ({"ROS_STATIC_PEERS": "no.such.host.invalid"}, "static_peers", "mend", "no.such.host.invalid"),
+        ({"FASTDDS_BUILTIN_TRANSPORTS": ""}, "transports", "mend", "set but empty"),
+        ({"FASTDDS_BUILTIN_TRANSPORTS": "UDPV4"}, "transports", "mend", "did you mean `UDPv4`?"),
+        ({"FASTRTPS_DEFAULT_PROFILES_FILE": "/nowhere/dds.xml"}, "profiles_file", "mend", "No such file"),
+        ({"ROS_LOG_DIR": "/proc/nowhere"}, "log_folder", "know", "/proc/nowhere (by ROS_LOG_DIR)"),
+        ({"ROS_LOG_DIR": "", "ROS_HOME": "", "HOME": ""}, "log_folder", "know", "are all unset"),
+        ({"SYNCRELAY_HEARTBEAT": "/nowhere/beat"}, "heartbeat", "mend", "/nowhere/beat: No such file or directory"),
+        ({"RMW_IMPLEMENTATION": "rmw_nowhere_cpp"}, "middleware_not_there", "mend", "asks for rmw_nowhere_cpp"),
+    ],
+)
+def test_a_variable_that_is_wrong_is_named(environ, code, severity, what, base):
+    if code in ("transports", "profiles_file") and os.environ.get("RMW_IMPLEMENTATION", "fastrtps").count("fast") == 0:
+        pytest.skip("another middleware than Fast DDS is chosen")
+    exit_code, found = examine({**base, **environ})
+    assert exit_code == (1 if severity == "mend" else 0)
+    assert found[code]["severity"] == severity
+    assert what in found[code]["what"]
+
+
+@pytest.mark.ros
+def test_a_profiles_file_that_is_no_xml_is_told_with_its_place(base, tmp_path):
+    (tmp_path / "dds.xml").write_text("<dds>\n  <profiles>\n</dds>\n")
+    _, found = examine({**base, "FASTRTPS_DEFAULT_PROFILES_FILE": str(tmp_path / "dds.xml")})
+    assert "is not XML: mismatched tag: line 3" in found["profiles_file"]["what"]
+
+
+@pytest.mark.ros
+def test_a_heartbeat_that_a_relay_writes_now_is_left_as_it_is(base, tmp_path):
+    (tmp_path / "beat").write_text("00000000000000000042\n")
+    _, found = examine({**base, "SYNCRELAY_HEARTBEAT": str(tmp_path / "beat")})
+    assert "heartbeat" not in found
+    assert (tmp_path / "beat").read_text() == "00000000000000000042\n"
+
+
+def bare(*words):
+    """Python without site-packages and without the wheels' start-up hook."""
+    return [sys.executable, "-S", "-m", "syncrelay", "doctor", "--json", *words]
+
+
+def test_without_rclpy_it_says_so_first_and_checks_the_rest(base, tmp_path):
+    site = site_with(tmp_path, OURS)
+    environ = {**base, "PYTHONPATH": f"{ROOT}:{site}", "AMENT_PREFIX_PATH": "", "ROS_DOMAIN_ID": "x"}
+    environ.pop("ROS_DISTRO", None)
+    (tmp_path / "f.yaml").write_text(BAD)
+    _, found = examine(environ, command=bare("--live", "--config", str(tmp_path / "f.yaml")))
+    assert next(iter(found)) == "no_rclpy"
+    assert "Traceback" not in str(found)
+    assert {"no_rclpy", "domain_id", "file", "not_looked"} <= set(found)
+
+
+def test_a_sourced_ros_that_this_python_cannot_use_is_named(base, tmp_path):
+    site = site_with(tmp_path, OURS)
+    environ = {**base, "PYTHONPATH": f"{ROOT}:{site}", "AMENT_PREFIX_PATH": "", "ROS_DISTRO": "jazzy"}
+    _, found = examine(environ, command=bare())
+    assert "though ROS 2 (jazzy) is sourced" in found["no_rclpy"]["what"]
+
+
+@pytest.mark.ros
+def test_rclpy_without_a_middleware_is_told_from_no_rclpy(base, tmp_path):
+    site = site_with(tmp_path, [*OURS, "rclpy", "rpyutils", "ament_index_python"])
+    environ = {**base, "PYTHONPATH": f"{ROOT}:{site}", "AMENT_PREFIX_PATH": str(tmp_path)}
+    _, found = examine(environ, command=[sys.executable, "-S", "-c", WITHOUT_PREFIX])
+    assert "no_middleware" in found
+
+
+# The wheels' index is found by the Python's own prefix, which an environment without them has for itself.
+WITHOUT_PREFIX = (
+    "import sys; sys.prefix = '/nowhere'; from syncrelay.cli import main; sys.exit(main(['doctor', '--json']))"
+)
+
+
+def test_an_rclpy_for_another_python_is_named_with_both(base, tmp_path):
+    site = site_with(tmp_path, OURS)
+    (site / "rclpy").mkdir()
+    (site / "rclpy/__init__.py").write_text("")
+    (site / "rclpy/_rclpy_pybind11.cpython-39-x86_64-linux-gnu.so").write_text("")
+    _, found = examine({**base, "PYTHONPATH": f"{ROOT}:{site}"}, command=bare())
+    assert "is built for Python 3.9, this is Python 3." in found["other_python"]["what"]
+
+
+def test_a_ros_beside_its_wheels_is_one_too_many(base, tmp_path):
+    distribution(tmp_path / "wheels", "ros-rclpy", "7.1.6")
+    (tmp_path / "ros/share/ament_index/resource_index/packages").mkdir(parents=True)
+    (tmp_path / "ros/share/ament_index/resource_index/packages/rclpy").touch()
+    (tmp_path / "wheels/rclpy").mkdir()
+    (tmp_path / "wheels/rclpy/__init__.py").touch()
+    environ = {
+        **base,
+        "PYTHONPATH": f"{ROOT}:{tmp_path / 'wheels'}",
+        "AMENT_PREFIX_PATH": str(tmp_path / "ros"),
+    }
+    _, found = examine(environ)
+    assert f"ROS 2 is sourced ({tmp_path / 'ros'}), and its wheels" in found["two_ros"]["what"]
+
+
+@pytest.mark.ros
+def test_wheels_that_ask_for_others_than_are_there_are_named(base, tmp_path):
+    distribution(tmp_path, "ros-acme-msgs", "1.0.0", "ros-acme-core~=2.0", "numpy>=99", "ros-acme-x; extra == 'x'")
+    distribution(tmp_path, "ros-acme-core", "1.9.0")
+    _, found = examine({**base, "PYTHONPATH": f"{ROOT}:{tmp_path}"})
+    assert found["wheels_disagree"]["what"].splitlines()[1:] == [
+        "ros-acme-msgs 1.0.0 needs ros-acme-core~=2.0, found 1.9.0"
+    ]
+
+
+@pytest.mark.ros
+def test_the_files_errors_are_shown_as_validate_shows_them(base, tmp_path):
+    (tmp_path / "f.yaml").write_text(BAD)
+    _, found = examine(base, "--config", str(tmp_path / "f.yaml"))
+    validated = run("validate", str(tmp_path / "f.yaml"), folder=tmp_path, environ=base)
+    assert found["file"]["what"].partition("\n")[2] == validated.stderr.rstrip("\n")
+
+
+@pytest.mark.ros
+def test_a_package_that_is_missing_is_a_fault_of_the_environment(base, tmp_path):
+    (tmp_path / "f.yaml").write_text(GOOD.replace("/b, type: sensor_msgs", "/b, type: acme_msgs"))
+    _, found = examine(base, "--config", str(tmp_path / "f.yaml"))
+    assert "package_missing" in found
+    assert "file" not in found
+    assert "type_unusable" not in found
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("module", "fault"),
+    [
+        (
+            "raise ImportError('libacme.so: cannot open shared object file')",
+            "libacme.so: cannot open shared object file",
+        ),
+        ("import os; os.abort()", "the process was ended by signal 6"),
+    ],
+    ids=["raises", "kills"],
+)
+def test_a_type_whose_library_does_not_load_is_named_with_its_topics(module, fault, base, tmp_path):
+    (tmp_path / "acme_msgs/msg").mkdir(parents=True)
+    (tmp_path / "acme_msgs/__init__.py").touch()
+    (tmp_path / "acme_msgs/msg/__init__.py").write_text(module)
+    index = tmp_path / "share/ament_index/resource_index"
+    (index / "rosidl_interfaces").mkdir(parents=True)
+    (index / "rosidl_interfaces/acme_msgs").write_text("msg/Thing.idl\nmsg/Thing.msg\n")
+    (tmp_path / "share/acme_msgs/msg").mkdir(parents=True)
+    (tmp_path / "share/acme_msgs/msg/Thing.msg").write_text("std_msgs/Header header\n")
+    (tmp_path / "f.yaml").write_text(GOOD.replace("/b, type: sensor_msgs/msg/Image", "/b, type: acme_msgs/msg/Thing"))
+    prefixes = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("AMENT_PREFIX_PATH"), sys.prefix]))
+    environ = {**base, "PYTHONPATH": f"{ROOT}:{tmp_path}", "AMENT_PREFIX_PATH": prefixes}
+    _, found = examine(environ, "--config", str(tmp_path / "f.yaml"))
+    assert fault in found["type_unusable"]["what"]
+    assert "nothing of /b is received: the group front waits" in found["type_unusable"]["so"]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    ("remap", "code"), [("/b:=/front/a", "remap_loop"), ("/front/a:=/front/b", "remap_outputs"), ("/b:=/c", None)]
+)
+def test_remaps_that_make_names_meet_are_found(remap, code, base, tmp_path):
+    (tmp_path / "f.yaml").write_text(GOOD)
+    _, found = examine(base, "--config", str(tmp_path / "f.yaml"), "--ros-args", "-r", remap)
+    assert [each for each in found if each.startswith("remap")] == ([code] if code else [])
+
+
+@pytest.mark.ros
+def test_arguments_that_ros_does_not_take_are_shown(base):
+    _, found = examine(base, "--ros-args", "-r", "nonsense")
+    assert found["ros_args"]["what"].startswith("ROS does not take --ros-args -r nonsense:")
+
+
+SHM = "mount -t tmpfs -o mode=1777 shm /dev/shm; cd /dev/shm"
+STALE = "touch fastrtps_0123456789abcdef fastrtps_0123456789abcdef_el fastrtps_port7999 fastrtps_port7999_el"
+LIVE = "touch fastrtps_port7411 fastrtps_port7411_el; exec 9<fastrtps_port7411_el; flock 9"
+VETH = "ip link add {0} type veth peer name {0}b; ip link set {0} up; ip link set {0}b up"
+FAULTS = {
+    "loopback_down": (["net"], "true"),
+    "no_network": (["net"], "ip link set lo up"),
+    "no_multicast": (
+        ["net"],
+        f"ip link set lo up; {VETH.format('wg0')}; ip link set wg0 multicast off; ip link set wg0b multicast off",
+    ),
+    "shm_full": (["mount"], "mount -t tmpfs -o size=300k shm /dev/shm"),
+    "shm_tight": (["mount"], "mount -t tmpfs -o size=2m shm /dev/shm"),
+    "shm_unusable": (["mount"], "mount -t tmpfs -o ro shm /dev/shm"),
+    "shm_stale": (["mount"], f"{SHM}; {STALE}"),
+    "shm_foreign": (["mount"], f"{SHM}; {LIVE}; chown 65534 fastrtps*"),
+    "private_shm": (
+        ["mount", "net"],
+        f"{SHM}; mount -t tmpfs run /run; touch /run/.containerenv; ip link set lo up; {VETH.format('docker0')}",
+    ),
+}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("code", FAULTS)
+def test_a_machine_that_is_set_up_wrong_is_recognised(code, base):
+    _, found = examine(base, command=unshared(*FAULTS[code], "doctor", "--json"))
+    assert code in found
+
+
+@pytest.mark.ros
+def test_what_it_says_to_do_about_stale_files_removes_them_and_no_others(base):
+    made = f"{SHM}; {STALE}; {LIVE}; touch kept"
+    _, found = examine(base, command=unshared(["mount"], made, "doctor", "--json"))
+    assert "2 files of Fast DDS" in found["shm_stale"]["what"]
+    clean = found["shm_stale"]["do"].splitlines()[-1]
+    command = unshared(["mount"], f"{made}; set +e\n{clean}\nls /dev/shm >&2", "--version")
+    done = subprocess.run(command, env=base, capture_output=True, text=True, timeout=60, check=False)
+    assert done.stderr.split() == ["fastrtps_port7411", "fastrtps_port7411_el", "kept"]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("no_color", "coloured"), [("", True), ("1", False)])
+def test_colour_is_for_terminals_that_want_it(no_color, coloured, base):
+    reader, terminal = pty.openpty()
+    environ = {**base, "NO_COLOR": no_color, "TERM": "xterm", "ROS_DOMAIN_ID": "x"}
+    command = [sys.executable, "-m", "syncrelay", "doctor"]
+    subprocess.run(command, env=environ, stdout=terminal, check=False, timeout=120)
+    os.close(terminal)
+    shown = os.read(reader, 100_000).decode()
+    os.close(reader)
+    assert "ROS_DOMAIN_ID=x is no domain" in shown
+    assert ("\033[" in shown) == coloured

@@ -1,0 +1,229 @@
+"""The checks of environment, network, memory and limits, by values."""
+
+from pathlib import Path
+
+import pytest
+
+from syncrelay.doctor.container import Isolation, check_isolation
+from syncrelay.doctor.diagnosis import Severity
+from syncrelay.doctor.discovery import Discovery, check_discovery, domain_of, range_of
+from syncrelay.doctor.folders import Written, check_folders
+from syncrelay.doctor.network import Interface, check_network
+from syncrelay.doctor.shared_memory import SharedMemory, ShmFile, check_shared_memory
+from syncrelay.doctor.transport import Transport, check_transport, uses_shared_memory
+
+MEND, KNOW = Severity.MEND, Severity.KNOW
+
+
+def brief(diagnoses):
+    return [(each.code, each.severity) for each in diagnoses]
+
+
+@pytest.mark.parametrize(
+    ("text", "domain"),
+    # As rcl took them when it was tried: strtoul with base 0.
+    [
+        ("", 0),
+        ("0", 0),
+        ("42", 42),
+        ("+5", 5),
+        (" 5", 5),
+        ("5 ", 5),
+        ("5abc", 5),
+        ("010", 8),
+        ("0x10", 16),
+        ("232", 232),
+        ("233", None),
+        ("-1", None),
+        ("abc", None),
+        ("08", None),
+        ("1.5", 1),
+    ],
+)
+def test_a_domain_is_read_as_ros_reads_it(text, domain):
+    assert domain_of({"ROS_DOMAIN_ID": text}) == domain
+
+
+def discovery(environ, unresolved=()):
+    return check_discovery(Discovery(environ, (32768, 60999), unresolved))
+
+
+@pytest.mark.parametrize(
+    ("environ", "found"),
+    [
+        ({}, []),
+        ({"ROS_DOMAIN_ID": "101"}, []),
+        ({"ROS_DOMAIN_ID": "102"}, [("domain_ports", KNOW)]),
+        ({"ROS_DOMAIN_ID": "232"}, []),
+        ({"ROS_DOMAIN_ID": "010"}, [("domain_id", MEND)]),
+        ({"ROS_DOMAIN_ID": "x"}, [("domain_id", MEND)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, []),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": ""}, []),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, [("discovery_range", KNOW)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.2"}, []),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}, [("discovery_range", KNOW)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "subnet"}, [("discovery_range", MEND)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, [("discovery_off", MEND)]),
+        ({"ROS_LOCALHOST_ONLY": "0"}, []),
+        ({"ROS_LOCALHOST_ONLY": "1"}, [("localhost_only", KNOW)]),
+        (
+            {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+            [("discovery_range", KNOW), ("localhost_only", KNOW)],
+        ),
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.2"}, [("localhost_only", MEND)]),
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, [("localhost_only", MEND)]),
+    ],
+)
+def test_discovery_variables(environ, found):
+    assert brief(discovery(environ)) == found
+
+
+def test_a_peer_without_an_address_is_named():
+    (diagnosis,) = discovery({"ROS_STATIC_PEERS": "robot;nobody"}, ("nobody",))
+    assert diagnosis.severity is MEND
+    assert "`nobody`" in diagnosis.what
+
+
+@pytest.mark.parametrize(
+    ("environ", "reach"),
+    [
+        ({}, "SUBNET"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "OFF"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "everywhere"}, "LOCALHOST"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF", "ROS_LOCALHOST_ONLY": "1"}, "LOCALHOST"),
+    ],
+)
+def test_discovery_reaches_as_far_as_ros_makes_of_it(environ, reach):
+    assert range_of(environ) == reach
+
+
+@pytest.mark.parametrize(
+    ("value", "found", "shared"),
+    [
+        (None, [], True),
+        ("DEFAULT", [], True),
+        ("UDPv4", [], False),
+        ("UDPv6", [], False),
+        ("LARGE_DATA", [], True),
+        ("LARGE_DATA?max_msg_size=1MB", [], True),
+        ("SHM", [("transports", KNOW)], True),
+        ("NONE", [("transports", MEND)], True),
+        ("", [("transports", MEND)], True),
+        ("udpv4", [("transports", MEND)], True),
+    ],
+)
+def test_transports(value, found, shared):
+    environ = {} if value is None else {"FASTDDS_BUILTIN_TRANSPORTS": value}
+    assert brief(check_transport(Transport(environ))) == found
+    assert uses_shared_memory(environ) == shared
+
+
+def test_a_profiles_file_that_cannot_be_read_is_named_with_the_cause():
+    environ = {"FASTRTPS_DEFAULT_PROFILES_FILE": "/dds.xml"}
+    (diagnosis,) = check_transport(Transport(environ, "No such file or directory"))
+    assert diagnosis.what == "FASTRTPS_DEFAULT_PROFILES_FILE=/dds.xml: No such file or directory"
+
+
+LO = Interface("lo", is_up=True, is_loopback=True, multicast=False)
+ETH = Interface("eth0", is_up=True, is_loopback=False, multicast=True)
+VPN = Interface("wg0", is_up=True, is_loopback=False, multicast=False)
+DOWN = Interface("eth1", is_up=False, is_loopback=False, multicast=True)
+
+
+@pytest.mark.parametrize(
+    ("interfaces", "reach", "middleware", "found"),
+    [
+        ([LO, ETH], "SUBNET", "rmw_fastrtps_cpp", []),
+        ([LO], "LOCALHOST", "rmw_fastrtps_cpp", []),
+        ([LO, DOWN], "SUBNET", "rmw_fastrtps_cpp", [("no_network", KNOW)]),
+        ([LO], "SUBNET", "rmw_cyclonedds_cpp", [("loopback_multicast", MEND)]),
+        ([LO, VPN], "SUBNET", "rmw_fastrtps_cpp", [("no_multicast", KNOW)]),
+        ([LO, VPN], "LOCALHOST", "rmw_fastrtps_cpp", []),
+        ([LO, VPN, ETH], "SUBNET", "rmw_fastrtps_cpp", []),
+        ([], "SUBNET", "rmw_fastrtps_cpp", [("loopback_down", MEND)]),
+        ([ETH], "SUBNET", "rmw_fastrtps_cpp", [("loopback_down", MEND)]),
+    ],
+)
+def test_interfaces(interfaces, reach, middleware, found):
+    assert brief(check_network(interfaces, discovery_range=reach, middleware=middleware)) == found
+
+
+LOG = Path("/log")
+
+
+@pytest.mark.parametrize(
+    ("written", "found"),
+    [
+        (Written(LOG, "ROS_LOG_DIR", None), []),
+        (Written(LOG, "ROS_LOG_DIR", None, LOG / "beat", None), []),
+        (Written(None, "", None), [("log_folder", KNOW)]),
+        (Written(LOG, "ROS_HOME", "Read-only file system"), [("log_folder", KNOW)]),
+        (Written(LOG, "HOME", None, LOG / "beat", "Permission denied"), [("heartbeat", MEND)]),
+    ],
+)
+def test_what_must_be_written(written, found):
+    assert brief(check_folders(written)) == found
+
+
+MB = 1_000_000
+
+
+def shm(*files, free=64 * MB, fault=None):
+    memory = SharedMemory("/dev/shm", fault, total=64 * MB, free=free, uid=1000, files=files)  # noqa: S108
+    return list(check_shared_memory(memory, domain=2))
+
+
+def file(*, uid, is_live, port=None):
+    return ShmFile("fastrtps_x", 549_408, uid, f"user{uid}", is_live, port)
+
+
+@pytest.mark.parametrize(
+    ("diagnoses", "found"),
+    [
+        (shm(), []),
+        (shm(file(uid=1000, is_live=True), file(uid=1000, is_live=True, port=7911)), []),
+        (shm(fault="Read-only file system"), [("shm_unusable", KNOW)]),
+        (shm(free=500_000), [("shm_full", MEND)]),
+        (shm(free=2 * MB), [("shm_tight", KNOW)]),
+        (shm(file(uid=1000, is_live=False)), [("shm_stale", KNOW)]),
+        (shm(file(uid=0, is_live=False, port=7911)), [("shm_stale", KNOW)]),
+        # Domain 2 has the ports 7900 to 8149.
+        (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7911)), [("shm_foreign", MEND)]),
+        (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7411)), [("shm_foreign", KNOW)]),
+        (shm(file(uid=0, is_live=True, port=7000)), []),
+    ],
+)
+def test_shared_memory(diagnoses, found):
+    assert brief(diagnoses) == found
+
+
+def test_what_is_stale_is_counted_with_its_size_and_owner():
+    (diagnosis,) = shm(file(uid=1000, is_live=False), file(uid=0, is_live=False))
+    assert "2 files of Fast DDS in /dev/shm" in diagnosis.what
+    assert "1.1 MB, some of user0" in diagnosis.what
+    assert "as root" in diagnosis.do
+
+
+CONTAINER = Isolation("/.dockerenv", host_network=True, private_shm=True)
+
+
+@pytest.mark.parametrize(
+    ("isolation", "environ", "found"),
+    [
+        (Isolation(None, host_network=True, private_shm=True), {}, []),
+        (CONTAINER, {}, [("private_shm", MEND)]),
+        (CONTAINER, {"FASTDDS_BUILTIN_TRANSPORTS": "LARGE_DATA"}, [("private_shm", MEND)]),
+        (CONTAINER, {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}, []),
+        (
+            CONTAINER,
+            {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+            [("private_shm", MEND)],
+        ),
+        (Isolation("/.dockerenv", host_network=False, private_shm=True), {}, []),
+        (Isolation("/.dockerenv", host_network=True, private_shm=False), {}, []),
+        (Isolation(None, False, False, 29, "ulimit -u"), {}, [("task_limit", MEND)]),  # noqa: FBT003
+        (Isolation(None, False, False, 30, "ulimit -u"), {}, []),  # noqa: FBT003
+    ],
+)
+def test_isolation(isolation, environ, found):
+    assert brief(check_isolation(isolation, environ)) == found
