@@ -5,8 +5,6 @@ from typing import Protocol
 
 from syncrelay.sync.counts import InputCounts
 
-_LONGEST_ADVISED = 1000
-
 
 class InputAccount(Protocol):
     """An input, by the name that the file gives its topic, and where its messages went."""
@@ -40,7 +38,6 @@ def _fates(counts: InputCounts) -> str:
     if counts.dropped:
         reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
         text += f" ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})"
-    # Beyond it, the stamps are of another clock, and no queue is the answer.
-    if counts.needed_queue is not None and counts.needed_queue <= _LONGEST_ADVISED:
+    if counts.needed_queue is not None:
         text += f"; a match needed what had overflowed: queue_size {counts.needed_queue} would have held it"
     return text

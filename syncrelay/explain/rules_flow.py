@@ -7,8 +7,6 @@ from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted
 from syncrelay.sync.messages import DropReason
 
-# Beyond it stamps are of another clock, and no queue is the answer.
-_LONGEST_QUEUE: Final = 1000
 _MISSING: Final = 0.05
 _TOO_SLOW: Final = 500_000_000
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
@@ -29,7 +27,7 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that overflowed and then were missed."""
     needed = an_input.counts.needed_queue
     overflowed = an_input.figures.dropped.get(DropReason.OVERFLOW, 0)
-    if needed is None or not overflowed or not facts.queue_size < needed <= _LONGEST_QUEUE:
+    if needed is None or not overflowed or needed <= facts.queue_size:
         return
     yield Finding(
         Code.SHORT_QUEUE,

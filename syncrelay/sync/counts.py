@@ -11,8 +11,9 @@ from syncrelay.sync.messages import DropReason, Match, Outcome
 class InputCounts:
     """Messages of one input since the group was made. `dropped` holds only reasons that occurred.
 
-    `needed_queue` is how long this input's queue should have been when a message of another input last found
-    that what it needed had overflowed; None if that never happened.
+    `needed_queue` is the greatest length that this input's queue should have had when a message of another input
+    found that what it needed had overflowed; None if that never happened. Lengths above 1000 don't count: they
+    come of stamps of another clock, and no queue is the answer.
     """
 
     fed: int

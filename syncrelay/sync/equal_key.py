@@ -6,6 +6,7 @@ from collections.abc import Hashable, Sequence
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional_keys import OptionalKeys
 from syncrelay.sync.policy import Policy, check_sizes
+from syncrelay.sync.queues import Losses
 
 _LOST_QUEUES = 10
 """How many queues' worth of lost keys are remembered, to tell how long a queue was needed."""
@@ -25,7 +26,7 @@ class EqualKey(Policy):
         -> C: cC
     """
 
-    __slots__ = ("_fed", "_keys", "_lost", "_messages", "_needed", "_queue_size", "_stamps", "n_inputs")
+    __slots__ = ("_fed", "_keys", "_losses", "_lost", "_messages", "_queue_size", "_stamps", "n_inputs")
 
     by_stamp = False
 
@@ -34,7 +35,7 @@ class EqualKey(Policy):
         self.n_inputs = n_inputs
         self._queue_size = queue_size
         self._fed = [0] * n_inputs
-        self._needed: list[int | None] = [None] * n_inputs
+        self._losses = Losses(n_inputs)
         self._reset()
 
     def narrowed(self, required: Sequence[bool]) -> tuple["EqualKey", OptionalKeys]:
@@ -67,7 +68,7 @@ class EqualKey(Policy):
         return len(self._keys[place])
 
     def needed_queue(self, place: int) -> int | None:
-        return self._needed[place]
+        return self._losses.needed[place]
 
     def _reset(self) -> None:
         places = range(self.n_inputs)
@@ -85,7 +86,7 @@ class EqualKey(Policy):
         self._fed[place] += 1
         for other, lost in enumerate(self._lost):
             if other != place and key in lost:
-                self._needed[other] = self._fed[other] - lost[key] + 1
+                self._losses.need(other, self._fed[other] - lost[key] + 1)
 
     def _take(self, place: int, position: int) -> Message:
         del self._stamps[place][position]

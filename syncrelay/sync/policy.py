@@ -93,7 +93,7 @@ class Policy(Protocol):
         ...
 
     def needed_queue(self, place: int) -> int | None:
-        """How long this input's queue should have been when a message last missed what it had dropped."""
+        """How long this input's queue should have been at most, by the messages that missed what it had dropped."""
         ...
 
 

@@ -5,6 +5,9 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Message
 
+LONGEST_QUEUE = 1000
+"""What would take more than this comes of stamps of another clock, and no queue is the answer."""
+
 
 class StampQueue:
     """Messages of one input in stamp order, each stamp once. `stamps` and `messages` run in parallel."""
@@ -40,7 +43,10 @@ class StampQueue:
 
 
 class Losses:
-    """What queues lost by overflow, and how long they should have been."""
+    """What queues lost by overflow, and how long they should have been.
+
+    `needed` is the greatest length for each place, of those up to LONGEST_QUEUE.
+    """
 
     __slots__ = ("_lost", "needed")
 
@@ -49,7 +55,7 @@ class Losses:
         self.needed: list[int | None] = [None] * n_inputs
 
     def forget(self) -> None:
-        """Start afresh, but keep what is known to be needed."""
+        """Start afresh, but keep what was needed."""
         self._lost = [None] * len(self._lost)
 
     def lose(self, place: int, stamp: int) -> None:
@@ -64,4 +70,9 @@ class Losses:
         """
         lost = self._lost[place]
         if lost is not None and wanted - reach <= lost < stamps[0]:
-            self.needed[place] = 2 + (stamps[-1] - wanted) * len(stamps) // (stamps[-1] - lost)
+            self.need(place, 2 + (stamps[-1] - wanted) * len(stamps) // (stamps[-1] - lost))
+
+    def need(self, place: int, length: int) -> None:
+        """Note that a queue of this length would have held what was missed."""
+        if (self.needed[place] or 0) < length <= LONGEST_QUEUE:
+            self.needed[place] = length

@@ -97,6 +97,15 @@ def test_the_queue_that_was_needed_is_told_exactly():
     assert longer.add(Message(1, 4, None, key=4))
 
 
+def test_the_greatest_queue_that_was_needed_is_told():
+    policy = equal_key(queue_size=1)
+    for number in range(6):
+        policy.add(Message(0, number, None, key=number))
+    for key in (4, 1, 3):
+        policy.add(Message(1, 0, None, key=key))
+    assert policy.needed_queue(0) == 5
+
+
 def test_only_so_many_lost_keys_are_remembered():
     policy = equal_key(queue_size=1)
     for number in range(13):

@@ -53,6 +53,13 @@ def test_what_was_lost_and_wanted_tells_how_long_a_queue_was_needed(lost, wanted
     assert losses.needed == [None, needed]
 
 
+def test_the_greatest_length_is_kept_but_none_that_no_queue_should_have():
+    losses = Losses(2)
+    for place, length in ((0, 7), (1, 1001), (0, 9), (1, 1000), (0, 8), (0, 5000)):
+        losses.need(place, length)
+    assert losses.needed == [9, 1000]
+
+
 def test_losses_are_forgotten_but_not_what_they_taught():
     losses = Losses(1)
     losses.lose(0, 10)
