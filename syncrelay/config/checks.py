@@ -83,7 +83,7 @@ def _optional_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]
     if optional and len(optional) == len(group.topics):
         text = "all inputs of this group are optional, expected one or more without `required: false`"
         yield _at(document, (*group.path, "topics"), text, code="conflict", at_key=True)
-    if optional and not group.has_max_wait:
+    if optional and group.needs_max_wait:
         text = "an optional input needs the group's `max_wait`: how long a set waits for it, for example 100ms"
         yield _at(document, (*optional[0].path, "required"), text, code="missing")
 

@@ -43,7 +43,8 @@ class TopicDraft:
 class GroupDraft:
     """A group with those of its topics that are mappings.
 
-    `restamp_topic` and `trigger_topic` are absolute, and None where they name no topic.
+    `restamp_topic` and `trigger_topic` are absolute, and None where they name no topic. `needs_max_wait` tells that
+    its sets would wait for optional inputs without end.
     """
 
     path: Path
@@ -52,7 +53,7 @@ class GroupDraft:
     trigger: str | None
     trigger_topic: str | None
     needs_key: bool
-    has_max_wait: bool
+    needs_max_wait: bool
     topics: tuple[TopicDraft, ...]
 
     @property
@@ -84,7 +85,7 @@ def _group(path: Path, node: MappingNode, absolute: Callable[[str], str]) -> Gro
         trigger=trigger,
         trigger_topic=absolute(trigger) if trigger else None,
         needs_key=_value(node, "policy") == "equal_key",
-        has_max_wait="max_wait" in node.entries,
+        needs_max_wait=_value(node, "policy") != "latest_time" and "max_wait" not in node.entries,
         topics=tuple(
             _topic((*path, "topics", *step), topic, node, prefix=prefix or f"/{path[-1]}", absolute=absolute)
             for step, topic in (mappings(topics) if isinstance(topics, SequenceNode) else ())

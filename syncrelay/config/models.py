@@ -100,7 +100,7 @@ class Topic(Keys):
         default=True,
         description=(
             "Whether every set has a message of this input. With false a set leaves without one after the group's"
-            " max_wait. Default: true."
+            " max_wait, with latest_time at once. Default: true."
         ),
     )
     offset: SignedDuration = Field(
@@ -170,8 +170,8 @@ class Group(Keys):
         default=None,
         description=(
             "How long a set may wait, once its required messages are there, for optional ones or for a closer match;"
-            " then it leaves as it is. Needed where an input is optional. A number is seconds, a text has a unit"
-            " (ns, us, ms, s, min). Default: no limit."
+            " then it leaves as it is. Needed where an input is optional, but not by latest_time, which never waits for"
+            " one. A number is seconds, a text has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["100ms"],
     )

@@ -45,11 +45,12 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     if an_input.required or missing <= _MISSING or not facts.figures.rate_hz:
         return
     waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
+    longer = "" if facts.max_wait is None else ", or write a larger `max_wait`"
     yield Finding(
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
         f"{words.share(missing)} of the sets leave without {an_input.name}{waits}",
-        f"see why {an_input.name} does not come in time, or write a larger `max_wait`",
+        f"see why {an_input.name} does not come in time{longer}",
         index,
     )
 

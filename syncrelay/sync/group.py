@@ -21,7 +21,8 @@ class SyncGroup:
     - Inputs that are not `required` never change which messages of the required ones go together. A set
       leaves when it has what it can have of them, or `max_wait_ns` after it was complete but for them.
     - `max_wait_ns` after its first complete set came together, the best one so far leaves. Without it, sets
-      of required inputs wait as long as the policy would have them wait.
+      wait as long as the policy would have them wait, and every input is required but with latest_time, whose
+      sets don't wait for others.
     - `restamp` gives sets a common stamp, of what they came in with. `every` and `min_set_period_ns` thin them.
 
     `add` lets go first what was due before it: calling `expire` more often changes nothing.
@@ -55,8 +56,6 @@ class SyncGroup:
         offsets = (0,) * n_inputs if offsets_ns is None else tuple(offsets_ns)
         if len(required) != n_inputs or len(offsets) != n_inputs or not any(required):
             raise ValueError(f"required {required} and offsets_ns {offsets} must be {n_inputs}, one required")
-        if max_wait_ns is None and not all(required):
-            raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
         if max_wait_ns is not None and max_wait_ns < 0:
             raise ValueError(f"max_wait_ns {max_wait_ns} must be 0 or more")
         if isinstance(restamp, int) and not 0 <= restamp < n_inputs:
@@ -73,9 +72,11 @@ class SyncGroup:
             self._thinning = Thinning(
                 n_inputs=n_inputs, repeats=policy.repeats, every=every, min_set_period_ns=min_set_period_ns
             )
-        self._matching: Matching = Unlimited(policy, self._arrivals)
         self._is_limited = max_wait_ns is not None
-        if max_wait_ns is not None:
+        self._matching: Matching
+        if max_wait_ns is None:
+            self._matching = Unlimited(policy, self._arrivals, required=required)
+        else:
             self._matching = Limited(
                 policy, self._arrivals, required=required, max_wait_ns=max_wait_ns, offsets_ns=offsets
             )

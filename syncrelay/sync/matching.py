@@ -40,12 +40,14 @@ class Matching(Protocol):
 
 
 class Unlimited(Matching):
-    """All inputs are required, and a set waits as long as the policy has it wait."""
+    """A set waits as long as the policy has it wait: no input may be optional that it would wait for."""
 
     __slots__ = ("_given", "_policy")
 
-    def __init__(self, policy: Policy, arrivals: Arrivals) -> None:
-        self._policy = policy
+    def __init__(self, policy: Policy, arrivals: Arrivals, *, required: Sequence[bool]) -> None:
+        self._policy, stage = policy.narrowed(required)
+        if stage.inputs:
+            raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
         self._given = arrivals.given
 
     def feed(self, stamp: int, message: Message, now: int) -> Sequence[Outcome]:

@@ -63,6 +63,13 @@ def test_outputs_are_named_by_prefix_and_input_unless_they_have_a_name(environ):
     ]
 
 
+def test_an_optional_input_that_nothing_waits_for_needs_no_max_wait(environ):
+    group = load(str(FOLDER / "optional_state.yaml"), environ=environ).groups[0]
+    assert [topic.required for topic in group.topics] == [True, False]
+    assert group.keys.max_wait is None
+    assert group.engine().next_deadline() is None
+
+
 def test_a_duration_of_the_middleware_has_a_largest_value(environ):
     text = (FOLDER / "shared_topic.yaml").read_text()
     no_limit = "qos: {lifespan: {sec: 9223372036, nsec: 854775807}, deadline: {sec: 9223372036854, nsec: 0}}"

@@ -340,6 +340,19 @@ test_optional = group_cases(
             -> @6: aA-
             """,
         ),
+        "a set that does not wait for optional inputs needs no max_wait": (
+            lambda: grouped(
+                LatestTime(n_inputs=3, queue_size=9, trigger=0, max_age_ns=2 * TICK_NS), required=(True, True, False)
+            ),
+            """
+            lidar |..a.b...c
+            odom  |.A.B...C.
+            gps   |...G.....
+            -> a: aA-
+            -> b: bBG
+            -> c: cC-
+            """,
+        ),
         "by key: the optional message of the key is waited for": (
             partial(by_key, **third_optional, max_wait=4),
             """
