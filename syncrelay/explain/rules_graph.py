@@ -17,7 +17,7 @@ def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) ->
         yield Finding(
             Code.TYPE_NOT_IMPORTABLE,
             Severity.ERROR if an_input.required else Severity.WARN,
-            f"{an_input.name}: {an_input.not_importable}",
+            f"{an_input.name}: {an_input.not_importable.splitlines()[0]}",
             "install the package where the relay runs, or source the workspace that has it",
             index,
         )

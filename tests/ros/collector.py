@@ -32,7 +32,7 @@ from tests.ros.message_types import import_type
 def main() -> None:
     arguments = _parser().parse_args()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("collector")
+    node = rclpy.create_node(arguments.node)
     profile = QoSProfile(
         history=HistoryPolicy.KEEP_ALL,
         reliability=ReliabilityPolicy[arguments.reliability.upper()],
@@ -57,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--topic", nargs=2, action="append", default=[], metavar=("NAME", "TYPE"))
+    parser.add_argument("--node", default="collector")
     parser.add_argument("--reliability", default="reliable")
     parser.add_argument("--durability", default="volatile")
     return parser

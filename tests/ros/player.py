@@ -31,7 +31,7 @@ _ACKNOWLEDGE = Duration(seconds=60)
 def main() -> None:
     arguments = _parser().parse_args()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node("player")
+    node = rclpy.create_node(arguments.node)
     profile = QoSProfile(
         depth=arguments.depth,
         reliability=ReliabilityPolicy[arguments.reliability.upper()],
@@ -56,6 +56,7 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--topic", nargs=2, action="append", required=True, metavar=("NAME", "TYPE"))
+    parser.add_argument("--node", default="player")
     parser.add_argument("--reliability", default="reliable")
     parser.add_argument("--durability", default="volatile")
     parser.add_argument("--depth", type=int, default=20_000)

@@ -122,24 +122,26 @@ class Stage:
         self,
         topics: Mapping[str, str],
         *,
+        node: str = "player",
         reliability: str = "reliable",
         durability: str = "volatile",
     ) -> Player:
         """A process that publishes on these topics, by name with their types."""
-        argv = _module("tests.ros.player", topics, reliability=reliability, durability=durability)
+        argv = _module("tests.ros.player", topics, node=node, reliability=reliability, durability=durability)
         return Player(self.start("player", argv, stdin=subprocess.PIPE), self.folder)
 
     def collector(
         self,
         topics: Mapping[str, str] | None = None,
         *,
+        node: str = "collector",
         reliability: str = "reliable",
         durability: str = "volatile",
     ) -> Collector:
         """A process that subscribes to these topics, by name with their types."""
         output = self.folder / f"collected-{len(self._processes)}.frames"
         output.touch()
-        argv = _module("tests.ros.collector", topics or {}, reliability=reliability, durability=durability)
+        argv = _module("tests.ros.collector", topics or {}, node=node, reliability=reliability, durability=durability)
         return Collector(self.start("collector", [*argv, "--output", str(output)], stdin=subprocess.PIPE), output)
 
     def note_shared_memory(self) -> None:
@@ -172,13 +174,14 @@ def running_stage(folder: Path, domain: int) -> Iterator[Stage]:
         stage.end()
 
 
-def _module(name: str, topics: Mapping[str, str], *, reliability: str, durability: str) -> list[str]:
+def _module(name: str, topics: Mapping[str, str], *, node: str, reliability: str, durability: str) -> list[str]:
     chosen = [word for topic, type_name in topics.items() for word in ("--topic", topic, type_name)]
     return [
         sys.executable,
         "-m",
         name,
         *chosen,
+        f"--node={node}",
         f"--reliability={reliability}",
         f"--durability={durability}",
     ]
