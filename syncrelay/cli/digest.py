@@ -6,9 +6,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from syncrelay.cli.live import Moment, awaited, ms, short_names
+from syncrelay.cli.live import Moment, awaited, ms
 from syncrelay.cli.tally import GroupFigures
 from syncrelay.sync.counts import InputCounts
+from syncrelay.top.names import short_names
 
 
 def plain_line(moment: Moment) -> str:

@@ -21,6 +21,7 @@ commands:
   replay BAG...         show what a file makes of a recording; write its outputs as one
   demo                  show it all on a simulated rig, without a robot
   doctor                tell what can go wrong before a message flows
+  top                   watch a running relay, here or on another machine
   healthcheck           tell whether the relay receives, by its heartbeat
   syncrelay COMMAND --help says more
 
@@ -213,6 +214,32 @@ def _doctor(words: Sequence[str], stop: StopRequest) -> int:
     return doctor(arguments.config, arguments.seconds if arguments.live else None, output_format, ros_args, stop=stop)
 
 
+def _top(words: Sequence[str], _stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay top",
+        description="Shows a running relay live: groups, inputs, recent sets, and what is wrong with them.\n"
+        "Without --url it is the one on this machine, of several the one you choose.\n"
+        "Exit code 1 if there is none.",
+    )
+    parser.add_argument(
+        "--url", metavar="URL", help="where it is: a host, host:port or URL, such as robot or http://robot:9464"
+    )
+    parser.add_argument("--once", action="store_true", help="print the state as text and end")
+    parser.add_argument(
+        "--json", action="store_true", help="with --once: print the state as JSON, as the relay tells it"
+    )
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    arguments = parser.read(words)
+    if arguments.json and not arguments.once:
+        parser.error("--json goes with --once")
+    from syncrelay.cli.top import Output, top
+
+    output = Output.JSON if arguments.json else Output.TEXT if arguments.once else Output.SCREEN
+    return top(arguments.url, output)
+
+
 def _healthcheck(words: Sequence[str], _stop: StopRequest) -> int:
     from syncrelay.cli.heartbeat import VARIABLE, healthcheck
 
@@ -234,6 +261,7 @@ _COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
     "replay": _replay,
     "demo": _demo,
     "doctor": _doctor,
+    "top": _top,
     "healthcheck": _healthcheck,
 }
 

@@ -10,6 +10,7 @@ from rich.text import Text
 from syncrelay.cli.tally import GroupFigures
 from syncrelay.ros.snapshot import GroupSnapshot, RelaySnapshot
 from syncrelay.sync.messages import DropReason
+from syncrelay.top.names import short_names
 from syncrelay.top.strip import COLUMN_NS, MARKS, Lanes, Sweep, drop_style, letter_style, newest_stamp, strip
 
 _LABEL = 13
@@ -86,15 +87,6 @@ def _group_block(figures: GroupFigures, sweep: Sweep) -> list[Text]:
         *_lanes(figures, names, sweep),
         *(_fate_line(figures, lane, name) for lane, name in enumerate(names)),
     ]
-
-
-def short_names(topics: Sequence[str]) -> list[str]:
-    """Name topics by the first part that tells them apart: /demo/camera/image_raw is `camera` beside /demo/imu/data."""
-    parts = [topic.strip("/").split("/") for topic in topics]
-    for candidates in zip(*parts, strict=False):
-        if len(set(candidates)) == len(topics):
-            return list(candidates)
-    return list(topics)
 
 
 def awaited(state: GroupSnapshot) -> str | None:

@@ -7,7 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
-from syncrelay.cli.live import Moment, frame, ms, short_names
+from syncrelay.cli.live import Moment, frame, ms
 from syncrelay.cli.tally import GroupFigures, GroupPlan, Spans
 from syncrelay.sync.messages import DropReason
 from tests.cli.demo_states import MS, PLAN, a_drop, a_group, a_set, an_input
@@ -124,20 +124,6 @@ def test_more_sets_than_the_slowest_input_gave_in_the_window_are_no_more_than_al
 
 def test_without_an_end_only_the_time_passed_is_shown():
     assert shown(moment(lidar_imu(), total_s=None)).splitlines()[0].endswith("  3.0 s")
-
-
-@pytest.mark.parametrize(
-    ("topics", "names"),
-    [
-        (["/demo/camera/image_raw", "/demo/lidar/points"], ["camera", "lidar"]),
-        (["/left/image", "/right/image"], ["left", "right"]),
-        (["/camera/color", "/camera/depth"], ["color", "depth"]),
-        (["/a/x", "/a/y", "/b/x"], ["/a/x", "/a/y", "/b/x"]),
-        (["/a", "/a/b"], ["/a", "/a/b"]),
-    ],
-)
-def test_topics_are_named_by_the_first_part_that_tells_them_apart(topics, names):
-    assert short_names(topics) == names
 
 
 @pytest.mark.parametrize(

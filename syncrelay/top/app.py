@@ -1,0 +1,129 @@
+"""The application: asks a relay once a second, in a thread, and holds what the screens show."""
+
+import asyncio
+import signal
+import time
+from collections.abc import Sequence
+from threading import Event
+from typing import ClassVar, Final
+
+from textual import on, work
+from textual.app import App
+from textual.binding import Binding, BindingType
+from textual.message import Message
+from textual.reactive import reactive
+from textual.widgets import OptionList
+from textual.worker import get_current_worker
+
+from syncrelay.top.client import Answer, NoAnswerError, OtherServerError, ask
+from syncrelay.top.dialogs import KeysScreen, RelaysScreen
+from syncrelay.top.screens import GroupsScreen
+from syncrelay.top.view import Order, View
+
+_PERIOD_S: Final = 1.0
+
+
+class Heard(Message):
+    """What came of asking a relay: its answer, or why there was none."""
+
+    def __init__(self, url: str, heard: Answer | NoAnswerError | OtherServerError) -> None:
+        super().__init__()
+        self.url, self.heard = url, heard
+
+
+class TopApp(App[None]):
+    """Watches one of the relays that were found, of several the one that the user chooses."""
+
+    CSS_PATH = "top.tcss"
+    ENABLE_COMMAND_PALETTE = False
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+c", "quit", "Quit", show=False, priority=True)]
+
+    view: reactive[View | None] = reactive(None)
+    order: reactive[Order] = reactive(Order.FILE)
+
+    def __init__(self, relays: Sequence[Answer]) -> None:
+        # The terminal's own colours, whatever its theme; said here already, so that NO_COLOR means none at all.
+        super().__init__(ansi_color=True)
+        self.theme = "ansi-dark"
+        self._relays = tuple(relays)
+        self._url = ""
+        self._answered_at = 0.0
+        self._latest: View | None = None
+        self._ended = Event()
+
+    def on_mount(self) -> None:
+        """Show the only relay, or ask which one."""
+        # Without it, the terminal would be left as it was drawn upon.
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            asyncio.get_running_loop().add_signal_handler(number, self.exit)
+        if len(self._relays) > 1:
+            self.push_screen(RelaysScreen(self._relays))
+        else:
+            self._watch(self._relays[0])
+
+    def on_unmount(self) -> None:
+        """Let the thread end."""
+        self._ended.set()
+
+    def _watch(self, answer: Answer) -> None:
+        self._url = answer.url
+        self._answered_at = time.monotonic()
+        self.view = self._latest = View(answer)
+        self.push_screen(GroupsScreen())
+        self._follow(answer.url)
+
+    @work(thread=True, exclusive=True)
+    def _follow(self, url: str) -> None:
+        worker = get_current_worker()
+        while not worker.is_cancelled and not self._ended.wait(_PERIOD_S):
+            self.post_message(Heard(url, _asked(url)))
+
+    @on(Heard)
+    def _take(self, event: Heard) -> None:
+        if event.url != self._url or self._latest is None:
+            return
+        now = time.monotonic()
+        if isinstance(event.heard, Answer):
+            self._answered_at = now
+            self._latest = View(event.heard)
+        else:
+            self._latest = View(self._latest.answer, str(event.heard), now - self._answered_at)
+        if self.view is not None and not self.view.paused:
+            self.view = self._latest
+
+    @on(OptionList.OptionSelected)
+    def _chosen(self, event: OptionList.OptionSelected) -> None:
+        if isinstance(self.screen, RelaysScreen):
+            self._watch(next(answer for answer in self._relays if answer.url == event.option.id))
+
+    def action_pause(self) -> None:
+        """Hold the picture, or let it go on with what came meanwhile."""
+        if self.view is None or self._latest is None:
+            return
+        if self.view.paused:
+            self.view = self._latest
+        else:
+            self.view = View(self.view.answer, self.view.trouble, self.view.quiet_s, paused=True)
+
+    def action_sort(self) -> None:
+        """Sort the groups in the next order."""
+        self.order = self.order.following()
+        if isinstance(self.screen, GroupsScreen):
+            self.screen.draw()
+
+    def action_relays(self) -> None:
+        """Go back to the list of relays, if there are several."""
+        if len(self._relays) > 1:
+            self._url = ""
+            self.pop_screen()
+
+    def action_keys(self) -> None:
+        """Say what the keys do."""
+        self.push_screen(KeysScreen())
+
+
+def _asked(url: str) -> Answer | NoAnswerError | OtherServerError:
+    try:
+        return ask(url)
+    except (NoAnswerError, OtherServerError) as error:
+        return error

@@ -1,0 +1,75 @@
+"""The screens that ask or explain: which of several relays, what the keys do."""
+
+from collections.abc import Sequence
+from typing import ClassVar, Final
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import ModalScreen, Screen
+from textual.widgets import Footer, Static
+
+from syncrelay.top.client import Answer
+from syncrelay.top.pieces import line
+from syncrelay.top.rows import Rows
+
+_KEYS: Final = (
+    ("up, down, k, j", "select a group; in a group, scroll"),
+    ("home, end, page up, page down", "the same, farther"),
+    ("enter", "open the selected group"),
+    ("left, right, p, n", "in a group: the one before, the next"),
+    ("escape, backspace", "back to the groups, or to the list of relays"),
+    ("space", "hold the picture, and let it go on"),
+    ("s", "sort: as in the file, worst first, by name"),
+    ("q, ctrl-c", "quit"),
+)
+_MEANINGS: Final = (
+    ("SETS/s", "sets a second, of those that the slowest input allows"),
+    ("SPAN", "from the oldest to the newest stamp of a set"),
+    ("LAT.", "latency: from the last message of a set to its leaving"),
+    ("LAG", "time of receipt minus stamp, the median"),
+    ("JITTER", "how far the time between stamps is off its median, p95"),
+)
+
+
+class RelaysScreen(Screen[None]):
+    """The relays that were found, to choose from."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("question_mark", "app.keys", "Keys", key_display="?"),
+        Binding("q", "app.quit", "Quit"),
+    ]
+
+    def __init__(self, relays: Sequence[Answer]) -> None:
+        super().__init__()
+        self._relays = {answer.url: answer for answer in relays}
+
+    def compose(self) -> ComposeResult:
+        """Lay out a line for each relay."""
+        yield Static(f"{len(self._relays)} relays answer. Which one?\n", id="title")
+        yield Rows({url: _relay(answer) for url, answer in self._relays.items()})
+        yield Footer()
+
+
+def _relay(answer: Answer) -> Text:
+    names = ", ".join(group.name for group in answer.state.groups)
+    return line((answer.state.relay.node, "bold"), f"  {answer.url}  groups: {names}")
+
+
+class KeysScreen(ModalScreen[None]):
+    """What the keys do and what the columns mean, until any key."""
+
+    def compose(self) -> ComposeResult:
+        """Lay out one text."""
+        keys = [line((f"{key:<30}", "bold"), does) for key, does in _KEYS]
+        meanings = [line((f"{name:<8}", "bold"), means) for name, means in _MEANINGS]
+        back = line(("any key goes back", "dim"))
+        yield Static(Text("\n").join([*keys, Text(""), *meanings, Text(""), back]), id="keys")
+
+    def on_key(self) -> None:
+        """Go back."""
+        self.dismiss()
+
+    def on_click(self) -> None:
+        """Go back."""
+        self.dismiss()

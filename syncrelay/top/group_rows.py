@@ -1,0 +1,87 @@
+"""The list of groups: a line each, and one above that names the columns."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from rich.text import Text
+
+from syncrelay.status import Level
+from syncrelay.top import phrases
+from syncrelay.top.names import fitted
+from syncrelay.top.pieces import STYLES, line, sparkline
+from syncrelay.top.state import Group
+from syncrelay.top.view import Order
+
+_LEVEL: Final = 7
+_SETS: Final = 14
+_FIGURE: Final = 10
+_SPARKLINE: Final = 20
+_FIXED: Final = _LEVEL + _SETS + 2 * _FIGURE
+_SORTED: Final = "▾"
+# What there should be left for the reason, in words, before names may grow and sparklines are drawn beside it.
+_REASON: Final = 18
+_SENTENCE: Final = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """How wide what varies is; no sparklines where their width is 0."""
+
+    name: int
+    sparkline: int
+    reason: int
+
+
+def columns_of(groups: Sequence[Group], width: int) -> Columns:
+    """Divide a line between the names, which are short, and the reasons, which are not."""
+    longest = max((len(group.name) for group in groups), default=0)
+    name = min(max(8, longest) + 2, max(10, width - _FIXED - _REASON))
+    left = width - _FIXED - name
+    drawn = _SPARKLINE if left >= 2 * (_SPARKLINE + 2) + _SENTENCE else 0
+    return Columns(name, drawn, max(0, left - 2 * (drawn + 2) if drawn else left))
+
+
+def heading(columns: Columns, order: Order) -> Text:
+    """Name the columns; the one that groups are sorted by is marked."""
+    name = "GROUP" + _SORTED * (order is Order.NAME)
+    level = "STATE" + _SORTED * (order is Order.WORST)
+    drawn = f"{'SPANS':<{columns.sparkline + 2}}{'LATENCIES':<{columns.sparkline + 2}}" if columns.sparkline else ""
+    last = "FINDING" if columns.sparkline else "FINDING or SPANS"
+    figures = f"{level:<{_LEVEL}}{'SETS/s':<{_SETS}}{'SPAN p95':<{_FIGURE}}{'LAT. p95':<{_FIGURE}}"
+    return line((f"{name:<{columns.name}}{figures}{drawn}{last}", "bold"))
+
+
+def row(group: Group, columns: Columns) -> Text:
+    """Draw a group."""
+    return line(
+        (f"{fitted(group.name, columns.name - 1):<{columns.name}}", "bold"),
+        (f"{phrases.LEVELS[group.level]:<{_LEVEL}}", STYLES[group.level]),
+        f"{phrases.sets_of_possible(group):<{_SETS}}",
+        f"{phrases.duration(group.span_ms.p95 if group.span_ms else None):<{_FIGURE}}",
+        f"{phrases.duration(group.latency_ms.p95 if group.latency_ms else None):<{_FIGURE}}",
+        *_drawn(group, columns),
+        _reason(group, columns),
+    )
+
+
+def _drawn(group: Group, columns: Columns) -> list[str]:
+    if not columns.sparkline:
+        return []
+    spans = sparkline([each.span_ms for each in group.last_sets], columns.sparkline)
+    latencies = sparkline([each.latency_ms for each in group.last_sets], columns.sparkline)
+    return [f"{spans}  ", f"{latencies}  "]
+
+
+def _reason(group: Group, columns: Columns) -> Text:
+    """Say what is wrong, in words of its code where there is no room for the sentence; draw spans where all is well."""
+    finding = group.explanation
+    if columns.sparkline:
+        text = finding.text if finding else ""
+    elif group.level is Level.OK or finding is None:
+        text = sparkline([each.span_ms for each in group.last_sets], max(0, columns.reason - 1))
+    else:
+        text = finding.code.replace("_", " ")
+    reason = Text(text)
+    reason.truncate(columns.reason, overflow="ellipsis")
+    return reason

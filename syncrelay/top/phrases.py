@@ -1,0 +1,103 @@
+"""What the figures of a state are called, for the screen and for plain text alike."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from syncrelay.explain import words
+from syncrelay.status import Level
+from syncrelay.top.state import Group, Input, Relay
+
+_NS_PER_MS: Final = 1_000_000
+_NS_PER_S: Final = 1_000_000_000
+# Of what is looked at once a second.
+_JUST_NOW_MS: Final = 1_500
+NONE: Final = "-"
+
+LEVELS: Final[Mapping[Level, str]] = {
+    Level.OK: "OK",
+    Level.WARN: "WARN",
+    Level.ERROR: "ERROR",
+    Level.STALE: "STALE",
+}
+
+
+def duration(milliseconds: float | None) -> str:
+    """Return a duration with its unit, or a dash."""
+    return NONE if milliseconds is None else words.duration(milliseconds * _NS_PER_MS)
+
+
+def ago(milliseconds: float) -> str:
+    """Return how long ago something was, to be watched."""
+    if milliseconds < _JUST_NOW_MS:
+        return "just now"
+    return f"{words.seconds(milliseconds * _NS_PER_MS)} ago"
+
+
+def seconds(count: float) -> str:
+    """Return how long something lasts."""
+    return words.seconds(count * _NS_PER_S)
+
+
+def rate(hertz: float) -> str:
+    """Return a rate with its unit, or a dash for none."""
+    return words.rate(hertz) if hertz else NONE
+
+
+def sets_of_possible(group: Group) -> str:
+    """Return `9.9 of 10`: sets a second, and how many there could be."""
+    return f"{words.figure(group.rate_hz)} of {words.figure(max(group.possible_hz, group.rate_hz))}"
+
+
+def share_of_possible(group: Group) -> float:
+    """Return how many of the possible sets leave, 0 to 1."""
+    return min(1.0, group.rate_hz / group.possible_hz) if group.possible_hz else 0.0
+
+
+def last_set(group: Group) -> str:
+    """Say how many sets there were, and when the last one left."""
+    if group.since_last_set_ms is None:
+        return "no set yet"
+    return f"{group.sets} {'set' if group.sets == 1 else 'sets'}, last {ago(group.since_last_set_ms)}"
+
+
+def keys(group: Group) -> str:
+    """Say what the file says of a group."""
+    tolerance = [f"{group.tolerance.key} {duration(group.tolerance.ms)}"] if group.tolerance else []
+    waits = [] if group.max_wait_ms is None else [f"max_wait {duration(group.max_wait_ms)}"]
+    return ", ".join([group.policy, *tolerance, f"queue_size {group.queue_size}", *waits])
+
+
+def phase(relay: Relay) -> str:
+    """Say where a relay is in its life."""
+    return f"{relay.phase.value}, {'ready' if relay.ready else 'not ready'}"
+
+
+def trouble(an_input: Input) -> str | None:
+    """Say why an input gives nothing, None if it does or if nothing is known."""
+    if not an_input.publishers:
+        return "nobody publishes it"
+    of_type = [publisher for publisher in an_input.publishers if publisher.type == an_input.type]
+    if not of_type:
+        return f"published as {an_input.publishers[0].type}"
+    if all(publisher.mismatch for publisher in of_type):
+        return f"incompatible {' and '.join({each.mismatch.policy: None for each in of_type if each.mismatch})}"
+    if an_input.rate_hz:
+        return None
+    return "no message yet" if an_input.age_ms is None else f"silent for {words.seconds(an_input.age_ms * _NS_PER_MS)}"
+
+
+def drops(dropped: Mapping[str, int]) -> str:
+    """Return `66 too_far, 1 late`, the most frequent first, or `none`."""
+    by_count = sorted(dropped.items(), key=lambda item: -item[1])
+    return ", ".join(f"{count} {reason}" for reason, count in by_count) or "none"
+
+
+def fates(an_input: Input) -> str:
+    """Say what became of all messages of an input."""
+    lost = f"; {an_input.lost} lost on the way" if an_input.lost else ""
+    dropped = sum(an_input.dropped.values())
+    reasons = f" ({drops(an_input.dropped)})" if dropped else ""
+    return (
+        f"{an_input.received} received, {an_input.matched} in sets, {an_input.buffered} waiting,"
+        f" {dropped} dropped{reasons}{lost}"
+    )

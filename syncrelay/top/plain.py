@@ -1,0 +1,76 @@
+"""The state of a relay as plain text, for logs and where there is no terminal."""
+
+from collections.abc import Iterator
+from textwrap import wrap
+
+from syncrelay.status import Level
+from syncrelay.top import phrases
+from syncrelay.top.client import Answer
+from syncrelay.top.state import Finding, Group, Input
+
+_WIDTH = 80
+
+
+def plain_text(answer: Answer) -> str:
+    """Say all of it in lines of at most 80 columns, but for names and words that are longer."""
+    return "\n".join(_lines(answer))
+
+
+def _lines(answer: Answer) -> Iterator[str]:
+    relay = answer.state.relay
+    yield from _wrapped(
+        f"{relay.node} at {answer.url}: {phrases.phase(relay)}, up {phrases.seconds(relay.uptime_s)},"
+        f" syncrelay {relay.version}, {relay.config}",
+        indent="",
+    )
+    for group in answer.state.groups:
+        yield ""
+        yield from _group(group)
+
+
+def _group(group: Group) -> Iterator[str]:
+    rate = f"{phrases.sets_of_possible(group)} possible sets a second, {phrases.last_set(group)}"
+    yield from _wrapped(f"{group.name}: {phrases.LEVELS[group.level]}, {rate}", indent="")
+    yield from _wrapped(phrases.keys(group), indent="  ")
+    for name, sample in (("span", group.span_ms), ("latency", group.latency_ms)):
+        if sample is not None:
+            values = (("p50", sample.p50), ("p95", sample.p95), ("max", sample.max))
+            yield f"  {name}: {', '.join(f'{key} {phrases.duration(value)}' for key, value in values)}"
+    for finding in group.findings:
+        yield from _finding(finding)
+    for each in group.inputs:
+        yield from _input(each)
+
+
+def _finding(finding: Finding) -> Iterator[str]:
+    level = "" if finding.severity is Level.OK else f"{phrases.LEVELS[finding.severity]}: "
+    yield from _wrapped(f"{level}{finding.text}", indent="  ")
+    if finding.suggestion:
+        yield from _wrapped(f"so: {finding.suggestion}", indent="    ")
+
+
+def _input(each: Input) -> Iterator[str]:
+    figures = [phrases.rate(each.rate_hz)] if each.rate_hz else []
+    if each.lag_ms is not None:
+        figures.append(f"lag {phrases.duration(each.lag_ms)}")
+    if each.jitter_ms is not None:
+        figures.append(f"jitter {phrases.duration(each.jitter_ms)}")
+    trouble = phrases.trouble(each)
+    if trouble:
+        figures.insert(0, trouble)
+    optional = "" if each.required else " (optional)"
+    if each.dropped_lately:
+        figures.append(f"dropped in the last 10 s: {phrases.drops(each.dropped_lately)}")
+    yield from _wrapped(f"{each.topic}{optional}: {', '.join(figures)}", indent="  ")
+    yield from _wrapped(phrases.fates(each), indent="    ")
+
+
+def _wrapped(text: str, *, indent: str) -> list[str]:
+    return wrap(
+        text,
+        _WIDTH,
+        initial_indent=indent,
+        subsequent_indent=f"{indent}  ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

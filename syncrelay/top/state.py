@@ -1,0 +1,164 @@
+"""The state of a relay as it tells it over HTTP, read back as values. Durations in milliseconds, as in the document."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Final
+
+from pydantic import BeforeValidator, TypeAdapter, ValidationError
+
+from syncrelay.errors import SyncRelayError
+from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.status import Level, Phase
+
+
+class NotAStateError(SyncRelayError):
+    """What was read is no state of a relay, or one of another version."""
+
+
+@dataclass(frozen=True, slots=True)
+class Relay:
+    """The relay as a whole."""
+
+    node: str
+    version: str
+    config: str
+    phase: Phase
+    ready: bool
+    uptime_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Percentiles:
+    """Of the last sets."""
+
+    p50: float
+    p95: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetFigures:
+    """One set that left."""
+
+    span_ms: float
+    latency_ms: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """The key of the file that says how far apart the stamps of a set may be."""
+
+    key: str
+    ms: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """A QoS policy by which two do not connect."""
+
+    policy: str
+    offered: str
+    requested: str
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A publisher of an input or a subscriber of an output."""
+
+    node: str
+    type: str
+    mismatch: Mismatch | None
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """An input and its output. `dropped_lately` counts the last ten seconds, `missing` is a share of the sets."""
+
+    topic: str
+    type: str
+    output: str
+    required: bool
+    rate_hz: float
+    age_ms: float | None
+    lag_ms: float | None
+    jitter_ms: float | None
+    received: int
+    matched: int
+    buffered: int
+    dropped: Mapping[str, int]
+    dropped_lately: Mapping[str, int]
+    lost: int
+    missing: float
+    publishers: tuple[Endpoint, ...]
+    subscribers: tuple[Endpoint, ...]
+    offset_ms: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is so; `severity` is never STALE."""
+
+    code: str
+    severity: Level
+    text: str
+    suggestion: str | None
+
+
+def _outcome(told: Any) -> Any:
+    match told:
+        case {"set": stamps}:
+            return {"stamps": stamps}
+        case {"drop": drop}:
+            return drop
+        case _:
+            return told
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A group; `last_sets` and `recent` oldest first."""
+
+    name: str
+    policy: str
+    level: Level
+    queue_size: int
+    tolerance: Tolerance | None
+    max_wait_ms: float | None
+    sets: int
+    rate_hz: float
+    possible_hz: float
+    since_last_set_ms: float | None
+    span_ms: Percentiles | None
+    latency_ms: Percentiles | None
+    last_sets: tuple[SetFigures, ...]
+    inputs: tuple[Input, ...]
+    findings: tuple[Finding, ...]
+    recent: tuple[Annotated[RecentSet | RecentDrop, BeforeValidator(_outcome)], ...]
+
+    @property
+    def explanation(self) -> Finding | None:
+        """The finding that says most of its state, as syncrelay.explain chooses it: the first of the worst."""
+        bad = [finding for finding in self.findings if finding.severity is not Level.OK]
+        errors = [finding for finding in bad if finding.severity is Level.ERROR]
+        return next(iter(errors or bad), self.findings[-1] if self.findings else None)
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A relay at one moment."""
+
+    relay: Relay
+    groups: tuple[Group, ...]
+
+
+_STATE: Final = TypeAdapter(State)
+
+
+def read_state(document: bytes) -> State:
+    """Return the state that a document holds; keys that it has beyond ours are left aside. Raises NotAStateError."""
+    try:
+        return _STATE.validate_json(document)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "the document"
+        raise NotAStateError(f"{where}: {first['msg']}") from error

@@ -1,0 +1,183 @@
+"""`syncrelay top` as a user starts it: on a terminal, without one, and where there is nothing to show."""
+
+import json
+import os
+import pty
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from contextlib import contextmanager
+from fcntl import ioctl
+
+import pytest
+
+from syncrelay.status import document
+from tests.cli.command import ROOT, run
+from tests.top import states
+from tests.top.relay_server import serving
+
+_DEADLINE_S = 60
+
+
+def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
+    with serving(states.rig()) as server:
+        shown = run("top", "--once", "--url", server.url, folder=tmp_path)
+    assert (shown.returncode, shown.stderr) == (0, "")
+    lines = shown.stdout.splitlines()
+    assert lines[0].startswith(f"/syncrelay at {server.url}: running, not ready, up 30 s, syncrelay")
+    assert "front: OK, 10 of 10 possible sets a second, 300 sets, last just now" in lines
+    assert "  latency: p50 2.56 ms, p95 9.01 ms, max 11.3 ms" in lines
+    assert "  ERROR: stamps of /rear/image_raw are 37.2 s behind those of /lidar/points" in lines
+    assert "    so: synchronize the clocks of their machines, or write `offset: 37.156s` at" in lines
+    assert "  /radar/points: nobody publishes it" in lines
+    assert "    900 received, 300 in sets, 2 waiting, 598 dropped (598 too_far)" in lines
+    assert max(map(len, lines)) <= 80
+    assert shown.stdout.isascii()
+
+
+def test_the_document_is_printed_as_it_came(tmp_path):
+    with serving(states.rig()) as server:
+        shown = run("top", "--once", "--json", "--url", server.url, folder=tmp_path)
+    assert json.loads(shown.stdout) == json.loads(json.dumps(document(states.rig())))
+
+
+def test_where_no_relay_answers_it_says_what_to_do(tmp_path):
+    with serving(states.healthy()) as server:
+        url = server.url
+    shown = run("top", "--url", url, folder=tmp_path)
+    assert shown.returncode == 1
+    shown = run("top", "--once", "--url", url, folder=tmp_path)
+    assert (shown.returncode, shown.stdout) == (1, "")
+    assert shown.stderr.splitlines() == [
+        f"syncrelay: no relay answers at {url}",
+        f"  {url}: nothing listens there",
+        "  From other machines a relay can be asked if its file says",
+        "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between.",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--json"], "--json goes with --once"),
+        (["--url", "ftp://robot"], "expected a host, host:port or http://host:port"),
+        (["--urls", "robot"], "unknown argument --urls, did you mean `--url`?"),
+    ],
+)
+def test_wrong_usage_is_said(tmp_path, words, text):
+    shown = run("top", *words, folder=tmp_path)
+    assert shown.returncode == 2
+    assert text in shown.stderr
+
+
+def test_without_a_terminal_it_points_to_text(tmp_path):
+    with serving(states.healthy()) as server:
+        shown = run("top", "--url", server.url, folder=tmp_path)
+    assert (shown.returncode, shown.stdout) == (1, "")
+    assert shown.stderr == (
+        "syncrelay: top draws on a terminal, and here is none\n  `syncrelay top --once` prints text\n"
+    )
+
+
+@pytest.mark.parametrize("setting", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "latin-1"}])
+def test_a_terminal_that_cannot_draw_gets_a_sentence(tmp_path, setting):
+    with serving(states.healthy()) as server, on_terminal(server.url, tmp_path, **setting) as top:
+        assert top.wait_for_end() == 1
+    assert "this terminal cannot be drawn on: see TERM and LANG" in top.written
+    assert "\x1b[?1049h" not in top.written
+
+
+def test_on_a_terminal_it_draws_until_q_and_leaves_it_as_it_was(tmp_path):
+    with serving(states.rig()) as server, on_terminal(server.url, tmp_path) as top:
+        top.wait_for("other clock")
+        top.press("q")
+        assert top.wait_for_end() == 0
+    assert top.written.count("\x1b[?1049h") == top.written.count("\x1b[?1049l") == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_leaves_the_terminal_as_it_was(tmp_path, number):
+    with serving(states.rig()) as server, on_terminal(server.url, tmp_path) as top:
+        top.wait_for("other clock")
+        os.kill(top.pid, number)
+        top.wait_for_end()
+    assert top.written.count("\x1b[?1049h") == top.written.count("\x1b[?1049l") == 1
+
+
+def test_without_colour_no_colour_is_written(tmp_path):
+    with serving(states.rig()) as server, on_terminal(server.url, tmp_path, NO_COLOR="1") as top:
+        top.wait_for("other clock")
+        top.press("q")
+        top.wait_for_end()
+    parameters = [part.partition("m")[0].split(";") for part in top.written.split("\x1b[")]
+    # All of SGR's colours but 39 and 49, the terminal's own.
+    colours = {str(code) for code in [*range(30, 39), *range(40, 49), *range(90, 98), *range(100, 108)]}
+    assert [codes for codes in parameters if colours & set(codes)] == []
+
+
+class Terminal:
+    """`syncrelay top` on a terminal of its own, and all that it wrote."""
+
+    def __init__(self, process, descriptor):
+        self._process, self._descriptor = process, descriptor
+        self._written = b""
+
+    @property
+    def pid(self):
+        return self._process.pid
+
+    @property
+    def written(self):
+        return self._written.decode(errors="replace")
+
+    def press(self, key):
+        os.write(self._descriptor, key.encode())
+
+    def wait_for(self, text):
+        end = time.monotonic() + _DEADLINE_S
+        while text not in self.written:
+            assert self._read(end), f"waited in vain for {text!r}: {self.written!r}"
+
+    def wait_for_end(self):
+        end = time.monotonic() + _DEADLINE_S
+        while self._read(end):
+            pass
+        return self._process.wait(_DEADLINE_S)
+
+    def _read(self, end):
+        if not select.select([self._descriptor], [], [], max(0, end - time.monotonic()))[0]:
+            return False
+        try:
+            chunk = os.read(self._descriptor, 65536)
+        except OSError:  # the other end is closed
+            return False
+        self._written += chunk
+        return bool(chunk)
+
+
+@contextmanager
+def on_terminal(url, folder, **environ):
+    """Start it on a terminal of 80x24."""
+    ours, theirs = pty.openpty()
+    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLORTERM")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "syncrelay", "top", "--url", url],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env=kept | {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"} | environ,
+        cwd=folder,
+        start_new_session=True,
+    )
+    os.close(theirs)
+    try:
+        yield Terminal(process, ours)
+    finally:
+        process.kill()
+        process.wait()
+        os.close(ours)

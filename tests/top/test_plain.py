@@ -1,0 +1,27 @@
+"""The state as plain text."""
+
+import json
+
+import pytest
+
+from syncrelay.status import document
+from syncrelay.top.client import Answer
+from syncrelay.top.plain import plain_text
+from syncrelay.top.state import read_state
+from tests.top import states
+
+
+@pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)
+def test_all_that_is_found_is_said_in_lines_of_80_columns(state):
+    told = json.dumps(document(state())).encode()
+    text = plain_text(Answer("http://robot:9464", told, read_state(told)))
+    assert all(len(line) <= 80 or len(line.split()) == 1 for line in text.splitlines())
+    flowing = " ".join(text.split())
+    for group in state().groups:
+        assert f"{group.facts.name}: " in flowing
+        for finding in group.findings:
+            assert finding.text in flowing
+            assert (finding.suggestion or "") in flowing
+        for each in group.facts.inputs:
+            assert f"{each.name}" in flowing
+            assert f"{each.counts.fed} received, {each.counts.matched} in sets" in flowing

@@ -1,0 +1,270 @@
+"""The screens by their text, on a headless terminal, with a relay's HTTP on a real socket."""
+
+import asyncio
+import time
+from contextlib import asynccontextmanager
+
+import pytest
+
+from syncrelay.top.app import TopApp
+from syncrelay.top.client import ask
+from tests.top import states
+from tests.top.relay_server import serving
+
+_SMALL, _WIDE = (80, 24), (160, 45)
+_DEADLINE_S = 60
+
+
+class Terminal:
+    """A person at a terminal: reads lines, presses keys."""
+
+    def __init__(self, app, pilot):
+        self.app, self.pilot = app, pilot
+
+    @property
+    def lines(self):
+        # Textual has no public way to the text of a screen.
+        strips = self.app.screen._compositor.render_strips()  # noqa: SLF001
+        return [strip.text.rstrip() for strip in strips]
+
+    @property
+    def text(self):
+        return "\n".join(self.lines)
+
+    async def press(self, *keys):
+        await self.pilot.press(*keys)
+        await self.pilot.pause()
+
+    async def sees(self, text):
+        end = time.monotonic() + _DEADLINE_S
+        while text not in self.text:
+            assert time.monotonic() < end, f"waited in vain for {text!r}:\n{self.text}"
+            await self.pilot.pause(0.05)
+
+
+@asynccontextmanager
+async def terminal(*servers, size=_SMALL):
+    app = TopApp([ask(server.url) for server in servers])
+    async with app.run_test(size=size) as pilot:
+        await pilot.pause()
+        yield Terminal(app, pilot)
+
+
+def at_terminal(state, *keys, size=_SMALL):
+    """The lines of a terminal after some keys."""
+
+    async def look():
+        with serving(state) as server:
+            async with terminal(server, size=size) as user:
+                await user.press(*keys)
+                return user.lines
+
+    return asyncio.run(look())
+
+
+def test_groups_are_listed_with_state_rates_and_reason_and_the_selected_one_below():
+    lines = at_terminal(states.rig())
+    assert lines[0].startswith("/syncrelay at 127.0.0.1:")
+    assert lines[0].endswith("running, not ready, up 30 s")
+    assert lines[1] == "  GROUP     STATE  SETS/s        SPAN p95  LAT. p95  FINDING or SPANS"
+    assert lines[2].startswith("▶ front     OK     10 of 10  ")
+    assert lines[3] == "  rear      ERROR  0 of 10       -         -         other clock"
+    assert lines[4] == "  inertial  ERROR  0 of 10       -         -         short queue"
+    assert lines[5] == "  radar     ERROR  0 of 0        -         -         no publisher"
+    assert lines[6].startswith("── front: approximate_time, slop 20 ms, queue_size 10 ──")
+    assert lines[7].startswith("OK       10 of 10 possible sets a second")
+    text = "\n".join(lines)
+    assert "/camera/image_raw 30 Hz    27.5 ms  4.25 ms  200 too_far" in text
+    assert "▁" in next(line for line in lines if line.startswith("latency  "))
+    assert "Open" in lines[-1]
+    assert "Quit" in lines[-1]
+
+
+@pytest.mark.parametrize("keys", [["j"], ["down"], ["end", "k", "up"]])
+def test_a_selected_group_says_what_is_wrong_and_what_to_do(keys):
+    lines = at_terminal(states.rig(), *keys)
+    assert lines[3].startswith("▶ rear")
+    assert lines[6].startswith("── rear:")
+    assert lines[7] == "ERROR    stamps of /rear/image_raw are 37.2 s behind those of /lidar/points"
+    assert lines[8].startswith("       → synchronize the clocks of their machines, or write `offset: 37.156s`")
+
+
+def test_a_wide_terminal_shows_spans_latencies_the_sentence_and_recent_sets():
+    lines = at_terminal(states.rig(), size=_WIDE)
+    assert "SPANS                 LATENCIES             FINDING" in lines[1]
+    assert "nobody publishes /radar/points (sensor_msgs/msg/PointCloud2)" in lines[5]
+    assert any(line.strip().startswith("camera ▏") for line in lines)
+
+
+def test_groups_are_sorted_and_the_selected_one_stays_selected():
+    async def look():
+        with serving(states.rig()) as server:
+            async with terminal(server) as user:
+                orders = []
+                for _ in range(4):
+                    orders.append([line.split()[0] for line in user.lines[2:6]])
+                    await user.press("s")
+                return orders, user.lines[1]
+
+    orders, heading = asyncio.run(look())
+    assert orders == [
+        ["▶", "rear", "inertial", "radar"],
+        ["rear", "inertial", "radar", "▶"],
+        ["▶", "inertial", "radar", "rear"],
+        ["▶", "rear", "inertial", "radar"],
+    ]
+    assert "STATE▾" in heading
+
+
+def test_a_group_is_opened_with_figures_findings_inputs_the_strip_and_who_publishes():
+    lines = at_terminal(states.healthy(), "enter", size=(80, 45))
+    assert lines[1].startswith("── front:")
+    assert lines[2].startswith("sets     10 of 10 possible a second ━")
+    assert lines[2].endswith("100%, 300 sets, last just now")
+    assert lines[3].startswith("span     ")
+    assert lines[3].endswith("p50 5.77 ms, p95 9.73 ms, max 14 ms")
+    camera = next(line for line in lines if line.startswith("       camera ▏"))
+    lidar = next(line for line in lines if line.startswith("        lidar ▏"))
+    assert camera.split("▏")[1].replace("×", "").split() == lidar.split("▏")[1].split()  # noqa: RUF001  the mark
+    assert any(line.startswith("ABC sets   × too_far") for line in lines)  # noqa: RUF001  the mark
+    assert "a column is 20 ms, the newest is on the right" in lines
+    assert "/camera/image_raw (sensor_msgs/msg/Image)" in lines
+    assert "  from /camera_driver" in lines
+    assert "  as   /front/camera/image_raw, to /fusion" in lines
+    assert "  900 received, 300 in sets, 2 waiting, 598 dropped (598 too_far)" in lines
+
+
+def test_keys_lead_through_the_groups_and_back():
+    async def look():
+        with serving(states.rig()) as server:
+            async with terminal(server) as user:
+                for key, sees in (
+                    ("enter", "── front"),
+                    ("right", "── rear"),
+                    ("n", "── inertial"),
+                    ("left", "── rear"),
+                    ("p", "── front"),
+                    ("p", "── radar"),
+                ):
+                    await user.press(key)
+                    assert user.lines[1].startswith(sees)
+                await user.press("end")
+                assert not user.lines[1].startswith("── radar")
+                await user.press("home")
+                await user.press("j")
+                assert user.lines[1].startswith("sets ")
+                await user.press("k")
+                assert user.lines[1].startswith("── radar")
+                await user.press("escape")
+                assert user.lines[1].startswith("  GROUP")
+                await user.press("question_mark")
+                assert "escape, backspace" in user.text
+                await user.press("x")
+                assert "escape, backspace" not in user.text
+                await user.press("q")
+        return user.app.return_code
+
+    assert asyncio.run(look()) == 0
+
+
+def test_the_screen_follows_the_relay():
+    async def look():
+        with serving(states.healthy()) as server:
+            async with terminal(server) as user:
+                server.show(states.silent())
+                await user.sees("/lidar/points has been silent for 18 s; until then it came at 10 Hz")
+                assert "→ look at /lidar_driver, which still publishes it" in user.text
+
+    asyncio.run(look())
+
+
+def test_a_held_picture_stays_and_then_shows_what_came_meanwhile():
+    async def look():
+        with serving(states.healthy()) as server:
+            async with terminal(server) as user:
+                await user.press("space")
+                assert " PAUSED: space goes on" in user.lines
+                asked = server.asked
+                server.show(states.silent())
+                while server.asked < asked + 2:
+                    await user.pilot.pause(0.05)
+                assert "silent" not in user.text
+                await user.press("space")
+                await user.sees("/lidar/points has been silent")
+                assert "PAUSED" not in user.text
+
+    asyncio.run(look())
+
+
+def test_a_relay_that_goes_away_is_said_over_its_last_state_and_found_when_it_comes_back():
+    async def look():
+        with serving(states.healthy()) as server:
+            async with terminal(server) as user:
+                server.stop()
+                await user.sees(" STALE: no answer for ")
+                assert "nothing listens there; still trying" in user.lines[1]
+                assert user.lines[3].startswith("▶ front     OK")
+                await user.press("enter")
+                assert "STALE" in user.lines[1]
+                server.start()
+                await user.sees("── front")
+                while "STALE" in user.text:
+                    await user.pilot.pause(0.05)
+
+    asyncio.run(look())
+
+
+def test_a_group_that_a_new_file_lacks_is_said():
+    async def look():
+        with serving(states.rig()) as server:
+            async with terminal(server) as user:
+                await user.press("down", "enter")
+                server.show(states.healthy())
+                await user.sees("The relay has no group rear any more.")
+                await user.press("right")
+                assert user.lines[1].startswith("── front")
+
+    asyncio.run(look())
+
+
+def test_of_several_relays_one_is_chosen_and_another_after_it():
+    async def look():
+        with serving(states.healthy()) as one, serving(states.rig()) as two:
+            async with terminal(one, two) as user:
+                assert user.lines[0] == "2 relays answer. Which one?"
+                assert f"/syncrelay  {two.url}  groups: front, rear, inertial, radar" in user.lines[3]
+                await user.press("down", "enter")
+                await user.sees("  inertial  ERROR")
+                await user.press("escape")
+                await user.sees("Which one?")
+                await user.press("up", "enter")
+                await user.sees("── front")
+                assert "inertial" not in user.text
+
+    asyncio.run(look())
+
+
+@pytest.mark.parametrize("size", [(59, 24), (80, 14), (20, 5)])
+def test_a_terminal_that_is_too_small_gets_a_sentence(size):
+    shown = " ".join(at_terminal(states.rig(), size=size)).split()
+    assert " ".join(shown) == f"syncrelay top needs 60x15; this terminal has {size[0]}x{size[1]}."
+
+
+@pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)
+@pytest.mark.parametrize("size", [(60, 15), _SMALL, (200, 60)], ids=str)
+def test_nothing_is_cut_off_without_a_mark_and_nothing_is_too_wide(state, size):
+    for keys in ([], ["enter"]):
+        lines = at_terminal(state(), *keys, size=size)
+        assert len(lines) == size[1]
+        assert max(map(len, lines)) <= size[0]
+        assert "Quit" in lines[-1]
+
+
+def test_sixteen_inputs_are_told_apart_by_what_differs_in_their_names():
+    lines = at_terminal(states.sixteen_inputs(), size=(80, 30))
+    rows = [line.split()[0] for line in lines if line.startswith("…/")]
+    assert rows == [f"…/camera_{number:02}/…" for number in range(16)]
+
+
+def test_what_has_no_room_is_counted():
+    assert "… 4 more lines: enter" in at_terminal(states.sixteen_inputs())
