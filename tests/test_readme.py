@@ -10,6 +10,7 @@ import pytest
 
 from syncrelay.config import load_text
 from syncrelay.config.file import GROUP_MODEL_OF
+from syncrelay.explain import Code
 from syncrelay.sync import DropReason
 from tests.sync.support.timeline import play_policy
 
@@ -51,6 +52,11 @@ def _is_syncrelay_command(words):
     )
     options = [word for word in words if word.startswith("--")]
     return run.returncode == 0 and all(option in run.stdout for option in options)
+
+
+def test_every_finding_is_told():
+    told = re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (`.*?) \|", _README, re.MULTILINE)))
+    assert {code.value for code in Code} <= set(told)
 
 
 def test_a_command_that_does_not_exist_would_be_noticed():

@@ -47,7 +47,7 @@ def run(
     stop.defer()
     with (
         _heartbeat(os.environ.get(VARIABLE)) as heartbeat,
-        _server(config.listen if explain_s is None else None) as server,
+        listening(config.listen if explain_s is None else None) as server,
         Relay(
             config,
             config_path=config_path,
@@ -82,7 +82,11 @@ def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:
         return nullcontext()
 
 
-def _server(listen: "Listen | None") -> "AbstractContextManager[Server | None]":
+def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]":
+    """Return a server on the file's port, None where it asks for none and its default ports are taken.
+
+    Raises ListenError where the port that it asks for cannot be had.
+    """
     from syncrelay.ros.logs import LOGGER
     from syncrelay.status import Server
 

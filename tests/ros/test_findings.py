@@ -27,7 +27,7 @@ BY_RECEIPT = inputs(PAIR, stamp="receive")
 def front(topics: Sequence[Mapping[str, Any]] | None = None, top: Mapping[str, Any] | None = None, **keys: Any) -> str:
     """One group of camera and lidar, whose relay says its state on a port of its own."""
     group = {**APPROXIMATE, **keys, "topics": topics or inputs(PAIR)}
-    return config({"front": group}, metrics=ANY_PORT, **(top or {}))
+    return config({"front": group}, **{"metrics": ANY_PORT, **(top or {})})
 
 
 def stream(topic: str, *, hz: float, late_ms: float = 0, shift_ms: float = 0, last_ms: float = MINUTE) -> list[Frame]:
