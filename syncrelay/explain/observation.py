@@ -2,10 +2,9 @@
 
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice, pairwise
 from statistics import median
-from types import MappingProxyType
 from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.explain.distribution import NOTHING, Distribution
@@ -49,7 +48,7 @@ class InputFigures:
     rate_hz: float = 0.0
     usual_hz: float = 0.0
     fed: int = 0
-    dropped: Mapping[DropReason, int] = MappingProxyType({})
+    dropped: Mapping[DropReason, int] = field(default_factory=dict)
     last_stamp: int | None = None
     last_received: int | None = None
     delay: int | None = None
