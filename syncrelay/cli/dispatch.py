@@ -190,7 +190,7 @@ def _demo(words: Sequence[str], stop: StopRequest) -> int:
     return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)
 
 
-def _doctor(words: Sequence[str], stop: StopRequest) -> int:
+def _doctor(words: Sequence[str], _stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay doctor",
         description="Tells what can go wrong before a message flows: what is so, what follows, what to do.\n"
@@ -200,7 +200,7 @@ def _doctor(words: Sequence[str], stop: StopRequest) -> int:
     parser.add_argument(
         "--live", action="store_true", help="join the graph: publishers, types, QoS, stamps of the topics of FILE"
     )
-    parser.add_argument("--seconds", metavar="N", type=_positive, default=5.0, help="look at the graph for N s (5)")
+    parser.add_argument("--seconds", metavar="N", type=_positive, help="with --live: look for N s (5)")
     parser.add_argument("--json", action="store_true", help="print it as JSON, for programs")
     parser.add_argument("--ros-args", action="store_true", help="what follows is what the relay gets: remaps and such")
     _add_help(parser)
@@ -210,8 +210,11 @@ def _doctor(words: Sequence[str], stop: StopRequest) -> int:
     arguments = parser.read(own)
     from syncrelay.cli.doctor import doctor
 
+    if arguments.seconds and not arguments.live:
+        parser.error("--seconds N is for how long --live looks at the graph, and --live is missing")
+    live_s = (arguments.seconds or 5.0) if arguments.live else None
     output_format = "json" if arguments.json else "text"
-    return doctor(arguments.config, arguments.seconds if arguments.live else None, output_format, ros_args, stop=stop)
+    return doctor(arguments.config, live_s, output_format, ros_args)
 
 
 def _top(words: Sequence[str], _stop: StopRequest) -> int:

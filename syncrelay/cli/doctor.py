@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, INTERRUPTED, put, say, wants_colour
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.cli.heartbeat import VARIABLE
-from syncrelay.cli.stop import StopRequest
 from syncrelay.doctor.diagnosis import Diagnosis, Severity
 from syncrelay.doctor.examine import Examination, Request, examine
 from syncrelay.doctor.stamps import delay_of
@@ -21,17 +20,12 @@ def doctor(
     live_s: float | None,
     output_format: str,
     ros_args: Sequence[str],
-    *,
-    stop: StopRequest,
 ) -> int:
     """Examine, print what was found as `text` or `json`; 1 if something is to be mended, else 0."""
     request = Request(dict(os.environ), VARIABLE, config_path, tuple(ros_args), live_s)
     if live_s is not None and sys.stderr.isatty():
         say(f"looking at the graph for {live_s:g} s ...")
-    stop.defer()
-    examination = examine(request, stopped=lambda: stop.requested)
-    if stop.requested and examination.sighting is None:
-        return INTERRUPTED
+    examination = examine(request)
     if output_format == "json":
         put(json.dumps(_as_json(examination), indent=2, ensure_ascii=False))
     else:

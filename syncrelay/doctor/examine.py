@@ -1,6 +1,6 @@
 """The whole examination, from the environment to the graph, in the order in which one thing rests on the other."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from syncrelay.config import Config, ConfigError, Problem, Severity, TopicConfig, load
@@ -49,8 +49,8 @@ class Examination:
     sighting: Sighting | None
 
 
-def examine(request: Request, *, stopped: Callable[[], bool]) -> Examination:
-    """Look at everything once; `stopped` cuts the look at the graph short."""
+def examine(request: Request) -> Examination:
+    """Look at everything once."""
     environ = request.environ
     installation = look_at_installation(environ)
     found = list(check_installation(installation))
@@ -68,7 +68,7 @@ def examine(request: Request, *, stopped: Callable[[], bool]) -> Examination:
         if trial is None or trial.failed is not None:
             found.append(_not_looked())
         else:
-            sighting = _look(config, trial, seconds=request.live_s, stopped=stopped)
+            sighting = _look(config, trial, seconds=request.live_s)
             found += _of_graph(sighting, config, trial, environ)
     return Examination(
         installation,
@@ -136,13 +136,13 @@ def _not_looked() -> Diagnosis:
     )
 
 
-def _look(config: Config | None, trial: Trial, *, seconds: float, stopped: Callable[[], bool]) -> Sighting:
+def _look(config: Config | None, trial: Trial, *, seconds: float) -> Sighting:
     from syncrelay.ros.environment import require_rclpy  # noqa: PLC0415  rclpy is imported where the graph is wanted
 
     require_rclpy()
     from syncrelay.ros.look import look  # noqa: PLC0415
 
-    return look(_topics(config, trial), seconds=seconds, use_sim_time=trial.use_sim_time, stopped=stopped)
+    return look(_topics(config, trial), seconds=seconds, use_sim_time=trial.use_sim_time)
 
 
 def _of_graph(

@@ -4,13 +4,24 @@ from collections.abc import Iterator, Sequence
 
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.doctor.diagnosis import Diagnosis, Severity, know, mend
+from syncrelay.doctor.discovery import ports_of
 from syncrelay.doctor.words import counted
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 
 
 def check_company(sighting: Sighting, *, domain: int, discovery_range: str) -> Iterator[Diagnosis]:
-    """Yield whether anyone else is there at all."""
-    if not sighting.nodes:
+    """Yield whether anyone else is there at all, and whether what they say arrives."""
+    if sighting.n_nameless:
+        ports = ports_of(domain)
+        yield mend(
+            "unreachable",
+            f"{counted(sighting.n_nameless, 'topic')} on domain {domain} are of nodes whose names did not arrive",
+            so="these nodes were found, but nothing that they send comes through, not even that",
+            do="where they run on this machine, in another container or as another user, on both sides:\n"
+            "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    and start them anew;\n"
+            f"on another machine: let UDP ports {ports[0]} to {ports[-1]} through both firewalls",
+        )
+    elif not sighting.nodes:
         yield mend(
             "alone",
             f"no other node was found on domain {domain} in {sighting.seconds:.0f} s (discovery: {discovery_range})",
@@ -64,9 +75,13 @@ def check_clock(sighting: Sighting, *, use_sim_time: bool) -> Iterator[Diagnosis
         )
 
 
+def _is_reached(sighting: Sighting) -> bool:
+    return bool(sighting.nodes or sighting.n_nameless)
+
+
 def check_topics(sighting: Sighting, *, optional: frozenset[str]) -> Iterator[Diagnosis]:
     """Yield topics that bring nothing; those that are optional everywhere need no action."""
-    if not sighting.nodes:
+    if not _is_reached(sighting):
         return
     for topic in sighting.topics:
         for found in _check_topic(topic, sighting.seconds):
@@ -83,7 +98,7 @@ def _check_topic(topic: SeenTopic, seconds: float) -> Iterator[Diagnosis]:
         yield _other_type(topic, strangers, alone=not fitting)
     if mismatched:
         yield _incompatible(topic, mismatched)
-    elif fitting and not topic.received:
+    elif any(each.node for each in fitting) and not topic.received:
         yield _silent(topic, fitting, seconds)
 
 
@@ -98,7 +113,7 @@ def _no_publisher(topic: SeenTopic, seconds: float) -> Diagnosis:
 
 
 def _other_type(topic: SeenTopic, strangers: Sequence[SeenPublisher], *, alone: bool) -> Diagnosis:
-    they = all_of(f"{each.node} ({each.type})" for each in strangers)
+    they = all_of(f"{_name(each)} ({each.type})" for each in strangers)
     make = mend if alone else know
     return make(
         "other_type",
@@ -109,7 +124,7 @@ def _other_type(topic: SeenTopic, strangers: Sequence[SeenPublisher], *, alone: 
 
 
 def _incompatible(topic: SeenTopic, mismatched: Sequence[SeenPublisher]) -> Diagnosis:
-    they = all_of(f"{each.node} (offers {each.offers})" for each in mismatched)
+    they = all_of(f"{_name(each)} (offers {each.offers})" for each in mismatched)
     reasons = all_of(dict.fromkeys(str(each.mismatch) for each in mismatched))
     return mend(
         "qos",
@@ -120,7 +135,7 @@ def _incompatible(topic: SeenTopic, mismatched: Sequence[SeenPublisher]) -> Diag
 
 
 def _silent(topic: SeenTopic, fitting: Sequence[SeenPublisher], seconds: float) -> Diagnosis:
-    they = all_of(each.node for each in fitting)
+    they = all_of(_name(each) for each in fitting)
     return mend(
         "silent",
         f"{topic.name} is published by {they}, but no message came in {seconds:.0f} s",
@@ -128,6 +143,10 @@ def _silent(topic: SeenTopic, fitting: Sequence[SeenPublisher], seconds: float) 
         do="see whether the driver sends: ros2 topic hz on its own machine, in its own container, as its own user.\n"
         "If it does, data get lost on the way: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4 on both sides, and start anew",
     )
+
+
+def _name(publisher: SeenPublisher) -> str:
+    return publisher.node or "a node whose name did not arrive"
 
 
 def _eased(found: Diagnosis) -> Diagnosis:

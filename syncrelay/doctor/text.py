@@ -51,7 +51,7 @@ def _row(topic: SeenTopic) -> tuple[str, ...]:
 
 
 def _publishers(publishers: Sequence[SeenPublisher]) -> str:
-    return "; ".join(f"{each.node} ({each.offers})" for each in publishers) or "no publisher"
+    return "; ".join(f"{each.node or 'a nameless node'} ({each.offers})" for each in publishers) or "no publisher"
 
 
 def verdict(diagnoses: Sequence[Diagnosis]) -> str:

@@ -1,7 +1,7 @@
 """A look at the graph for a few seconds, with a hidden node that subscribes as the relay would."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -21,6 +21,8 @@ from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 from syncrelay.ros.types import StampReader, import_type, stamp_reader
 
 _NODE: Final = "_syncrelay_doctor"
+# What rmw_dds_common has in the place of a name that did not arrive.
+_NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 _POLL_S: Final = 0.02
 _OF_EVERY_NODE: Final = ("/parameter_events", "/rosout")
 _CLOCK: Final = "/clock"
@@ -29,18 +31,16 @@ _CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
 _MOST_SAMPLED: Final = 2_000
 
 
-def look(
-    topics: Mapping[str, TopicConfig], *, seconds: float, use_sim_time: bool, stopped: Callable[[], bool]
-) -> Sighting:
+def look(topics: Mapping[str, TopicConfig], *, seconds: float, use_sim_time: bool) -> Sighting:
     """Join the graph and return what was seen of these topics, by their names in it, and of all others.
 
-    Ends early when `stopped` says so. Raises RosUnavailableError where rclpy does not start.
+    Raises RosUnavailableError where rclpy does not start.
     """
     context = Context()
     node = None
     try:
         node = _join(context)
-        return _watch(node, topics, seconds=seconds, use_sim_time=use_sim_time, stopped=stopped)
+        return _watch(node, topics, seconds=seconds, use_sim_time=use_sim_time)
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"the graph cannot be looked at: {error}") from error
     finally:
@@ -114,12 +114,11 @@ def _watch(
     *,
     seconds: float,
     use_sim_time: bool,
-    stopped: Callable[[], bool],
 ) -> Sighting:
     watched = [_watched(name, config) for name, config in topics.items()]
     clock = _Clock(node, simulated=use_sim_time)
     began = time.monotonic()
-    while time.monotonic() < began + seconds and not stopped():
+    while time.monotonic() < began + seconds:
         clock.turn()
         for topic in watched:
             _subscribe(node, topic)
@@ -127,10 +126,12 @@ def _watch(
                 topic.take(payload, received, clock.time_of(received))
         time.sleep(_POLL_S)
     listed = dict(node.get_topic_names_and_types())
+    published = [name for name in listed if name not in _OF_EVERY_NODE and _is_published(node, name)]
     return Sighting(
         seconds=time.monotonic() - began,
         nodes=tuple(_others(node)),
-        n_topics=sum(1 for name in listed if name not in _OF_EVERY_NODE and _is_published(node, name)),
+        n_topics=len(published),
+        n_nameless=sum(1 for name in published if any(map(_is_nameless, _publishers(node, name)))),
         topics=tuple(_seen(node, topic, listed) for topic in watched),
         clocks=node.count_publishers(_CLOCK),
         ticks=clock.ticks,
@@ -197,11 +198,16 @@ def _seen_publisher(endpoint: Any, topic: _Watched) -> SeenPublisher:
         compatibility, reason = qos_check_compatible(offered, topic.profile)
         mismatch = _in_words(reason) if compatibility == QoSCompatibility.ERROR else None
     return SeenPublisher(
-        node=f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}",
+        node="" if _is_nameless(endpoint) else f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}",
         type=endpoint.topic_type,
         offers=f"{_word(offered.reliability)}, {_word(offered.durability)}",
         mismatch=mismatch,
     )
+
+
+def _is_nameless(endpoint: Any) -> bool:
+    """Whether DDS found a publisher, but not yet the message that tells its node."""
+    return bool(endpoint.node_name == _NAMELESS)
 
 
 def _word(policy: Any) -> str:

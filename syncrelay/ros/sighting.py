@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class SeenPublisher:
-    """A publisher: its node, its type, what it offers in words, and why it cannot serve what is asked of it."""
+    """A publisher: its node, its type, what it offers in words, and why it cannot serve what is asked of it.
+
+    `node` is empty where DDS found the publisher, but the message that tells its node did not arrive.
+    """
 
     node: str
     type: str
@@ -37,13 +40,15 @@ class SeenTopic:
 class Sighting:
     """The graph. `nodes` are all others in full, each as often as it is there.
 
-    `n_topics` counts what is published, what every node has aside; `clocks` counts the publishers of /clock, `ticks`
+    `n_topics` counts what is published, what every node has aside, and
+    `n_nameless` those of them by nodes whose names did not arrive; `clocks` counts the publishers of /clock, `ticks`
     its messages.
     """
 
     seconds: float
     nodes: tuple[str, ...]
     n_topics: int
+    n_nameless: int = 0
     topics: tuple[SeenTopic, ...] = ()
     clocks: int = 0
     ticks: int = 0

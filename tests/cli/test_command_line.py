@@ -69,6 +69,7 @@ def test_the_version_is_that_of_the_package(tmp_path):
         (["validate", "--format", "xml", "f.yaml"], "argument --format: invalid choice: 'xml'"),
         (["schema", "f.yaml"], "unknown argument f.yaml"),
         (["doctor", "f.yaml"], "unknown argument f.yaml"),
+        (["doctor", "--seconds", "3"], "--seconds N is for how long --live looks at the graph, and --live is missing"),
         (["doctor", "--live", "--seconds", "0"], "argument --seconds: expected a number above 0, found 0"),
         (["demo", "--seconds", "0"], "argument --seconds: expected a number above 0, found 0"),
         (["demo", "--seconds", "soon"], "argument --seconds: expected a number above 0, found soon"),

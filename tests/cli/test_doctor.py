@@ -5,6 +5,7 @@ import os
 import pty
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -222,9 +223,41 @@ def test_remaps_that_make_names_meet_are_found(remap, code, base, tmp_path):
 
 
 @pytest.mark.ros
+def test_a_start_that_fails_for_a_reason_nobody_thought_of_is_shown_with_its_words(base):
+    _, found = examine({**base, "ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}, "--live")
+    assert found["no_start"]["what"].startswith("ROS does not start:\nfailed to initialize rcl")
+    assert "not_looked" in found
+
+
+@pytest.mark.ros
 def test_arguments_that_ros_does_not_take_are_shown(base):
     _, found = examine(base, "--ros-args", "-r", "nonsense")
     assert found["ros_args"]["what"].startswith("ROS does not take --ros-args -r nonsense:")
+
+
+@pytest.fixture
+def tasks_allowed():
+    """The folder of a control group that allows 25 processes and threads."""
+    top = next((path for path in map(Path, PIDS_GROUPS) if (path / "cgroup.procs").exists()), None)
+    group = top and top / f"syncrelay-test-{os.getpid()}"
+    try:
+        group.mkdir()
+        (group / "pids.max").write_text("25")
+    except (AttributeError, OSError):
+        pytest.skip("this machine lets nobody make control groups that limit tasks")
+    yield group
+    group.rmdir()
+
+
+PIDS_GROUPS = ("/sys/fs/cgroup/pids", "/sys/fs/cgroup")
+
+
+@pytest.mark.ros
+def test_too_few_processes_allowed_are_counted(base, tasks_allowed):
+    script = f'echo $$ > {tasks_allowed}/cgroup.procs; exec "$@"'
+    command = ["sh", "-ec", script, "sh", sys.executable, "-m", "syncrelay", "doctor", "--json"]
+    _, found = examine(base, command=command)
+    assert "only 25 processes and threads are allowed here" in found["task_limit"]["what"]
 
 
 SHM = "mount -t tmpfs -o mode=1777 shm /dev/shm; cd /dev/shm"

@@ -13,8 +13,8 @@ S = 1_000_000_000
 CAMERA = SeenPublisher("/camera_driver", IMAGE, "reliable, volatile")
 
 
-def sighting(*topics, nodes=("/camera_driver",), clocks=0, ticks=0):
-    return Sighting(5.0, nodes, 3, topics, clocks, ticks)
+def sighting(*topics, nodes=("/camera_driver",), clocks=0, ticks=0, nameless=0):
+    return Sighting(5.0, nodes, 3, nameless, topics, clocks, ticks)
 
 
 def brief(diagnoses):
@@ -52,6 +52,15 @@ def test_alone_is_said_once():
     assert brief(check_company(seen, domain=3, discovery_range="SUBNET")) == [("alone", MEND)]
     assert list(check_topics(seen, optional=frozenset())) == []
     assert list(check_company(sighting(), domain=3, discovery_range="SUBNET")) == []
+
+
+def test_nodes_that_are_found_but_do_not_get_through_are_not_taken_for_absent():
+    nameless = SeenPublisher("", IMAGE, "reliable, volatile")
+    seen = sighting(image(publishers=(nameless,), received=0), SeenTopic("/imu", IMU), nodes=(), nameless=1)
+    (found,) = check_company(seen, domain=3, discovery_range="SUBNET")
+    assert (found.code, found.severity) == ("unreachable", MEND)
+    assert "let UDP ports 8150 to 8399 through" in found.do
+    assert brief(check_topics(seen, optional=frozenset())) == [("no_publisher", MEND)]
 
 
 @pytest.mark.parametrize(("count", "found"), [(0, []), (1, [("node_name", KNOW)]), (2, [("node_name", MEND)])])

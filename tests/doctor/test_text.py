@@ -78,7 +78,7 @@ def test_the_readme_shows_what_is_printed():
     lidar = SeenTopic("/lidar/points", CLOUD, alike=("/ouster/points",))
     imu_driver = SeenPublisher("/imu_driver", "sensor_msgs/msg/Imu", "best_effort, volatile")
     imu = SeenTopic("/imu/data", "sensor_msgs/msg/Imu", (imu_driver,), 998, 199.8, delays=(2 * MS,))
-    seen = Sighting(5.0, ("/camera_driver", "/imu_driver", "/ouster"), 7, (camera, lidar, imu))
+    seen = Sighting(5.0, ("/camera_driver", "/imu_driver", "/ouster"), 7, topics=(camera, lidar, imu))
     found = worst_first(
         [
             *check_discovery(Discovery({"ROS_DOMAIN_ID": "110"}, (32768, 60999))),

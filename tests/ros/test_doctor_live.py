@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from tests.doctor.environments import unshared
 from tests.ros.cdr_messages import CLOCK, IMAGE, VECTOR, serialize, vector
 from tests.ros.cdr_messages import time as ros_time
 from tests.ros.configs import config, inputs
@@ -105,6 +106,29 @@ def test_every_fault_of_a_graph_is_named_with_its_topic(stage: Stage):
     assert said["qos"]["what"].endswith(
         "(offers best_effort, volatile): best effort publisher and reliable subscription"
     )
+
+
+# Root's player ends with the doctor, who is another user: he may look where root may, and write nowhere.
+OTHER_USER = """
+mount -t tmpfs -o mode=1777 shm /dev/shm
+(tail --pid=$$ -f /dev/null | {player}) >/dev/null 2>&1 &
+set -- setpriv --reuid 65534 --regid 65534 --clear-groups {caps} "$@"
+"""
+MAY_READ = " ".join(f"--{kind}=-all,+dac_read_search" for kind in ("inh-caps", "ambient-caps", "bounding-set"))
+
+
+def test_nodes_of_another_user_are_told_from_nodes_that_are_not_there(stage: Stage):
+    (stage.folder / "doctor.yaml").write_text(config({"front": group("/camera", "/lidar")}))
+    player = f"{sys.executable} -m tests.ros.player --topic /camera {VECTOR} --topic /lidar {VECTOR}"
+    words = ["doctor", "--json", "--live", "--seconds", "8", "--config", str(stage.folder / "doctor.yaml")]
+    command = unshared(["mount"], OTHER_USER.format(player=player, caps=MAY_READ), *words)
+    environment = {**stage.environment, "HOME": str(stage.folder)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    assert done.stdout, done.stderr
+    said = {each["code"]: each for each in json.loads(done.stdout)["diagnoses"]}
+    assert {"shm_foreign", "unreachable"} <= set(said)
+    assert said["unreachable"]["what"].startswith("2 topics on domain")
+    assert {"alone", "silent", "no_publisher"}.isdisjoint(said)
 
 
 def test_alone_on_a_domain_it_says_so_once(stage: Stage):
