@@ -40,7 +40,13 @@ def ros_domain() -> Iterator[int]:
 
 
 @pytest.fixture
-def stage(tmp_path: Path, ros_domain: int) -> Iterator[Stage]:
+def receive_path() -> str:
+    """The path of the relay's messages; tests marked `both_paths` run on each."""
+    return "direct"
+
+
+@pytest.fixture
+def stage(tmp_path: Path, ros_domain: int, receive_path: str) -> Iterator[Stage]:
     """Starts players, relays and collectors on a domain of their own, and ends them all."""
-    with running_stage(tmp_path, ros_domain) as opened:
+    with running_stage(tmp_path, ros_domain, receive_path) as opened:
         yield opened

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 import syncrelay
 from tests.ros import frames
 from tests.ros.frames import Frame
@@ -15,6 +17,9 @@ from tests.ros.shared_memory import left_of
 
 _CHECKOUT = Path(__file__).parents[2]
 _PACKAGE = Path(syncrelay.__file__).parents[1]
+
+both_paths = pytest.mark.parametrize("receive_path", ["direct", "rclpy"])
+"""For what must be so whichever way messages pass through rcl."""
 
 
 class Player:
@@ -95,9 +100,10 @@ class Collector:
 class Stage:
     """Starts the processes of one test on one domain."""
 
-    def __init__(self, folder: Path, domain: int) -> None:
+    def __init__(self, folder: Path, domain: int, receive_path: str = "direct") -> None:
         self.folder, self.domain = folder, domain
         self.environment = ros_environment(domain=domain, folder=folder, python_path=[_PACKAGE, _CHECKOUT])
+        self.environment["SYNCRELAY_RECEIVE"] = receive_path
         self._processes: list[Process] = []
         self._segments: set[Path] = set()
 
@@ -166,8 +172,8 @@ class Stage:
 
 
 @contextmanager
-def running_stage(folder: Path, domain: int) -> Iterator[Stage]:
-    stage = Stage(folder, domain)
+def running_stage(folder: Path, domain: int, receive_path: str = "direct") -> Iterator[Stage]:
+    stage = Stage(folder, domain, receive_path)
     try:
         yield stage
     finally:
