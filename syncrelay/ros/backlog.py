@@ -45,7 +45,7 @@ class Backlog:
         for _ in range(_BATCH):
             if not self._heads or self._heads[0][0] > look.seen_until:
                 return
-            self._take(self._pop())
+            self._take(self._hand_on(heappop(self._heads)))
 
     def deliver_until(self, until: int, sources: Iterable[Source]) -> None:
         """Deliver what these sources received up to a time, in nanoseconds of the system clock, however much it is."""
@@ -53,12 +53,12 @@ class Backlog:
             if source not in self._held:
                 self._take(source)
         while self._heads and self._heads[0][0] <= until:
-            self._take(self._pop())
+            self._take(self._hand_on(heappop(self._heads)))
 
     def deliver_held(self) -> None:
         """Deliver what is held, at the end: its sources are not drained."""
         while self._heads:
-            self._pop()
+            self._hand_on(heappop(self._heads))
 
     def forget(self, source: Source) -> None:
         """Deliver what is held of a source that ends."""
@@ -67,9 +67,6 @@ class Backlog:
             self._heads.remove(head)
             self._heads.sort()
             self._hand_on(head)
-
-    def _pop(self) -> Source:
-        return self._hand_on(heappop(self._heads))
 
     def _hand_on(self, head: _Head) -> Source:
         received, _, payload, content, source = head

@@ -1,5 +1,6 @@
 """The node: subscribes to what the file names as it appears, and keeps its groups at work."""
 
+import gc
 import logging
 import os
 import threading
@@ -99,6 +100,9 @@ class Relay:
         self._jump_handle: Any = None
 
     def __enter__(self) -> Self:
+        # What there is by now stays: the garbage collector need not look through all modules for each few messages.
+        gc.collect()
+        gc.freeze()
         self._receiving = self._threads.submit(self._loop.run)
         self._receiving.add_done_callback(lambda _: self._wake.set())
         self._threads.submit(self._serve)
