@@ -3,7 +3,7 @@
 from syncrelay.config.errors import ConfigError
 from syncrelay.config.listen import Listen
 from syncrelay.config.load import load, load_text
-from syncrelay.config.models import DiagnosticsConfig, NodeConfig, StampField, StampSource
+from syncrelay.config.models import DiagnosticsConfig, NodeConfig, StampField, StampSource, Transport
 from syncrelay.config.problems import Problem, Severity, Span
 from syncrelay.config.qos import AUTO, QosOverrides, QosPreset
 from syncrelay.config.render import render
@@ -25,6 +25,7 @@ __all__ = [
     "StampField",
     "StampSource",
     "TopicConfig",
+    "Transport",
     "load",
     "load_text",
     "render",

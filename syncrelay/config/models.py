@@ -22,6 +22,8 @@ from syncrelay.config.keys import (
 from syncrelay.config.qos import AUTO, Qos
 from syncrelay.config.wording import describe
 
+Transport: TypeAlias = Literal["default", "large_messages"]
+
 
 class NodeConfig(Keys):
     """The ROS node. Remaps and parameters behind --ros-args still win."""
@@ -37,6 +39,15 @@ class NodeConfig(Keys):
     use_sim_time: bool = Field(
         default=False,
         description="Take the time from /clock, as with a simulation or a bag played with --clock. Default: false.",
+    )
+    transport: Transport = Field(
+        default="default",
+        description=(
+            "How Fast DDS carries messages of this node: `large_messages` gives it shared memory for images and clouds"
+            " over 0.5 MB, which publishers and subscribers need too, see configs/large_messages.xml. Transports that"
+            " the environment names stand. Default: default."
+        ),
+        examples=["default", "large_messages"],
     )
 
 

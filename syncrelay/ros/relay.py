@@ -30,6 +30,7 @@ from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
+from syncrelay.ros.transport import apply_transport
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
 
@@ -302,6 +303,7 @@ def _init(config: Config, ros_args: Sequence[str]) -> Context:
     # the same lines from rcl would double it.
     simulated = ["-p", "use_sim_time:=true"] if config.node.use_sim_time else []
     ours = ["--ros-args", "--disable-stdout-logs", *log_arguments(), *simulated, "--"]
+    apply_transport(config.node.transport, os.environ)
     context = Context()
     try:
         rclpy.init(

@@ -123,6 +123,7 @@ OPTIONS = {
     "groups": (file(), file().replace("front", "back"), outputs),
     "name": (file(), file(node={"name": "z"}), lambda config: config.node.name),
     "namespace": (file(), file(node={"namespace": "/z"}), lambda config: config.node.namespace),
+    "transport": (file(), file(node={"transport": "large_messages"}), lambda config: config.node.transport),
     "use_sim_time": (file(), file(node={"use_sim_time": True}), lambda config: config.node.use_sim_time),
     "node": (file(), file(node={"name": "z"}), lambda config: config.node),
     "metrics": (file(), file(metrics=None), lambda config: config.listen),
