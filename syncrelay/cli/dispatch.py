@@ -33,7 +33,7 @@ exit codes:
 def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
     """Run what the command line asks for; raises UsageError where it makes no sense."""
     if not words:
-        say(f"{_USAGE}\n\n{_ABOUT}\n\n{_COMMANDS_HELP}")
+        say(_relay_parser().format_help().rstrip("\n"))
         return USAGE
     first, *rest = words
     if first == "help":
@@ -46,7 +46,7 @@ def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
     return command(rest, stop)
 
 
-def _relay(words: Sequence[str], stop: StopRequest) -> int:
+def _relay_parser() -> Parser:
     parser = Parser("syncrelay", description=_ABOUT, usage=_USAGE.removeprefix("usage: "), epilog=_COMMANDS_HELP)
     options = parser.add_argument_group("the relay")
     options.add_argument("--config", metavar="FILE", help="relay what FILE says until Ctrl-C or SIGTERM")
@@ -78,6 +78,11 @@ def _relay(words: Sequence[str], stop: StopRequest) -> int:
     )
     _add_help(parser)
     parser.add_argument("--version", action="store_true", help="print the version")
+    return parser
+
+
+def _relay(words: Sequence[str], stop: StopRequest) -> int:
+    parser = _relay_parser()
     own, ros_args = _split_at_ros_args(words)
     arguments = parser.read(own)
     if arguments.help:

@@ -158,7 +158,7 @@ class Relay:
             phase=self._phase,
             uptime_s=now - self._started,
             turned_s=now - self._turned,
-            receives_by="rclpy",
+            receives_by=self.receive_path.value,
             groups=self.monitor.reports,
         )
 
