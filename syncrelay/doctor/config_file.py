@@ -1,6 +1,7 @@
 """The file: what `validate` finds in it, and what remaps make of its names."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from syncrelay.config import Config, Problem, Severity, TopicConfig, render
 from syncrelay.config.wording import all_of
@@ -11,8 +12,9 @@ from syncrelay.doctor.words import counted
 def check_file(file: str, problems: Sequence[Problem]) -> Iterator[Diagnosis]:
     """Yield what is wrong with a file. A package that is missing is a fault of this environment, not of the file."""
     errors = [problem for problem in problems if problem.severity is Severity.ERROR]
-    missing = [problem for problem in problems if problem.code == "package_missing" and problem not in errors]
-    unchecked = [problem for problem in problems if problem not in errors and problem not in missing]
+    noted = [problem for problem in problems if problem not in errors]
+    missing = [replace(each, severity=Severity.ERROR) for each in noted if each.code == "package_missing"]
+    unchecked = [problem for problem in noted if problem.code != "package_missing"]
     if errors:
         yield mend(
             "file",

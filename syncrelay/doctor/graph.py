@@ -117,7 +117,7 @@ def _other_type(topic: SeenTopic, strangers: Sequence[SeenPublisher], *, alone: 
     make = mend if alone else know
     return make(
         "other_type",
-        f"{topic.name} is published as another type by {they}; the file says {topic.type}",
+        f"{topic.name} is published as another type by {they};\nthe file says {topic.type}",
         so="nothing of theirs is received" + ("" if alone else ", only what the others publish"),
         do=f"write their type into the file if it is what you want: type: {strangers[0].type}",
     )
@@ -128,7 +128,7 @@ def _incompatible(topic: SeenTopic, mismatched: Sequence[SeenPublisher]) -> Diag
     reasons = all_of(dict.fromkeys(str(each.mismatch) for each in mismatched))
     return mend(
         "qos",
-        f"{topic.name}: the file's QoS does not fit {they}: {reasons}",
+        f"{topic.name}: the file's QoS does not fit {they}:\n{reasons}",
         so="nothing of theirs is received",
         do="take `qos` away from this topic in the file, or write `qos: auto`: it takes what publishers offer",
     )

@@ -47,11 +47,16 @@ def _row(topic: SeenTopic) -> tuple[str, ...]:
     delay = delay_of(topic)
     age = "" if delay is None else f"stamps {duration(abs(delay))} {'old' if delay >= 0 else 'ahead'}"
     rate = f"{topic.rate_hz:.1f} Hz" if topic.rate_hz else f"{topic.received} received"
-    return topic.name, topic.type, rate, age, _publishers(topic.publishers)
+    return topic.name, topic.type, rate, age, _publishers(topic)
 
 
-def _publishers(publishers: Sequence[SeenPublisher]) -> str:
-    return "; ".join(f"{each.node or 'a nameless node'} ({each.offers})" for each in publishers) or "no publisher"
+def _publishers(topic: SeenTopic) -> str:
+    return "; ".join(_publisher(each, topic.type) for each in topic.publishers) or "no publisher"
+
+
+def _publisher(publisher: SeenPublisher, wanted: str) -> str:
+    strange = "" if publisher.type == wanted else f"{publisher.type}, "
+    return f"{publisher.node or 'a nameless node'} ({strange}{publisher.offers})"
 
 
 def verdict(diagnoses: Sequence[Diagnosis]) -> str:

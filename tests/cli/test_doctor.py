@@ -178,7 +178,8 @@ def test_the_files_errors_are_shown_as_validate_shows_them(base, tmp_path):
 def test_a_package_that_is_missing_is_a_fault_of_the_environment(base, tmp_path):
     (tmp_path / "f.yaml").write_text(GOOD.replace("/b, type: sensor_msgs", "/b, type: acme_msgs"))
     _, found = examine(base, "--config", str(tmp_path / "f.yaml"))
-    assert "package_missing" in found
+    assert "`acme_msgs` is not installed here" in found["package_missing"]["what"]
+    assert "note:" not in found["package_missing"]["what"]
     assert "file" not in found
     assert "type_unusable" not in found
 

@@ -72,6 +72,14 @@ def test_durations_are_in_the_unit_that_reads_best(ns, text):
     assert duration(ns) == text
 
 
+def test_a_publisher_of_another_type_is_listed_with_it():
+    stranger = SeenPublisher("/ouster", CLOUD, "reliable, volatile")
+    seen = Sighting(5.0, ("/ouster",), 1, topics=(SeenTopic("/scan", "sensor_msgs/msg/LaserScan", (stranger,)),))
+    assert list(sighting_lines(seen))[1].endswith(
+        "0 received    /ouster (sensor_msgs/msg/PointCloud2, reliable, volatile)"
+    )
+
+
 def test_the_readme_shows_what_is_printed():
     driver = SeenPublisher("/camera_driver", IMAGE, "reliable, volatile")
     camera = SeenTopic("/camera/image_raw", IMAGE, (driver,), 150, 29.97, delays=(37_231 * MS,))

@@ -104,7 +104,7 @@ def test_every_fault_of_a_graph_is_named_with_its_topic(stage: Stage):
     assert "did you mean /camera/image" in said["no_publisher"]["do"]
     assert said["other_type"]["what"].startswith(f"/strange is published as another type by /player ({IMAGE})")
     assert said["qos"]["what"].endswith(
-        "(offers best_effort, volatile): best effort publisher and reliable subscription"
+        "(offers best_effort, volatile):\nbest effort publisher and reliable subscription"
     )
 
 
