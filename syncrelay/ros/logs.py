@@ -17,7 +17,8 @@ class _TextFormatter(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         level = _ROS_LEVELS.get(record.levelname, record.levelname)
-        text = f"[{level}] [{record.created:.3f}] [{record.name}]: {record.getMessage()}"
+        source = getattr(record, "node", record.name)
+        text = f"[{level}] [{record.created:.3f}] [{source}]: {record.getMessage()}"
         return f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text
 
 
@@ -28,7 +29,7 @@ class _JsonFormatter(logging.Formatter):
         line = {
             "time": datetime.fromtimestamp(record.created, tz=UTC).isoformat(),
             "level": record.levelname.lower(),
-            "logger": record.name,
+            "logger": getattr(record, "node", record.name),
             "message": record.getMessage(),
         }
         for key in ("group", "finding"):
@@ -55,6 +56,17 @@ class RosoutHandler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(record.getMessage())
+
+
+def name_after(node_name: str) -> None:
+    """Have all lines from now on bear a node's name, which tells two relays of a launch apart."""
+
+    def name(record: logging.LogRecord) -> bool:
+        record.node = node_name
+        return True
+
+    for handler in LOGGER.handlers:
+        handler.addFilter(name)
 
 
 def configure(level: str, log_format: str) -> None:

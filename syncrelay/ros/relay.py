@@ -25,7 +25,7 @@ from syncrelay.ros.diagnostics import Diagnostics, Scalars
 from syncrelay.ros.environment import log_arguments
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.inputs import Wiring, wire
-from syncrelay.ros.logs import RosoutHandler
+from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
 from syncrelay.ros.receive import ReceiveLoop
@@ -73,6 +73,7 @@ class Relay:
         self._beat = beat
         self._context = _init(config, ros_args)
         self.node = rclpy.create_node(config.node.name, namespace=config.node.namespace, context=self._context)
+        name_after(self.node.get_logger().name)
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)

@@ -49,6 +49,11 @@ def test_the_node_is_named_by_the_file_and_the_command_line_has_the_last_word(
     collector.process.wait_until(lambda: full_name in collector.nodes(), full_name)
 
 
+def test_the_log_bears_the_name_of_the_node(stage: Stage):
+    relay = stage.relay(_front(node={"name": "fusion"}), "--ros-args", "-r", "__ns:=/left")
+    relay.wait_for_log("[left.fusion]: front: waiting for")
+
+
 def test_topics_can_be_remapped_from_the_command_line(stage: Stage):
     recording = merged(at("/robot/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
     aligned = {"/fused/camera": VECTOR, "/front/lidar": VECTOR}
