@@ -84,6 +84,8 @@ class Relay:
             path.watch(), now=self._now, deadline=self._deadline, expire=self._expire, beat=self._turn
         )
         self._groups = [GroupRelay(group, now=self._now) for group in chosen]
+        # Asked for their deadlines at every turn of the loop: the others never have one.
+        self._limited = [group for group in self._groups if group.config.keys.max_wait is not None]
         self._wirings = wire(self._groups, node=self.node, path=path, loop=self._loop)
         self._inputs = list(dict.fromkeys(each for wiring in self._wirings for each in wiring.inputs))
         self.monitor = Monitor(self._wirings, node=self.node, loop=self._loop, simulated=self._sim_time)
@@ -243,7 +245,7 @@ class Relay:
         # Simulated time does not pass while we sleep: its ticks call expire instead.
         if self._sim_time:
             return None
-        deadlines = (group.engine.next_deadline() for group in self._groups)
+        deadlines = (group.engine.next_deadline() for group in self._limited)
         return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
     def _expire(self, now: int) -> None:
