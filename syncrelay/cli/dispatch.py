@@ -19,6 +19,7 @@ commands:
   validate FILE...      check files and report everything that is wrong with them
   schema                print the JSON Schema of the file, for editors
   replay BAG...         show what a file makes of a recording; write its outputs as one
+  analyze BAG           measure a recording, and suggest the values that fit
   demo                  show it all on a simulated rig, without a robot
   doctor                tell what can go wrong before a message flows
   top                   watch a running relay, here or on another machine
@@ -168,6 +169,27 @@ def _replay(words: Sequence[str], _stop: StopRequest) -> int:
     return replay(arguments.bags, arguments.config, Wanted(arguments.json, arguments.drops, arguments.output))
 
 
+def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay analyze",
+        description="Measures a recording without ROS: rates, gaps, faults of stamps, offsets; what the groups of a\n"
+        "file make of it, and why; and the values that would fit. Exit code 1 if a required topic is not in it.",
+    )
+    parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
+    parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics to match, where there is no file yet")
+    parser.add_argument("--config", metavar="FILE", help="the file whose groups are looked at")
+    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values, comments kept")
+    parser.add_argument("--json", action="store_true", help="print all figures as JSON")
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    arguments = parser.read(words)
+    from syncrelay.cli.analyze import Asked, analyze_bag
+
+    asked = Asked(arguments.config, tuple(arguments.topics), arguments.write, arguments.json)
+    return analyze_bag(arguments.bag, asked)
+
+
 def _demo(words: Sequence[str], stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay demo",
@@ -267,6 +289,7 @@ _COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
     "validate": _validate,
     "schema": _schema,
     "replay": _replay,
+    "analyze": _analyze,
     "demo": _demo,
     "doctor": _doctor,
     "top": _top,

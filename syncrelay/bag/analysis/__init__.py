@@ -1,0 +1,6 @@
+"""What a recording tells of its topics, and what a file would make of it: figures, curves, findings, better values."""
+
+from syncrelay.bag.analysis.analysis import Analysis, GroupAnalysis, analyze, proposed_text, settled
+from syncrelay.bag.analysis.changes import Change, patch, with_changes
+
+__all__ = ["Analysis", "Change", "GroupAnalysis", "analyze", "patch", "proposed_text", "settled", "with_changes"]

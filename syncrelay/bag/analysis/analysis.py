@@ -1,0 +1,116 @@
+"""A recording and a file: figures of topics and pairs, what each group gives, and what it could give."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import yaml
+
+from syncrelay.bag.analysis.changes import Change, with_changes
+from syncrelay.bag.analysis.nearest import Pair, Tightest, pair
+from syncrelay.bag.analysis.streams import Stream, read_streams
+from syncrelay.bag.analysis.suggest import Suggestion, possible_sets, stamped, suggest
+from syncrelay.bag.analysis.topics import TopicFigures, figures_of
+from syncrelay.bag.analysis.trial import LastingFinding, Trial, try_group, watch_group
+from syncrelay.bag.definitions import begins_with_header
+from syncrelay.bag.recording import Channel, Recording
+from syncrelay.bag.wiring import Wiring
+from syncrelay.config import GroupConfig, Severity, load_text
+
+
+@dataclass(frozen=True, slots=True)
+class GroupAnalysis:
+    """One group. `tightest` is None where an input has no stamps; `possible` are the spans of sets there could be."""
+
+    group: GroupConfig
+    streams: tuple[Stream, ...]
+    pairs: tuple[Pair, ...]
+    tightest: Tightest | None
+    possible: tuple[int, ...]
+    trial: Trial
+    suggestion: Suggestion
+
+    def findings(self) -> tuple[LastingFinding, ...]:
+        """Return what the running relay would have found, the worst first: it looks once a second of the recording."""
+        return watch_group(self.group, self.streams)
+
+    @property
+    def slop(self) -> int:
+        """The slop of the file if it matches anything, else the one that would match all that belongs together."""
+        slop = 0 if self.group.keys.policy == "exact_time" else getattr(self.group.keys, "slop", None)
+        if slop is not None and self.tightest is not None and self.tightest.share_within(slop):
+            return int(slop)
+        return self.possible[-1] if self.possible else 0
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """A recording; `text` is the file that its groups are from."""
+
+    begin: int
+    end: int
+    topics: tuple[TopicFigures, ...]
+    groups: tuple[GroupAnalysis, ...]
+    text: str
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """All that is suggested."""
+        return tuple(change for each in self.groups for change in each.suggestion.changes)
+
+
+def analyze(recording: Recording, text: str, wirings: Sequence[Wiring]) -> Analysis:
+    """Read a recording to its end and return what it tells, and what the groups of a file's text make of it.
+
+    Raises BagError for a stamp or key that a recorded type does not have.
+    """
+    streams = read_streams(recording, wirings)
+    groups = tuple(_analyze(wiring.group, of_group, text) for wiring, of_group in zip(wirings, streams, strict=True))
+    distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
+    topics = tuple(figures_of(stream) for stream in distinct.values() if stream.stamps)
+    return Analysis(recording.begin, recording.end, topics, groups, text)
+
+
+def proposed_text(name: str, channels: Sequence[Channel]) -> str:
+    """Return a file's text with one group of channels, and values that stand until better ones are measured."""
+    topics = [{"topic": channel.topic, "type": channel.type} for channel in channels]
+    for topic, channel in zip(topics, channels, strict=True):
+        if begins_with_header(channel) is False:
+            topic["stamp"] = "receive"
+    group = {"policy": "approximate_time", "slop": "10ms", "topics": topics}
+    return yaml.safe_dump({"version": 1, "groups": {name: group}}, sort_keys=False)
+
+
+def settled(analysis: Analysis) -> Analysis:
+    """Return the analysis of the file with all that was suggested."""
+    text = with_changes(analysis.text, analysis.changes)
+    groups = []
+    for each in analysis.groups:
+        group = group_of(text, each.group.name)
+        groups.append(_analyze(group, tuple(stamped(group, each.streams)), text))
+    return replace(analysis, groups=tuple(groups), text=text)
+
+
+def group_of(text: str, name: str) -> GroupConfig:
+    """Return a group of a file's text."""
+    groups = load_text(text, package_missing=Severity.NOTE).groups
+    return next(group for group in groups if group.name == name)
+
+
+def _analyze(group: GroupConfig, streams: tuple[Stream, ...], text: str) -> GroupAnalysis:
+    trial = try_group(group, streams)
+    possible = possible_sets(group, streams)
+    offsets = [topic.offset_ns for topic in group.topics]
+    pairs = [
+        pair(streams[first], streams[second], (offsets[first], offsets[second]))
+        for first, second in combinations(range(len(streams)), 2)
+    ]
+    return GroupAnalysis(
+        group=group,
+        streams=streams,
+        pairs=tuple(each for each in pairs if each is not None),
+        tightest=None if possible is None else possible.tightest,
+        possible=() if possible is None else possible.spans,
+        trial=trial,
+        suggestion=suggest(group, streams, trial, lambda changes: group_of(with_changes(text, changes), group.name)),
+    )

@@ -1,0 +1,89 @@
+"""Better values, put into the text of a file: comments and the order of keys stay."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import StringIO
+from typing import Any, Final
+
+from ruamel.yaml import YAML
+
+from syncrelay.config.file import GROUP_MODEL_OF, topic_model
+
+_POLICY: Final = "policy"
+_WIDEST: Final = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A key of a group, or of one of its topics by index, its better value as it stands in a file, and why."""
+
+    group: str
+    topic: int | None
+    key: str
+    value: str | int
+    reason: str
+
+
+def with_changes(text: str, changes: Sequence[Change]) -> str:
+    """Return the text of a file with changes made.
+
+    A new policy takes keys with it that it does not have.
+    """
+    yaml = _yaml()
+    document = yaml.load(text)
+    for change in changes:
+        group = document["groups"][change.group]
+        if change.key == _POLICY:
+            _fit(group, str(change.value))
+        _set(group if change.topic is None else group["topics"][change.topic], change)
+    return _dumped(yaml, document)
+
+
+def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
+    """Return changes alone, as the part of a file that they stand in; `names` are the topics of each group."""
+    groups: dict[str, Any] = {}
+    for change in changes:
+        group = groups.setdefault(change.group, {})
+        if change.topic is None:
+            group[change.key] = change.value
+        else:
+            topics = group.setdefault("topics", {})
+            topics.setdefault(change.topic, {"topic": names[change.group][change.topic]})[change.key] = change.value
+    for group in groups.values():
+        if "topics" in group:
+            # Those keys first that stand first in a file.
+            group["topics"] = [each for _, each in sorted(group.pop("topics").items())]
+    return _dumped(_yaml(), {"groups": groups})
+
+
+def _set(mapping: Any, change: Change) -> None:
+    is_new = change.key not in mapping
+    if is_new and "topics" in mapping:
+        mapping.insert(list(mapping).index("topics"), change.key, change.value)
+    mapping[change.key] = change.value
+    # Behind a key in braces a comment would swallow the rest of the line.
+    if change.reason and is_new and not mapping.fa.flow_style():
+        mapping.yaml_add_eol_comment(change.reason, change.key)
+
+
+def _fit(group: Any, policy: str) -> None:
+    model = GROUP_MODEL_OF[policy]
+    for key in [key for key in group if key not in model.model_fields]:
+        del group[key]
+    for topic in group["topics"]:
+        for key in [key for key in topic if key not in topic_model(model).model_fields]:
+            del topic[key]
+
+
+def _yaml() -> YAML:
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = _WIDEST
+    yaml.indent(mapping=2, sequence=4, offset=2)
+    return yaml
+
+
+def _dumped(yaml: YAML, document: Any) -> str:
+    out = StringIO()
+    yaml.dump(document, out)
+    return out.getvalue()

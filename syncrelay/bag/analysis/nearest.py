@@ -1,0 +1,149 @@
+"""Which messages lie nearest to which, whatever slop and queues are: the one pass that both curves come from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds, Stream
+from syncrelay.bag.analysis.topics import Spread, spread
+
+# Farther than any stamp, and twice it still fits.
+_FAR = 2**61
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """The signed distance of each message of `first` to the nearest of `second`: positive where that is later.
+
+    `distance` is the same without the sign. All of `offsets` in the order of the stamps.
+    """
+
+    first: str
+    second: str
+    signed: Spread
+    distance: Spread
+    offsets: Nanoseconds
+
+
+@dataclass(frozen=True, slots=True)
+class Tightest:
+    """For each message of the slowest input, the pivot, the tightest set that it could be in.
+
+    `spans` are in nanoseconds; `queues` is how many messages the fullest queue must hold until the set is complete;
+    `disjoint` tells which sets share no message with a tighter one. All in the order of the pivot's stamps.
+    """
+
+    pivot: int
+    spans: Nanoseconds
+    queues: Nanoseconds
+    disjoint: npt.NDArray[np.bool_]
+
+    def share_within(self, slop: int) -> float:
+        """Return the share of the pivot's messages, 0 to 1, whose tightest set is no wider."""
+        return float(np.mean(self.spans <= slop)) if len(self.spans) else 0.0
+
+    def share_held(self, queue_size: int, slop: int) -> float:
+        """Return the share of the pivot's messages whose tightest set is no wider, and held by such queues."""
+        held = (self.spans <= slop) & (self.queues <= queue_size)
+        return float(np.mean(held)) if len(self.spans) else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Sorted:
+    """Distinct stamps in order, with where each was received, and how many messages had come by then."""
+
+    stamps: Nanoseconds
+    places: Nanoseconds
+    arrivals: Nanoseconds
+
+
+def pair(first: Stream, second: Stream, offsets: tuple[int, int]) -> Pair | None:
+    """Return how the messages of the slower stream lie to those of the other; None where one has no stamps."""
+    one, other = _sorted(first, offsets[0]), _sorted(second, offsets[1])
+    if not len(one.stamps) or not len(other.stamps):
+        return None
+    if len(one.stamps) > len(other.stamps):
+        first, second, one, other = second, first, other, one
+    before, after, _ = _sides(one.stamps, other.stamps)
+    signed = np.where(after <= before, after, -before)
+    return Pair(first.topic, second.topic, spread(signed), spread(np.abs(signed)), signed)
+
+
+def tightest(streams: Sequence[Stream], offsets: Sequence[int], *, successors: int = 0) -> Tightest | None:
+    """Return the tightest set of each message of the slowest stream; None where a stream has no stamps.
+
+    A set can leave when all its messages are there, or, with `successors`, so many later ones of each input.
+    """
+    inputs = [_sorted(stream, offset) for stream, offset in zip(streams, offsets, strict=True)]
+    if not all(len(each.stamps) for each in inputs):
+        return None
+    pivot = min(range(len(inputs)), key=lambda index: len(inputs[index].stamps))
+    pivots = inputs[pivot]
+    others = [each for index, each in enumerate(inputs) if index != pivot]
+    sides = [_sides(pivots.stamps, other.stamps) for other in others]
+    spans, lefts = _tightest_spans(sides)
+    chosen = [(pivots, np.arange(len(pivots.stamps)))]
+    for other, (before, _, behind) in zip(others, sides, strict=True):
+        # `behind` is the first not older: the partner is it, or the one before it, if that lies within.
+        at = np.clip(np.where(before <= lefts, behind - 1, behind), 0, len(other.stamps) - 1)
+        equal = other.stamps[np.clip(behind, 0, len(other.stamps) - 1)] == pivots.stamps
+        at = np.where(equal, np.clip(behind, 0, len(other.stamps) - 1), at)
+        chosen.append((other, at))
+    complete = np.zeros(len(spans), dtype=np.int64)
+    for each, at in chosen:
+        complete = np.maximum(complete, each.places[np.minimum(at + successors, len(each.places) - 1)])
+    queues = np.ones(len(spans), dtype=np.int64)
+    for each, at in chosen:
+        came = np.searchsorted(each.arrivals, complete, side="right")
+        since = np.searchsorted(each.arrivals, each.places[at], side="left")
+        queues = np.maximum(queues, came - since)
+    return Tightest(pivot, spans, queues, _disjoint(spans, [at for _, at in chosen[1:]]))
+
+
+def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArray[np.bool_]:
+    """Tell which sets share no partner with one that is tighter: each message is in one set."""
+    order = np.argsort(spans, kind="stable")
+    rows = np.stack(partners, axis=1)[order].tolist()
+    taken: list[set[int]] = [set() for _ in partners]
+    free = np.zeros(len(spans), dtype=np.bool_)
+    for place, row in zip(order.tolist(), rows, strict=True):
+        if not any(each in used for each, used in zip(row, taken, strict=True)):
+            free[place] = True
+            for each, used in zip(row, taken, strict=True):
+                used.add(each)
+    return free
+
+
+def _sorted(stream: Stream, offset: int) -> _Sorted:
+    stamps, _, places = stream.numbers()
+    is_set = (stamps != 0) & (stamps != UNREADABLE)
+    # Of a repeated stamp the last counts, as for the engine.
+    _, last = np.unique(stamps[is_set][::-1], return_index=True)
+    at = len(stamps[is_set]) - 1 - last
+    return _Sorted(stamps[is_set][at] + offset, places[is_set][at], np.sort(places))
+
+
+def _sides(pivots: Nanoseconds, stamps: Nanoseconds) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
+    """Return how far before and after each pivot the nearest stamps lie, and the place of the first not older."""
+    behind = np.searchsorted(stamps, pivots, side="left")
+    after = np.where(behind < len(stamps), stamps[np.clip(behind, 0, len(stamps) - 1)] - pivots, _FAR)
+    before = np.where(behind > 0, pivots - stamps[np.clip(behind - 1, 0, len(stamps) - 1)], _FAR)
+    return np.where(after == 0, 0, before), after, behind
+
+
+def _tightest_spans(
+    sides: Sequence[tuple[Nanoseconds, Nanoseconds, Nanoseconds]],
+) -> tuple[Nanoseconds, Nanoseconds]:
+    """Return the least span of each pivot, and how far before the pivot that set begins."""
+    best = np.full(len(sides[0][0]), 2 * _FAR, dtype=np.int64)
+    best_left = np.zeros_like(best)
+    for left in [np.zeros_like(best), *(before for before, _, _ in sides)]:
+        reach = np.zeros_like(best)
+        for before, after, _ in sides:
+            reach = np.maximum(reach, np.where(before <= left, 0, after))
+        span = left + reach
+        is_less = span < best
+        best, best_left = np.where(is_less, span, best), np.where(is_less, left, best_left)
+    return best, best_left

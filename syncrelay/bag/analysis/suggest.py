@@ -1,0 +1,258 @@
+"""Values that fit what was recorded: measured, then tried on the recording with the engine itself."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from statistics import median
+from typing import Final
+
+import numpy as np
+
+from syncrelay.bag.analysis.changes import Change
+from syncrelay.bag.analysis.nearest import Pair, Tightest, pair, tightest
+from syncrelay.bag.analysis.streams import Stream
+from syncrelay.bag.analysis.topics import TopicFigures, figures_of
+from syncrelay.bag.analysis.trial import Trial, try_group
+from syncrelay.config import GroupConfig
+from syncrelay.explain import words
+from syncrelay.sync import DropReason
+
+_US: Final = 1_000
+_MS: Final = 1_000_000
+_SECOND: Final = 1_000_000_000
+ENOUGH: Final = 0.99
+"""The share of the possible sets that good values give."""
+# Stamps are meant to be equal where so many are; what is not equal then has lost its partner.
+_EQUAL: Final = 0.8
+# Farther away than so many periods of the input, a partner is not the one that was meant: it is missing.
+_PERIODS: Final = 1.5
+_FAR_OFF: Final = 4
+# A slop so many times what is needed lets wrong messages in where the right ones are missing.
+_TOO_WIDE: Final = 4
+_LARGEST_QUEUE: Final = 1000
+_SAME_SPAN: Final = 1.02
+_UNSET: Final = 0.5
+_MEASURED: Final = ("exact_time", "approximate_time", "approximate_time_eager", "approximate_epsilon_time")
+
+
+@dataclass(frozen=True, slots=True)
+class Suggestion:
+    """Changes to a group and what they would give; no changes where its values do, or cannot be measured.
+
+    `possible` is how many sets there could be, `now` and `then` how many there are, before thinning. `hints` are
+    sentences on what only its owner can know of a rig.
+    """
+
+    changes: tuple[Change, ...]
+    hints: tuple[str, ...]
+    possible: int
+    now: int
+    then: int
+    trial: Trial | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Possible:
+    """What could be had: the tightest sets, how many of them are no accident, and their spans."""
+
+    tightest: Tightest
+    is_exact: bool
+    spans: tuple[int, ...]
+
+
+def suggest(
+    group: GroupConfig, streams: Sequence[Stream], trial: Trial, changed: Callable[[Sequence[Change]], GroupConfig]
+) -> Suggestion:
+    """Return better values for a group; `changed` gives the group with changes made."""
+    if group.keys.policy not in _MEASURED:
+        return Suggestion((), (_NOT_MEASURED[group.keys.policy],), 0, 0, 0, None)
+    stamping = list(_stamping(group, streams))
+    base = changed(stamping)
+    streams = stamped(base, streams)
+    possible = possible_sets(base, streams)
+    if possible is None:
+        missing = [stream.topic for stream in streams if not stream.stamps]
+        return Suggestion((), (f"nothing to measure: no messages of {', '.join(missing)}",), 0, 0, 0, None)
+    hints = tuple(_hints(base, streams))
+    most = len(possible.spans)
+    now = completed(trial, possible.tightest.pivot)
+    changes, best = stamping, try_group(base, streams) if stamping else trial
+    if not _does(base, best, possible):
+        for more in _ladder(base, possible):
+            changes = [*stamping, *more]
+            best = try_group(changed(changes), streams)
+            if completed(best, possible.tightest.pivot) >= ENOUGH * most:
+                break
+    sooner = [*changes, *_periods(changed(changes), streams)]
+    if len(sooner) > len(changes):
+        quick = try_group(changed(sooner), streams)
+        if _is_sooner(quick, best):
+            reason = f"sets leave {words.duration(_latency(best) - _latency(quick))} sooner"
+            changes = [replace(each, reason=reason) if each.key == "min_period" else each for each in sooner]
+            best = quick
+    then = completed(best, possible.tightest.pivot)
+    # A policy may find sets that are wider than the tightest of a message.
+    return Suggestion(tuple(changes), hints, max(most, now, then), now, then, best)
+
+
+_NOT_MEASURED: Final = {
+    "latest_time": "which messages belong together is what `trigger` and `max_age` say: no measure can tell",
+    "equal_key": "which messages belong together is what `key` says: no measure can tell",
+}
+
+
+def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | None:
+    """Return what sets a recording holds for the required inputs; None where one of them has no stamps."""
+    required = [index for index, topic in enumerate(group.topics) if topic.required]
+    # The best match is certain only when what comes next is there.
+    successors = 1 if group.keys.policy == "approximate_time" else 0
+    chosen, offsets = [streams[index] for index in required], [group.topics[index].offset_ns for index in required]
+    found = tightest(chosen, offsets, successors=successors)
+    if found is None:
+        return None
+    found = replace(found, pivot=required[found.pivot])
+    if found.share_within(0) >= _EQUAL:
+        return _Possible(found, is_exact=True, spans=(0,) * int(np.count_nonzero(found.spans == 0)))
+    periods = [figures_of(streams[index]).period or 0 for index in required if index != found.pivot]
+    # Where most lie close together, what lies far off has lost its partner.
+    usual = int(np.quantile(found.spans, 0.75, method="inverted_cdf"))
+    limit = min(_PERIODS * max(periods), _FAR_OFF * usual)
+    within = found.spans[found.disjoint & (found.spans <= limit)]
+    return _Possible(found, is_exact=False, spans=tuple(np.sort(within).tolist()))
+
+
+def completed(trial: Trial, pivot: int) -> int:
+    """Return how many sets came together, also those that thinning left out."""
+    counts = trial.counts[pivot]
+    return counts.matched + counts.dropped.get(DropReason.THINNED, 0)
+
+
+def _stamping(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
+    """Go by arrival where stamps are unset, and bring together clocks that are far apart."""
+    figures = [figures_of(stream) for stream in streams]
+    unset = [each for each in figures if each.messages and each.unstamped > _UNSET * each.messages]
+    if unset:
+        reason = f"{unset[0].unstamped} of {unset[0].messages} messages of {unset[0].topic} have stamp 0"
+        for index, topic in enumerate(group.topics):
+            if topic.stamp != "receive":
+                yield Change(group.name, index, "stamp", "receive", reason)
+        return
+    delays = {index: each.delay.median for index, each in enumerate(figures) if each.delay is not None}
+    usual = sorted(delays.values(), key=abs)[0 if len(delays) <= 2 else (len(delays) - 1) // 2] if delays else 0  # noqa: PLR2004
+    for index, delay in delays.items():
+        if abs(delay - usual) > _SECOND and not group.topics[index].offset_ns:
+            reason = f"its clock is {words.duration(abs(delay - usual))} off the others'"
+            yield Change(group.name, index, "offset", words.exactly(delay - usual), reason)
+
+
+def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
+    """Return the streams with times of receipt in place of stamps where the group goes by them."""
+    return [
+        stream.by_receipt() if topic.stamp == "receive" else stream
+        for topic, stream in zip(group.topics, streams, strict=True)
+    ]
+
+
+def _does(group: GroupConfig, trial: Trial, possible: _Possible) -> bool:
+    """Tell whether a group's values give enough, and no slop is far wider than what is needed."""
+    if completed(trial, possible.tightest.pivot) < ENOUGH * len(possible.spans):
+        return False
+    slop = getattr(group.keys, "slop", 0)
+    return bool(possible.is_exact and not slop) or (
+        not possible.is_exact and bool(possible.spans) and slop <= _TOO_WIDE * possible.spans[-1]
+    )
+
+
+def _ladder(group: GroupConfig, possible: _Possible) -> Iterator[list[Change]]:
+    """Yield values, the tightest first."""
+    if possible.is_exact:
+        for queue in _queues(group, possible, 0):
+            yield [*_policy(group, "exact_time", "stamps of one set are equal"), *queue]
+        return
+    spans = possible.spans
+    if not spans:
+        return
+    policy = "approximate_time" if group.keys.policy == "exact_time" else group.keys.policy
+    for slop in dict.fromkeys((spans[ceil(0.995 * len(spans)) - 1], spans[-1])):
+        text = words.at_least(slop)
+        reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
+        for queue in _queues(group, possible, slop):
+            yield [
+                *_policy(group, policy, "stamps of one set differ"),
+                Change(group.name, None, "slop", text, reason),
+                *queue,
+            ]
+
+
+def _policy(group: GroupConfig, policy: str, reason: str) -> list[Change]:
+    return [] if group.keys.policy == policy else [Change(group.name, None, "policy", policy, reason)]
+
+
+def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list[Change]]:
+    """Yield larger and larger queues, first the one that there is."""
+    yield []
+    found = possible.tightest
+    queues = found.queues[found.spans <= slop]
+    need = int(np.quantile(queues, 0.995, method="inverted_cdf")) if len(queues) else 1
+    size = need + ceil(need / 4) + 1
+    while size <= 4 * max(need, group.keys.queue_size) and size <= _LARGEST_QUEUE:
+        if size > group.keys.queue_size:
+            reason = f"up to {need} messages of one input come before a set that it is in can leave"
+            yield [Change(group.name, None, "queue_size", size, reason)]
+        size *= 2
+
+
+def _periods(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
+    """Tell the policy that can use it the least time between messages, where a topic keeps one."""
+    if group.keys.policy != "approximate_time":
+        return
+    for index, (topic, stream) in enumerate(zip(group.topics, streams, strict=True)):
+        figures = figures_of(stream)
+        bound = _lower_bound(figures)
+        if bound and not topic.min_period_ns:
+            yield Change(group.name, index, "min_period", bound, "")
+
+
+def _lower_bound(figures: TopicFigures) -> str | None:
+    """Return nine tenths of the least period, in whole units that people write."""
+    least, usual = figures.least_period, figures.period
+    if not least or not usual or 2 * least < usual or figures.out_of_order:
+        return None
+    bound = least * 9 // 10
+    if bound >= 10 * _MS:
+        return f"{bound // _MS}ms"
+    return f"{bound // _US}us" if bound >= _US else None
+
+
+def _is_sooner(quick: Trial, slow: Trial) -> bool:
+    if len(quick.sets) < len(slow.sets) or not slow.sets:
+        return False
+    spans = [median(each.span for each in trial.sets) for trial in (quick, slow)]
+    gain = _latency(slow) - _latency(quick)
+    # The last sets, which only one of the two has, move the median a little.
+    return spans[0] <= _SAME_SPAN * spans[1] and gain >= max(_MS, _latency(slow) / 10)
+
+
+def _latency(trial: Trial) -> float:
+    return median(each.latency for each in trial.sets)
+
+
+def _hints(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[str]:
+    """Yield which inputs lie a constant time apart: a clock that is off, or a trigger that is."""
+    for first in range(len(streams)):
+        for second in range(first + 1, len(streams)):
+            offsets = (group.topics[first].offset_ns, group.topics[second].offset_ns)
+            found = pair(streams[first], streams[second], offsets)
+            if found is not None and _is_constant(found, streams):
+                apart = found.signed.median
+                yield (
+                    f"{found.second} is stamped {words.duration(abs(apart))} {'after' if apart > 0 else 'before'}"
+                    f" {found.first}, give or take {words.duration((found.signed.high - found.signed.low) / 2)}: if one"
+                    f" trigger starts both, write `offset: {words.exactly(-apart)}` at {found.second}"
+                )
+
+
+def _is_constant(found: Pair, streams: Sequence[Stream]) -> bool:
+    period = min(figures_of(stream).period or 0 for stream in streams if stream.topic in (found.first, found.second))
+    middle, scatter = abs(found.signed.median), found.signed.high - found.signed.low
+    return middle >= _MS and scatter <= middle / 2 and middle < 0.4 * period

@@ -1,0 +1,87 @@
+"""`syncrelay analyze BAG`: figures of a recording, what a file makes of it, and the values that would fit."""
+
+import json
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from syncrelay.bag import Channel, Recording, open_recording
+from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, with_changes
+from syncrelay.bag.wiring import wire
+from syncrelay.cli.analysis_json import as_json
+from syncrelay.cli.analysis_text import report
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.progress import progress_of
+from syncrelay.config import Severity, load_text
+from syncrelay.config.source import read_source
+from syncrelay.config.wording import did_you_mean
+from syncrelay.errors import BagError, UsageError
+
+_GROUP = "matched"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is analyzed: a file's groups, or topics as one group; and what comes of it beside the text."""
+
+    config: str | None
+    topics: tuple[str, ...]
+    write: str | None
+    json: bool
+
+
+def analyze_bag(bag: str, asked: Asked) -> int:
+    """Print what a recording tells; 1 if a required topic is not in it.
+
+    Raises ConfigError for a faulty file, BagError for a recording that cannot be read, UsageError where neither a
+    file nor topics are named.
+    """
+    if (asked.config is None) == (not asked.topics):
+        raise UsageError("name a file with --config FILE, or the topics to match\n  syncrelay analyze --help says more")
+    with closing(open_recording([bag])) as recording:
+        text = read_source(asked.config).text if asked.config else _proposed(recording, asked.topics)
+        wirings = wire(load_text(text, name=asked.config or "<topics>", package_missing=Severity.NOTE), recording)
+        for problem in (problem for wiring in wirings for problem in wiring.problems):
+            say(f"syncrelay: {problem}")
+        with progress_of(recording):
+            analysis = analyze(recording, text, wirings)
+        if asked.config is None:
+            analysis = settled(analysis)
+        for fault in recording.faults:
+            say(f"syncrelay: {fault}")
+    _print(bag, analysis, asked)
+    return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
+
+
+def _proposed(recording: Recording, topics: Sequence[str]) -> str:
+    by_name: dict[str, Channel] = {channel.topic: channel for channel in recording.channels}
+    for topic in topics:
+        if topic not in by_name:
+            raise BagError(
+                f"{topic} is not in the recording{did_you_mean(topic, by_name)}; it has {', '.join(by_name)}"
+            )
+    if len(set(topics)) < 2:  # noqa: PLR2004  one alone has nothing to be matched with
+        raise UsageError("name 2 topics or more")
+    return proposed_text(_GROUP, [by_name[topic] for topic in dict.fromkeys(topics)])
+
+
+def _print(bag: str, analysis: Analysis, asked: Asked) -> None:
+    if asked.json:
+        put(json.dumps(as_json(bag, analysis), indent=2))
+    else:
+        for line in report(bag, analysis):
+            put(line)
+        if asked.config is None:
+            put(f"\nA file that gives these sets:\n\n{analysis.text.rstrip()}")
+    if asked.write is None:
+        return
+    path = Path(asked.write)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(with_changes(analysis.text, analysis.changes))
+    except FileExistsError as error:
+        raise BagError(f"{path}: exists already, and is not overwritten") from error
+    except OSError as error:
+        raise BagError(f"{path}: cannot be written: {error.strerror}") from error
+    say(f"syncrelay: {path} is written")

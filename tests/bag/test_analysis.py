@@ -1,0 +1,288 @@
+"""What the analysis measures and suggests, on streams of which all is known."""
+
+import random
+from array import array
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from syncrelay.bag.analysis.analysis import group_of
+from syncrelay.bag.analysis.changes import Change, patch, with_changes
+from syncrelay.bag.analysis.curves import queue_curve, slop_curve
+from syncrelay.bag.analysis.nearest import pair, tightest
+from syncrelay.bag.analysis.streams import UNREADABLE, Stream
+from syncrelay.bag.analysis.suggest import suggest
+from syncrelay.bag.analysis.topics import figures_of
+from syncrelay.bag.analysis.trial import try_group, watch_group
+from syncrelay.sync import DropReason
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.streams import BEGIN, MS
+
+_SECOND = 1000 * MS
+
+
+def _streams(*topics, latency=5 * MS):
+    """Streams of stamps in nanoseconds, received `latency` later in the order of the stamps."""
+    came = sorted((stamp + latency, index, stamp) for index, stamps in enumerate(topics) for stamp in stamps)
+    streams = [Stream(f"/{'abcdef'[index]}", VECTOR) for index in range(len(topics))]
+    for place, (received, index, stamp) in enumerate(came):
+        for values, value in (("stamps", stamp), ("received", received), ("places", place)):
+            getattr(streams[index], values).append(value)
+    return streams
+
+
+def _every(period, count, *, phase=0, jitter=0, seed=1):
+    chance = random.Random(seed)
+    return [BEGIN + phase + n * period + round(chance.uniform(-jitter, jitter)) for n in range(count)]
+
+
+def test_the_rhythm_of_a_topic_is_measured():
+    stamps = _every(100 * MS, 100, jitter=2 * MS)
+    del stamps[50:53]
+    (stream,) = _streams(stamps)
+    figures = figures_of(stream)
+    assert (figures.messages, figures.gaps) == (97, 1)
+    assert figures.period == pytest.approx(100 * MS, abs=MS)
+    assert figures.longest_gap == pytest.approx(400 * MS, abs=4 * MS)
+    assert MS < figures.jitter < 4 * MS
+    assert figures.rate_hz == pytest.approx(9.7, abs=0.1)
+    assert (figures.delay.median, figures.delay.greatest) == (5 * MS, 5 * MS)
+
+
+def test_faults_of_stamps_are_counted():
+    values = array("q", [100, 200, 200, 150, 0, UNREADABLE, 300])
+    places = array("q", range(7))
+    figures = figures_of(Stream("/a", VECTOR, values, array("q", range(1000, 1700, 100)), places))
+    assert (figures.duplicates, figures.out_of_order, figures.unstamped, figures.unreadable) == (1, 1, 1, 1)
+
+
+def test_a_topic_without_stamps_has_its_rhythm_by_arrival_and_no_delay():
+    zeros = array("q", [0] * 50)
+    figures = figures_of(Stream("/a", VECTOR, zeros, array("q", _every(20 * MS, 50)), array("q", range(50))))
+    assert (figures.period, figures.rate_hz, figures.delay, figures.unstamped) == (20 * MS, 50.0, None, 50)
+
+
+@pytest.mark.parametrize("ppm", [-40, 0, 250])
+def test_drift_is_measured_in_parts_per_million(ppm):
+    stamps = _every(50 * MS, 2000)
+    chance = random.Random(1)
+    received = [stamp + 5 * MS + (stamp - BEGIN) * ppm // 1_000_000 + round(chance.uniform(0, MS)) for stamp in stamps]
+    stream = Stream("/a", VECTOR, array("q", stamps), array("q", received), array("q", range(2000)))
+    found = figures_of(stream).drift_ppm
+    assert found == pytest.approx(ppm, abs=5) if ppm else found is None or abs(found) < 5
+
+
+def test_a_pair_is_measured_from_the_slower_to_the_faster():
+    slow, fast = _streams(_every(100 * MS, 20, phase=3 * MS), _every(20 * MS, 100))
+    for first, second in ((slow, fast), (fast, slow)):
+        found = pair(first, second, (0, 0))
+        assert (found.first, found.second) == ("/a", "/b")
+        assert {found.signed.least, found.signed.greatest} == {-3 * MS}
+    assert pair(slow, fast, (-3 * MS, 0)).signed.median == 0
+    assert pair(slow, Stream("/c", VECTOR), (0, 0)) is None
+
+
+_STAMPS = st.lists(st.integers(1, 60), min_size=1, max_size=8, unique=True).map(sorted)
+
+
+@given(st.lists(_STAMPS, min_size=2, max_size=4))
+def test_the_tightest_sets_are_those_of_all_combinations(topics):
+    streams = _streams(*topics, latency=0)
+    found = tightest(streams, [0] * len(topics))
+    others = [stamps for index, stamps in enumerate(topics) if index != found.pivot]
+    expected = [
+        min(max(stamp, *a_set) - min(stamp, *a_set) for a_set in product(*others)) for stamp in topics[found.pivot]
+    ]
+    assert found.spans.tolist() == expected
+
+
+def test_a_queue_must_hold_what_comes_until_the_set_can_leave():
+    # The slow input's message comes 5 messages of the fast one after its partner.
+    slow, fast = _streams([BEGIN + 100 * MS], _every(10 * MS, 40))
+    slow.places = array("q", [16])
+    fast.places = array("q", [place for place in range(41) if place != 16])
+    assert tightest([slow, fast], (0, 0)).queues.tolist() == [6]
+    assert tightest([slow, fast], (0, 0), successors=1).queues.tolist() == [6]
+
+
+def test_curves_rise_and_end_where_everything_is_matched():
+    streams = _streams(_every(100 * MS, 200, jitter=10 * MS), _every(33 * MS, 600, jitter=MS, seed=2))
+    found = tightest(streams, (0, 0))
+    slops = slop_curve(found, marks=(5 * MS,))
+    assert 5 * MS in [slop for slop, _, _ in slops]
+    assert [share for _, share, _ in slops] == sorted(share for _, share, _ in slops)
+    assert slops[-1][1] == 1.0
+    for slop, share, span in slops:
+        assert share == np.mean(found.spans <= slop)
+        assert span <= slop
+    sizes = queue_curve(found, slops[-1][0])
+    assert sizes[-1][1] == 1.0
+    assert queue_curve(found, -1) == []
+
+
+def _suggested(streams, **keys):
+    topics = inputs({stream.topic: VECTOR for stream in streams})
+    group = {"policy": "approximate_time", "slop": "10ms", "topics": topics, **keys}
+    text = config({"front": {key: value for key, value in group.items() if value is not None}})
+    group = group_of(text, "front")
+    trial = try_group(group, streams)
+    return suggest(group, streams, trial, lambda changes: group_of(with_changes(text, changes), "front"))
+
+
+def _values(suggestion):
+    return {(change.topic, change.key): change.value for change in suggestion.changes}
+
+
+def test_values_that_do_are_left_alone():
+    streams = _streams(_every(100 * MS, 100, phase=2 * MS, jitter=3 * MS), _every(100 * MS, 100, jitter=2 * MS, seed=2))
+    suggestion = _suggested(streams, policy="approximate_time_eager")
+    assert (suggestion.changes, suggestion.now) == ((), suggestion.possible)
+
+
+def test_a_slop_that_is_too_small_is_widened_to_what_is_needed():
+    streams = _streams(_every(100 * MS, 200, jitter=2 * MS), _every(40 * MS, 500, jitter=MS, seed=2))
+    suggestion = _suggested(streams, policy="approximate_time_eager")
+    assert suggestion.now < suggestion.possible
+    assert suggestion.then >= 0.99 * suggestion.possible
+    assert _values(suggestion).keys() == {(None, "slop")}
+    assert 20 <= int(_values(suggestion)[None, "slop"].removesuffix("ms")) <= 25
+
+
+def test_a_slop_that_is_far_too_wide_is_narrowed():
+    streams = _streams(_every(100 * MS, 100, phase=MS, jitter=MS), _every(100 * MS, 100, jitter=MS, seed=2))
+    assert _values(_suggested(streams, slop="80ms"))[None, "slop"].endswith("ms")
+
+
+def test_messages_that_lost_their_partner_do_not_widen_slop():
+    camera = _every(33 * MS, 600, jitter=MS)
+    del camera[::60]
+    streams = _streams(_every(99 * MS, 200, jitter=MS), camera)
+    suggestion = _suggested(streams, slop="6ms")
+    assert (None, "slop") not in _values(suggestion)
+    assert suggestion.now >= 0.99 * suggestion.possible
+
+
+def test_stamps_that_are_equal_want_exact_time():
+    stamps = _every(50 * MS, 100, jitter=5 * MS)
+    suggestion = _suggested(_streams(stamps, stamps[3:]))
+    assert _values(suggestion)[None, "policy"] == "exact_time"
+    assert suggestion.then == suggestion.possible == 97
+
+
+def test_stamps_that_never_are_equal_want_approximate_time():
+    stamps = _every(50 * MS, 100)
+    suggestion = _suggested(_streams(stamps, [stamp + 9 for stamp in stamps]), policy="exact_time", slop=None)
+    assert suggestion.now == 0
+    assert _values(suggestion)[None, "policy"] == "approximate_time"
+    assert suggestion.then >= 99
+
+
+def test_a_queue_that_is_too_short_is_lengthened():
+    slow, fast = _streams(_every(_SECOND, 30, jitter=MS), _every(5 * MS, 6000))
+    suggestion = _suggested([slow, fast])
+    assert suggestion.then >= 0.99 * suggestion.possible > suggestion.now
+    assert _values(suggestion)[None, "queue_size"] >= 200
+
+
+def test_unset_stamps_want_the_receive_time_for_all():
+    streams = _streams(_every(100 * MS, 50), _every(100 * MS, 50, phase=MS))
+    streams[1].stamps = array("q", [0] * 50)
+    suggestion = _suggested(streams)
+    assert {key: value for key, value in _values(suggestion).items() if key[1] == "stamp"} == {
+        (0, "stamp"): "receive",
+        (1, "stamp"): "receive",
+    }
+    assert suggestion.then >= 0.99 * suggestion.possible
+
+
+def test_a_clock_of_another_time_wants_an_offset():
+    streams = _streams(_every(100 * MS, 50), _every(100 * MS, 50))
+    streams[1].stamps = array("q", [stamp - 3600 * _SECOND for stamp in streams[1].stamps])
+    suggestion = _suggested(streams)
+    assert _values(suggestion)[1, "offset"] == "3600s"
+    assert suggestion.then >= 0.99 * suggestion.possible
+
+
+def test_least_periods_are_suggested_where_sets_leave_sooner():
+    streams = _streams(_every(100 * MS, 100, jitter=MS), _every(100 * MS, 100, phase=2 * MS, jitter=MS, seed=2))
+    suggestion = _suggested(streams)
+    assert {key for key in _values(suggestion) if key[1] == "min_period"} == {(0, "min_period"), (1, "min_period")}
+    (reason,) = {change.reason for change in suggestion.changes}
+    assert reason.startswith("sets leave 9")
+    assert reason.endswith("ms sooner")
+
+
+def test_a_constant_distance_is_a_hint_and_no_change():
+    streams = _streams(_every(100 * MS, 100, jitter=MS), _every(100 * MS, 100, phase=12 * MS, jitter=MS, seed=2))
+    suggestion = _suggested(streams, slop="15ms")
+    assert "if one trigger starts both, write `offset: -12ms` at /b" in suggestion.hints[0]
+    assert not any(change.key == "offset" for change in suggestion.changes)
+
+
+def test_what_a_policy_means_is_not_measured():
+    streams = _streams(_every(100 * MS, 10), _every(100 * MS, 10))
+    suggestion = _suggested(streams, policy="latest_time", trigger="/a", slop=None)
+    assert (suggestion.changes, len(suggestion.hints)) == ((), 1)
+
+
+def test_the_findings_are_those_of_the_running_relay():
+    streams = _streams(_every(100 * MS, 300), _every(100 * MS, 300, phase=30 * MS))
+    topics = inputs({"/a": VECTOR, "/b": VECTOR})
+    text = config({"front": {"policy": "approximate_time", "slop": "10ms", "topics": topics}})
+    first = watch_group(group_of(text, "front"), streams)[0]
+    assert (first.finding.code.value, first.finding.severity.name) == ("over_slop", "ERROR")
+    assert 20 < first.seconds <= 30
+
+
+def test_a_trial_loses_no_message():
+    streams = _streams(_every(100 * MS, 50, jitter=9 * MS), _every(30 * MS, 150, jitter=MS))
+    topics = inputs({"/a": VECTOR, "/b": VECTOR})
+    text = config({"front": {"policy": "approximate_time", "slop": "10ms", "topics": topics}})
+    trial = try_group(group_of(text, "front"), streams)
+    assert sum(each.fed for each in trial.counts) == 2 * len(trial.sets) + len(trial.drops) == 200
+    assert {drop.reason for drop in trial.drops} <= set(DropReason)
+
+
+_FILE = """\
+version: 1
+groups:
+  front:  # what the robot sees
+    policy: approximate_time
+    slop: 10ms            # measured in May
+    age_penalty: 0.2
+    topics:
+      - topic: /a         # the camera
+        type: x/msg/Y
+        min_period: "9ms"
+      - {topic: /b, type: x/msg/Y}
+"""
+
+
+def test_changes_keep_comments_quotes_and_order():
+    changes = [
+        Change("front", None, "slop", "25ms", "wider"),
+        Change("front", None, "queue_size", 40, "longer"),
+        Change("front", 1, "min_period", "8ms", "sooner"),
+    ]
+    assert with_changes(_FILE, changes) == _FILE.replace("slop: 10ms ", "slop: 25ms ").replace(
+        "    topics:\n", "    queue_size: 40  # longer\n    topics:\n"
+    ).replace("type: x/msg/Y}", "type: x/msg/Y, min_period: 8ms}")
+
+
+def test_a_new_policy_takes_with_it_what_it_does_not_have():
+    changed = with_changes(_FILE, [Change("front", None, "policy", "exact_time", "")])
+    for gone in ("slop", "age_penalty", "min_period"):
+        assert gone not in changed
+    assert "policy: exact_time" in changed
+    assert "# the camera" in changed
+
+
+def test_a_patch_holds_the_changes_alone():
+    changes = [Change("front", None, "slop", "25ms", ""), Change("front", 1, "stamp", "receive", "")]
+    assert patch(changes, {"front": ["/a", "/b"]}) == (
+        "groups:\n  front:\n    slop: 25ms\n    topics:\n      - topic: /b\n        stamp: receive\n"
+    )
