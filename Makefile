@@ -25,6 +25,7 @@ lint: $(VENV)/lint
 
 bench: $(VENV)/test
 	$(BIN)/python bench/engine.py
+	$(BIN)/python bench/relay.py
 
 clean:
 	rm -rf .venv* build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,91 @@
+// The floor: a relay of bytes on rcl alone, which neither matches nor reads anything.
+//
+//     floor TYPE INPUT OUTPUT [TYPE INPUT OUTPUT ...]        TYPE is Image or Imu
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <rcl/error_handling.h>
+#include <rcl/rcl.h>
+#include <rmw/rmw.h>
+#include <sensor_msgs/msg/image.h>
+#include <sensor_msgs/msg/imu.h>
+
+static volatile sig_atomic_t ended;
+
+static void end(int number)
+{
+  (void)number;
+  ended = 1;
+}
+
+static void require(rcl_ret_t code, const char * what)
+{
+  if (code != RCL_RET_OK) {
+    fprintf(stderr, "%s: %d: %s\n", what, (int)code, rcl_get_error_string().str);
+    exit(1);
+  }
+}
+
+static const rosidl_message_type_support_t * type_of(const char * name)
+{
+  return strcmp(name, "Imu") == 0 ? ROSIDL_GET_MSG_TYPE_SUPPORT(sensor_msgs, msg, Imu)
+                                  : ROSIDL_GET_MSG_TYPE_SUPPORT(sensor_msgs, msg, Image);
+}
+
+int main(int argc, char ** argv)
+{
+  const size_t count = (size_t)(argc - 1) / 3;
+  rcl_allocator_t allocator = rcl_get_default_allocator();
+  rcl_init_options_t options = rcl_get_zero_initialized_init_options();
+  require(rcl_init_options_init(&options, allocator), "init options");
+  rcl_context_t context = rcl_get_zero_initialized_context();
+  require(rcl_init(0, NULL, &options, &context), "init");
+  signal(SIGTERM, end);
+  rcl_node_options_t node_options = rcl_node_get_default_options();
+  rcl_node_t node = rcl_get_zero_initialized_node();
+  require(rcl_node_init(&node, "floor", "", &context, &node_options), "node");
+
+  rcl_subscription_t * subscriptions = calloc(count, sizeof(*subscriptions));
+  rcl_publisher_t * publishers = calloc(count, sizeof(*publishers));
+  for (size_t i = 0; i < count; ++i) {
+    char ** words = argv + 1 + 3 * i;
+    rcl_subscription_options_t input = rcl_subscription_get_default_options();
+    input.qos.depth = 100;
+    subscriptions[i] = rcl_get_zero_initialized_subscription();
+    require(rcl_subscription_init(&subscriptions[i], &node, type_of(words[0]), words[1], &input), words[1]);
+    rcl_publisher_options_t output = rcl_publisher_get_default_options();
+    output.qos.depth = 100;
+    publishers[i] = rcl_get_zero_initialized_publisher();
+    require(rcl_publisher_init(&publishers[i], &node, type_of(words[0]), words[2], &output), words[2]);
+  }
+
+  rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
+  require(rmw_serialized_message_init(&message, 0, &allocator), "message");
+  rcl_wait_set_t wait_set = rcl_get_zero_initialized_wait_set();
+  require(rcl_wait_set_init(&wait_set, count, 0, 0, 0, 0, 0, &context, allocator), "wait set");
+  while (!ended) {
+    require(rcl_wait_set_clear(&wait_set), "clear");
+    for (size_t i = 0; i < count; ++i) {
+      require(rcl_wait_set_add_subscription(&wait_set, &subscriptions[i], NULL), "add");
+    }
+    if (rcl_wait(&wait_set, 100 * 1000 * 1000) == RCL_RET_TIMEOUT) {
+      continue;
+    }
+    for (size_t i = 0; i < count; ++i) {
+      rmw_message_info_t info;
+      while (wait_set.subscriptions[i] &&
+             rcl_take_serialized_message(&subscriptions[i], &message, &info, NULL) == RCL_RET_OK) {
+        require(rcl_publish_serialized_message(&publishers[i], &message, NULL), "publish");
+      }
+    }
+  }
+  // The process ends with all that it holds; only the graph wants to hear of it.
+  for (size_t i = 0; i < count; ++i) {
+    require(rcl_subscription_fini(&subscriptions[i], &node), "subscription");
+    require(rcl_publisher_fini(&publishers[i], &node), "publisher");
+  }
+  require(rcl_node_fini(&node), "node");
+  return rcl_shutdown(&context) == RCL_RET_OK ? 0 : 1;
+}
