@@ -64,7 +64,9 @@ def _require_terminal() -> None:
 
 
 def _nothing_there(named: str | None, found: Search) -> str:
-    others = "".join(f"\n  {other}" for other in found.others)
+    # Of a machine whose name is not known, or that is off, all ports say the same.
+    reasons = {text.partition(": ")[2]: text for text in reversed(found.others)}
+    others = "".join(f"\n  {text}" for text in reversed(reasons.values()))
     if named is None:
         return (
             f"syncrelay: no relay answers on this machine, at 127.0.0.1:{FIRST_PORT} to {LAST_PORT}{others}\n"

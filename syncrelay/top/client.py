@@ -17,6 +17,8 @@ FIRST_PORT: Final = 9464
 LAST_PORT: Final = 9473
 """Where a relay listens unless its file says otherwise: at the first of these that is free."""
 _TIMEOUT_S: Final = 2.0
+# A relay that is just starting, or a machine under load, takes longer to be found than to be asked again.
+_SEARCH_TIMEOUT_S: Final = 5.0
 _MOST_BYTES: Final = 64_000_000
 # A robot is asked directly: a proxy that the environment names is for the world outside.
 _OPENER: Final = build_opener(ProxyHandler({}))
@@ -24,6 +26,10 @@ _OPENER: Final = build_opener(ProxyHandler({}))
 
 class NoAnswerError(SyncRelayError):
     """Nothing answers there."""
+
+
+class NobodyListensError(NoAnswerError):
+    """There is a machine, and no server at the port."""
 
 
 class OtherServerError(SyncRelayError):
@@ -41,25 +47,25 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """What was found: relays, and what was in their place, in words."""
+    """What was found: relays, and in words what else there was at the places where they are looked for."""
 
     relays: tuple[Answer, ...]
     others: tuple[str, ...]
 
 
-def ask(url: str) -> Answer:
+def ask(url: str, *, timeout_s: float = _TIMEOUT_S) -> Answer:
     """Get the state of the relay at a base URL such as http://robot:9464.
 
-    Raises NoAnswerError where nothing answers within 2 s, OtherServerError where something else does.
+    Raises NoAnswerError where nothing answers in time, OtherServerError where something else does.
     """
     try:
-        with _OPENER.open(f"{url}/status", timeout=_TIMEOUT_S) as response:
+        with _OPENER.open(f"{url}/status", timeout=timeout_s) as response:
             document = response.read(_MOST_BYTES)
     except HTTPError as error:
         error.close()
         raise OtherServerError(f"what listens there is no relay: it answers {error.code} {error.reason}") from error
     except (OSError, HTTPException, UnicodeError) as error:
-        raise NoAnswerError(_why(error)) from error
+        raise _no_answer(error, timeout_s) from error
     try:
         return Answer(url, document, read_state(document))
     except NotAStateError as error:
@@ -67,20 +73,20 @@ def ask(url: str) -> Answer:
 
 
 def search(urls: Sequence[str]) -> Search:
-    """Ask all at once; Search.others tells what else answered, and, of a single URL, why nothing did."""
+    """Ask all at once. Of several, those where nobody listens are not worth a word."""
     with ThreadPoolExecutor(len(urls)) as pool:
         answers = list(pool.map(_ask_or_error, urls))
     told = [
         f"{url}: {answer}"
         for url, answer in zip(urls, answers, strict=True)
-        if isinstance(answer, OtherServerError) or (isinstance(answer, NoAnswerError) and len(urls) == 1)
+        if not isinstance(answer, Answer) and (len(urls) == 1 or not isinstance(answer, NobodyListensError))
     ]
     return Search(tuple(answer for answer in answers if isinstance(answer, Answer)), tuple(told))
 
 
 def _ask_or_error(url: str) -> Answer | SyncRelayError:
     try:
-        return ask(url)
+        return ask(url, timeout_s=_SEARCH_TIMEOUT_S)
     except (NoAnswerError, OtherServerError) as error:
         return error
 
@@ -109,16 +115,16 @@ def _at_usual_ports(host: str) -> list[str]:
     return [f"http://{host}:{port}" for port in range(FIRST_PORT, LAST_PORT + 1)]
 
 
-def _why(error: Exception) -> str:
+def _no_answer(error: Exception, timeout_s: float) -> NoAnswerError:
     reason = error.reason if isinstance(error, URLError) and isinstance(error.reason, Exception) else error
     match reason:
         case ConnectionRefusedError():
-            return "nothing listens there"
+            return NobodyListensError("nothing listens there")
         case TimeoutError():
-            return f"no answer within {_TIMEOUT_S:g} s"
+            return NoAnswerError(f"no answer within {timeout_s:g} s")
         case socket.gaierror():
-            return "no machine of that name is known"
+            return NoAnswerError("no machine of that name is known")
         case OSError(strerror=str() as words):
-            return words
+            return NoAnswerError(words)
         case _:
-            return str(reason) or type(reason).__name__
+            return NoAnswerError(str(reason) or type(reason).__name__)

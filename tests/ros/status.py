@@ -11,12 +11,17 @@ ANY_PORT = {"listen": "127.0.0.1:0"}
 _ADDRESS = re.compile(r"status and metrics: (http://\S+)/")
 
 
-def get(relay: Process, path: str) -> str:
-    """The body of a page that must be there."""
+def address(relay: Process) -> str:
+    """The base URL of a relay."""
     relay.wait_for_log("status and metrics: ")
     found = _ADDRESS.search(relay.stderr)
     assert found is not None
-    with urlopen(f"{found[1]}{path}", timeout=30) as answer:  # noqa: S310  the relay's own
+    return found[1]
+
+
+def get(relay: Process, path: str) -> str:
+    """The body of a page that must be there."""
+    with urlopen(f"{address(relay)}{path}", timeout=30) as answer:  # noqa: S310  the relay's own
         return str(answer.read().decode())
 
 

@@ -102,11 +102,13 @@ def test_another_http_server_is_said_with_its_answer():
 
 
 def test_a_search_finds_relays_and_tells_what_else_answers(closed_port):
+    closed = f"http://127.0.0.1:{closed_port}"
     with serving(states.healthy()) as one, serving(states.rig()) as two, serving(states.nothing()) as other:
         other.body = b"{}"
-        found = search([one.url, f"http://127.0.0.1:{closed_port}", two.url, other.url])
+        found = search([one.url, closed, two.url, other.url])
     assert [answer.url for answer in found.relays] == [one.url, two.url]
     assert [text.startswith(other.url) for text in found.others] == [True]
+    assert search([closed]).others == (f"{closed}: nothing listens there",)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The screens by their text, on a headless terminal, with a relay's HTTP on a real socket."""
 
 import asyncio
-import time
 from contextlib import asynccontextmanager
 
 import pytest
@@ -10,36 +9,9 @@ from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
 from tests.top import states
 from tests.top.relay_server import serving
+from tests.top.terminal import Terminal
 
 _SMALL, _WIDE = (80, 24), (160, 45)
-_DEADLINE_S = 60
-
-
-class Terminal:
-    """A person at a terminal: reads lines, presses keys."""
-
-    def __init__(self, app, pilot):
-        self.app, self.pilot = app, pilot
-
-    @property
-    def lines(self):
-        # Textual has no public way to the text of a screen.
-        strips = self.app.screen._compositor.render_strips()  # noqa: SLF001
-        return [strip.text.rstrip() for strip in strips]
-
-    @property
-    def text(self):
-        return "\n".join(self.lines)
-
-    async def press(self, *keys):
-        await self.pilot.press(*keys)
-        await self.pilot.pause()
-
-    async def sees(self, text):
-        end = time.monotonic() + _DEADLINE_S
-        while text not in self.text:
-            assert time.monotonic() < end, f"waited in vain for {text!r}:\n{self.text}"
-            await self.pilot.pause(0.05)
 
 
 @asynccontextmanager

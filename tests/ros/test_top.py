@@ -1,0 +1,77 @@
+"""`syncrelay top` and a real relay over DDS, each a process."""
+
+import asyncio
+import re
+import signal
+import sys
+
+import pytest
+
+from syncrelay.top.app import TopApp
+from syncrelay.top.client import ask
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.processes import DEADLINE_S
+from tests.ros.stage import Stage
+from tests.ros.status import ANY_PORT, address, status, wait_for_finding
+from tests.ros.streams import at, merged
+from tests.top.terminal import Terminal
+
+pytestmark = pytest.mark.ros
+
+PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+GROUPS = {
+    "front": {"policy": "approximate_time", "slop": "20ms", "topics": inputs(PAIR)},
+    "rear": {"policy": "exact_time", "topics": inputs({"/camera": VECTOR, "/rear": VECTOR})},
+}
+
+
+@pytest.fixture
+def relay(stage: Stage):
+    """A relay of two groups, one of which is given all that it needs."""
+    started = stage.relay(config(GROUPS, metrics=ANY_PORT))
+    player = stage.player(PAIR)
+    player.match()
+    camera, lidar = (at(topic, *range(shift, 60_000, 100)) for topic, shift in (("/camera", 0), ("/lidar", 7)))
+    player.start(merged(camera, lidar), speed=1)
+    wait_for_finding(started, "healthy")
+    wait_for_finding(started, "no_publisher", "rear")
+    return started
+
+
+def once(stage: Stage, *words: str) -> tuple[int, str, str]:
+    top = stage.start("top", [sys.executable, "-m", "syncrelay", "top", "--once", *words])
+    return top.wait(), " ".join(top.stdout.split()), top.stderr
+
+
+def test_its_groups_are_printed_once(stage: Stage, relay):
+    code, shown, talk = once(stage, "--url", address(relay))
+    assert (code, talk) == (0, "")
+    assert f"/syncrelay at {address(relay)}: running, not ready" in shown
+    assert "front: OK" in shown
+    assert re.search(r"/camera: [\d.]+ Hz, lag ", shown)
+    assert "nobody publishes /rear (geometry_msgs/msg/Vector3Stamped)" in shown
+
+
+def test_a_relay_at_its_usual_port_is_found(stage: Stage):
+    relay = stage.relay(config(GROUPS))
+    status(relay)
+    # Others may run on this machine: then it is among those to choose from.
+    _, shown, talk = once(stage)
+    assert address(relay) in shown or address(relay) in talk
+
+
+def test_the_screen_shows_it_until_it_ends_and_says_so_then(relay):
+    async def look() -> None:
+        app = TopApp([ask(address(relay))])
+        async with app.run_test(size=(80, 24)) as pilot:
+            user = Terminal(app, pilot)
+            await user.sees("front", deadline_s=DEADLINE_S)
+            await user.press("enter")
+            await user.sees("span in ms", deadline_s=DEADLINE_S)
+            relay.send(signal.SIGTERM)
+            await user.sees(" STALE: no answer for ", deadline_s=DEADLINE_S)
+            assert "span in ms" in user.text
+
+    asyncio.run(look())
+    assert relay.wait() == 0
