@@ -48,7 +48,10 @@ def _as_text(answer: Answer) -> str:
 def _screen(found: Search) -> int:
     from syncrelay.top.app import TopApp
 
-    TopApp(found.relays).run()
+    app = TopApp(found.relays)
+    app.run()
+    if app.failure is not None:
+        raise app.failure
     return DONE
 
 

@@ -4,6 +4,7 @@ import asyncio
 import signal
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from threading import Event
 from typing import ClassVar, Final
 
@@ -32,20 +33,25 @@ class Heard(Message):
 
 
 class TopApp(App[None]):
-    """Watches one of the relays that were found, of several the one that the user chooses."""
+    """Watches one of the relays that were found, of several the one that the user chooses.
 
-    CSS_PATH = "top.tcss"
+    `failure` is the error, a bug, that ended it.
+    """
+
+    CSS_PATH = Path(__file__).parent / "top.tcss"
     ENABLE_COMMAND_PALETTE = False
     BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+c", "quit", "Quit", show=False, priority=True)]
 
     view: reactive[View | None] = reactive(None)
     order: reactive[Order] = reactive(Order.FILE)
 
-    def __init__(self, relays: Sequence[Answer]) -> None:
+    def __init__(self, relays: Sequence[Answer], *, period_s: float = _PERIOD_S) -> None:
         # The terminal's own colours, whatever its theme; said here already, so that NO_COLOR means none at all.
         super().__init__(ansi_color=True)
         self.theme = "ansi-dark"
+        self.failure: Exception | None = None
         self._relays = tuple(relays)
+        self._period_s = period_s
         self._url = ""
         self._answered_at = 0.0
         self._latest: View | None = None
@@ -75,7 +81,7 @@ class TopApp(App[None]):
     @work(thread=True, exclusive=True)
     def _follow(self, url: str) -> None:
         worker = get_current_worker()
-        while not worker.is_cancelled and not self._ended.wait(_PERIOD_S):
+        while not worker.is_cancelled and not self._ended.wait(self._period_s):
             self.post_message(Heard(url, _asked(url)))
 
     @on(Heard)
@@ -120,6 +126,14 @@ class TopApp(App[None]):
     def action_keys(self) -> None:
         """Say what the keys do."""
         self.push_screen(KeysScreen())
+
+    def _handle_exception(self, error: Exception) -> None:
+        self.failure = error
+        super()._handle_exception(error)
+
+    def _fatal_error(self) -> None:
+        # Textual's own would print every local, whole states among them; `failure` is for the caller to raise.
+        self._close_messages_no_wait()
 
 
 def _asked(url: str) -> Answer | NoAnswerError | OtherServerError:

@@ -11,7 +11,7 @@ from syncrelay.top import phrases
 from syncrelay.top.names import fitted, fitted_names, short_names
 from syncrelay.top.pieces import STYLES, bar, line, sparkline, wrapped
 from syncrelay.top.state import Endpoint, Finding, Group, Input, Percentiles
-from syncrelay.top.strip import MARKS, Lanes, drop_style, letter_style, strip, window_of
+from syncrelay.top.strip import MARKS, Lanes, drop_style, letter_style, newest_stamp, strip, window_of
 
 _LABEL: Final = 9
 _BAR: Final = 24
@@ -111,17 +111,17 @@ def recent_sets(group: Group, width: int) -> Iterator[Text]:
         yield line((label, "bold"), (" ▏", "dim"), drawn[2 * index])
         below = "span in ms" if index == len(fed) - 1 else ""
         yield line((below.rjust(_LANE_LABEL), "dim"), (" ▏", "dim"), drawn[2 * index + 1])
-    yield _legend(recent, fed)
+    yield _legend([each for each in recent if window.column(newest_stamp([each])) is not None], fed)
     yield line((f"a column is {phrases.duration(window.column_ns / 1_000_000)}, the newest is on the right", "dim"))
 
 
-def _legend(recent: Sequence[RecentSet | RecentDrop], fed: Sequence[int]) -> Text:
+def _legend(shown: Sequence[RecentSet | RecentDrop], fed: Sequence[int]) -> Text:
     parts = []
-    if any(isinstance(each, RecentSet) for each in recent):
+    if any(isinstance(each, RecentSet) for each in shown):
         parts.append(line(*((letter, letter_style(number)) for number, letter in enumerate("ABC")), " sets"))
     for reason in MARKS:
         styles = {
-            drop_style(fed, each.input) for each in recent if isinstance(each, RecentDrop) and each.reason is reason
+            drop_style(fed, each.input) for each in shown if isinstance(each, RecentDrop) and each.reason is reason
         }
         if styles:
             # The style that stands out is the longer.

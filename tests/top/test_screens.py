@@ -16,7 +16,7 @@ _SMALL, _WIDE = (80, 24), (160, 45)
 
 @asynccontextmanager
 async def terminal(*servers, size=_SMALL):
-    app = TopApp([ask(server.url) for server in servers])
+    app = TopApp([ask(server.url) for server in servers], period_s=0.1)
     async with app.run_test(size=size) as pilot:
         await pilot.pause()
         yield Terminal(app, pilot)
@@ -223,13 +223,19 @@ def test_a_terminal_that_is_too_small_gets_a_sentence(size):
 
 
 @pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)
-@pytest.mark.parametrize("size", [(60, 15), _SMALL, (200, 60)], ids=str)
-def test_nothing_is_cut_off_without_a_mark_and_nothing_is_too_wide(state, size):
-    for keys in ([], ["enter"]):
-        lines = at_terminal(state(), *keys, size=size)
-        assert len(lines) == size[1]
-        assert max(map(len, lines)) <= size[0]
-        assert "Quit" in lines[-1]
+def test_every_state_fits_every_terminal(state):
+    async def look():
+        with serving(state()) as server:
+            async with terminal(server) as user:
+                for size in ((60, 15), _SMALL, (200, 60)):
+                    await user.pilot.resize_terminal(*size)
+                    for key in ("enter", "escape"):
+                        await user.press(key)
+                        assert len(user.lines) == size[1]
+                        assert max(map(len, user.lines)) <= size[0]
+                        assert "Quit" in user.lines[-1]
+
+    asyncio.run(look())
 
 
 def test_sixteen_inputs_are_told_apart_by_what_differs_in_their_names():
@@ -240,3 +246,20 @@ def test_sixteen_inputs_are_told_apart_by_what_differs_in_their_names():
 
 def test_what_has_no_room_is_counted():
     assert "… 4 more lines: enter" in at_terminal(states.sixteen_inputs())
+
+
+def test_a_bug_ends_it_and_is_handed_on():
+    class Broken(TopApp):
+        def action_sort(self):
+            raise ZeroDivisionError
+
+    async def look(app):
+        async with app.run_test(size=_SMALL) as pilot:
+            await pilot.press("s")
+            await pilot.pause()
+
+    with serving(states.rig()) as server:
+        app = Broken([ask(server.url)])
+        with pytest.raises(ZeroDivisionError):
+            asyncio.run(look(app))
+    assert isinstance(app.failure, ZeroDivisionError)
