@@ -14,7 +14,7 @@ from syncrelay.bag.analysis.changes import Change, patch, with_changes
 from syncrelay.bag.analysis.curves import queue_curve, slop_curve
 from syncrelay.bag.analysis.nearest import pair, tightest
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
-from syncrelay.bag.analysis.suggest import suggest
+from syncrelay.bag.analysis.suggest import possible_sets, suggest
 from syncrelay.bag.analysis.topics import figures_of
 from syncrelay.bag.analysis.trial import try_group, watch_group
 from syncrelay.sync import DropReason
@@ -227,6 +227,8 @@ def test_what_a_policy_means_is_not_measured():
     streams = _streams(_every(100 * MS, 10), _every(100 * MS, 10))
     suggestion = _suggested(streams, policy="latest_time", trigger="/a", slop=None)
     assert (suggestion.changes, len(suggestion.hints)) == ((), 1)
+    text = config({"front": {"policy": "latest_time", "trigger": "/a", "topics": inputs({"/a": VECTOR, "/b": VECTOR})}})
+    assert possible_sets(group_of(text, "front"), streams) is None
 
 
 def test_the_findings_are_those_of_the_running_relay():

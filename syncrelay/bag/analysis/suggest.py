@@ -102,7 +102,12 @@ _NOT_MEASURED: Final = {
 
 
 def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | None:
-    """Return what sets a recording holds for the required inputs; None where one of them has no stamps."""
+    """Return what sets a recording holds for the required inputs.
+
+    None where one of them has no stamps, and for a policy by which messages need not be near to belong together.
+    """
+    if group.keys.policy not in _MEASURED:
+        return None
     required = [index for index, topic in enumerate(group.topics) if topic.required]
     # The best match is certain only when what comes next is there.
     successors = 1 if group.keys.policy == "approximate_time" else 0
