@@ -19,6 +19,7 @@ commands:
   validate FILE...      check files and report everything that is wrong with them
   schema                print the JSON Schema of the file, for editors
   replay BAG...         show what a file makes of a recording; write its outputs as one
+  init --from-bag BAG   propose a file for a recording
   analyze BAG           measure a recording, and suggest the values that fit
   demo                  show it all on a simulated rig, without a robot
   doctor                tell what can go wrong before a message flows
@@ -190,6 +191,23 @@ def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
     return analyze_bag(arguments.bag, asked)
 
 
+def _init(words: Sequence[str], _stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay init",
+        description="Proposes a file, without ROS: groups of the topics that a recording has, types, and values that\n"
+        "fit, with what was measured as comments. The file gives sets of that recording.",
+    )
+    parser.add_argument("--from-bag", metavar="BAG", required=True, help="a recording, as for replay")
+    parser.add_argument("-o", "--output", metavar="NEW", help="write the file; without it, it is printed")
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    arguments = parser.read(words)
+    from syncrelay.cli.init import init_from_bag
+
+    return init_from_bag(arguments.from_bag, arguments.output)
+
+
 def _demo(words: Sequence[str], stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay demo",
@@ -288,6 +306,7 @@ def _healthcheck(words: Sequence[str], _stop: StopRequest) -> int:
 _COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
     "validate": _validate,
     "schema": _schema,
+    "init": _init,
     "replay": _replay,
     "analyze": _analyze,
     "demo": _demo,

@@ -27,6 +27,7 @@ def test_help_names_every_command_and_option_on_stdout(tmp_path):
     [
         ("validate", ["FILE", "--format"]),
         ("schema", ["JSON Schema"]),
+        ("init", ["--from-bag", "--output"]),
         ("analyze", ["BAG", "TOPIC", "--config", "--write", "--json"]),
         ("replay", ["BAG", "--config", "--output", "--json", "--drops"]),
         ("demo", ["--seconds", "--seed", "--show-config", "--record"]),

@@ -2,5 +2,16 @@
 
 from syncrelay.bag.analysis.analysis import Analysis, GroupAnalysis, analyze, proposed_text, settled
 from syncrelay.bag.analysis.changes import Change, patch, with_changes
+from syncrelay.bag.analysis.proposal import propose
 
-__all__ = ["Analysis", "Change", "GroupAnalysis", "analyze", "patch", "proposed_text", "settled", "with_changes"]
+__all__ = [
+    "Analysis",
+    "Change",
+    "GroupAnalysis",
+    "analyze",
+    "patch",
+    "propose",
+    "proposed_text",
+    "settled",
+    "with_changes",
+]

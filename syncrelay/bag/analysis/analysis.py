@@ -65,7 +65,9 @@ def analyze(recording: Recording, text: str, wirings: Sequence[Wiring]) -> Analy
     Raises BagError for a stamp or key that a recorded type does not have.
     """
     streams = read_streams(recording, wirings)
-    groups = tuple(_analyze(wiring.group, of_group, text) for wiring, of_group in zip(wirings, streams, strict=True))
+    groups = tuple(
+        analyze_group(wiring.group, of_group, text) for wiring, of_group in zip(wirings, streams, strict=True)
+    )
     distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
     topics = tuple(figures_of(stream) for stream in distinct.values() if stream.stamps)
     return Analysis(recording.begin, recording.end, topics, groups, text)
@@ -87,7 +89,7 @@ def settled(analysis: Analysis) -> Analysis:
     groups = []
     for each in analysis.groups:
         group = group_of(text, each.group.name)
-        groups.append(_analyze(group, tuple(stamped(group, each.streams)), text))
+        groups.append(analyze_group(group, tuple(stamped(group, each.streams)), text))
     return replace(analysis, groups=tuple(groups), text=text)
 
 
@@ -97,7 +99,8 @@ def group_of(text: str, name: str) -> GroupConfig:
     return next(group for group in groups if group.name == name)
 
 
-def _analyze(group: GroupConfig, streams: tuple[Stream, ...], text: str) -> GroupAnalysis:
+def analyze_group(group: GroupConfig, streams: tuple[Stream, ...], text: str) -> GroupAnalysis:
+    """Return what a group of a file's text makes of the streams of its inputs."""
     trial = try_group(group, streams)
     possible = possible_sets(group, streams)
     offsets = [topic.offset_ns for topic in group.topics]

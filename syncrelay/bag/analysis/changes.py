@@ -39,6 +39,15 @@ def with_changes(text: str, changes: Sequence[Change]) -> str:
     return _dumped(yaml, document)
 
 
+def with_evidence(text: str, group: str, evidence: Sequence[str]) -> str:
+    """Return the text of a file with a comment at each topic of a group."""
+    yaml = _yaml()
+    document = yaml.load(text)
+    for topic, comment in zip(document["groups"][group]["topics"], evidence, strict=True):
+        _comment(topic, "topic", comment)
+    return _dumped(yaml, document)
+
+
 def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
     """Return changes alone, as the part of a file that they stand in; `names` are the topics of each group."""
     groups: dict[str, Any] = {}
@@ -61,9 +70,13 @@ def _set(mapping: Any, change: Change) -> None:
     if is_new and "topics" in mapping:
         mapping.insert(list(mapping).index("topics"), change.key, change.value)
     mapping[change.key] = change.value
+    _comment(mapping, change.key, change.reason)
+
+
+def _comment(mapping: Any, key: str, comment: str) -> None:
     # Behind a key in braces a comment would swallow the rest of the line.
-    if change.reason and is_new and not mapping.fa.flow_style():
-        mapping.yaml_add_eol_comment(change.reason, change.key)
+    if comment and key not in mapping.ca.items and not mapping.fa.flow_style():
+        mapping.yaml_add_eol_comment(comment, key)
 
 
 def _fit(group: Any, policy: str) -> None:
