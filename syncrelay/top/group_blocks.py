@@ -15,7 +15,7 @@ from syncrelay.top.strip import MARKS, Lanes, drop_style, letter_style, newest_s
 
 _LABEL: Final = 9
 _BAR: Final = 24
-_FIGURE: Final = 9
+_FIGURE: Final = 10
 _LEAST_TOPIC, _LEAST_NOTES = 16, 22
 _LANE_LABEL: Final = 13
 # On a wider strip the recent outcomes of a fast input would not reach back to its begin.

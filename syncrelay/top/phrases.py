@@ -9,6 +9,8 @@ from syncrelay.top.state import Group, Input, Relay
 
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
+_LONG_MS: Final = 100_000_000
+_YEAR_MS: Final = 31_557_600_000
 # Of what is looked at once a second.
 _JUST_NOW_MS: Final = 1_500
 NONE: Final = "-"
@@ -22,8 +24,13 @@ LEVELS: Final[Mapping[Level, str]] = {
 
 
 def duration(milliseconds: float | None) -> str:
-    """Return a duration with its unit, or a dash."""
-    return NONE if milliseconds is None else words.duration(milliseconds * _NS_PER_MS)
+    """Return a duration with its unit in at most 9 characters, or a dash."""
+    if milliseconds is None:
+        return NONE
+    if abs(milliseconds) < _LONG_MS:
+        return words.duration(milliseconds * _NS_PER_MS)
+    # As those of a stamp that was never set: since 1970.
+    return f"{milliseconds / _YEAR_MS:.2g} years"
 
 
 def ago(milliseconds: float) -> str:

@@ -19,6 +19,8 @@ COLUMN_NS = 20_000_000
 # Columns for a set's letter and its span, where the scale may be chosen.
 _COLUMNS_PER_SET = 6
 _FINEST_NS = 1_000_000
+# Stamps farther apart than a strip of these are of different clocks, or were never set.
+_COARSEST_NS = 10_000_000_000
 # Columns kept blank ahead of the newest message, where the lanes begin to be written over.
 _GAP = 3
 
@@ -134,7 +136,7 @@ def window_of(recent: Sequence[Outcome], width: int) -> Window:
     else:
         oldest = min((stamp for outcome in recent for stamp in _stamps(outcome)), default=head)
         wanted = (head - oldest) / width
-    return Window(head, width, _round_step(wanted))
+    return Window(head, width, _round_step(min(wanted, _COARSEST_NS)))
 
 
 def _round_step(wanted: float) -> int:

@@ -70,6 +70,19 @@ def incompatible() -> RelayState:
 
 
 @cache
+def unstamped() -> RelayState:
+    camera = Sensor(30, unstamped=True, publishers=("/camera_driver",))
+    return simulated(file(front=FRONT), {"/camera/image_raw": camera, "/lidar/points": LIDAR})
+
+
+@cache
+def without_its_optional_input() -> RelayState:
+    front = group({"/camera/image_raw": IMAGE, "/lidar/points": CLOUD, "/radar/points": CLOUD}, max_wait="100ms")
+    front["topics"][2]["required"] = False
+    return simulated(file(front=front), {"/camera/image_raw": CAMERA, "/lidar/points": LIDAR})
+
+
+@cache
 def twelve_groups() -> RelayState:
     sensors: dict[str, Sensor] = {}
     groups = {}
@@ -97,6 +110,8 @@ ALL = {
     "silent": silent,
     "nothing": nothing,
     "incompatible": incompatible,
+    "unstamped": unstamped,
+    "optional": without_its_optional_input,
     "twelve": twelve_groups,
     "sixteen": sixteen_inputs,
 }

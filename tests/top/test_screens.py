@@ -46,7 +46,7 @@ def test_groups_are_listed_with_state_rates_and_reason_and_the_selected_one_belo
     assert lines[6].startswith("── front: approximate_time, slop 20 ms, queue_size 10 ──")
     assert lines[7].startswith("OK       10 of 10 possible sets a second")
     text = "\n".join(lines)
-    assert "/camera/image_raw 30 Hz    27.5 ms  4.25 ms  200 too_far" in text
+    assert "/camera/image_raw 30 Hz     27.5 ms   4.25 ms   200 too_far" in text
     assert "▁" in next(line for line in lines if line.startswith("latency  "))
     assert "Open" in lines[-1]
     assert "Quit" in lines[-1]

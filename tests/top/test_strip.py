@@ -165,6 +165,7 @@ def test_a_window_has_the_newest_at_its_right_end_and_joints_of_any_width():
         pytest.param([a_set(n * 1000, n * 990) for n in range(9)], 200, id="1 Hz"),
         pytest.param([a_set(n * 60_000, n * 60_000) for n in range(9)], 10_000, id="one a minute"),
         pytest.param([a_drop(0, n * 33) for n in range(31)], 50, id="no sets: all that happened"),
+        pytest.param([a_drop(0, 0), a_drop(1, 1e12)], 10_000, id="stamps that were never set do not count"),
         pytest.param([], 1, id="nothing yet"),
     ],
 )
