@@ -203,7 +203,7 @@ def _measure(command, load, start):
     pace = [f"--size={load.size}", f"--rate={load.rate}", f"--warm-up={warm_up}", f"--counted={load.counted}"]
     relay = start(command)
     publisher = start([*rig, "publish", load.type_name, *pace, f"--together={load.topics}", *load.inputs])
-    receiver = start([*rig, "receive", load.type_name, *load.outputs])
+    receiver = start([*rig, "receive", load.type_name, f"--together={load.topics}", *load.outputs])
     for child in (publisher, receiver):
         child.read()
     # What matched on one side may still be unknown on the other.

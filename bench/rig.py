@@ -1,10 +1,10 @@
 """What stands around a relay under test: a process that publishes, and one that receives. Started by relay_runs.py.
 
     rig.py publish TYPE --size BYTES --rate HZ --warm-up N --counted N --together N TOPIC...
-    rig.py receive TYPE TOPIC...
+    rig.py receive TYPE --together N TOPIC...
 
-Stamps are times of publishing by the system clock, so that a message's age when it comes back is its latency. Both
-say `ready` when DDS has matched them.
+Stamps are times of publishing by the system clock, so that the age of a set's last message, when it comes back, is its
+latency. Both say `ready` when DDS has matched them.
 """
 
 import argparse
@@ -25,12 +25,14 @@ from syncrelay.cdr import read_stamp, write_stamp
 TYPES = {"Image": Image, "Imu": Imu}
 PROFILE = QoSProfile(depth=100)
 POLL_S = 0.02
+# Between two topics of a set, as sensors do not speak in one breath: each message wakes the relay.
+APART_S = 0.0002
 
 
 def publish(node, asked):
     """Publish on all topics; say `warm` before the messages that count, and the span of their stamps after them.
 
-    Topics that go `together` get one stamp; the others follow, spread evenly over the period.
+    Topics that go `together` follow each other closely; the next ones come later, spread evenly over the period.
     """
     publishers = [node.create_publisher(TYPES[asked.type], topic, PROFILE) for topic in asked.topics]
     while any(publisher.get_subscription_count() < 1 for publisher in publishers):
@@ -48,11 +50,12 @@ def publish(node, asked):
         for place, group in enumerate(groups):
             due = began + (number + place / len(groups)) / asked.rate
             time.sleep(max(0.0, due - time.monotonic()))
-            last = time.time_ns()
+            # One stamp, when the last of them is due: however busy the machine is, they are a set.
+            last = time.time_ns() + int((len(group) - 1) * APART_S * 1e9)
             write_stamp(payload, last)
-            message = bytes(payload)
             for publisher in group:
-                publisher.publish(message)
+                publisher.publish(bytes(payload))
+                time.sleep(APART_S)
     say([first, last])
     sys.stdin.readline()
 
@@ -64,7 +67,7 @@ def payload_of(type_name, size):
 
 
 def receive(node, asked):
-    """Take what comes until stdin gives a span of stamps; say how much came of it, and its median age."""
+    """Take what comes until stdin gives a span of stamps; say how much came of it, and the median age of sets."""
     kind, topics = TYPES[asked.type], asked.topics
     subscriptions = [node.create_subscription(kind, topic, print, PROFILE, raw=True) for topic in topics]
     while any(node.count_publishers(topic) < 1 for topic in topics):
@@ -80,10 +83,12 @@ def receive(node, asked):
         for index, subscription in enumerate(subscriptions):
             while wait_set.is_ready("subscription", index) and (taken := take(subscription.handle, kind)):
                 stamp = read_stamp(taken[0])
-                ages.append((stamp, time.time_ns() - stamp))
+                ages.append((stamp, index, time.time_ns() - stamp))
     first, last = json.loads(sys.stdin.readline())
-    counted = [age for stamp, age in ages if first <= stamp <= last]
-    say([len(counted), statistics.median(counted) if counted else 0])
+    counted = [(index, age) for stamp, index, age in ages if first <= stamp <= last]
+    # The last topic of a set completes it: the others wait for it, whatever the relay.
+    completing = [age for index, age in counted if (index + 1) % asked.together == 0]
+    say([len(counted), statistics.median(completing) if completing else 0])
 
 
 def take(handle, kind):
