@@ -59,8 +59,8 @@ class Arrivals:
         if before is None:
             return False
         ahead = stamp + self._offsets[index] - self.newest[self._jumped] - self._offsets[self._jumped]
-        if ahead > JUMP_NS and before < stamp <= before + JUMP_NS:
-            return True
-        self._before[index] = None
-        self.newest[index] = _UNSEEN
-        return False
+        goes_on = ahead > JUMP_NS and before < stamp <= before + JUMP_NS
+        if not goes_on:
+            self._before[index] = None
+            self.newest[index] = _UNSEEN
+        return goes_on

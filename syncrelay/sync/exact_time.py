@@ -63,14 +63,10 @@ class ExactTime(Policy):
         messages: list[Message | None] = [None] * self.n_inputs
         messages[place] = message
         self._sets[stamp] = messages
-        order = self._order
-        if not order or stamp > order[-1]:
-            order.append(stamp)
-        else:
-            insort(order, stamp)
+        insort(self._order, stamp)
         if self.n_inputs == 1:
             return self._emit(stamp, messages)
-        if len(order) > self._queue_size:
+        if len(self._order) > self._queue_size:
             return self._overflow(place, stamp)
         return ()
 

@@ -174,8 +174,7 @@ class LatestTime(Policy):
         drops = self._drop_oldest(self._trigger, 1, reason)
         self.closed += 1
         for place in range(self.n_inputs):
-            if place != self._trigger:
-                drops += self._drop_expired(place, stamp)
+            drops += self._drop_expired(place, stamp)
         return drops
 
     def _drop_expired(self, place: int, stamp: int) -> list[Drop]:

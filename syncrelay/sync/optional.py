@@ -28,7 +28,7 @@ class OptionalInputs(OptionalStage):
     one to a set, too far when it lies too far back for any set to come.
     """
 
-    __slots__ = ("_min_periods", "_newest", "_queue_size", "_queues", "_slop", "_waiting", "inputs")
+    __slots__ = ("_least_steps", "_newest", "_queue_size", "_queues", "_slop", "_waiting", "inputs")
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class OptionalInputs(OptionalStage):
         self.inputs: Sequence[int] = [index for index, needed in enumerate(required) if not needed]
         self._queue_size = queue_size
         self._slop = slop_ns
-        self._min_periods = (0,) * len(required) if min_periods_ns is None else tuple(min_periods_ns)
+        self._least_steps = [max(1, period) for period in min_periods_ns or (1,) * len(required)]
         self._queues = {index: StampQueue() for index in self.inputs}
         self._newest: dict[int, int] = {}
         self._waiting: deque[_Waiting] = deque()
@@ -113,7 +113,7 @@ class OptionalInputs(OptionalStage):
         if newest is None:
             return False
         waiting = self._waiting[0]
-        next_stamp = newest + max(1, self._min_periods[index])
+        next_stamp = newest + self._least_steps[index]
         stamps = self._queues[index].stamps
         position = self._nearest(waiting, stamps, waiting.low, waiting.high)
         if position is None:

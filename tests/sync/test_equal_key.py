@@ -38,6 +38,17 @@ test_drawn = policy_cases(
             -> B: a superseded, bB
             """,
         ),
+        "also after a set has left": (
+            equal_key,
+            """
+            left  |a.cb..
+            right |.A..C.
+            keys: aA cC
+            arrive: a A b c C
+            -> A: aA
+            -> C: cC
+            """,
+        ),
         "messages of one stamp count by arrival": (
             equal_key,
             """
@@ -107,13 +118,13 @@ def test_the_greatest_queue_that_was_needed_is_told():
 
 
 def test_only_so_many_lost_keys_are_remembered():
-    policy = equal_key(queue_size=1)
-    for number in range(13):
+    policy = equal_key(queue_size=2)
+    for number in range(24):
         policy.add(Message(0, number, None, key=number))
     policy.add(Message(1, 0, None, key=1))
     assert policy.needed_queue(0) is None
     policy.add(Message(1, 0, None, key=2))
-    assert policy.needed_queue(0) == 11
+    assert policy.needed_queue(0) == 22
 
 
 def test_a_key_that_its_own_input_lost_asks_for_nothing():

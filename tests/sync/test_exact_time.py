@@ -3,7 +3,7 @@ from functools import partial
 import pytest
 from drawn import policy_cases
 
-from syncrelay.sync import ExactTime, Message
+from syncrelay.sync import Drop, DropReason, ExactTime, Message
 
 exact = partial(ExactTime, n_inputs=2, queue_size=10)
 three = partial(ExactTime, n_inputs=3, queue_size=10)
@@ -85,6 +85,17 @@ def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
     policy.add(Message(1, 5, None))
     # Stamps 5 to 10 are six, and one more is on the safe side.
     assert [policy.needed_queue(place) for place in (0, 1)] == [7, None]
+
+
+@pytest.mark.parametrize(
+    ("index", "stamp"), [(0, 5), (1, 11)], ids=["the input that overflowed itself", "an input that comes between"]
+)
+def test_only_what_another_input_had_of_a_stamp_is_missed(index, stamp):
+    policy = exact(queue_size=2)
+    for lost_first in (10, 20, 30):
+        policy.add(Message(0, lost_first, None))
+    assert policy.add(Message(index, stamp, None)) == [Drop(Message(index, stamp, None), DropReason.OVERFLOW)]
+    assert [policy.needed_queue(place) for place in (0, 1)] == [None, None]
 
 
 def test_a_queue_of_the_needed_length_would_have_matched():

@@ -7,7 +7,9 @@ from drawn import group_cases
 from timeline import START_NS, TICK_NS, play_group, stamp
 
 from syncrelay.sync import (
+    ApproximateEpsilonTime,
     ApproximateTime,
+    ApproximateTimeEager,
     Drop,
     DropReason,
     EqualKey,
@@ -35,6 +37,17 @@ def exact(inputs=2, queue=10, **options):
 
 def approximate(inputs=2, queue=10, slop=20, **options):
     return grouped(ApproximateTime(n_inputs=inputs, queue_size=queue, slop_ns=slop * TICK_NS), **options)
+
+
+def paced(periods, *, slop, required):
+    periods_ns = [period * TICK_NS for period in periods]
+    policy = ApproximateTime(n_inputs=len(periods), queue_size=9, slop_ns=slop * TICK_NS, min_periods_ns=periods_ns)
+    return grouped(policy, required=required, max_wait=9)
+
+
+def eager(*, slop):
+    policy = ApproximateTimeEager(n_inputs=3, queue_size=9, slop_ns=slop * TICK_NS)
+    return grouped(policy, required=(True, True, False), max_wait=9)
 
 
 def by_key(inputs=2, **options):
@@ -253,15 +266,71 @@ test_optional = group_cases(
             """,
         ),
         "a known least period decides sooner": (
-            lambda: grouped(
-                ApproximateTime(n_inputs=2, queue_size=9, slop_ns=4 * TICK_NS, min_periods_ns=(0, 3 * TICK_NS)),
-                required=(True, False),
-                max_wait=9,
-            ),
+            partial(paced, (0, 2), slop=4, required=(True, False)),
             """
             lidar |..b...
             imu   |.x....
             -> b: bx
+            """,
+        ),
+        "unless a message after the least period would still fit": (
+            partial(paced, (0, 5), slop=2, required=(True, False)),
+            """
+            lidar |....b......
+            imu   |.x....y....
+            -> y: x superseded, by
+            """,
+        ),
+        "a known least period of required inputs still decides which of them go together": (
+            partial(paced, (0, 2, 0), slop=3, required=(False, True, True)),
+            """
+            gps    |..g.
+            lidar  |a...
+            camera |.A..
+            -> g: gaA
+            """,
+        ),
+        "epsilon counts for them as slop does": (
+            lambda: grouped(
+                ApproximateEpsilonTime(n_inputs=3, queue_size=2, epsilon_ns=TICK_NS),
+                required=(True, False, True),
+                max_wait=9,
+            ),
+            """
+            lidar  |a....b...
+            imu    |.x......y
+            camera |.A...B...
+            -> A: axA
+            -> y: b-B
+            """,
+        ),
+        "slop counts from the ends of a set": (
+            partial(eager, slop=4),
+            """
+            lidar  |..a.....
+            camera |.....A..
+            imu    |x......y
+            -> y: x too_far, aA-
+            """,
+        ),
+        "what another optional input has shut out goes when no later set could take it": (
+            partial(approximate, 4, required=(True, True, False, False), slop=3, max_wait=9),
+            """
+            lidar  |...b....
+            camera |...B....
+            imu    |....v...
+            gps    |x......y
+            -> y: x too_far, bBv-
+            """,
+        ),
+        "of two sets that wait, a message as near to both goes to the first": (
+            partial(approximate, **third_optional, slop=5, max_wait=20),
+            """
+            lidar  |a...b..
+            camera |A...B..
+            gps    |..x....
+            arrive: a A b B x
+            -> x: aAx
             """,
         ),
         "of two sets that wait, a message goes to the nearer": (
@@ -322,6 +391,20 @@ test_optional = group_cases(
             -> z: y duplicate
             """,
         ),
+        "what a set that waits holds has been given: older is late": (
+            partial(exact, **third_optional, max_wait=3),
+            """
+            left  |.b...
+            right |.B...
+            depth |.....
+            left  |a....
+            right |A....
+            arrive: b B a A
+            -> a: a late
+            -> A: A late
+            -> @4: bB-
+            """,
+        ),
         "more sets than a queue holds do not wait": (
             partial(exact, **third_optional, queue=2, max_wait=50),
             """
@@ -338,6 +421,27 @@ test_optional = group_cases(
             camera |.A........
             imu    |..........
             -> @6: aA-
+            """,
+        ),
+        "of two sets that one message completes, the first has waited longer": (
+            partial(approximate, **third_optional, slop=4, max_wait=8),
+            """
+            lidar  |a....b........
+            camera |.A...B........
+            imu    |..............
+            arrive: a A B b
+            -> @9: aA-
+            -> @13: bB-
+            """,
+        ),
+        "a set that waits for optional inputs leaves in time while a later one is still open": (
+            partial(approximate, **third_optional, slop=4, max_wait=8),
+            """
+            lidar  |a....b.........
+            camera |.A....B........
+            imu    |...............
+            -> @9: aA-
+            -> @14: bB-
             """,
         ),
         "a set that does not wait for optional inputs needs no max_wait": (
@@ -363,6 +467,26 @@ test_optional = group_cases(
             -> x: aAx
             -> z: bBz
             -> @8: cC-
+            """,
+        ),
+        "by key: of each optional input": (
+            partial(by_key, 4, required=(True, True, False, False), max_wait=9),
+            """
+            left  |a....
+            right |A....
+            depth |.x...
+            masks |...z.
+            keys: aAxz
+            -> z: aAxz
+            """,
+        ),
+        "by key: at once where no input is optional": (
+            partial(by_key, max_wait=9),
+            """
+            left  |a.
+            right |.A
+            keys: aA
+            -> A: aA
             """,
         ),
         "by key: not once its input has shown the key of a later set": (
@@ -420,6 +544,34 @@ def test_by_key_a_stamp_may_be_unset():
     assert [counts.matched for counts in group.counts()] == [3, 3]
 
 
+def test_by_key_an_unset_stamp_is_no_jump_and_makes_nothing_less_late():
+    group = by_key()
+    for number, time in ((1, START_NS), (2, 0)):
+        group.add(Message(0, time, number, key=number), now=0)
+        (match,) = group.add(Message(1, time, number, key=number), now=0)
+        assert [message.payload for message in match.messages] == [number, number]
+    late = Message(0, START_NS - 1, 3, key=3)
+    assert list(group.add(late, now=0)) == [Drop(late, DropReason.LATE)]
+
+
+def test_an_input_that_was_a_nanosecond_before_a_set_may_still_join_it_and_one_that_passed_it_does_not():
+    group = exact(inputs=2, required=(True, False), max_wait=9)
+    before, after = (Message(1, START_NS + off, None) for off in (-1, 1))
+    assert list(group.add(before, now=0)) == []
+    assert list(group.add(Message(0, START_NS, "a"), now=0)) == []
+    drop, match = group.add(after, now=0)
+    assert drop == Drop(before, DropReason.TOO_FAR)
+    assert match.messages == (Message(0, START_NS, "a"), None)
+
+
+def test_of_three_that_fit_the_nearest_to_the_middle_is_taken_to_the_nanosecond():
+    group = grouped(ApproximateTime(n_inputs=3, queue_size=9, slop_ns=20), required=(True, True, False), max_wait=0)
+    for index, time in ((2, 1002), (2, 1003), (2, 1009), (0, 1000)):
+        assert list(group.add(Message(index, time, None), now=0)) == []
+    (match,) = group.add(Message(1, 1005, None), now=0)
+    assert match.messages[2].stamp == 1002
+
+
 def test_an_input_that_fell_too_belongs_to_the_new_time_however_far_ahead_it_is():
     group = exact(queue=9)
     for index, column in ((0, 300), (1, 310), (0, 100)):
@@ -436,18 +588,28 @@ def test_one_stamp_far_ahead_costs_no_more_than_what_was_buffered():
     assert [getattr(outcome, "reason", None) for outcome in told] == [None, DropReason.TIME_JUMP, None, None]
 
 
+@pytest.mark.parametrize("offsets", [(0, 0), (-7, 0), (0, -7), (4, -7)])
 @pytest.mark.parametrize(
     ("before", "column", "left_over"),
     [(90, 100, False), (90, 101, True), (150, 150, False), (150, 151, True), (150, 250, True), (150, 251, False)],
 )
 def test_left_over_is_what_goes_on_by_a_second_where_its_input_was_and_is_more_than_a_second_ahead(
-    before, column, left_over
+    before, column, left_over, offsets
 ):
-    group = exact(queue=9)
-    for index, time in ((1, before), (0, 900), (0, 0)):
-        group.add(Message(index, stamp(time), time), now=0)
-    told = group.add(Message(1, stamp(column), column), now=0)
+    offsets_ns = [offset * 1_000_000_000 for offset in offsets]
+    group = exact(queue=9, offsets_ns=offsets_ns)
+    for index, time in ((1, before), (0, 900), (0, 0), (1, column)):
+        told = group.add(Message(index, stamp(time) - offsets_ns[index], time), now=0)
     assert [drop.reason.value for drop in told] == ["time_jump"] * left_over
+
+
+def test_a_flush_forgets_where_each_input_was():
+    group = exact()
+    for index, column in ((0, 500), (1, 510)):
+        group.add(Message(index, stamp(column), column), now=0)
+    group.flush(DropReason.TIME_JUMP)
+    for index, column in ((0, 100), (1, 520)):
+        assert list(group.add(Message(index, stamp(column), column), now=0)) == []
 
 
 def test_two_jumps_in_a_row_are_two():
@@ -487,21 +649,20 @@ def test_offsets_count_for_matching_and_messages_leave_with_the_stamps_they_came
     assert match.messages == (first, second)
 
 
-@pytest.mark.parametrize("offsets", [(0, 0), (-7, 0), (0, -7), (4, -7)])
-def test_offsets_count_for_what_is_left_over_of_the_time_before(offsets):
-    second = 10**9
-    group = exact(offsets_ns=[offset * second for offset in offsets], queue=9)
+def test_offsets_count_for_what_comes_out_of_order():
+    group = exact(offsets_ns=(0, -12_000_000))
+    for index, time in ((0, START_NS), (1, START_NS + 99_000_000)):
+        group.add(Message(index, time, None), now=0)
+    (match,) = group.add(Message(1, START_NS + 12_000_000, None), now=0)
+    assert [message.stamp for message in match.messages] == [START_NS, START_NS + 12_000_000]
 
-    def told(index, time):
-        """Add a message whose stamp is `time` once the offset is added; give what leaves of its own input."""
-        outcomes = group.add(Message(index, (time - offsets[index]) * second, time), now=0)
-        return [drop.reason.value for drop in outcomes if drop.message.payload == time]
 
-    for index, time in ((0, 50), (1, 54), (0, 52), (1, 55)):
-        assert told(index, time) == []
-    assert told(0, 40) == [], "the jump"
-    assert told(1, 56) == ["time_jump"], "left over"
-    assert told(1, 41) == [], "of the new time"
+def test_offsets_of_required_inputs_count_for_the_optional_ones():
+    group = exact(3, required=(True, True, False), max_wait=0, offsets_ns=(-5, -5, 0))
+    for index, time in ((2, START_NS), (0, START_NS + 5)):
+        group.add(Message(index, time, None), now=0)
+    (match,) = group.add(Message(1, START_NS + 5, None), now=0)
+    assert [message.input for message in match.messages] == [0, 1, 2]
 
 
 @pytest.mark.parametrize(
@@ -558,12 +719,14 @@ def test_a_served_message_of_latest_time_is_matched_once_and_not_buffered():
     assert (trigger.matched, odom.matched, odom.buffered, group.sets) == (2, 1, 0, 2)
 
 
-def test_a_flush_starts_afresh_but_counts_go_on():
+@pytest.mark.parametrize("column", [5, 6], ids=["while a set waits for the optional", "while a set is open"])
+def test_a_flush_starts_afresh_but_counts_go_on(column):
     group = approximate(3, required=(True, True, False), max_wait=50)
-    waiting = [Message(0, stamp(5), "a"), Message(1, stamp(5), "A"), Message(2, stamp(0), "x")]
+    waiting = [Message(0, stamp(5), "a"), Message(1, stamp(column), "A"), Message(2, stamp(0), "x")]
     for message in waiting:
         group.add(message, now=0)
     assert group.next_deadline() == 50 * TICK_NS
+    assert [counts.buffered for counts in group.counts()] == [1, 1, 1]
     assert sorted(group.flush(DropReason.SHUTDOWN)) == sorted(Drop(message, DropReason.SHUTDOWN) for message in waiting)
     assert group.next_deadline() is None
     assert [counts.dropped for counts in group.counts()] == [{DropReason.SHUTDOWN: 1}] * 3
@@ -598,30 +761,33 @@ def test_what_is_due_leaves_before_what_is_added():
     late, on_time = group.add(Message(0, stamp(9), "b"), now=3 * TICK_NS), group.next_deadline()
     assert [match.messages[0].payload for match in late] == ["a"]
     assert on_time == 6 * TICK_NS
+    (match,) = group.add(Message(1, stamp(9), "B"), now=6 * TICK_NS)
+    assert match.messages[1] is None, "B came too late for b"
 
 
-def test_no_message_is_needed_for_a_deadline():
-    group = approximate(max_wait=3)
+@pytest.mark.parametrize("max_wait", [None, 3])
+def test_no_message_is_needed_for_a_deadline(max_wait):
+    group = approximate(max_wait=max_wait)
     assert group.next_deadline() is None
     assert list(group.expire(now=0)) == []
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "told"),
     [
-        {"required": (True,)},
-        {"required": (False, False), "max_wait": 1},
-        {"required": (True, False)},
-        {"offsets_ns": (0,)},
-        {"max_wait": -1},
-        {"restamp": 2},
-        {"restamp": -1},
-        {"every": 0},
-        {"min_set_period_ns": 0},
+        ({"required": (True,)}, "must be 2, one required"),
+        ({"required": (False, False), "max_wait": 1}, "must be 2, one required"),
+        ({"required": (True, False)}, "needs max_wait_ns"),
+        ({"offsets_ns": (0,)}, "must be 2"),
+        ({"max_wait": -1}, "must be 0 or more"),
+        ({"restamp": 2}, "must be one of 2 inputs"),
+        ({"restamp": -1}, "must be one of 2 inputs"),
+        ({"every": 0}, "must be 1 or more"),
+        ({"min_set_period_ns": 0}, "must be 1 or more"),
     ],
 )
-def test_options_out_of_range_are_refused(wrong):
-    with pytest.raises(ValueError, match=r"must be|needs max_wait_ns"):
+def test_options_out_of_range_are_refused(wrong, told):
+    with pytest.raises(ValueError, match=told):
         exact(**wrong)
 
 

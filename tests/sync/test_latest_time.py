@@ -53,6 +53,16 @@ test_drawn = policy_cases(
             -> a: aA
             """,
         ),
+        "a greatest age of 0 asks for the trigger's own stamp": (
+            partial(latest, age=0),
+            """
+            lidar |.a.b.
+            odom  |A..B.
+            arrive: A a B b
+            -> B: a too_far, A expired
+            -> b: bB
+            """,
+        ),
         "a trigger waits for an input that has nothing for it yet": (
             latest,
             """
@@ -69,6 +79,25 @@ test_drawn = policy_cases(
             odom  |.....A.
             -> A: a too_far, b too_far
             -> c: cA
+            """,
+        ),
+        "a message may serve several triggers that waited": (
+            latest,
+            """
+            lidar |.ab
+            odom  |A..
+            arrive: a b A
+            -> A: aA, bA
+            """,
+        ),
+        "a message of just the greatest age does not expire yet": (
+            partial(latest, 3),
+            """
+            lidar |....a..b
+            odom  |.A.....B
+            gps   |.....G..
+            -> G: a too_far
+            -> B: A superseded, bBG
             """,
         ),
         "what no trigger can use any more expires": (
@@ -162,6 +191,34 @@ def test_a_trigger_that_has_waited_enough_expires_and_the_next_is_served():
     assert (policy.opened, policy.closed) == (2, 0)
     assert [drop.reason for drop in policy.settle()] == [DropReason.EXPIRED] * 2
     assert (policy.opened, policy.closed, policy.buffered(0), policy.buffered(1)) == (2, 1, 1, 0)
+
+
+def test_when_a_trigger_expires_the_next_may_be_too_far():
+    policy = latest(3, age=3)
+    left, _ = play_policy(policy, "lidar |...a...b..\n odom |.A.......B\n gps |..........")
+    assert left == ()
+    told = [(drop.message.payload, drop.reason.value) for drop in policy.settle()]
+    assert told == [("a", "expired"), ("b", "too_far"), ("A", "expired")]
+    assert (policy.opened, policy.closed) == (2, 2)
+
+
+def test_a_trigger_that_overflows_waits_no_longer():
+    policy = latest(queue=2)
+    for index, column in ((1, 7), (1, 8), (1, 9), (0, 10), (0, 11), (0, 12), (0, 13), (0, 14), (0, 15)):
+        policy.add(Message(index, column * TICK_NS, None))
+    # Two of the odometry's went, and of the triggers after 12, which find it too old, two wait.
+    assert (policy.opened, policy.closed, policy.buffered(0)) == (6, 4, 2)
+
+
+@pytest.mark.parametrize("columns", [(5, 6, 7), (6, 7, 8, 9)], ids=["older", "of its stamp"])
+def test_an_input_that_has_what_a_trigger_needs_needs_no_longer_queue(columns):
+    policy = latest(3, queue=2)
+    for column in columns:
+        policy.add(Message(1, column * TICK_NS, None))
+    for index, column in ((2, 9), (0, 8)):
+        outcomes = policy.add(Message(index, column * TICK_NS, None))
+    assert [drop.reason for drop in outcomes] == [DropReason.TOO_FAR]
+    assert [policy.needed_queue(place) for place in (0, 1, 2)] == [None, None, None]
 
 
 def test_the_queue_that_was_needed_is_told_when_what_would_have_served_has_overflowed():

@@ -65,5 +65,5 @@ def test_losses_are_forgotten_but_not_what_they_taught():
     losses.lose(0, 10)
     losses.miss(0, [20, 30, 40], 10, 0)
     losses.forget()
-    losses.miss(0, [20, 30, 40], 5, 0)
+    losses.miss(0, [20, 30, 40], 0, 0)
     assert losses.needed == [5]

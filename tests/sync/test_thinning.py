@@ -3,12 +3,12 @@ from functools import partial
 from drawn import group_cases
 from timeline import START_NS, TICK_NS, stamp
 
-from syncrelay.sync import DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
+from syncrelay.sync import ApproximateTimeEager, DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
 
 
-def grouped(policy, *, period=None, **options):
+def grouped(policy, *, period=None, required=(True, True), **options):
     min_set_period_ns = None if period is None else period * TICK_NS
-    return SyncGroup(policy, required=(True, True), min_set_period_ns=min_set_period_ns, **options)
+    return SyncGroup(policy, required=required, min_set_period_ns=min_set_period_ns, **options)
 
 
 def exact(**options):
@@ -143,6 +143,15 @@ test_drawn = group_cases(
             -> c: b thinned, cB
             """,
         ),
+        "a set that did not pass may lack an optional input": (
+            partial(latest, required=(True, False), every=2),
+            """
+            lidar |ab.c
+            odom  |..B.
+            -> a: a-
+            -> c: b thinned, cB
+            """,
+        ),
         "and not if it is in one that passes": (
             partial(latest, every=2),
             """
@@ -193,6 +202,7 @@ def test_the_least_period_is_a_nanosecond():
         for index in (0, 1):
             group.add(Message(index, time, None), now=0)
     assert group.sets == 3
+    assert [counts.buffered for counts in group.counts()] == [0, 0]
 
 
 def test_sets_without_stamps_are_thinned_by_the_clock():
@@ -213,3 +223,14 @@ def test_the_period_is_of_the_stamps_that_sets_are_matched_by():
         group.add(Message(0, stamp(column), None), now=0)
         group.add(Message(1, stamp(column - 10), None), now=0)
     assert group.sets == 2
+
+
+def test_the_period_is_of_the_latest_required_stamp_of_a_set():
+    # Both sets end within a period of each other, but for their earliest stamps, the optional one, or no offset.
+    policy = ApproximateTimeEager(n_inputs=3, queue_size=9, slop_ns=3 * TICK_NS)
+    offsets_ns = (0, 10 * TICK_NS, 0)
+    group = grouped(policy, period=4, required=(True, True, False), max_wait_ns=0, offsets_ns=offsets_ns)
+    for index, column in ((0, 0), (1, 3), (2, 7), (0, 4), (1, 5)):
+        group.add(Message(index, stamp(column) - offsets_ns[index], None), now=0)
+    assert group.sets == 1
+    assert [counts.dropped for counts in group.counts()] == [{DropReason.THINNED: 1}] * 3
