@@ -26,7 +26,7 @@ class ApproximateTimeEager(Policy):
     Slop is 2. aA does not wait for b, which is nearer to A and comes a little later.
     """
 
-    __slots__ = ("_empty", "_latest_head", "_losses", "_messages", "_queue_size", "_slop", "_stamps", "n_inputs")
+    __slots__ = ("_losses", "_messages", "_queue_size", "_slop", "_stamps", "n_inputs")
 
     def __init__(self, *, n_inputs: int, queue_size: int, slop_ns: int) -> None:
         check_sizes(n_inputs, queue_size)
@@ -38,7 +38,6 @@ class ApproximateTimeEager(Policy):
         self._stamps: list[list[int]] = [[] for _ in range(n_inputs)]
         self._messages: list[list[Message]] = [[] for _ in range(n_inputs)]
         self._losses = Losses(n_inputs)
-        self._see_heads()
 
     def narrowed(self, required: Sequence[bool]) -> tuple["ApproximateTimeEager", OptionalInputs]:
         size, slop = self._queue_size, self._slop
@@ -53,7 +52,7 @@ class ApproximateTimeEager(Policy):
             self._messages[place].append(message)
         else:
             self._insert(place, stamp, message, outcomes)
-        if not self._empty:
+        if all(self._stamps):
             # No set was in here before, so this is the first message of its input; all first messages lie
             # within slop of the latest of them, so there is a set now.
             self._match(stamp, outcomes)
@@ -69,7 +68,6 @@ class ApproximateTimeEager(Policy):
             stamps.clear()
             messages.clear()
         self._losses.forget()
-        self._see_heads()
         return drops
 
     def buffered(self, place: int) -> int:
@@ -99,22 +97,16 @@ class ApproximateTimeEager(Policy):
             if stamps and stamps[0] > stamp + self._slop:
                 self._losses.miss(place, stamps, stamp, self._slop)
 
-    def _see_heads(self) -> None:
-        heads = [stamps[0] for stamps in self._stamps if stamps]
-        self._empty = self.n_inputs - len(heads)
-        self._latest_head = max(heads, default=0)
-
     def _drop_too_far(self, outcomes: list[Outcome]) -> None:
         """Drop what no message that any other input still has, or will show, lies within slop of."""
-        self._see_heads()
-        latest = None
-        while latest != self._latest_head:
-            latest = self._latest_head
+        known = -1
+        while len(outcomes) != known:
+            known = len(outcomes)
+            latest = max([stamps[0] for stamps in self._stamps if stamps], default=0)
             for place, stamps in enumerate(self._stamps):
                 if stamps and stamps[0] < latest - self._slop:
                     count = bisect_left(stamps, latest - self._slop)
                     self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
-            self._see_heads()
 
     def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
         messages = self._messages[place]

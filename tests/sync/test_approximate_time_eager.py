@@ -125,6 +125,16 @@ test_drawn = policy_cases(
             -> e: c overflow, a too_far
             """,
         ),
+        "a set that leaves may show that something else is too far": (
+            partial(eager, 3),
+            """
+            lidar  |..ab.....
+            camera |..A.....B
+            radar  |..r......
+            arrive: a A b B r
+            -> r: aAr, b too_far
+            """,
+        ),
         "two inputs show that a message is too far while a third has nothing": (
             partial(eager, 3),
             """
@@ -140,7 +150,8 @@ test_drawn = policy_cases(
             lidar  |a.
             lidar  |b.
             camera |.A
-            arrive: a b A
+            camera |.B
+            arrive: a b A B
             -> b: a duplicate
             -> A: bA
             """,
@@ -168,6 +179,25 @@ def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
     for column in range(1, 21):
         longer.add(Message(0, column * TICK_NS, None))
     assert longer.add(Message(1, 8 * TICK_NS, None))
+
+
+@pytest.mark.parametrize("column", [14, 15])
+def test_a_message_that_finds_a_partner_needs_no_longer_queue(column):
+    policy = eager(queue=5)
+    for number in range(1, 21):
+        policy.add(Message(0, number * TICK_NS, None))
+    (match,) = policy.add(Message(1, column * TICK_NS, None))
+    assert match.messages[0].stamp == 16 * TICK_NS
+    assert policy.needed_queue(0) is None
+
+
+def test_a_message_with_others_behind_it_does_not_ask_for_a_longer_queue():
+    policy = eager(3, queue=5)
+    for column in range(1, 21):
+        policy.add(Message(0, column * TICK_NS, None))
+    for column in (19, 8):
+        policy.add(Message(1, column * TICK_NS, None))
+    assert policy.needed_queue(0) is None
 
 
 @pytest.mark.parametrize("wrong", [{"slop": -1}, {"queue": 0}, {"inputs": 0}])
