@@ -733,6 +733,19 @@ def test_a_flush_starts_afresh_but_counts_go_on(column):
     assert group.add(waiting[0], now=0) == [], "not late: what was before is forgotten"
 
 
+@pytest.mark.parametrize("make", [partial(exact, inputs=3), partial(by_key, inputs=3)], ids=["stamp", "key"])
+def test_a_flush_forgets_what_waits_for_optional_inputs_and_what_they_gave(make):
+    group = make(required=(True, False, False), max_wait=50)
+    first, second, third = (Message(index, stamp(column), None, key=index) for index, column in enumerate((5, 9, 9)))
+    for message in (first, second):
+        assert list(group.add(message, now=0)) == []
+    assert group.flush(DropReason.SHUTDOWN) == [Drop(message, DropReason.SHUTDOWN) for message in (first, second)]
+    assert group.next_deadline() is None
+    assert [counts.buffered for counts in group.counts()] == [0, 0, 0]
+    for message in (third, first):
+        assert list(group.add(message, now=0)) == [], "the second input has shown nothing yet"
+
+
 def test_the_clock_may_fall_while_a_set_waits():
     group = approximate(max_wait=3)
     group.add(Message(0, stamp(0), "a"), now=100 * TICK_NS)
