@@ -179,8 +179,7 @@ class ApproximateTime(Policy):
         self._losses.lose(place, self._stamps[place][0])
         self._overflowed.add(place)
         had_candidate = self._pivot != _NO_PIVOT
-        if had_candidate:
-            self._forget_candidate()
+        self._forget_candidate()
         self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
         return self._search(outcomes) if had_candidate else outcomes
 

@@ -196,6 +196,32 @@ def test_a_queue_of_the_needed_length_matches():
     ]
 
 
+def test_a_message_with_others_behind_it_does_not_ask_for_a_longer_queue():
+    policy = approximate(3, queue=5, slop=1)
+    for column in range(1, 21):
+        policy.add(Message(0, column * TICK_NS, None))
+    for index, column in ((1, 8), (1, 9), (2, 20)):
+        policy.add(Message(index, column * TICK_NS, None))
+    # From 9 to 20 are twelve, and one more.
+    assert policy.needed_queue(0) == 13
+
+
+def test_an_input_does_not_miss_its_own_messages():
+    policy = approximate(queue=1, slop=1)
+    for index, column in ((1, 7), (1, 8), (0, 20)):
+        policy.add(Message(index, column * TICK_NS, None))
+    assert [policy.needed_queue(place) for place in (0, 1)] == [None, None]
+
+
+def test_a_better_set_does_not_begin_another_wait():
+    policy = approximate(3)
+    for index, column in ((0, 0), (1, 5), (2, 3)):
+        policy.add(Message(index, column * TICK_NS, None))
+    assert (policy.opened, policy.closed) == (1, 0)
+    assert len(policy.add(Message(0, 2 * TICK_NS, None))) == 1
+    assert (policy.opened, policy.closed) == (1, 0)
+
+
 def test_a_message_too_far_from_what_is_queued_does_not_ask_for_a_longer_queue():
     policy = approximate(queue=5, slop=1)
     for column in range(10, 15):

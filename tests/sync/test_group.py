@@ -185,6 +185,24 @@ test_max_wait = group_cases(
             -> @9: bB
             """,
         ),
+        "also if one message ends the one wait and begins the other": (
+            partial(approximate, max_wait=8),
+            """
+            lidar  |a....b.........
+            camera |.A....B........
+            arrive: a A B b
+            -> b: aA
+            -> @14: bB
+            """,
+        ),
+        "nothing waits any more when an overflow has left no set": (
+            partial(approximate, queue=2, max_wait=9),
+            """
+            lidar  |a............
+            camera |.ABC.........
+            -> C: A overflow, a too_far
+            """,
+        ),
         "a max_wait of 0 lets a set leave with the message that completes it": (
             partial(approximate, max_wait=0),
             """
@@ -739,6 +757,7 @@ def test_a_flush_forgets_what_waits_for_optional_inputs_and_what_they_gave(make)
     first, second, third = (Message(index, stamp(column), None, key=index) for index, column in enumerate((5, 9, 9)))
     for message in (first, second):
         assert list(group.add(message, now=0)) == []
+    assert [counts.buffered for counts in group.counts()] == [1, 1, 0]
     assert group.flush(DropReason.SHUTDOWN) == [Drop(message, DropReason.SHUTDOWN) for message in (first, second)]
     assert group.next_deadline() is None
     assert [counts.buffered for counts in group.counts()] == [0, 0, 0]

@@ -204,7 +204,7 @@ def test_when_a_trigger_expires_the_next_may_be_too_far():
 
 def test_a_trigger_that_overflows_waits_no_longer():
     policy = latest(queue=2)
-    for index, column in ((1, 7), (1, 8), (1, 9), (0, 10), (0, 11), (0, 12), (0, 13), (0, 14), (0, 15)):
+    for index, column in ((1, 6), (1, 7), (1, 8), (1, 9), (0, 10), (0, 11), (0, 12), (0, 13), (0, 14), (0, 15)):
         policy.add(Message(index, column * TICK_NS, None))
     # Two of the odometry's went, and of the triggers after 12, which find it too old, two wait.
     assert (policy.opened, policy.closed, policy.buffered(0)) == (6, 4, 2)
