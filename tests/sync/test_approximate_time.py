@@ -2,7 +2,7 @@ from functools import partial
 
 import pytest
 from drawn import policy_cases
-from timeline import TICK_NS
+from timeline import TICK_NS, play_policy
 
 from syncrelay.sync import ApproximateTime, Match, Message
 
@@ -172,6 +172,20 @@ test_drawn = policy_cases(
         ),
     }
 )
+
+
+def test_an_overflow_is_excused_in_a_long_search_too_once_another_input_has_the_latest_head():
+    drawing = """
+        lidar  |..............ABCDEFGHIJK
+        camera |.bcdefghij......k........
+        radar  |..........l.m............
+        imu    |..............n..........
+        arrive: A B C D E F G H I J K b c d e f g h i j k l m n
+    """
+    (overflow, search), _ = play_policy(approximate(4, slop=8), drawing)
+    assert overflow == "K: A overflow"
+    # The lidar may not be the pivot before k is the latest; then l is no longer too far.
+    assert search == "n: " + "".join(f"{letter} too_far, " for letter in "bcdefghij") + "l superseded"
 
 
 def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
