@@ -26,8 +26,9 @@ from syncrelay.status.state import RelayState, is_ready
 # An idle loop turns once a second; what has not turned for this long hangs.
 _STALLED_S: Final = 5.0
 # A reader of /status takes milliseconds.
-_CLIENT_TIMEOUT_S: Final = 10
-_CONNECTIONS: Final = 64
+_CLIENT_TIMEOUT_S: Final = 5
+# Beyond them a client waits until one that idles has timed out. Each takes a file descriptor, of a usual 1024.
+_CONNECTIONS: Final = 256
 _HEADER_BYTES: Final = 16_384
 
 _Start = Callable[[str, list[tuple[str, str]]], Any]
@@ -41,7 +42,7 @@ class Server:
         # waitress warns of clients that go away, which is no concern of the robot's operator.
         logging.getLogger("waitress").setLevel(logging.CRITICAL)
         self._socket = _bound(listen)
-        self.address: str = "{}:{}".format(*self._socket.getsockname()[:2])
+        self.address = _in_words(self._socket)
         self._server: Any = None
         self._thread: Thread | None = None
 
@@ -65,7 +66,7 @@ class Server:
             threads=2,
             connection_limit=_CONNECTIONS,
             channel_timeout=_CLIENT_TIMEOUT_S,
-            cleanup_interval=_CLIENT_TIMEOUT_S // 2,
+            cleanup_interval=1,
             max_request_header_size=_HEADER_BYTES,
             max_request_body_size=_HEADER_BYTES,
             asyncore_use_poll=True,
@@ -77,6 +78,11 @@ class Server:
 
     def _loop_settings(self) -> dict[str, Any]:
         return {"timeout": 1, "map": self._server._map, "use_poll": True}  # noqa: SLF001
+
+
+def _in_words(bound: socket.socket) -> str:
+    host, port = bound.getsockname()[:2]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def _bound(listen: Listen) -> socket.socket:
@@ -120,7 +126,8 @@ def _application(state: Callable[[], RelayState]) -> Callable[[dict[str, Any], _
         answer = answers.get(environ["PATH_INFO"])
         if answer is None:
             return _text(start, "404 Not Found", "there are /status, /metrics, /livez and /readyz")
-        return answer(environ, start)
+        body = answer(environ, start)
+        return [] if environ["REQUEST_METHOD"] == "HEAD" else body
 
     return application
 

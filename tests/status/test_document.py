@@ -1,0 +1,122 @@
+"""The state as JSON: all of it, in numbers that JSON has, under the names that `top` and others read."""
+
+import json
+
+import pytest
+from states import BEGAN, MS, relay, started, working
+
+from syncrelay.explain import Endpoint, Mismatch
+from syncrelay.status import Level, Phase, document, level
+
+STATES = {
+    "no group": relay(),
+    "starting": relay(started(), phase=Phase.STARTING),
+    "nobody publishes": relay(started(camera=(), lidar=())),
+    "working": relay(working()),
+    "draining, two groups": relay(working(), started(), phase=Phase.DRAINING, reloads=2),
+}
+
+
+@pytest.mark.parametrize("state", STATES.values(), ids=STATES)
+def test_every_state_is_json_and_no_number_is_nan(state):
+    assert json.loads(json.dumps(document(state), allow_nan=False)) == document(state)
+
+
+def test_what_is_said_of_the_relay():
+    said = document(relay(working(), reloads=3))["relay"]
+    assert said.pop("version")
+    assert said == {
+        "node": "/syncrelay",
+        "config": "fusion.yaml",
+        "phase": "running",
+        "ready": True,
+        "uptime_s": 3.2,
+        "receives_by": "rclpy",
+        "reloads": 3,
+    }
+
+
+def test_what_is_said_of_a_group():
+    group = document(relay(working()))["groups"][0]
+    assert group.pop("inputs")
+    assert group == {
+        "name": "front",
+        "policy": "approximate_time",
+        "level": "ok",
+        "queue_size": 10,
+        "tolerance": {"key": "slop", "ms": 20.0},
+        "max_wait_ms": None,
+        "sets": 30,
+        "rate_hz": 10.0,
+        "possible_hz": 10.0,
+        "since_last_set_ms": 0.0,
+        "span_ms": {"p50": 5.0, "p95": 5.0, "max": 5.0},
+        "latency_ms": {"p50": 2.0, "p95": 2.0, "max": 2.0},
+        "nearest_ms": {"p50": 5.0, "p95": 5.0, "max": 5.0},
+        "last_sets": [{"span_ms": 5.0, "latency_ms": 2.0}] * 30,
+        "findings": [
+            {
+                "code": "healthy",
+                "severity": "ok",
+                "text": "10 of 10 possible sets a second, span 5 ms and latency 2 ms at the 95th percentile",
+                "suggestion": None,
+                "topic": None,
+            }
+        ],
+        "recent": [{"set": [BEGAN, None]}, {"drop": {"input": 0, "stamp": BEGAN, "reason": "late"}}],
+    }
+
+
+def test_what_is_said_of_an_input():
+    assert document(relay(working()))["groups"][0]["inputs"][0] == {
+        "topic": "/camera",
+        "type": "sensor_msgs/msg/Image",
+        "output": "/front/camera",
+        "required": True,
+        "offset_ms": 0.0,
+        "rate_hz": 10.0,
+        "age_ms": 99.0,
+        "lag_ms": 1.0,
+        "jitter_ms": 0.0,
+        "drift_ppm": None,
+        "received": 34,
+        "matched": 30,
+        "buffered": 1,
+        "dropped": {"late": 1, "too_far": 2},
+        "dropped_lately": {},
+        "lost": 0,
+        "missing": 0.0,
+        "publishers": [{"node": "/usb_cam", "type": "sensor_msgs/msg/Image", "mismatch": None}],
+        "subscribers": [{"node": "/fusion", "type": "sensor_msgs/msg/Image", "mismatch": None}],
+    }
+
+
+def test_what_did_not_happen_yet_is_null_or_empty():
+    group = document(relay(started()))["groups"][0]
+    assert [group[key] for key in ("since_last_set_ms", "span_ms", "latency_ms", "nearest_ms")] == [None] * 4
+    assert [group["inputs"][0][key] for key in ("age_ms", "lag_ms", "jitter_ms", "drift_ppm")] == [None] * 4
+    assert group["last_sets"] == []
+
+
+def test_a_mismatch_says_what_is_offered_and_requested_and_a_finding_its_topic():
+    mismatch = Mismatch("durability", "volatile", "transient_local")
+    group = document(relay(started(camera=(Endpoint("/usb_cam", "sensor_msgs/msg/Image", mismatch),))))["groups"][0]
+    assert group["inputs"][0]["publishers"][0]["mismatch"] == {
+        "policy": "durability",
+        "offered": "volatile",
+        "requested": "transient_local",
+    }
+    assert next((each["code"], each["topic"]) for each in group["findings"]) == ("incompatible_qos", "/camera")
+
+
+@pytest.mark.parametrize(
+    ("report", "expected"),
+    [(working(), Level.OK), (started(), Level.OK), (started(camera=(Endpoint("/x", "x/msg/Y"),)), Level.WARN)],
+    ids=["works", "starts", "other type"],
+)
+def test_a_level_is_the_worst_finding(report, expected):
+    assert level(report) is expected
+
+
+def test_durations_are_milliseconds():
+    assert document(relay(working()))["groups"][0]["tolerance"]["ms"] * MS == 20_000_000

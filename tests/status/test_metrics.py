@@ -1,0 +1,77 @@
+"""The state as Prometheus metrics: a text that its own parser reads, and counters that add up."""
+
+import pytest
+from prometheus_client import generate_latest
+from prometheus_client.parser import text_string_to_metric_families
+from states import relay, started, working
+
+from syncrelay.status import Phase
+from syncrelay.status.metrics import registry
+
+
+def samples(state):
+    """All samples of a scrape: (name, labels) to value."""
+    text = generate_latest(registry(lambda: state)).decode()
+    families = text_string_to_metric_families(text)
+    return {(each.name, frozenset(each.labels.items())): each.value for family in families for each in family.samples}
+
+
+def value(found, name, **labels):
+    return found[name, frozenset(labels.items())]
+
+
+@pytest.mark.parametrize("state", [relay(), relay(started()), relay(working(), started())])
+def test_every_state_can_be_parsed(state):
+    assert samples(state)
+
+
+def test_received_is_matched_and_dropped_and_waiting():
+    found = samples(relay(working()))
+    of_camera = {"group": "front", "topic": "/camera"}
+    outcomes = [
+        count
+        for (name, labels), count in found.items()
+        if name == "syncrelay_messages_total" and of_camera.items() <= dict(labels).items()
+    ]
+    waiting = value(found, "syncrelay_queue_length", **of_camera)
+    assert sum(outcomes) + waiting == value(found, "syncrelay_messages_received_total", **of_camera) == 34
+    assert value(found, "syncrelay_messages_total", **of_camera, outcome="late") == 1
+    assert value(found, "syncrelay_messages_total", **of_camera, outcome="matched") == 30
+
+
+def test_histograms_are_in_seconds_and_count_every_set():
+    found = samples(relay(working()))
+    for quantity, seconds in (("span", 0.005), ("latency", 0.002)):
+        name = f"syncrelay_set_{quantity}_seconds"
+        assert value(found, f"{name}_count", group="front") == value(found, "syncrelay_sets_total", group="front") == 30
+        assert value(found, f"{name}_sum", group="front") == pytest.approx(30 * seconds)
+        assert value(found, f"{name}_bucket", group="front", le=f"{seconds:g}") == 30
+        assert value(found, f"{name}_bucket", group="front", le="0.001") == 0
+
+
+def test_readiness_reloads_and_build_are_told():
+    found = samples(relay(working(), reloads=4))
+    assert value(found, "syncrelay_ready") == 1
+    assert value(found, "syncrelay_reloads_total") == 4
+    assert value(samples(relay(working(), phase=Phase.DRAINING)), "syncrelay_ready") == 0
+    build = next(dict(labels) for name, labels in found if name == "syncrelay_build_info")
+    assert set(build) == {"version", "python", "receives_by"}
+
+
+def test_each_finding_is_a_series_while_it_holds():
+    found = samples(relay(working()))
+    assert value(found, "syncrelay_finding", group="front", code="healthy", severity="ok", topic="") == 1
+
+
+def test_the_state_is_asked_for_at_each_scrape_and_not_before():
+    asked = []
+
+    def state():
+        asked.append(None)
+        return relay()
+
+    metrics = registry(state)
+    assert not asked
+    generate_latest(metrics)
+    generate_latest(metrics)
+    assert len(asked) == 2

@@ -1,0 +1,215 @@
+"""The relay's HTTP over real sockets: what it answers, and whom it does not wait for."""
+
+import json
+import socket
+import threading
+from contextlib import ExitStack, suppress
+
+import pytest
+from serving import ANY, asked, connected, sent, serving
+from states import CAMERA, relay, started, working
+
+from syncrelay.config.listen import Listen
+from syncrelay.errors import ListenError
+from syncrelay.explain import Endpoint, Mismatch
+from syncrelay.status import Phase, Server
+
+HEALTHY = relay(working())
+UNFIT = Endpoint("/usb_cam", CAMERA.type, Mismatch("reliability", "best_effort", "reliable"))
+
+
+def test_status_is_the_whole_state_as_json():
+    with serving(HEALTHY) as address:
+        code, body = asked(address, "/status")
+    assert code == 200
+    assert [group["name"] for group in json.loads(body)["groups"]] == ["front"]
+
+
+def test_metrics_are_prometheus_text():
+    with serving(HEALTHY) as address:
+        code, body = asked(address, "/metrics")
+    assert code == 200
+    assert 'syncrelay_sets_total{group="front"} 30.0\n' in body
+
+
+def test_the_root_names_all_pages():
+    with serving(HEALTHY) as address:
+        assert asked(address, "/") == (200, "syncrelay: /status /metrics /livez /readyz\n")
+
+
+@pytest.mark.parametrize(
+    ("state", "answer"),
+    [
+        (relay(), (200, "receiving\n")),
+        (relay(turned_s=4.9), (200, "receiving\n")),
+        (relay(turned_s=7.2), (503, "the receive loop last turned 7 s ago\n")),
+    ],
+    ids=["turns", "is slow", "hangs"],
+)
+def test_a_relay_lives_while_its_receive_loop_turns(state, answer):
+    with serving(state) as address:
+        assert asked(address, "/livez") == answer
+
+
+@pytest.mark.parametrize(
+    ("state", "answer"),
+    [
+        (HEALTHY, (200, "ready\n")),
+        (relay(working(), phase=Phase.DRAINING), (503, "not ready: draining, see /status\n")),
+        (relay(started(), phase=Phase.STARTING), (503, "not ready: starting, see /status\n")),
+        (relay(), (503, "not ready: running, see /status\n")),
+        (relay(working(), started(lidar=())), (503, "not ready: running, see /status\n")),
+        (relay(started(camera=(UNFIT,))), (503, "not ready: running, see /status\n")),
+        (relay(started(camera=(UNFIT, CAMERA))), (200, "ready\n")),
+        (relay(started(camera=(Endpoint("/x", "std_msgs/msg/Int64"),))), (503, "not ready: running, see /status\n")),
+    ],
+    ids=["ready", "drains", "starts", "no group", "no publisher", "QoS does not fit", "one of two fits", "other type"],
+)
+def test_a_relay_is_ready_while_every_required_input_is_served(state, answer):
+    with serving(state) as address:
+        assert asked(address, "/readyz") == answer
+
+
+def test_what_is_not_there_is_answered_with_what_is():
+    with serving(HEALTHY) as address:
+        assert asked(address, "/statsu") == (404, "there are /status, /metrics, /livez and /readyz\n")
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])
+def test_nothing_can_be_written(method):
+    with serving(HEALTHY) as address:
+        assert asked(address, "/status", method=method) == (405, "only GET\n")
+
+
+def test_head_is_answered_without_a_body():
+    with serving(HEALTHY) as address:
+        assert asked(address, "/livez", method="HEAD") == (200, "")
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n",
+        b"GET\r\n\r\n",
+        b"GET / HTTP/9\x00\r\nHost\r\n\r\n",
+        b"\x00" * 90 + b"\r\n\r\n",
+    ],
+    ids=["a TLS hello", "a method alone", "a broken header", "zeros"],
+)
+def test_garbage_is_a_bad_request_and_the_server_lives_on(garbage):
+    with serving(HEALTHY) as address:
+        assert b" 400 Bad Request" in sent(address, garbage).partition(b"\r\n")[0]
+        assert asked(address, "/livez")[0] == 200
+
+
+def test_a_header_without_end_is_refused():
+    with serving(HEALTHY) as address:
+        endless = b"GET / HTTP/1.1\r\nHost: robot\r\n" + b"X-Long: " + b"x" * 40_000
+        # What it has not read by then may turn the end into a reset, before the answer is seen.
+        with suppress(ConnectionError):
+            assert b" 431 " in sent(address, endless).partition(b"\r\n")[0]
+        assert asked(address, "/livez")[0] == 200
+
+
+@pytest.mark.parametrize(
+    "request_so_far",
+    [
+        b"",
+        b"GET /status HT",
+        b"GET /status HTTP/1.1\r\nHost: robot\r\n",
+        b"POST / HTTP/1.1\r\nContent-Length: 9\r\n\r\nx",
+    ],
+    ids=["sends nothing", "stops in a line", "stops in the header", "stops in the body"],
+)
+def test_clients_that_stall_keep_nobody_from_an_answer(request_so_far):
+    with serving(HEALTHY) as address, ExitStack() as stack:
+        for _ in range(10):
+            stack.enter_context(connected(address)).sendall(request_so_far)
+        assert asked(address, "/livez")[0] == 200
+
+
+def test_clients_that_never_read_keep_nobody_from_an_answer():
+    with serving(relay(*[working()] * 200)) as address, ExitStack() as stack:
+        for _ in range(5):
+            client = stack.enter_context(socket.socket())
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+            client.connect(address)
+            client.sendall(b"GET /status HTTP/1.1\r\nHost: robot\r\n\r\n" * 5)
+        assert asked(address, "/livez")[0] == 200
+
+
+def test_two_hundred_idle_connections_keep_nobody_from_an_answer():
+    with serving(HEALTHY) as address, ExitStack() as stack:
+        for _ in range(200):
+            stack.enter_context(connected(address))
+        assert asked(address, "/livez")[0] == 200
+
+
+def test_an_exception_of_ours_is_a_500_and_the_server_lives_on():
+    def broken():
+        raise KeyError("no such group")
+
+    with Server(ANY) as server:
+        server.serve(broken)
+        host, port = server.address.split(":")
+        assert asked((host, int(port)), "/status")[0] == 500
+        assert asked((host, int(port)), "/nowhere")[0] == 404
+
+
+def test_a_port_that_is_taken_is_an_error_that_names_it_and_what_to_do():
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        with pytest.raises(ListenError) as caught:
+            Server(Listen("127.0.0.1", range(port, port + 1)))
+    assert str(caught.value) == (
+        f"cannot listen on 127.0.0.1:{port}: another process does; give `metrics` another `listen`, or write"
+        " `metrics: null` to go without"
+    )
+
+
+def test_an_address_of_another_machine_is_an_error_that_names_it():
+    with pytest.raises(ListenError, match=r"^cannot listen on 192\.0\.2\.1:0: .+"):
+        Server(Listen("192.0.2.1", range(1)))
+
+
+def test_a_host_that_nobody_knows_is_an_error_that_names_it():
+    with pytest.raises(ListenError, match=r"^cannot listen on nowhere\.invalid:0: .+"):
+        Server(Listen("nowhere.invalid", range(1)))
+
+
+def test_of_several_ports_the_first_free_one_is_taken():
+    with Server(ANY) as first:
+        port = int(first.address.split(":")[1])
+        # The next one is free most likely, and one of those that follow all but surely.
+        with Server(Listen("127.0.0.1", range(port, min(port + 50, 65_536)))) as second:
+            assert port < int(second.address.split(":")[1]) < port + 50
+
+
+def test_the_loopback_of_ip_6_is_an_address_too():
+    if not socket.has_ipv6:
+        pytest.skip("this Python knows no IPv6")
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("this machine has no ::1")
+    with Server(Listen("::1", range(1))) as server:
+        assert server.address.startswith("[::1]:")
+
+
+def test_it_ends_with_its_threads_and_its_port_whoever_is_connected():
+    before = set(threading.enumerate())
+    with ExitStack() as stack:
+        with serving(HEALTHY) as address:
+            for _ in range(20):
+                stack.enter_context(connected(address)).sendall(b"GET /st")
+            assert asked(address, "/livez")[0] == 200
+        assert set(threading.enumerate()) == before
+        with Server(Listen(address[0], range(address[1], address[1] + 1))):
+            pass
+
+
+def test_it_ends_where_it_never_served():
+    with Server(ANY) as server:
+        address = server.address.split(":")
+    with pytest.raises(ConnectionRefusedError):
+        connected((address[0], int(address[1])))
