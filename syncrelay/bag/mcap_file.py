@@ -17,6 +17,7 @@ from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 from mcap.summary import Summary
 from zstandard import ZstdError
 
+from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import read_profiles
 from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
 from syncrelay.bag.segments import Segment, read_in_order
@@ -159,22 +160,6 @@ class McapFile:
         else:
             channel = ChannelRecord.read(stream)
             self._records[channel.id] = channel
-
-
-def topic_name(recorded: str) -> str:
-    """Return a topic's name with the slash that some recorders leave out."""
-    return recorded if recorded.startswith("/") else f"/{recorded}"
-
-
-# Renamed in ROS 2; the layout is the same.
-_RENAMED: Final = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
-
-
-def full_type_name(recorded: str) -> str:
-    """Return ROS 1's `pkg/Name` as ROS 2 writes it; a full name as it is."""
-    package, slash, name = recorded.partition("/")
-    full = f"{package}/msg/{name}" if slash and "/" not in name else recorded
-    return _RENAMED.get(full, full)
 
 
 def _unpacked(chunk: Chunk) -> bytes:

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 
 import lz4.frame
 
-from syncrelay.bag.mcap_file import full_type_name, topic_name
+from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import Profile
 from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
 from syncrelay.bag.segments import Segment, read_in_order

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mcap.writer import CompressionType, IndexType
+from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag1 import Writer as Ros1Writer
@@ -12,9 +12,9 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
+from tests.ros.cdr_messages import NS_PER_SECOND, STORE
 from tests.ros.frames import Frame
-from tests.ros.streams import BEGIN, MS, at
+from tests.ros.streams import MS, at
 
 ROS1_STORE = get_typestore(Stores.ROS1_NOETIC)
 CUSTOM = "rig_msgs/msg/Blip"
@@ -113,6 +113,3 @@ def blip(stamp: int, *, seen: int, number: int = 0, label: str = "") -> bytes:
     header = types["std_msgs/msg/Header"](time(*divmod(stamp, NS_PER_SECOND)), "rig")
     message = types[CUSTOM](header, time(*divmod(seen, NS_PER_SECOND)), number, label)
     return bytes(CUSTOM_STORE.serialize_cdr(message, CUSTOM))
-
-
-__all__ = ["BEGIN", "BEST_EFFORT", "MS", "VECTOR", "CompressionType", "IndexType"]

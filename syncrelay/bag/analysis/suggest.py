@@ -79,9 +79,11 @@ def suggest(
     changes, best = stamping, try_group(base, streams) if stamping else trial
     if not _does(base, best, possible):
         for more in _ladder(base, possible):
-            changes = [*stamping, *more]
-            best = try_group(changed(changes), streams)
-            if completed(best, possible.tightest.pivot) >= ENOUGH * most:
+            attempt = try_group(changed([*stamping, *more]), streams)
+            reached = completed(attempt, possible.tightest.pivot)
+            if reached >= ENOUGH * most or reached > completed(best, possible.tightest.pivot):
+                changes, best = [*stamping, *more], attempt
+            if reached >= ENOUGH * most:
                 break
     sooner = [*changes, *_periods(changed(changes), streams)]
     if len(sooner) > len(changes):
@@ -109,10 +111,10 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | 
     if group.keys.policy not in _MEASURED:
         return None
     required = [index for index, topic in enumerate(group.topics) if topic.required]
-    # The best match is certain only when what comes next is there.
-    successors = 1 if group.keys.policy == "approximate_time" else 0
     chosen, offsets = [streams[index] for index in required], [group.topics[index].offset_ns for index in required]
-    found = tightest(chosen, offsets, successors=successors)
+    # The best match is certain only when what comes next is there, unless it may not wait so long.
+    waits = group.keys.policy == "approximate_time" and group.keys.max_wait is None
+    found = tightest(chosen, offsets, successors=int(waits))
     if found is None:
         return None
     found = replace(found, pivot=required[found.pivot])
