@@ -23,3 +23,7 @@ class UsageError(SyncRelayError):
 
 class ListenError(SyncRelayError):
     """The relay cannot listen where the file says."""
+
+
+class ReloadError(SyncRelayError):
+    """A file that was read again asks for what a running relay cannot take on."""

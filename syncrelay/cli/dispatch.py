@@ -24,6 +24,7 @@ commands:
   demo                  show it all on a simulated rig, without a robot
   doctor                tell what can go wrong before a message flows
   top                   watch a running relay, here or on another machine
+  reload                have a running relay read its file again
   healthcheck           tell whether the relay receives, by its heartbeat
   syncrelay COMMAND --help says more
 
@@ -55,6 +56,7 @@ def _relay_parser() -> Parser:
     options.add_argument(
         "--group", metavar="NAME", action="append", default=[], help="relay this group only; may be repeated"
     )
+    options.add_argument("--watch", action="store_true", help="read FILE again when it changes, and not only at SIGHUP")
     options.add_argument(
         "--explain",
         metavar="N",
@@ -102,6 +104,7 @@ def _relay(words: Sequence[str], stop: StopRequest) -> int:
         arguments.log_format,
         ros_args,
         explain_s=arguments.explain,
+        watch=arguments.watch,
         stop=stop,
     )
 
@@ -288,6 +291,22 @@ def _top(words: Sequence[str], _stop: StopRequest) -> int:
     return top(arguments.url, output)
 
 
+def _reload(words: Sequence[str], _stop: StopRequest) -> int:
+    parser = Parser(
+        "syncrelay reload",
+        description="Has the relay of this machine read its file again: groups that did not change go on, with all\n"
+        "that they hold. A file with an error is left aside, and the exit code is 1.",
+    )
+    parser.add_argument("--url", metavar="URL", help="which relay, of several: its host:port or URL")
+    _add_help(parser)
+    if _asks_for_help(words):
+        return _print(parser.format_help())
+    arguments = parser.read(words)
+    from syncrelay.cli.reload import reload
+
+    return reload(arguments.url)
+
+
 def _healthcheck(words: Sequence[str], _stop: StopRequest) -> int:
     from syncrelay.cli.heartbeat import VARIABLE, healthcheck
 
@@ -312,6 +331,7 @@ _COMMANDS: Final[dict[str, Callable[[Sequence[str], StopRequest], int]]] = {
     "demo": _demo,
     "doctor": _doctor,
     "top": _top,
+    "reload": _reload,
     "healthcheck": _healthcheck,
 }
 

@@ -6,12 +6,14 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from syncrelay.cli.file_changes import FileChanges
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
 from syncrelay.cli.stop import StopRequest
-from syncrelay.errors import ListenError, UsageError
+from syncrelay.errors import ListenError, SyncRelayError, UsageError
 
 if TYPE_CHECKING:
     from syncrelay.config import Listen
+    from syncrelay.ros.relay import Relay
     from syncrelay.status import Server
 
 
@@ -23,11 +25,13 @@ def run(
     ros_args: Sequence[str],
     *,
     explain_s: float | None = None,
+    watch: bool = False,
     stop: StopRequest,
 ) -> int:
     """Relay the groups of a file, all of them if `groups` is empty; 0 after an orderly end.
 
-    With `explain_s`, end after so many seconds with the findings, and 1 unless all groups are healthy.
+    With `explain_s`, end after so many seconds with the findings, and 1 unless all groups are healthy. The file is
+    read again at SIGHUP, and with `watch` when it changes.
 
     Raises ConfigError for a faulty file, UsageError for a group that it lacks, RosUnavailableError where ROS
     cannot be used.
@@ -62,12 +66,29 @@ def run(
             LOGGER.info("status and metrics: http://%s/", server.address)
         if explain_s is not None:
             return explain(relay, explain_s, stop=stop)
+        changes = FileChanges(config_path) if watch else None
         while not stop.requested:
             relay.step()
+            if stop.take_reload() or (changes and changes.seen()):
+                _reload(relay, config_path, groups)
         for group in relay.drain().groups:
             for line in summarize(group):
                 LOGGER.info(line, extra={"group": group.name})
     return 0
+
+
+def _reload(relay: "Relay", config_path: str, groups: Sequence[str]) -> None:
+    """Take on the file as it is now; whatever is wrong with it, all goes on as before."""
+    from syncrelay.config import Severity, load
+    from syncrelay.ros.logs import LOGGER
+
+    try:
+        config = load(config_path, package_missing=Severity.NOTE)
+        _require_groups(groups, [group.name for group in config.groups], config_path)
+        relay.reload(config)
+    except SyncRelayError as error:
+        LOGGER.error("the file was read again and is left aside, all goes on as before:\n%s", error)
+        relay.refuse_reload(str(error))
 
 
 def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:

@@ -1,7 +1,11 @@
-"""SIGINT and SIGTERM as a request to end in order. Imports nothing slow: it must be there before all else."""
+"""SIGINT and SIGTERM as a request to end in order, SIGHUP as one to read the file again.
+
+Imports nothing slow: it must be there before all else.
+"""
 
 import os
 import signal
+import sys
 from collections.abc import Callable
 from types import FrameType
 
@@ -25,13 +29,16 @@ class StopRequest:
 
     def __init__(self) -> None:
         self.requested = False
+        self._reload = False
+        self._had_terminal = os.isatty(sys.stderr.fileno())
         self._wake: Callable[[], None] | None = None
         self._deferred = False
 
     def install(self) -> None:
-        """Take SIGINT and SIGTERM from here on."""
+        """Take the signals from here on."""
         for number in _SIGNALS:
             signal.signal(number, self._request)
+        signal.signal(signal.SIGHUP, self._request_reload)
 
     def defer(self) -> None:
         """From here on there is something to end in order: only remember the request."""
@@ -42,6 +49,20 @@ class StopRequest:
         self._wake = wake
         if self.requested:
             wake()
+
+    def take_reload(self) -> bool:
+        """Whether the file is to be read again, since this was last asked."""
+        asked, self._reload = self._reload, False
+        return asked
+
+    def _request_reload(self, signal_number: int, frame: FrameType | None) -> None:
+        if self._had_terminal and not os.isatty(sys.stderr.fileno()):
+            # Not asked for: the terminal is gone, and with it whoever could end us.
+            self._request(signal_number, frame)
+            return
+        self._reload = True
+        if self._wake is not None:
+            self._wake()
 
     def _request(self, _signal: int, _frame: FrameType | None) -> None:
         self.requested = True

@@ -34,6 +34,10 @@ class Diagnostics:
             array.header.stamp = self._node.get_clock().now().to_msg()
             self._publisher.publish(array)
 
+    def close(self) -> None:
+        """Publish no more."""
+        self._node.destroy_publisher(self._publisher)
+
     def _status(self, report: GroupReport) -> DiagnosticStatus:
         return DiagnosticStatus(
             level=_LEVELS[level(report)],
@@ -48,6 +52,7 @@ class Scalars:
     """Publishes the figures of each group as Float64 on `~/GROUP/sets_hz`, `.../span_ms` and `.../latency_ms`."""
 
     def __init__(self, node: Any, groups: Sequence[str]) -> None:
+        self._node = node
         self._publishers = {
             (group, figure): node.create_publisher(Float64, f"~/{group}/{figure}", 10)
             for group in groups
@@ -63,6 +68,11 @@ class Scalars:
                 span, latency = figures.last_sets[0]
                 self._publish(report, "span_ms", span / _NS_PER_MS)
                 self._publish(report, "latency_ms", latency / _NS_PER_MS)
+
+    def close(self) -> None:
+        """Publish no more."""
+        for publisher in self._publishers.values():
+            self._node.destroy_publisher(publisher)
 
     def _publish(self, report: GroupReport, figure: str, value: float) -> None:
         self._publishers[report.facts.name, figure].publish(Float64(data=value))

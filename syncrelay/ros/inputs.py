@@ -20,6 +20,7 @@ from syncrelay.ros.path import Content, Deliver, Path, Source
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.types import begins_with_header, import_type, stamp_reader, value_reader
+from syncrelay.sync import DropReason
 
 _LOG = logging.getLogger("syncrelay")
 
@@ -35,6 +36,18 @@ class _LeftToTheReceiveLoop(CallbackGroup):  # type: ignore[misc]  # CallbackGro
 
     def ending_execution(self, entity: Any) -> None:
         """Nothing ever begins."""
+
+
+class User:
+    """An input of a group that is fed from a topic, with what feeds it and where its messages leave."""
+
+    __slots__ = ("group", "index", "publisher", "take")
+
+    def __init__(self, group: GroupRelay, index: int) -> None:
+        self.group = group
+        self.index = index
+        self.take: Deliver | None = None
+        self.publisher: Any = None
 
 
 class TopicInput:
@@ -55,13 +68,12 @@ class TopicInput:
         self.name = name
         self.missing: str | None = f"a publisher of {self.name} ({self.type})"
         self._callback_group = _LeftToTheReceiveLoop()
-        self._users: list[tuple[GroupRelay, int]] = []
+        self._users: list[User] = []
         self._takers: list[Deliver] = []
         self._message_type: Any = None
         self._profile: Any = None
         self._subscription: Any = None
         self._source: Source | None = None
-        self._publishers: list[Any] = []
         self._lost: Any = None
         self._said: set[str] = set()
 
@@ -75,9 +87,41 @@ class TopicInput:
         """How many publish it as the file's type."""
         return sum(publisher.type == self.type for publisher in self.publishers)
 
-    def add_user(self, group: GroupRelay, index: int) -> None:
-        """Feed an input of a group from this topic."""
-        self._users.append((group, index))
+    def user(self, group: GroupRelay, index: int) -> User:
+        """Make ready to feed an input of a group; raises TypeImportError for a field that the type does not have."""
+        user = User(group, index)
+        if self._message_type is not None:
+            user.take = taker(group, index, self._message_type)
+        if self._profile is not None:
+            user.publisher = self._publisher(user, self._profile)
+        return user
+
+    def attach(self, user: User) -> None:
+        """Feed it from now on. On the loop's thread, or before that runs."""
+        self._users.append(user)
+        if user.publisher is not None:
+            self._connect(user)
+        self._feed_users()
+
+    def detach(self, group: GroupRelay) -> list[User]:
+        """Feed a group no longer; its users, whose publishers are to be destroyed. On the loop's thread."""
+        gone = [user for user in self._users if user.group is group]
+        self._users = [user for user in self._users if user.group is not group]
+        self._feed_users()
+        return gone
+
+    @property
+    def is_used(self) -> bool:
+        """Whether a group is fed."""
+        return bool(self._users)
+
+    def close(self) -> None:
+        """Receive no longer. On the main thread."""
+        source = self._source
+        if source is not None:
+            self._loop.call(lambda: self._loop.remove(source)).result()
+            self._node.destroy_subscription(self._subscription)
+            self._source = self._subscription = self._lost = None
 
     def look(self) -> None:
         """Look at the graph; subscribe, anew where the publishers' QoS changed; `missing` says what is not there."""
@@ -89,7 +133,8 @@ class TopicInput:
         importlib.invalidate_caches()
         try:
             message_type = import_type(self.type)
-            self._takers = [taker(group, index, message_type) for group, index in self._users]
+            for user in self._users:
+                user.take = taker(user.group, user.index, message_type)
         except TypeImportError as error:
             self.not_importable = str(error)
             self._say_once(logging.ERROR, f"{self.name}: {error}")
@@ -146,28 +191,39 @@ class TopicInput:
             raw=True,
             callback_group=self._callback_group,
         )
-        publishers = [
-            self._node.create_publisher(self._message_type, group.config.topics[index].output, profile)
-            for group, index in self._users
-        ]
+        publishers = [self._publisher(user, profile) for user in self._users]
         self._profile = profile
         self._lost = _rclpy.EventHandle(
             subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST
         )
         self._loop.call(lambda: self._swap(subscription, publishers)).result()
 
+    def _publisher(self, user: User, profile: Any) -> Any:
+        return self._node.create_publisher(self._message_type, user.group.config.topics[user.index].output, profile)
+
     def _swap(self, subscription: Any, publishers: list[Any]) -> None:
-        with_header = begins_with_header(self._message_type)
-        for (group, index), publisher in zip(self._users, publishers, strict=True):
-            group.connect(index, self._path.outlet(publisher), restamped=with_header)
+        old = [user.publisher for user in self._users if user.publisher is not None]
+        for user, publisher in zip(self._users, publishers, strict=True):
+            user.publisher = publisher
+            self._connect(user)
         if self._source is not None:
             self._loop.remove(self._source)
             self._node.destroy_subscription(self._subscription)
-        for publisher in self._publishers:
+        for publisher in old:
             self._node.destroy_publisher(publisher)
-        self._subscription, self._publishers = subscription, publishers
-        self._source = self._path.source(subscription, self._takers[0] if len(self._takers) == 1 else self._deliver)
+        self._subscription = subscription
+        self._source = self._path.source(subscription, self._deliver)
+        self._feed_users()
         self._loop.add(self._source)
+
+    def _connect(self, user: User) -> None:
+        outlet = self._path.outlet(user.publisher)
+        user.group.connect(user.index, outlet, restamped=begins_with_header(self._message_type))
+
+    def _feed_users(self) -> None:
+        self._takers = [user.take for user in self._users if user.take is not None]
+        if self._source is not None:
+            self._source.deliver = self._takers[0] if len(self._takers) == 1 else self._deliver
 
     def _deliver(self, payload: Any, content: Content, received: int) -> None:
         for take in self._takers:
@@ -175,9 +231,10 @@ class TopicInput:
 
     def wait_until_acknowledged(self, deadline: int) -> None:
         """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
-        for publisher in self._publishers:
-            left = max(0, deadline - time.monotonic_ns())
-            publisher.wait_for_all_acked(Duration(nanoseconds=left))
+        for user in self._users:
+            if user.publisher is not None:
+                left = max(0, deadline - time.monotonic_ns())
+                user.publisher.wait_for_all_acked(Duration(nanoseconds=left))
 
 
 def taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
@@ -212,16 +269,70 @@ class Wiring:
         return ", ".join(each.missing for topic, each in inputs if each.missing and topic.required) or None
 
 
-def wire(groups: Sequence[GroupRelay], *, node: Any, path: Path, loop: ReceiveLoop) -> list[Wiring]:
-    """Make one input per topic, however many groups use it and whatever they call it."""
-    inputs: dict[str, TopicInput] = {}
+class Wirings:
+    """All groups that run, in the file's order; one input per topic, however many use it and whatever they call it."""
 
-    def input_of(topic: TopicConfig) -> TopicInput:
-        name = node.resolve_topic_name(topic.topic)
-        return inputs.setdefault(name, TopicInput(topic, name=name, node=node, path=path, loop=loop))
+    def __init__(self, *, node: Any, path: Path, loop: ReceiveLoop) -> None:
+        self.all: tuple[Wiring, ...] = ()
+        self._node = node
+        self._path = path
+        self._loop = loop
+        self._inputs: dict[tuple[str, str, str], TopicInput] = {}
 
-    wirings = [Wiring(group, tuple(input_of(topic) for topic in group.config.topics)) for group in groups]
-    for wiring in wirings:
-        for index, topic_input in enumerate(wiring.inputs):
-            topic_input.add_user(wiring.group, index)
-    return wirings
+    @property
+    def groups(self) -> list[GroupRelay]:
+        """The groups alone."""
+        return [wiring.group for wiring in self.all]
+
+    @property
+    def inputs(self) -> list[TopicInput]:
+        """Each topic once."""
+        return list(self._inputs.values())
+
+    def wire(self, groups: Sequence[GroupRelay]) -> None:
+        """Let these groups run, and no other; those that did go on as they are. On the main thread.
+
+        What is new begins, and what is gone ends, between two messages. Raises TypeImportError, with nothing
+        changed, for a field that a type does not have.
+        """
+        running = {wiring.group: wiring for wiring in self.all}
+        inputs = dict(self._inputs)
+        wirings = tuple(running.get(group) or self._wiring(group, inputs) for group in groups)
+        users = [
+            (topic_input, topic_input.user(wiring.group, index))
+            for wiring in wirings
+            if wiring.group not in running
+            for index, topic_input in enumerate(wiring.inputs)
+        ]
+        ended = [wiring for group, wiring in running.items() if group not in groups]
+        gone = self._loop.call(lambda: _switch(ended, users)).result() if running else _switch(ended, users)
+        for user in gone:
+            if user.publisher is not None:
+                self._node.destroy_publisher(user.publisher)
+        for topic_input in inputs.values():
+            if not topic_input.is_used:
+                topic_input.close()
+        self._inputs = {key: topic_input for key, topic_input in inputs.items() if topic_input.is_used}
+        self.all = wirings
+
+    def _wiring(self, group: GroupRelay, inputs: dict[tuple[str, str, str], TopicInput]) -> Wiring:
+        return Wiring(group, tuple(self._input(topic, inputs) for topic in group.config.topics))
+
+    def _input(self, topic: TopicConfig, inputs: dict[tuple[str, str, str], TopicInput]) -> TopicInput:
+        name = self._node.resolve_topic_name(topic.topic)
+        key = (name, topic.type, repr(topic.qos))
+        if key not in inputs:
+            inputs[key] = TopicInput(topic, name=name, node=self._node, path=self._path, loop=self._loop)
+        return inputs[key]
+
+
+def _switch(ended: Sequence[Wiring], users: Sequence[tuple[TopicInput, User]]) -> list[User]:
+    """End some groups and begin others; the users that are gone. On the loop's thread, or before that runs."""
+    gone = []
+    for wiring in ended:
+        wiring.group.flush(DropReason.SHUTDOWN)
+        for topic_input in wiring.inputs:
+            gone += topic_input.detach(wiring.group)
+    for topic_input, user in users:
+        topic_input.attach(user)
+    return gone

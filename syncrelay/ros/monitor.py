@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from syncrelay.explain import (
     GroupReport,
@@ -44,6 +44,11 @@ class _Seen:
     recent: tuple[RecentSet | RecentDrop, ...]
 
 
+class _Watched(NamedTuple):
+    watch: GroupWatch
+    silence: Silence
+
+
 class Monitor:
     """Makes a report of every group at each look, and logs what is worth a line. On the main thread."""
 
@@ -53,13 +58,25 @@ class Monitor:
         self._node = node
         self._loop = loop
         self._clock = _ClockWatch(node) if simulated else None
-        now = time.time_ns()
-        self._wirings = wirings
-        self._watches = [GroupWatch(wiring.group.config, began=now) for wiring in wirings]
-        self._silences = [Silence() for _ in wirings]
-        self._losses = {each: deque([0], maxlen=_LOSS_LOOKS) for wiring in wirings for each in wiring.inputs}
+        self._wirings: Sequence[Wiring] = ()
+        self._watched: dict[GroupRelay, _Watched] = {}
+        self._losses: dict[TopicInput, deque[int]] = {}
         self._subscribers: dict[tuple[str, int], Any] = {}
         self._looks = 0
+        self.watch(wirings)
+
+    def watch(self, wirings: Sequence[Wiring]) -> None:
+        """Look at these groups from now on; what is known of those that were there before stays."""
+        now = time.time_ns()
+        self._wirings = wirings
+        self._watched = {
+            wiring.group: self._watched.get(wiring.group)
+            or _Watched(GroupWatch(wiring.group.config, began=now), Silence())
+            for wiring in wirings
+        }
+        inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
+        self._losses = {each: self._losses.get(each) or deque([0], maxlen=_LOSS_LOOKS) for each in inputs}
+        self._subscribers.clear()
 
     def look(self) -> None:
         """Gather, find, log. Raises CancelledError where the receive loop has ended."""
@@ -69,7 +86,8 @@ class Monitor:
         for topic_input, losses in self._losses.items():
             losses.append(topic_input.lost())
         reports = []
-        for wiring, watch, silence, gathered in zip(self._wirings, self._watches, self._silences, seen, strict=True):
+        for wiring, gathered in zip(self._wirings, seen, strict=True):
+            watch, silence = self._watched[wiring.group]
             batch = gathered.batch
             watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
             shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]

@@ -5,7 +5,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
@@ -18,13 +18,13 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.signals import SignalHandlerOptions
 
-from syncrelay.config import Config, GroupConfig
-from syncrelay.errors import RosUnavailableError, UsageError
+from syncrelay.config import Config
+from syncrelay.errors import ReloadError, RosUnavailableError, UsageError
 from syncrelay.explain import GroupReport
 from syncrelay.ros.diagnostics import Diagnostics, Scalars
 from syncrelay.ros.environment import log_arguments
 from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.inputs import Wiring, wire
+from syncrelay.ros.inputs import Wiring, Wirings
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
@@ -77,19 +77,21 @@ class Relay:
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
-        chosen = [group for group in config.groups if groups is None or group.name in groups]
+        self._config, self._names = config, groups
         path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
         self.receive_path = path.name
         self._loop = ReceiveLoop(
             path.watch(), now=self._now, deadline=self._deadline, expire=self._expire, beat=self._turn
         )
-        self._groups = [GroupRelay(group, now=self._now) for group in chosen]
+        self._wirings = Wirings(node=self.node, path=path, loop=self._loop)
         # Asked for their deadlines at every turn of the loop: the others never have one.
-        self._limited = [group for group in self._groups if group.config.keys.max_wait is not None]
-        self._wirings = wire(self._groups, node=self.node, path=path, loop=self._loop)
-        self._inputs = list(dict.fromkeys(each for wiring in self._wirings for each in wiring.inputs))
-        self.monitor = Monitor(self._wirings, node=self.node, loop=self._loop, simulated=self._sim_time)
-        self._tellers = _tellers(config, self.node, chosen)
+        self._limited: list[GroupRelay] = []
+        self._run_groups(config)
+        self.monitor = Monitor(self._wirings.all, node=self.node, loop=self._loop, simulated=self._sim_time)
+        self._tellers = _tellers(config, self.node, self._wirings.groups)
+        self._reloads = 0
+        self._refused_reloads = 0
+        self._reload_error: str | None = None
         self._config_path = config_path
         self._phase = Phase.STARTING
         self._turned = time.monotonic()
@@ -119,6 +121,43 @@ class Relay:
     ) -> None:
         self.close()
 
+    def reload(self, config: Config) -> None:
+        """Run the groups of a file that was read again: those that are as before go on, with all that they hold.
+
+        On the main thread. Raises ReloadError, with nothing changed, where the file asks for what needs a restart.
+        """
+        _require_same_node(self._config, config)
+        before = self._wirings.groups
+        self._run_groups(config)
+        self._config = config
+        self.monitor.watch(self._wirings.all)
+        for teller in self._tellers:
+            teller.close()
+        self._tellers = _tellers(config, self.node, self._wirings.groups)
+        self._announced = {group.config.name: text for group, text in self._announcements(before)}
+        self._reloads += 1
+        self._reload_error = None
+        kept = sum(group in before for group in self._wirings.groups)
+        _LOG.info("the file was read again: %d groups go on, %d begin", kept, len(self._wirings.groups) - kept)
+
+    def refuse_reload(self, reason: str) -> None:
+        """Tell in `state` that the file was read again and is left aside."""
+        self._reload_error = reason
+        self._refused_reloads += 1
+
+    def _announcements(self, before: Sequence[GroupRelay]) -> Iterator[tuple[GroupRelay, str]]:
+        kept = (group for group in self._wirings.groups if group in before)
+        return ((group, self._announced[group.config.name]) for group in kept if group.config.name in self._announced)
+
+    def _run_groups(self, config: Config) -> None:
+        running = self._wirings.groups
+        chosen = [each for each in config.groups if self._names is None or each.name in self._names]
+        as_before = [next((group for group in running if group.config == each), None) for each in chosen]
+        self._wirings.wire(
+            [group or GroupRelay(each, now=self._now) for group, each in zip(as_before, chosen, strict=True)]
+        )
+        self._limited = [group for group in self._wirings.groups if group.config.keys.max_wait is not None]
+
     def wake(self) -> None:
         """Have `step` return at once. Safe in a signal handler."""
         self._wake.set()
@@ -130,14 +169,15 @@ class Relay:
         """
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
-        for topic_input in self._inputs:
+        for topic_input in self._wirings.inputs:
             topic_input.look()
         self._announce()
         if time.monotonic() >= self._next_look:
             self.look()
-        is_waiting = any(wiring.waiting_for for wiring in self._wirings)
+        is_waiting = any(wiring.waiting_for for wiring in self._wirings.all)
         until_look = max(0.0, self._next_look - time.monotonic())
         self._wake.wait(min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S))
+        self._wake.clear()
 
     def look(self) -> tuple[GroupReport, ...]:
         """Look at all groups now, tell of it, and give what there is to say."""
@@ -163,6 +203,9 @@ class Relay:
             turned_s=now - self._turned,
             receives_by=self.receive_path.value,
             groups=self.monitor.reports,
+            reloads=self._reloads,
+            refused_reloads=self._refused_reloads,
+            reload_error=self._reload_error,
         )
 
     def _turn(self) -> None:
@@ -184,10 +227,10 @@ class Relay:
         if receiving is not None:
             self._loop.stop()
             receiving.result()
-            for group in self._groups:
+            for group in self._wirings.groups:
                 group.flush(DropReason.SHUTDOWN)
             deadline = time.monotonic_ns() + _ACKNOWLEDGE_NS
-            for topic_input in self._inputs:
+            for topic_input in self._wirings.inputs:
                 topic_input.wait_until_acknowledged(deadline)
         return self._snapshot()
 
@@ -227,14 +270,14 @@ class Relay:
         def changed(jump: Any) -> None:
             if jump.delta <= _CLOCK_JUMP:
                 self._loop.call(self._flush_jump)
-            elif any(group.engine.next_deadline() is not None for group in self._groups):
+            elif any(group.engine.next_deadline() is not None for group in self._wirings.groups):
                 self._loop.call(lambda: self._expire(self._now()))
 
         self._jump_handle = clock.create_jump_callback(threshold, post_callback=changed)
 
     def _flush_jump(self) -> None:
         _LOG.warning("the clock jumped back: everything buffered is dropped as time_jump")
-        for group in self._groups:
+        for group in self._wirings.groups:
             group.flush(DropReason.TIME_JUMP)
 
     def _now(self) -> int:
@@ -249,15 +292,15 @@ class Relay:
         return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
     def _expire(self, now: int) -> None:
-        for group in self._groups:
+        for group in self._wirings.groups:
             group.expire(now)
 
     def _snapshot(self) -> RelaySnapshot:
-        return RelaySnapshot(tuple(_describe(wiring) for wiring in self._wirings))
+        return RelaySnapshot(tuple(_describe(wiring) for wiring in self._wirings.all))
 
     def _announce(self) -> None:
         """Say once what each group waits for, and once that it runs."""
-        for wiring in self._wirings:
+        for wiring in self._wirings.all:
             name, waiting_for = wiring.group.config.name, wiring.waiting_for
             if waiting_for and time.monotonic() - self._started < _GRACE_S:
                 continue
@@ -267,13 +310,23 @@ class Relay:
                 _LOG.info("%s: %s", name, text, extra={"group": name})
 
 
-def _tellers(config: Config, node: Any, groups: Sequence[GroupConfig]) -> list[Diagnostics | Scalars]:
+def _require_same_node(running: Config, asked: Config) -> None:
+    """Raise ReloadError for what a running relay cannot take on."""
+    for name, before, now in (
+        ("node", running.node, asked.node),
+        ("metrics", running.listen, asked.listen),
+    ):
+        if before != now:
+            raise ReloadError(f"`{name}` cannot change while the relay runs: restart it")
+
+
+def _tellers(config: Config, node: Any, groups: Sequence[GroupRelay]) -> list[Diagnostics | Scalars]:
     """Make what publishes about the relay, as the file asks for it."""
     if config.diagnostics is None:
         return []
     if not config.diagnostics.scalars:
         return [Diagnostics(node)]
-    return [Diagnostics(node), Scalars(node, [group.name for group in groups])]
+    return [Diagnostics(node), Scalars(node, [group.config.name for group in groups])]
 
 
 def _describe(wiring: Wiring) -> GroupSnapshot:

@@ -1,5 +1,6 @@
 """The state of a relay as JSON: what /status gives and `syncrelay top` reads."""
 
+import os
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
@@ -30,6 +31,9 @@ def document(state: RelayState) -> dict[str, Any]:
             "uptime_s": round(state.uptime_s, 1),
             "receives_by": state.receives_by,
             "reloads": state.reloads,
+            "refused_reloads": state.refused_reloads,
+            "reload_error": state.reload_error,
+            "pid": os.getpid(),
         },
         "groups": [_group(report) for report in state.groups],
     }

@@ -19,7 +19,7 @@ class RelayState:
     """A relay at one moment. `turned_s` is how long ago its receive loop last turned, `uptime_s` since its start.
 
     `receives_by` names the way by which messages are taken and published, `reloads` counts how often the file was
-    read again.
+    read again and taken, `refused_reloads` how often it was left aside, `reload_error` says why the last time.
     """
 
     node: str
@@ -30,6 +30,8 @@ class RelayState:
     receives_by: str
     groups: tuple[GroupReport, ...]
     reloads: int = 0
+    refused_reloads: int = 0
+    reload_error: str | None = None
 
 
 class Level(Enum):

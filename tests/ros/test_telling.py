@@ -79,7 +79,7 @@ def test_nothing_is_published_about_the_relay_if_that_is_asked_for(stage: Stage)
     collector = stage.collector()
     relay = stage.relay(front(top={"diagnostics": None}))
     wait_until(lambda: bool(findings(relay)), "a first look")
-    assert not collector.endpoints("/diagnostics", kind="publisher", node="syncrelay")
+    assert not collector.endpoints("/diagnostics", kind="publisher", node="/syncrelay")
 
 
 def test_a_run_that_explains_tells_of_a_healthy_group_and_exits_with_0(stage: Stage):

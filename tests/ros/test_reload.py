@@ -1,0 +1,192 @@
+"""A file that is read again while the relay runs: what did not change goes on, and nothing is lost of it."""
+
+import fcntl
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import termios
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from syncrelay.sync import ApproximateTime
+from tests.ros import relaying
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import LOSSLESS, config, inputs
+from tests.ros.processes import Process, wait_until
+from tests.ros.stage import Stage, both_paths
+from tests.ros.status import ANY_PORT, status
+from tests.ros.streams import at, jittery, merged
+
+pytestmark = pytest.mark.ros
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_FRONT = {"policy": "approximate_time", "queue_size": 50, "slop": "20ms", "topics": inputs(_PAIR, qos=LOSSLESS)}
+
+
+def _rear(*, topics: tuple[str, ...] = ("/camera", "/lidar"), **keys: Any) -> dict[str, Any]:
+    return {"policy": "exact_time", "topics": inputs(dict.fromkeys(topics, VECTOR), qos=LOSSLESS), **keys}
+
+
+class _File:
+    """The file of a relay, which it reads again."""
+
+    def __init__(self, stage: Stage, *arguments: str, **groups: Any) -> None:
+        self.relay = stage.relay(config(groups, metrics=ANY_PORT), *arguments)
+        self._path = stage.folder / "config-0.yaml"
+        if not self._path.exists():
+            self._path = max(stage.folder.glob("config-*.yaml"))
+        self.relay.wait_for_log("status and metrics: ")
+
+    def write(self, text: str) -> None:
+        # In one go: a file that is half written is no file of the user's.
+        new = self._path.with_suffix(".new")
+        new.write_text(text)
+        new.replace(self._path)
+
+    def reload(self, **groups: Any) -> None:
+        """Write the file, have it read, and wait until it is taken."""
+        self.write(config(groups, metrics=ANY_PORT))
+        before = self.count("reloads")
+        self.relay.send(signal.SIGHUP)
+        wait_until(lambda: self.count("reloads") == before + 1, "the file to be read")
+
+    def refuse(self, text: str) -> str:
+        """Write a file that is to be left aside; why it was."""
+        self.write(text)
+        before = self.count("refused_reloads")
+        self.relay.send(signal.SIGHUP)
+        wait_until(lambda: self.count("refused_reloads") == before + 1, "the file to be refused")
+        return str(status(self.relay)["relay"]["reload_error"])
+
+    def count(self, what: str) -> int:
+        return int(status(self.relay)["relay"][what])
+
+
+@both_paths
+def test_an_unchanged_group_loses_and_doubles_nothing_while_others_come_change_and_go(stage: Stage):
+    camera = jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1)
+    recording = merged(camera, jittery("/lidar", period_ms=10, jitter_ms=2, count=2000, seed=2))
+    aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+    file = _File(stage, front=_FRONT)
+    collector = stage.collector(aligned)
+    player = stage.player(_PAIR)
+    relaying.connect(player, collector, recording, aligned)
+    player.start(recording, speed=2)
+    changes = [
+        {"rear": _rear()},
+        {"rear": _rear(queue_size=5)},
+        {"rear": _rear(topics=("/camera", "/other"))},
+        {"rear": _rear(), "side": _rear(output_prefix="/elsewhere")},
+        {},
+    ]
+    reloads = 0
+    while not player.finished():
+        file.reload(front=_FRONT, **changes[reloads % len(changes)])
+        reloads += 1
+    player.finish()
+    relaying.conclude(player, collector, recording, aligned)
+    assert reloads > len(changes)
+    policy = ApproximateTime(n_inputs=2, queue_size=50, slop_ns=20_000_000)
+    expected = relaying.expected_sets(policy, recording, list(_PAIR))
+    assert relaying.sets_within(recording, collector, aligned) == expected
+    assert {each["topic"]: each["received"] for each in status(file.relay)["groups"][0]["inputs"]}["/camera"] >= 4000
+
+
+def test_a_changed_group_is_built_anew_and_a_new_one_begins(stage: Stage):
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    file = _File(stage, front=_FRONT)
+    relay = file.relay
+    file.reload(front=_rear(output_prefix="/new"), rear=_rear())
+    aligned = {"/new/camera": VECTOR, "/new/lidar": VECTOR, "/rear/camera": VECTOR, "/rear/lidar": VECTOR}
+    collector, player = stage.collector(aligned), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, aligned)
+    player.play(recording)
+    relaying.conclude(player, collector, recording, aligned)
+    assert [each["name"] for each in status(relay)["groups"]] == ["front", "rear"]
+    assert status(relay)["groups"][0]["policy"] == "exact_time"
+    assert not collector.endpoints("/front/camera", kind="publisher")
+
+
+def test_a_topic_that_no_group_uses_any_more_is_not_subscribed_any_more(stage: Stage):
+    file = _File(stage, front=_FRONT, rear=_rear(topics=("/camera", "/other")))
+    collector = stage.collector()
+    other = stage.player({"/other": VECTOR, **_PAIR})
+    other.match()
+    file.reload(front=_FRONT)
+    wait_until(lambda: not collector.endpoints("/other", kind="subscription"), "the subscription to go")
+    wait_until(lambda: not collector.endpoints("/rear/camera", kind="publisher"), "the publisher to go")
+    assert collector.endpoints("/camera", kind="subscription", node="/syncrelay")
+
+
+def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
+    file = _File(stage, front=_FRONT)
+    why = file.refuse(config({"front": {**_FRONT, "slopp": "1ms"}}, metrics=ANY_PORT))
+    assert "groups.front.slopp: unknown key, did you mean `slop`?" in why
+    assert "the file was read again and is left aside, all goes on as before" in file.relay.stderr
+    assert "needs" not in file.refuse("")
+    why = file.refuse(config({"front": _FRONT}, metrics=ANY_PORT, node={"name": "other"}))
+    assert why == "`node` cannot change while the relay runs: restart it"
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+    collector, player = stage.collector(aligned), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, aligned)
+
+
+def test_a_watched_file_is_read_when_it_changes(stage: Stage):
+    file = _File(stage, "--watch", front=_FRONT)
+    file.write(config({"front": _FRONT, "rear": _rear()}, metrics=ANY_PORT))
+    wait_until(lambda: file.count("reloads") == 1, "the file to be read")
+    file.write("version: 1\n")
+    wait_until(lambda: file.count("refused_reloads") == 1, "the file to be refused")
+
+
+def _command(stage: Stage, relay: Process) -> subprocess.CompletedProcess[str]:
+    address = relay.stderr.split("http://")[1].split("/")[0]
+    words = [sys.executable, "-m", "syncrelay", "reload", "--url", address]
+    return subprocess.run(words, env=stage.environment, capture_output=True, text=True, check=False)
+
+
+def test_a_command_has_it_read_and_tells_what_came_of_it(stage: Stage):
+    file = _File(stage, front=_FRONT)
+    done = _command(stage, file.relay)
+    assert (done.returncode, done.stdout.startswith("/syncrelay has read ")) == (0, True)
+    file.write("groups: 5")
+    failed = _command(stage, file.relay)
+    assert failed.returncode == 1
+    assert "/syncrelay goes on as before, its file is left aside:" in failed.stderr
+    assert "groups: expected a mapping" in failed.stderr
+
+
+def test_a_relay_ends_with_its_terminal(stage: Stage, tmp_path: Path):
+    path = tmp_path / "fusion.yaml"
+    path.write_text(config({"front": _FRONT}))
+    ours, its = pty.openpty()
+    relay = subprocess.Popen(
+        [sys.executable, "-m", "syncrelay", "--config", str(path)],
+        env=stage.environment,
+        stdin=its,
+        stdout=its,
+        stderr=its,
+        preexec_fn=_own_terminal,  # noqa: PLW1509  this process has one thread
+    )
+    os.close(its)
+    said = b""
+    while b"waiting for" not in said:
+        said += os.read(ours, 4096)
+    os.close(ours)
+    assert relay.wait(timeout=60) == 0
+
+
+def _own_terminal() -> None:
+    os.setsid()
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+
+def test_its_state_tells_which_process_it_is(stage: Stage):
+    file = _File(stage, front=_FRONT)
+    assert json.loads(json.dumps(status(file.relay)))["relay"]["pid"] == file.relay.pid
