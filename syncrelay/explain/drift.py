@@ -1,19 +1,29 @@
 """Clock drift: how fast an input's stamps run against the time at which they are received."""
 
 from collections.abc import Sequence
-from math import sqrt
-from statistics import fmean
+from operator import mul, sub
+from statistics import fmean, median
 from typing import NamedTuple
 
 _FEWEST = 10
+_PARTS = 4
 
 
 class Drift(NamedTuple):
-    """A slope without unit, positive where stamps run slow, its standard error, and how long it was watched in ns."""
+    """A slope without unit, positive where stamps run slow, and for how long it was watched in nanoseconds.
+
+    `bend_ns` is how far the delays strayed from the line, by the medians of the quarters of that time: a clock drifts
+    along a line, what else makes delays grow, such as a load, a step or a pause, does not.
+    """
 
     slope: float
-    error: float
+    bend_ns: float
     watched_ns: int
+
+    @property
+    def drifted_ns(self) -> float:
+        """How far stamps drifted while they were watched."""
+        return self.slope * self.watched_ns
 
 
 def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
@@ -24,19 +34,21 @@ def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
     if len(points) < _FEWEST:
         return None
     # As differences of integers, before floats could lose the nanoseconds of an epoch.
-    times = [time - points[0][0] for time, _ in points]
-    delays = [delay - points[0][1] for _, delay in points]
+    first_time, first_delay = points[0]
+    times = [float(time - first_time) for time, _ in points]
+    delays = [float(delay - first_delay) for _, delay in points]
     mean_time, mean_delay = fmean(times), fmean(delays)
-    spread = sum((time - mean_time) ** 2 for time in times)
+    times = [time - mean_time for time in times]
+    spread = sum(map(mul, times, times))
     if spread == 0:
         return None
-    pairs = list(zip(times, delays, strict=True))
-    slope = sum((time - mean_time) * (delay - mean_delay) for time, delay in pairs) / spread
-    residuals = sum((delay - mean_delay - slope * (time - mean_time)) ** 2 for time, delay in pairs)
-    return Drift(slope, sqrt(residuals / (len(points) - 2) / spread), times[-1])
+    slope = sum(map(mul, times, delays)) / spread
+    strayed = list(map(sub, delays, [mean_delay + slope * time for time in times]))
+    quarter = len(points) // _PARTS
+    bend = max(abs(median(strayed[part * quarter : (part + 1) * quarter])) for part in range(_PARTS))
+    return Drift(slope, bend, points[-1][0] - first_time)
 
 
 def apart(one: Drift, other: Drift) -> Drift:
     """Return how fast two inputs drift apart."""
-    watched = min(one.watched_ns, other.watched_ns)
-    return Drift(one.slope - other.slope, sqrt(one.error**2 + other.error**2), watched)
+    return Drift(one.slope - other.slope, one.bend_ns + other.bend_ns, min(one.watched_ns, other.watched_ns))

@@ -4,7 +4,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Final
 
-from syncrelay.explain.observation import GroupFigures, InputFigures
+from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
@@ -66,8 +66,9 @@ class GroupFacts:
     """A group. Durations in nanoseconds.
 
     `tolerance` is None where stamps may be any distance apart, as with `equal_key`. `by_stamp` says whether stamps are
-    what is matched. `clock_stopped` is for how long the simulated time stands still, None if it does not; `waited` how
-    long messages at most lay before the relay took them.
+    what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
+    others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it does
+    not; `waited` how long messages at most lay before the relay took them.
     """
 
     name: str
@@ -77,6 +78,7 @@ class GroupFacts:
     figures: GroupFigures
     tolerance: Tolerance | None = None
     by_stamp: bool = True
+    trigger: int | None = None
     max_wait: int | None = None
     every: int = 1
     least_period: int | None = None
@@ -85,14 +87,20 @@ class GroupFacts:
 
     @property
     def possible_hz(self) -> float:
-        """The most sets a second that there could be: one for each message of the slowest required input."""
+        """The most sets a second that there could be: one for each message of the input that sets the pace."""
         possible = self.figures.best_hz / self.every
         return min(possible, _SECOND / self.least_period) if self.least_period else possible
 
     @property
-    def slowest(self) -> InputFacts:
-        """The required input with the fewest messages."""
+    def pacemaker(self) -> InputFacts:
+        """The input that sets the pace: the trigger, or the required one with the fewest messages."""
+        if self.trigger is not None:
+            return self.inputs[self.trigger]
         return min((each for each in self.inputs if each.required), key=lambda each: each.figures.rate_hz)
+
+    def is_held(self, index: int) -> bool:
+        """Whether the latest message of this input is held and serves until there is a newer one."""
+        return self.trigger is not None and index != self.trigger
 
     @property
     def silent_after(self) -> int:

@@ -1,6 +1,7 @@
 """How often a quantity fell below each of a few bounds, ever: what Prometheus calls a histogram."""
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,10 +27,12 @@ class Tallied:
         self._counts = [0] * (len(BOUNDS_NS) + 1)
         self._sum = 0
 
-    def add(self, value: int) -> None:
-        """Count one value, in nanoseconds."""
-        self._counts[bisect_left(BOUNDS_NS, value)] += 1
-        self._sum += value
+    def add(self, values: Sequence[int]) -> None:
+        """Count values, in nanoseconds."""
+        counts = self._counts
+        for value in values:
+            counts[bisect_left(BOUNDS_NS, value)] += 1
+        self._sum += sum(values)
 
     def histogram(self) -> Histogram:
         """Give all so far."""

@@ -11,6 +11,8 @@ _MISSING: Final = 0.05
 _TOO_SLOW: Final = 500_000_000
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
 _FEW: Final = 0.8
+# Nearly all sets that were possible: then what a queue dropped was not missed.
+_NEARLY_ALL: Final = 0.95
 _POSSIBLE: Final = 10
 _WATCHED: Final = 10 * SECOND
 _WHAT_HELPS: Final = {
@@ -28,6 +30,8 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     needed = an_input.counts.needed_queue
     overflowed = an_input.figures.dropped.get(DropReason.OVERFLOW, 0)
     if needed is None or not overflowed or needed <= facts.queue_size:
+        return
+    if not facts.is_silent and facts.figures.rate_hz >= _NEARLY_ALL * facts.possible_hz:
         return
     yield Finding(
         Code.SHORT_QUEUE,
@@ -58,10 +62,11 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
 def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that DDS itself lost before they came here."""
     if an_input.lost:
+        messages = "1 message" if an_input.lost == 1 else f"{an_input.lost} messages"
         yield Finding(
             Code.MESSAGES_LOST,
             Severity.WARN,
-            f"DDS lost {an_input.lost} messages of {an_input.name} on their way here in the last 10 s",
+            f"DDS lost {messages} of {an_input.name} on their way here in the last 10 s",
             f"look at the network and the load; if its publisher offers it, `qos: {{reliability: reliable}}` at"
             f" {an_input.name} asks again for what is lost",
             index,
@@ -80,19 +85,19 @@ def too_slow(facts: GroupFacts) -> Found:
 
 
 def few_sets(facts: GroupFacts) -> Found:
-    """Find that far fewer sets leave than the slowest input would allow."""
+    """Find that far fewer sets leave than the input that sets the pace would allow."""
     figures = facts.figures
     if facts.is_silent or figures.last_set is None or figures.now - figures.began < _WATCHED:
         return
     if facts.possible_hz * _WATCHED < _POSSIBLE * SECOND or figures.rate_hz >= _FEW * facts.possible_hz:
         return
-    slowest = facts.slowest
-    reason = max(slowest.figures.dropped, key=lambda each: slowest.figures.dropped[each], default=None)
+    pacemaker = facts.pacemaker
+    reason = max(pacemaker.figures.dropped, key=lambda each: pacemaker.figures.dropped[each], default=None)
     yield Finding(
         Code.FEW_SETS,
         Severity.WARN,
         f"{words.figure(figures.rate_hz)} of {words.figure(facts.possible_hz)} possible sets a second leave;"
-        f" {fates(slowest)}",
+        f" {fates(pacemaker)}",
         f"{_WHAT_HELPS[reason]} would give more" if reason in _WHAT_HELPS else None,
     )
 
@@ -100,8 +105,8 @@ def few_sets(facts: GroupFacts) -> Found:
 def fates(an_input: InputFacts) -> str:
     """Say what most often became of an input's messages."""
     figures = an_input.figures
+    if not figures.fed:
+        return f"of {an_input.name} none came lately"
     dropped = sorted(figures.dropped.items(), key=lambda item: -item[1])[:2]
-    if not dropped:
-        return f"of {an_input.name}'s last {figures.fed} messages none was dropped"
-    parts = " and ".join(f"{count} as {reason.value}" for reason, count in dropped)
-    return f"of {an_input.name}'s last {figures.fed} messages were dropped {parts}"
+    parts = " and ".join(f"{count} were dropped as {reason.value}" for reason, count in dropped)
+    return f"of {an_input.name}'s last {figures.fed} messages {parts or 'none was dropped'}"

@@ -9,6 +9,8 @@ from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, b
 # Discovery takes this long.
 _GRACE: Final = 2 * SECOND
 _NO_MESSAGE: Final = 5 * SECOND
+# A pause that is so many times the longest before it is news.
+_PAUSES: Final = 3
 
 
 def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -86,7 +88,7 @@ def silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     now, figures = facts.figures.now, an_input.figures
     if not fitting or facts.clock_stopped is not None:
         return
-    node = fitting[0].node
+    node, quiet = fitting[0].node, now - (figures.last_received or now)
     if an_input.counts.fed == 0 and now - facts.figures.began >= _NO_MESSAGE:
         yield Finding(
             Code.SILENT,
@@ -95,15 +97,32 @@ def silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             f"see with `ros2 topic hz {an_input.name}` whether {node} sends; if it does, ask `syncrelay doctor`",
             index,
         )
-    elif figures.last_received is not None and now - figures.last_received >= _NO_MESSAGE and not figures.rate_hz:
+    elif quiet >= _NO_MESSAGE and not figures.rate_hz and not (facts.is_held(index) and _is_enough(facts, an_input)):
         until_then = f"; until then it came at {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
         yield Finding(
             Code.SILENT,
             blocks(facts, an_input),
-            f"{an_input.name} has been silent for {words.seconds(now - figures.last_received)}{until_then}",
-            f"look at {node}, which still publishes it",
+            f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
+            f"look at {node}, which still publishes it{_or_hold_longer(facts, index)}",
             index,
         )
+
+
+def _is_enough(facts: GroupFacts, an_input: InputFacts) -> bool:
+    """Whether an input whose latest message serves on sends when it has something to say, as a map: once, or at odds.
+
+    One that has always come more often than that has died, and what is held of it is old.
+    """
+    now, figures = facts.figures.now, an_input.figures
+    quiet = now - (figures.last_received or now)
+    return not facts.is_silent and (not figures.usual_hz or quiet < _PAUSES * figures.longest_pause)
+
+
+def _or_hold_longer(facts: GroupFacts, index: int) -> str:
+    if facts.tolerance is None or not facts.is_held(index):
+        return ""
+    age = words.duration(facts.tolerance.ns)
+    return f"; if it is sent that rarely by design, write a larger `{facts.tolerance.key}` than {age}, or none"
 
 
 def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -4,6 +4,7 @@ from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
+from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.drift import apart
 from syncrelay.explain.facts import GroupFacts, InputFacts, Tolerance
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
@@ -15,10 +16,14 @@ _TOLD_JUMP: Final = 30 * SECOND
 # A share of the slowest input's messages that could have no set, and from how many on it means something.
 _MISSED: Final = 0.05
 _FEWEST: Final = 5
-# Below this drift is noise: so much apart since it was watched, so long watched, so many standard errors.
+# Below this drift is noise: so much apart since it was watched, so long watched, so much more than it bends.
 _DRIFTED: Final = 5_000_000
 _DRIFT_WATCHED: Final = 20 * SECOND
-_DRIFT_ERRORS: Final = 6
+_DRIFT_BENDS: Final = 8
+# A message in a hundred whose stamp repeats or comes late is no reason to call anyone.
+_FAULTY: Final = 0.01
+# What a computation may take; stamps that are older are those of another clock.
+_LATENCY: Final = 10 * SECOND
 
 
 def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -26,7 +31,7 @@ def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     if count := an_input.figures.dropped.get(DropReason.MALFORMED, 0):
         yield Finding(
             Code.MALFORMED,
-            blocks(facts, an_input),
+            _blocks_if_most(facts, an_input, count),
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} are cut short, or not of its type",
             f"see that {nodes(an_input)} has the same version of {an_input.type} as is installed here",
             index,
@@ -38,19 +43,24 @@ def unstamped(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     if count := an_input.figures.dropped.get(DropReason.UNSTAMPED, 0):
         yield Finding(
             Code.UNSTAMPED,
-            blocks(facts, an_input),
+            _blocks_if_most(facts, an_input, count),
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} have stamp 0",
             f"have {nodes(an_input)} set header.stamp, or write `stamp: receive` at {an_input.name}",
             index,
         )
 
 
+def _blocks_if_most(facts: GroupFacts, an_input: InputFacts, count: int) -> Severity:
+    """Return how bad it is that so many messages are of no use: a few don't explain a silence."""
+    return blocks(facts, an_input) if 2 * count >= an_input.figures.fed else Severity.WARN
+
+
 def other_clock(facts: GroupFacts) -> Found:
     """Find an input whose stamps, against the time of their receipt, are far off those of the others."""
     known = {
-        index: each.figures.delay
+        index: each.figures.delay - each.offset
         for index, each in enumerate(facts.inputs)
-        if each.required and each.figures.delay is not None and each.figures.last_stamp
+        if each.required and each.figures.delay is not None and each.figures.rate_hz
     }
     if not facts.by_stamp or not facts.is_silent or len(known) < 2:  # noqa: PLR2004  one alone has no other clock
         return
@@ -61,15 +71,20 @@ def other_clock(facts: GroupFacts) -> Found:
     behind = known[odd] - usual
     if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0):
         return
-    name = facts.inputs[odd].name
+    name, offset = facts.inputs[odd].name, facts.inputs[odd].offset
     others = [facts.inputs[index].name for index in known if index != odd]
     side = "behind" if behind > 0 else "ahead of"
+    shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
+    needed = max((each.counts.needed_queue or 0 for each in facts.inputs), default=0)
+    may_be_late = needed > facts.queue_size and 0 < behind < _LATENCY
+    wait = f"; if {name} really takes that long to come, write `queue_size: {needed}`" if may_be_late else ""
     yield Finding(
         Code.OTHER_CLOCK,
         Severity.ERROR,
-        f"stamps of {name} are {words.duration(abs(behind))} {side} those of"
+        f"stamps of {name}{shifted} are {words.duration(abs(behind))} {side} those of"
         f" {others[0] if len(others) == 1 else 'the other inputs'}",
-        f"synchronize the clocks of their machines, or write `offset: {words.exactly(behind)}` at {name}",
+        f"synchronize the clocks of their machines, or write `offset: {words.exactly(behind + offset)}` at"
+        f" {name}{wait}",
         odd,
     )
 
@@ -89,24 +104,31 @@ def no_common_key(facts: GroupFacts) -> Found:
 
 def over_slop(facts: GroupFacts) -> Found:
     """Find that the sets that could be had are too wide for the file."""
-    nearest, tolerance = facts.figures.nearest, facts.tolerance
-    if tolerance is None or len(nearest.values) < _FEWEST or next(other_clock(facts), None):
+    tolerance = facts.tolerance
+    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
+    if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
         return
     over = nearest.share_over(tolerance.ns)
-    if facts.is_silent and over == 1:
-        yield Finding(Code.OVER_SLOP, Severity.ERROR, _too_wide(facts, tolerance), _wide_enough(facts, tolerance))
+    if facts.is_silent and over > 1 - _MISSED:
+        text, suggestion = _too_wide(facts, tolerance, nearest), _wide_enough(facts, tolerance, nearest)
+        yield Finding(Code.OVER_SLOP, Severity.ERROR, text, suggestion)
     elif not facts.is_silent and over > _MISSED:
-        yield Finding(
-            Code.OVER_SLOP,
-            Severity.WARN,
-            f"{words.share(over)} of the last {len(nearest.values)} messages of {facts.slowest.name} were farther from"
-            f" their partners than {tolerance.key} {words.duration(tolerance.ns)}",
-            _wide_enough(facts, tolerance),
-        )
+        text, suggestion = _often_too_wide(facts, tolerance, nearest)
+        yield Finding(Code.OVER_SLOP, Severity.WARN, text, suggestion)
 
 
-def _too_wide(facts: GroupFacts, tolerance: Tolerance) -> str:
-    nearest = facts.figures.nearest
+def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> tuple[str, str]:
+    missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
+    name = facts.pacemaker.name
+    if facts.policy == "exact_time":
+        # Others do have equal stamps: a wider slop would pair what does not belong together.
+        lost = "look for messages that a driver leaves out or the network loses"
+        return f"{missed} {name} have no partner of an equal stamp", lost
+    farther = f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
+    return farther, _wide_enough(facts, tolerance, nearest)
+
+
+def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
     least, most = words.duration(nearest.quantile(0)), words.duration(nearest.quantile(0.95))
     widths = least if least == most else f"{least} to {most}"
     if facts.policy == "exact_time":
@@ -116,8 +138,7 @@ def _too_wide(facts: GroupFacts, tolerance: Tolerance) -> str:
     return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
 
 
-def _wide_enough(facts: GroupFacts, tolerance: Tolerance) -> str:
-    nearest = facts.figures.nearest
+def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
     most, nearly_all = words.at_least(nearest.quantile(0.95)), words.at_least(nearest.quantile(0.99))
     policy = "`policy: approximate_time` and " if facts.policy == "exact_time" else ""
     less = "" if most == nearly_all else f", `{tolerance.key}: {most}` would match 95 %"
@@ -137,7 +158,8 @@ def time_jump(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 def out_of_order(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that came after one of a later stamp."""
-    if facts.by_stamp and (count := an_input.figures.out_of_order):
+    count = an_input.figures.out_of_order
+    if facts.by_stamp and count > _FAULTY * an_input.figures.fed:
         text = (
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} came out of the order of their stamps"
         )
@@ -145,8 +167,9 @@ def out_of_order(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 
 def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find messages that repeat a stamp."""
-    if facts.by_stamp and (count := an_input.figures.duplicates):
+    """Find messages that repeat a stamp; what is held until there is a newer one may be sent again and again."""
+    count = an_input.figures.duplicates
+    if facts.by_stamp and not facts.is_held(index) and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} repeat the stamp before them"
         yield Finding(Code.DUPLICATES, Severity.WARN, text, _who_disorders(an_input), index)
 
@@ -164,9 +187,7 @@ def clock_drift(facts: GroupFacts) -> Found:
         return
     (slow, slowest), (fast, fastest) = max(known), min(known)
     between = apart(slow, fast)
-    if between.slope < _DRIFT_ERRORS * between.error or between.watched_ns < _DRIFT_WATCHED:
-        return
-    if between.slope * between.watched_ns >= _DRIFTED:
+    if between.watched_ns >= _DRIFT_WATCHED and between.drifted_ns >= max(_DRIFTED, _DRIFT_BENDS * between.bend_ns):
         name, other = facts.inputs[slowest].name, facts.inputs[fastest].name
         yield Finding(
             Code.CLOCK_DRIFT,

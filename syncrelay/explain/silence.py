@@ -27,9 +27,11 @@ class Silence:
     """Turns the findings of one group, look by look, into what is worth saying."""
 
     def __init__(self) -> None:
-        self._told_at: int | None = None
+        self._quiet_since: int | None = None
+        self._told = False
         self._pause = 0
-        self._quiet_since = 0
+        self._tell_again = 0
+        self._well_since = 0
         self._warned: dict[tuple[Code, int | None], _Warning] = {}
 
     def look(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
@@ -38,21 +40,24 @@ class Silence:
         if facts.is_silent:
             yield from self._silent(facts, explanation(findings), now)
             return
-        if self._told_at is not None:
-            self._told_at = None
-            yield Remark(Severity.OK, f"sets leave again, after {words.seconds(now - self._quiet_since)}", None)
+        if self._quiet_since is not None:
+            if self._told:
+                yield Remark(Severity.OK, f"sets leave again, after {words.seconds(now - self._quiet_since)}", None)
+            self._quiet_since, self._told, self._well_since = None, False, now
         yield from self._warnings(findings, now)
 
     def _silent(self, facts: GroupFacts, finding: Finding, now: int) -> Iterator[Remark]:
-        if self._told_at is None:
+        if self._quiet_since is None:
             last = facts.figures.last_set
             self._quiet_since = facts.figures.began if last is None else last
-            self._pause = now - self._quiet_since
-        elif now - self._told_at < self._pause:
+            # A group that comes and goes is not told anew each time: the pauses grow on until it was well for long.
+            if now - self._well_since > _FORGOTTEN:
+                self._pause, self._tell_again = 0, now
+        if now < self._tell_again:
             return
-        else:
-            self._pause = min(2 * self._pause, _LONGEST_PAUSE)
-        self._told_at = now
+        self._pause = min(2 * self._pause, _LONGEST_PAUSE) if self._pause else now - self._quiet_since
+        self._tell_again = now + self._pause
+        self._told = True
         quiet = words.seconds(now - self._quiet_since)
         ever = "no set" if facts.figures.last_set is None else "no more sets"
         yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", finding.code)

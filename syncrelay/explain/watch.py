@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Tolerance
-from syncrelay.explain.observation import Arrivals, Observation, SentSets
+from syncrelay.explain.input_observation import Arrivals
+from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.sync.counts import InputCounts
 
 
@@ -29,12 +30,12 @@ class GroupWatch:
         self.config = config
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
-        trigger = config.inputs.index_of(config.keys.trigger) if config.keys.policy == "latest_time" else None
+        self._trigger = config.inputs.index_of(config.keys.trigger) if config.keys.policy == "latest_time" else None
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
             began=began,
-            trigger=trigger,
+            trigger=self._trigger,
         )
 
     def add(
@@ -85,6 +86,7 @@ class GroupWatch:
             figures=figures,
             tolerance=_tolerance(self.config),
             by_stamp=keys.policy != "equal_key",
+            trigger=self._trigger,
             max_wait=keys.max_wait,
             every=keys.every,
             least_period=keys.max_rate,

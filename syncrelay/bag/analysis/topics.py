@@ -12,9 +12,9 @@ _SECOND: Final = 1_000_000_000
 # A period so many times the usual one is a gap: one message or more is missing.
 _GAP: Final = 1.5
 _DRIFT_POINTS: Final = 300
-# Below it drift is noise: so long watched, so many standard errors.
+# Below it drift is noise: so long watched, so much more than it bends.
 _DRIFT_WATCHED: Final = 20 * _SECOND
-_DRIFT_ERRORS: Final = 6
+_DRIFT_BENDS: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +103,6 @@ def _drift_ppm(stamps: Nanoseconds, received: Nanoseconds) -> float | None:
     delays = received - stamps
     points = [(int(received[part[len(part) // 2]]), int(np.median(delays[part] - delays[0]))) for part in parts]
     found = drift(points)
-    if found is None or found.watched_ns < _DRIFT_WATCHED or abs(found.slope) < _DRIFT_ERRORS * found.error:
+    if found is None or found.watched_ns < _DRIFT_WATCHED or abs(found.drifted_ns) < _DRIFT_BENDS * found.bend_ns:
         return None
     return found.slope * 1e6

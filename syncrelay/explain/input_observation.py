@@ -1,0 +1,164 @@
+"""What is seen of one input over its last messages: rate, delay, jitter, drift, faults of its stamps."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from operator import sub
+from statistics import median_low
+from typing import Final, NamedTuple, TypeAlias
+
+from syncrelay.explain.distribution import Distribution
+from syncrelay.explain.drift import Drift, drift
+from syncrelay.explain.figures import InputFigures
+from syncrelay.sync.messages import DropReason
+
+Arrivals: TypeAlias = Sequence[tuple[int, int]]
+"""Stamps and times of receipt of one input's messages as they came, in nanoseconds."""
+
+WINDOW_NS: Final = 10_000_000_000
+"""Rates, drops and faults are those of about this long."""
+_SECOND: Final = 1_000_000_000
+# A fall by more is a jump, as for the engine.
+_JUMP_NS: Final = 1_000_000_000
+_SILENT_NS: Final = 5_000_000_000
+_SILENT_PERIODS: Final = 5
+_LAST_MESSAGES: Final = 200
+# Of a slow input, so many messages tell the rate, however long ago they came.
+_RATE_FROM: Final = 5
+_DRIFT_POINTS: Final = 300
+# It costs more than all the rest, and changes slowly.
+_DRIFT_EVERY: Final = 5
+
+
+class _Faults(NamedTuple):
+    """What was wrong with the stamps of messages that came together, the last of them at `at`."""
+
+    at: int
+    duplicates: int
+    out_of_order: int
+
+
+class InputObservation:
+    """Gathers the messages of one input."""
+
+    def __init__(self) -> None:
+        self._stamps: deque[int] = deque(maxlen=_LAST_MESSAGES)
+        self._received: deque[int] = deque(maxlen=_LAST_MESSAGES)
+        self._longest_pause = 0
+        self._delays: deque[int] = deque(maxlen=_LAST_MESSAGES)
+        self._delay: int | None = None
+        self._jitter: int | None = None
+        self._faults: deque[_Faults] = deque()
+        self._points: deque[tuple[int, int]] = deque(maxlen=_DRIFT_POINTS)
+        self._points_seen = 0
+        self._drift: Drift | None = None
+        self._newest: int | None = None
+        self._fell: tuple[int, int] | None = None
+
+    def add(self, arrivals: Arrivals) -> bool:
+        """Take what came; whether its stamps have fallen back by more than a second."""
+        if not arrivals:
+            return False
+        last = arrivals[-1][1]
+        if self._received and last < self._received[-1]:
+            self._forget()
+        duplicates, out_of_order, fallen = self._judge(arrivals)
+        if fallen:
+            self._forget()
+        while self._faults and self._faults[0].at <= last - WINDOW_NS:
+            self._faults.popleft()
+        self._faults.append(_Faults(last, duplicates, out_of_order))
+        self._received.extend(received for _, received in arrivals)
+        self._longest_pause = _greatest_step(self._received)
+        # A stamp of 0 was never set: it tells nothing of a clock.
+        stamped = [arrival for arrival in arrivals if arrival[0]]
+        if stamped:
+            self._measure(stamped)
+        return fallen
+
+    def figures(self, *, fed: int, dropped: Mapping[DropReason, int], seconds: float, now: int) -> InputFigures:
+        """Give the figures; counts are those of the window, which is so many seconds long."""
+        fell_by, fell_at = self._fell or (None, None)
+        rate_hz, usual_hz = self._rates(fed, seconds, now)
+        faults = [each for each in self._faults if each.at > now - WINDOW_NS]
+        return InputFigures(
+            rate_hz=rate_hz,
+            usual_hz=usual_hz,
+            longest_pause=self._longest_pause,
+            fed=fed,
+            dropped=dropped,
+            last_received=self._received[-1] if self._received else None,
+            delay=self._delay,
+            jitter=self._jitter,
+            drift=self._drift,
+            duplicates=sum(each.duplicates for each in faults),
+            out_of_order=sum(each.out_of_order for each in faults),
+            fell_by=fell_by,
+            fell_at=fell_at,
+        )
+
+    def _forget(self) -> None:
+        """Start afresh: a clock jumped, that of the stamps or this machine's."""
+        self._stamps.clear()
+        self._delays.clear()
+        self._received.clear()
+        self._faults.clear()
+        self._points.clear()
+        self._drift = None
+
+    def _judge(self, arrivals: Arrivals) -> tuple[int, int, bool]:
+        """Count what repeats the newest stamp and what is older; whether one fell by more than a second."""
+        duplicates = out_of_order = 0
+        fallen = False
+        newest = self._newest
+        for stamp, received in arrivals:
+            if newest is None or stamp > newest:
+                newest = stamp
+            elif not stamp:
+                continue
+            elif stamp == newest:
+                duplicates += 1
+            elif stamp < newest - _JUMP_NS:
+                self._fell = (newest - stamp, received)
+                newest, fallen = stamp, True
+            else:
+                out_of_order += 1
+        self._newest = newest
+        return duplicates, out_of_order, fallen
+
+    def _measure(self, stamped: Arrivals) -> None:
+        """Measure delay, jitter and drift anew, from messages that have stamps."""
+        self._stamps.extend(stamp for stamp, _ in stamped)
+        delays = [received - stamp for stamp, received in stamped]
+        self._delays.extend(delays)
+        self._delay = median_low(self._delays)
+        self._jitter = _jitter(self._stamps)
+        # What came fastest was held up least: the least delay tells more of the clock than of the load.
+        self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, min(delays)))
+        self._points_seen += 1
+        if self._points_seen % _DRIFT_EVERY == 0:
+            self._drift = drift(self._points)
+
+    def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:
+        """Give messages a second, of the window or of the last few where it held fewer, and while they came."""
+        times = self._received
+        if len(times) < 2 or times[-1] <= times[0]:  # noqa: PLR2004  two make a period
+            return 0.0, 0.0
+        mean = (len(times) - 1) * _SECOND / (times[-1] - times[0])
+        usual = mean if len(times) >= _RATE_FROM else 0.0
+        if (now - times[-1]) * mean > _SILENT_PERIODS * _SECOND and now - times[-1] > _SILENT_NS:
+            return 0.0, usual
+        return (fed / seconds if fed >= _RATE_FROM and seconds > 0 else mean), usual
+
+
+def _greatest_step(times: Sequence[int]) -> int:
+    ordered = list(times)
+    return max(map(sub, ordered[1:], ordered), default=0)
+
+
+def _jitter(stamps: Sequence[int]) -> int | None:
+    ordered = list(stamps)
+    periods = list(map(sub, ordered[1:], ordered))
+    if not periods:
+        return None
+    usual = median_low(periods)
+    return Distribution([abs(period - usual) for period in periods]).quantile(0.95)

@@ -1,0 +1,66 @@
+"""A healthy group of two inputs at 10 Hz after a minute, to be made ill in one respect."""
+
+from dataclasses import replace
+
+from syncrelay.explain import Distribution, Endpoint, GroupFacts, InputFacts, Tolerance
+from syncrelay.explain.figures import GroupFigures, InputFigures
+from syncrelay.sync.counts import InputCounts
+
+S = 1_000_000_000
+MS = 1_000_000
+BEGAN = 1_700_000_000 * S
+NOW = BEGAN + 60 * S
+IMAGE = "sensor_msgs/msg/Image"
+
+
+def an_input(name="/camera", *, node="/driver", counts=None, figures=None, **facts):
+    """An input at 10 Hz, all of whose messages go into sets; `figures` changes some."""
+    usual = InputFigures(
+        rate_hz=10.0, usual_hz=10.0, longest_pause=101 * MS, fed=100, last_received=NOW - 50 * MS, delay=5 * MS
+    )
+    return InputFacts(
+        **{
+            "name": name,
+            "type": IMAGE,
+            "output": f"/front{name}",
+            "required": True,
+            "counts": counts or InputCounts(600, 600, {}, 0),
+            "figures": replace(usual, **(figures or {})),
+            "publishers": (Endpoint(node, IMAGE),),
+            **facts,
+        }
+    )
+
+
+def a_group(*inputs, figures=None, **facts):
+    """A group whose sets leave at 10 Hz; `figures` changes some."""
+    each = inputs or (an_input(), an_input("/lidar"))
+    usual = GroupFigures(
+        now=NOW,
+        began=BEGAN,
+        sets=600,
+        rate_hz=10.0,
+        best_hz=10.0,
+        last_set=NOW - 50 * MS,
+        last_sets=((5 * MS, 2 * MS),),
+        spans=Distribution([5 * MS] * 100),
+        latencies=Distribution([2 * MS] * 100),
+        nearest=Distribution([5 * MS] * 100),
+        missing=(0.0,) * len(each),
+    )
+    return GroupFacts(
+        **{
+            "name": "front",
+            "policy": "approximate_time",
+            "queue_size": 10,
+            "inputs": each,
+            "figures": replace(usual, **(figures or {})),
+            "tolerance": Tolerance("slop", 20 * MS),
+            **facts,
+        }
+    )
+
+
+def a_silent_group(*inputs, figures=None, **facts):
+    """The same after seven seconds without a set."""
+    return a_group(*inputs, figures={"rate_hz": 0.0, "last_set": NOW - 7 * S, **(figures or {})}, **facts)

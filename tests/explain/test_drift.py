@@ -1,0 +1,69 @@
+"""Drift of a clock, told from what else makes delays grow."""
+
+import random
+
+import pytest
+from groups import BEGAN, MS, S
+
+from syncrelay.explain.drift import Drift, apart, drift
+
+
+def points(delay, *, n=120, noise=0.0):
+    """One point a second, of a delay in nanoseconds by the second."""
+    source = random.Random(5)
+    return [(BEGAN + second * S, round(delay(second) + source.gauss(0, noise))) for second in range(n)]
+
+
+def is_straight(found):
+    return found.drifted_ns > 8 * found.bend_ns
+
+
+@pytest.mark.parametrize("ppm", [20, 100, 2000, -100])
+def test_a_drift_is_measured_in_the_noise(ppm):
+    found = drift(points(lambda second: second * ppm * 1000, noise=0.2 * MS))
+    assert found.slope * 1e6 == pytest.approx(ppm, abs=3)
+    assert found.watched_ns == 119 * S
+
+
+def test_a_line_has_no_bend():
+    found = drift(points(lambda second: second * 100_000))
+    assert found.drifted_ns == pytest.approx(11.9 * MS)
+    assert found.bend_ns < 1
+
+
+def test_an_epoch_costs_no_nanoseconds():
+    assert drift(points(lambda second: second)).slope == pytest.approx(1e-9)
+
+
+@pytest.mark.parametrize("n", [0, 1, 9])
+def test_few_points_tell_nothing(n):
+    assert drift(points(lambda second: second * MS, n=n)) is None
+
+
+def test_points_of_one_moment_tell_nothing():
+    assert drift([(BEGAN, n) for n in range(20)]) is None
+
+
+@pytest.mark.parametrize(
+    "delay",
+    [
+        lambda second: 20 * MS * (second > 60),
+        lambda second: 20 * MS * (second > 30),
+        lambda second: 20 * MS * (second > 105),
+        lambda second: 60_000 * MS * (second > 60),
+        lambda second: 20 * MS * (second % 60 > 45),
+        lambda second: 10 * MS * (second / 60) ** 3,
+    ],
+    ids=["a step", "an early step", "a late step", "a pause", "a load that comes and goes", "a load that grows"],
+)
+def test_what_is_no_line_bends(delay):
+    assert not is_straight(drift(points(delay, noise=0.1 * MS)))
+
+
+def test_noise_alone_is_no_line():
+    assert not is_straight(drift(points(lambda _: 0, noise=10 * MS)))
+
+
+def test_two_drifts_are_compared_over_the_shorter_time():
+    one, other = Drift(0.5, 3.0, 60 * S), Drift(0.2, 1.0, 40 * S)
+    assert apart(one, other) == Drift(pytest.approx(0.3), 4.0, 40 * S)

@@ -1,0 +1,97 @@
+"""The nearest sets, against a slow and obvious search through all sets that there could be."""
+
+from bisect import bisect_right
+from itertools import product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from syncrelay.explain.nearest import NearestSpans, greatest_age, tightest_span
+
+STAMPS = st.lists(st.integers(0, 60), min_size=1, max_size=7, unique=True).map(sorted)
+STREAMS = st.lists(STAMPS, min_size=2, max_size=4)
+
+
+def measured(streams, pivot):
+    """The pivot's messages with something of every input not after and not before them."""
+    first, last = max(stream[0] for stream in streams), min(stream[-1] for stream in streams)
+    return [stamp for stamp in streams[pivot] if first <= stamp <= last]
+
+
+def tightest_of_all(streams, pivot):
+    """For each message of the pivot, the least span of all sets that hold it."""
+    spans = []
+    for stamp in measured(streams, pivot):
+        others = [stream for index, stream in enumerate(streams) if index != pivot]
+        spans.append(min(max(stamp, *chosen) - min(stamp, *chosen) for chosen in product(*others)))
+    return spans
+
+
+def oldest_of_the_latest(streams, pivot):
+    """For each message of the pivot, the age of the oldest of the others' latest messages that are not newer."""
+    others = [stream for index, stream in enumerate(streams) if index != pivot]
+    return [
+        max(stamp - max(other for other in stream if other <= stamp) for stream in others)
+        for stamp in measured(streams, pivot)
+    ]
+
+
+@st.composite
+def chunked(draw, streams):
+    """The streams cut into chunks at moments that all share, each chunk in any order."""
+    cuts = [*sorted(draw(st.lists(st.integers(0, 60), max_size=6))), 60]
+    chunks = []
+    done = [0] * len(streams)
+    for cut in cuts:
+        ends = [bisect_right(stream, cut) for stream in streams]
+        pieces = [stream[start:end] for stream, start, end in zip(streams, done, ends, strict=True)]
+        chunks.append([draw(st.permutations(piece)) for piece in pieces])
+        done = ends
+    return chunks
+
+
+@pytest.mark.parametrize(
+    ("measure", "reference"),
+    [(tightest_span, tightest_of_all), (greatest_age, oldest_of_the_latest)],
+    ids=["tightest span", "greatest age"],
+)
+@settings(max_examples=60, deadline=None)
+@given(cases=st.data())
+def test_it_is_what_a_search_through_all_sets_finds_in_whatever_chunks_the_stamps_come(measure, reference, cases):
+    streams = cases.draw(STREAMS)
+    pivot = cases.draw(st.integers(0, len(streams) - 1))
+    nearest = NearestSpans(len(streams), measure=measure)
+    chunks = cases.draw(chunked(streams))
+    assert [span for chunk in chunks for span in nearest.add(chunk, pivot=pivot)] == reference(streams, pivot)
+
+
+def test_a_message_is_measured_once_something_on_every_input_is_not_older():
+    nearest = NearestSpans(2)
+    assert nearest.add([[100], []], pivot=0) == []
+    assert nearest.add([[], [90]], pivot=0) == []
+    assert nearest.add([[], [104]], pivot=0) == [4]
+    assert nearest.add([[], [110]], pivot=0) == []
+
+
+def test_slow_inputs_that_never_come_in_one_chunk_are_measured():
+    nearest = NearestSpans(2)
+    spans = [
+        span for n in range(10) for one in (([n * 100], []), ([], [n * 100 + 30])) for span in nearest.add(one, pivot=0)
+    ]
+    assert spans == [30] * 9
+
+
+def test_after_clearing_nothing_of_before_counts():
+    nearest = NearestSpans(2)
+    nearest.add([[100], [101]], pivot=0)
+    nearest.clear()
+    assert nearest.add([[5, 15], [7, 17]], pivot=1) == [2]
+
+
+def test_what_piles_up_while_an_input_is_silent_is_bounded():
+    nearest = NearestSpans(2)
+    for begin in range(0, 100_000, 1000):
+        nearest.add([range(begin, begin + 1000), []], pivot=0)
+    assert sum(map(len, nearest._stamps)) <= 5000  # noqa: SLF001  memory is the promise
+    assert nearest.add([[], [99_998, 99_999]], pivot=1) == [0, 0]

@@ -1,0 +1,253 @@
+"""What is seen of streams: rates, delays, faults, windows; and that memory stays bounded."""
+
+import pytest
+from groups import BEGAN, MS, S
+
+from syncrelay.explain.observation import Observation
+from syncrelay.sync.counts import InputCounts
+from syncrelay.sync.messages import DropReason
+
+
+class Stage:
+    """An observation of inputs, fed second by second as a relay is."""
+
+    def __init__(self, n_inputs=2, *, began=BEGAN, offsets=None, required=None, trigger=None):
+        self.n_inputs = n_inputs
+        self.now = began
+        self.observation = Observation(
+            offsets_ns=offsets or [0] * n_inputs, required=required or [True] * n_inputs, began=began, trigger=trigger
+        )
+        self.fed = [0] * n_inputs
+        self.dropped = [{} for _ in range(n_inputs)]
+        self.sets = 0
+
+    def second(self, *streams, sets=(), dropped=None, length=S):
+        """One look: what came on each input in this second, as (stamp, time of receipt)."""
+        self.now += length
+        arrivals = [*streams, *[[]] * (self.n_inputs - len(streams))]
+        self.fed = [fed + len(came) for fed, came in zip(self.fed, arrivals, strict=True)]
+        self.sets += len(sets)
+        for reason, count in (dropped or {}).items():
+            self.dropped[0][reason] = self.dropped[0].get(reason, 0) + count
+        counts = [InputCounts(fed, 0, dict(gone), 0) for fed, gone in zip(self.fed, self.dropped, strict=True)]
+        self.observation.add(arrivals, sets, counts, self.sets, now=self.now)
+
+    def stream(self, hz, *, delay=2 * MS, shift=0):
+        """The messages of the second to come."""
+        stamps = [self.now + n * S // hz + shift for n in range(hz)]
+        return [(stamp, stamp - shift + delay) for stamp in stamps]
+
+    @property
+    def group(self):
+        return self.observation.figures(now=self.now)[0]
+
+    @property
+    def inputs(self):
+        return self.observation.figures(now=self.now)[1]
+
+
+@pytest.mark.parametrize("hz", [1, 5, 10, 200, 1000])
+def test_the_rate_of_an_input_is_that_of_its_window(hz):
+    stage = Stage()
+    for _ in range(15):
+        stage.second(stage.stream(hz))
+    assert stage.inputs[0].rate_hz == pytest.approx(hz, rel=0.01)
+    assert stage.inputs[0].usual_hz == pytest.approx(hz, rel=0.01)
+
+
+def test_the_rate_of_a_slow_input_is_that_of_its_last_messages():
+    stage = Stage()
+    for second in range(60):
+        stage.second([(stage.now, stage.now)] if second % 6 == 0 else [])
+    assert stage.inputs[0].rate_hz == pytest.approx(1 / 6)
+
+
+def test_an_input_that_is_silent_has_no_rate_but_had_one():
+    stage = Stage()
+    for _ in range(5):
+        stage.second(stage.stream(10))
+    for _ in range(6):
+        stage.second()
+    assert (stage.inputs[0].rate_hz, stage.inputs[0].usual_hz) == (0.0, pytest.approx(10, rel=0.01))
+    assert stage.inputs[0].last_received == BEGAN + 4900 * MS + 2 * MS
+
+
+def test_a_slow_input_is_silent_after_five_periods():
+    stage = Stage()
+    for second in range(51):
+        stage.second([(stage.now, stage.now)] if second % 5 == 0 else [])
+    for _ in range(23):
+        stage.second()
+    assert stage.inputs[0].rate_hz > 0
+    for _ in range(3):
+        stage.second()
+    assert stage.inputs[0].rate_hz == 0
+
+
+def test_one_message_has_no_rate_and_few_no_usual_one():
+    stage = Stage()
+    stage.second([(BEGAN, BEGAN)])
+    assert stage.inputs[0].rate_hz == stage.inputs[0].usual_hz == 0
+    stage.second([(BEGAN + S, BEGAN + S)])
+    assert (stage.inputs[0].rate_hz, stage.inputs[0].usual_hz) == (1.0, 0.0)
+
+
+def test_the_longest_pause_is_that_of_the_last_messages():
+    stage = Stage()
+    stage.second(stage.stream(10))
+    for _ in range(3):
+        stage.second()
+    stage.second(stage.stream(10))
+    assert stage.inputs[0].longest_pause == 3100 * MS
+
+
+def test_the_delay_is_the_median_whatever_an_outlier_does():
+    stage = Stage()
+    stage.second([(BEGAN + n, BEGAN + n + delay * MS) for n, delay in enumerate([4, 4, 5, 6, 900])])
+    assert stage.inputs[0].delay == 5 * MS
+
+
+def test_jitter_is_how_far_periods_are_off_their_median():
+    even, uneven = Stage(), Stage()
+    even.second(even.stream(100))
+    uneven.second([(stamp + n % 2 * MS, at) for n, (stamp, at) in enumerate(uneven.stream(100))])
+    assert even.inputs[0].jitter == 0
+    assert uneven.inputs[0].jitter == 2 * MS
+
+
+def test_stamps_of_zero_tell_nothing_of_a_clock():
+    stage = Stage()
+    stage.second([(0, at) for _, at in stage.stream(10)], stage.stream(10))
+    zero = stage.inputs[0]
+    assert (zero.delay, zero.jitter, zero.duplicates, zero.out_of_order, zero.fell_by) == (None, None, 0, 0, None)
+    stage.second(
+        [(0, at) if n % 2 else (stamp, at) for n, (stamp, at) in enumerate(stage.stream(10))], stage.stream(10)
+    )
+    assert stage.inputs[0].delay == 2 * MS
+    assert stage.inputs[0].fell_by is None
+
+
+def test_stamps_that_repeat_and_fall_a_little_are_counted_while_the_window_lasts():
+    stage = Stage()
+    stage.second([(BEGAN + each * MS, BEGAN + 900 * MS) for each in (500, 500, 600, 550, 590, 700)])
+    assert (stage.inputs[0].duplicates, stage.inputs[0].out_of_order) == (1, 2)
+    for _ in range(10):
+        stage.second(stage.stream(10))
+    assert (stage.inputs[0].duplicates, stage.inputs[0].out_of_order) == (0, 0)
+
+
+def test_a_jump_back_is_told_with_its_length_and_is_no_disorder():
+    stage = Stage()
+    stage.second(stage.stream(10))
+    stage.second([(BEGAN - 2 * S, BEGAN + S)])
+    figures = stage.inputs[0]
+    assert (figures.fell_by, figures.fell_at, figures.out_of_order) == (2900 * MS, BEGAN + S, 0)
+
+
+def test_drops_are_those_of_the_window():
+    stage = Stage()
+    stage.second(stage.stream(10), dropped={DropReason.LATE: 7})
+    stage.second(stage.stream(10), dropped={DropReason.OVERFLOW: 2})
+    assert stage.inputs[0].dropped == {DropReason.OVERFLOW: 2}
+    for _ in range(10):
+        stage.second(stage.stream(10))
+    assert stage.inputs[0].dropped == {}
+
+
+def a_set(stage, *, span=5 * MS, latency=MS, second=True):
+    return (stage.now, stage.now + span if second else None), latency
+
+
+def test_sets_have_a_rate_a_span_with_offsets_and_a_latency():
+    stage = Stage(offsets=[0, -3 * MS])
+    for _ in range(12):
+        stage.second(stage.stream(4), stage.stream(4), sets=[a_set(stage)] * 4)
+    group = stage.group
+    assert (group.sets, group.rate_hz, group.best_hz) == (48, 4.0, 4.0)
+    assert set(group.last_sets) == {(2 * MS, MS)}
+    assert (group.spans.quantile(1), group.latencies.quantile(1), group.last_set) == (2 * MS, MS, stage.now)
+    assert sum(group.span_histogram.counts) == sum(group.latency_histogram.counts) == 48
+
+
+def test_the_best_rate_is_that_of_the_slowest_required_input_or_of_the_trigger():
+    def of(**settings):
+        stage = Stage(3, **settings)
+        for _ in range(11):
+            stage.second(stage.stream(20), stage.stream(10), stage.stream(5))
+        return stage.group.best_hz
+
+    assert of() == 5
+    assert of(required=[True, True, False]) == 10
+    assert of(trigger=0) == 20
+
+
+def test_what_was_missing_is_a_share_of_the_window():
+    stage = Stage(required=[True, False])
+    stage.second(stage.stream(4), sets=[a_set(stage, second=False)] * 100)
+    for _ in range(10):
+        stage.second(stage.stream(4), sets=[*[a_set(stage)] * 3, a_set(stage, second=False)])
+    assert stage.group.missing == (0.0, 0.25)
+
+
+def test_nearest_sets_are_measured_with_offsets_and_since_the_last_set():
+    stage = Stage(offsets=[0, -12 * MS])
+    stage.second(stage.stream(10), stage.stream(10, shift=15 * MS))
+    stage.second(stage.stream(10), stage.stream(10, shift=15 * MS), sets=[a_set(stage)])
+    assert set(stage.group.nearest.values) == {3 * MS}
+    assert len(stage.group.nearest_since) == 0
+    stage.second(stage.stream(10), stage.stream(10, shift=32 * MS))
+    assert stage.group.nearest_since.quantile(1) == 20 * MS
+    assert stage.group.nearest.quantile(0) == 3 * MS
+
+
+def test_the_slowest_input_is_the_one_whose_messages_are_measured():
+    stage = Stage()
+    for _ in range(5):
+        stage.second(stage.stream(100), stage.stream(5, shift=4 * MS))
+    assert len(stage.group.nearest) == pytest.approx(25, abs=2)
+    assert stage.group.nearest.quantile(0.5) == 4 * MS
+
+
+def test_of_a_trigger_the_age_of_what_is_held_is_measured():
+    stage = Stage(trigger=0)
+    for _ in range(3):
+        stage.second(stage.stream(10), stage.stream(10, shift=-40 * MS))
+    assert set(stage.group.nearest.values) == {40 * MS}
+
+
+def test_nothing_is_known_before_the_first_look():
+    stage = Stage()
+    assert (stage.group.sets, stage.group.last_set, len(stage.group.spans)) == (0, None, 0)
+    assert stage.inputs[0].last_received is None
+
+
+def test_a_clock_that_is_set_back_is_borne():
+    stage = Stage()
+    for _ in range(20):
+        stage.second(stage.stream(10), sets=[a_set(stage)])
+    stage.second(length=-3600 * S)
+    group = stage.group
+    assert group.began <= group.now
+    assert group.last_set == group.now
+    for _ in range(20):
+        stage.second(stage.stream(10))
+    assert stage.inputs[0].rate_hz == pytest.approx(10)
+    assert stage.group.now - stage.group.last_set == 20 * S
+
+
+def test_memory_does_not_grow_with_time():
+    stage = Stage()
+
+    def held():
+        observation = stage.observation
+        deques = [observation._looks, observation._sets, observation._nearest]  # noqa: SLF001  memory is the promise
+        for each in observation._inputs:  # noqa: SLF001
+            deques += [each._stamps, each._received, each._delays, each._faults, each._points]  # noqa: SLF001
+        return sum(map(len, deques))
+
+    for _ in range(330):
+        stage.second(stage.stream(10), stage.stream(20), sets=[a_set(stage)] * 10)
+    after_a_while = held()
+    for _ in range(200):
+        stage.second(stage.stream(10), stage.stream(20), sets=[a_set(stage)] * 10)
+    assert held() == after_a_while

@@ -1,0 +1,116 @@
+"""What is worth a line in the log, and when."""
+
+import pytest
+from groups import BEGAN, NOW, S, a_group, an_input
+
+from syncrelay.explain import Code, Finding, GroupFacts, Severity, Silence, find, in_words
+from syncrelay.explain.silence import Remark
+
+DEAD = {"publishers": (), "figures": {"last_received": None, "rate_hz": 0.0}}
+WHO = "nobody publishes /camera (sensor_msgs/msg/Image)"
+WHY = f"{WHO}; start the node that publishes /camera, or correct the topic's name"
+
+
+def at(second: float, *, last_set: float | None, **facts) -> GroupFacts:
+    """A group whose camera is missing, so many seconds after the start."""
+    figures = {"now": BEGAN + round(second * S), "last_set": None if last_set is None else BEGAN + round(last_set * S)}
+    return a_group(an_input("/camera", **DEAD), an_input("/lidar"), figures={**figures, "best_hz": 0.0, **facts})
+
+
+def looked(silence, facts):
+    return list(silence.look(facts, find(facts)))
+
+
+def told(silence, seconds, *, last_set):
+    """At which of these seconds something was said, of sets that left at `last_set(second)`."""
+    return [second for second in seconds if looked(silence, at(second, last_set=last_set(second)))]
+
+
+def test_a_silence_is_said_after_five_seconds_and_then_at_growing_pauses():
+    assert told(Silence(), range(1, 200), last_set=lambda _: None) == [5, 10, 20, 40, 80, 160]
+
+
+def test_no_pause_is_longer_than_ten_minutes():
+    seconds = told(Silence(), range(5, 4000, 5), last_set=lambda _: None)
+    assert seconds[-4:] == [1840, 2440, 3040, 3640]
+
+
+def test_a_silence_is_said_with_its_reason_and_what_to_do():
+    assert looked(Silence(), at(7, last_set=None)) == [
+        Remark(Severity.WARN, f"no set for 7 s: {WHY}", Code.NO_PUBLISHER)
+    ]
+    assert looked(Silence(), at(17, last_set=10))[0].text == f"no more sets for 7 s: {WHY}"
+
+
+def test_its_end_is_said_once():
+    silence = Silence()
+    looked(silence, at(5, last_set=None))
+    assert looked(silence, at(9, last_set=8.9)) == [Remark(Severity.OK, "sets leave again, after 9 s", None)]
+    assert looked(silence, at(10, last_set=9.9)) == []
+
+
+def test_what_was_not_said_has_no_end_to_say():
+    silence = Silence()
+    assert told(silence, [1, 2, 3, 4], last_set=lambda _: None) == []
+    assert looked(silence, at(4.5, last_set=4.4)) == []
+
+
+def test_a_group_that_comes_and_goes_is_not_told_each_time():
+    every_eight = told(Silence(), range(1, 200), last_set=lambda second: second // 8 * 8)
+    assert len(every_eight) <= 12
+
+
+def test_after_a_minute_of_health_a_silence_is_new():
+    silence = Silence()
+    told(silence, range(1, 50), last_set=lambda _: None)
+    told(silence, range(50, 120), last_set=lambda second: second)
+    assert told(silence, range(120, 150), last_set=lambda _: 119) == [124, 129, 139]
+
+
+def test_a_slow_group_is_given_three_periods():
+    silence = Silence()
+    lines = {second: looked(silence, at(second, last_set=0, best_hz=0.1)) for second in range(1, 40)}
+    assert [second for second, said in lines.items() if said and said[0].text.startswith("no more sets")] == [30]
+
+
+def warned(silence, seconds, *findings):
+    facts = [a_group(figures={"now": NOW + second * S, "last_set": NOW + second * S}) for second in seconds]
+    lines = []
+    for second, each in zip(seconds, facts, strict=True):
+        lines += [(second, remark.text) for remark in silence.look(each, findings)]
+    return lines
+
+
+REPEATS = Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat", "look there", 0)
+
+
+def test_a_warning_is_said_once_it_has_lasted():
+    assert warned(Silence(), range(100), REPEATS) == [(5, "stamps repeat; look there")]
+
+
+def test_a_warning_of_each_input_is_said():
+    other = Finding(Code.DUPLICATES, Severity.WARN, "others repeat", None, 1)
+    assert warned(Silence(), range(100), REPEATS, other) == [(5, "stamps repeat; look there"), (5, "others repeat")]
+
+
+def test_a_warning_that_comes_back_within_a_minute_is_not_said_again():
+    silence = Silence()
+    assert len(warned(silence, range(10), REPEATS)) == 1
+    assert warned(silence, range(10, 60)) == []
+    assert warned(silence, range(60, 100), REPEATS) == []
+
+
+def test_a_warning_is_forgotten_after_a_minute():
+    silence = Silence()
+    assert len(warned(silence, range(10), REPEATS)) == 1
+    assert warned(silence, range(10, 71)) == []
+    assert warned(silence, range(71, 100), REPEATS) == [(76, "stamps repeat; look there")]
+
+
+def test_what_is_no_warning_is_never_said():
+    assert warned(Silence(), range(100), Finding(Code.TIME_JUMP, Severity.OK, "fell")) == []
+
+
+@pytest.mark.parametrize(("suggestion", "line"), [(None, "so it is"), ("do this", "so it is; do this")])
+def test_a_finding_is_one_line(suggestion, line):
+    assert in_words(Finding(Code.HEALTHY, Severity.OK, "so it is", suggestion)) == line
