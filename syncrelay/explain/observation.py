@@ -102,8 +102,9 @@ class Observation:
 
     def _slowest(self) -> int:
         """Give the required input of which the fewest came in the window."""
-        first, last = self._looks[0].counts, self._looks[-1].counts
-        return min(self._required, key=lambda index: last[index].fed - first[index].fed)
+        last = self._looks[-1].counts
+        before = [each.fed for each in self._looks[0].counts] if len(self._looks) > 1 else [0] * len(last)
+        return min(self._required, key=lambda index: last[index].fed - before[index])
 
     def _take_sets(self, sets: SentSets, now: int) -> None:
         if not sets:
