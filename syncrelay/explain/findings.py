@@ -83,7 +83,7 @@ def blocks(facts: GroupFacts, an_input: InputFacts) -> Severity:
 
 def counted(count: int, fed: int) -> str:
     """Return `3 of the last 100`, or `all 100`."""
-    return f"all {fed}" if count >= fed else f"{count} of the last {fed}"
+    return f"all {count}" if count >= fed else f"{count} of the last {fed}"
 
 
 def nodes(an_input: InputFacts) -> str:

@@ -35,7 +35,8 @@ class Observation:
         self._required = [index for index, needed in enumerate(required) if needed]
         self._trigger = trigger
         self._inputs = [InputObservation() for _ in offsets_ns]
-        self._looks: deque[_Look] = deque()
+        nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in offsets_ns)
+        self._looks = deque([_Look(began, nothing, 0, 0, (0,) * len(nothing))])
         self._span_histogram, self._latency_histogram = Tallied(), Tallied()
         self._last_set: int | None = None
         self._sets: deque[tuple[int, int]] = deque(maxlen=_LAST_SETS)

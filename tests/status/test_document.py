@@ -1,6 +1,7 @@
 """The state as JSON: all of it, in numbers that JSON has, under the names that `top` and others read."""
 
 import json
+import os
 
 import pytest
 from states import BEGAN, MS, relay, started, working
@@ -33,6 +34,9 @@ def test_what_is_said_of_the_relay():
         "uptime_s": 3.2,
         "receives_by": "rclpy",
         "reloads": 3,
+        "refused_reloads": 0,
+        "reload_error": None,
+        "pid": os.getpid(),
     }
 
 
