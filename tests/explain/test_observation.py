@@ -148,9 +148,11 @@ def test_drops_are_those_of_the_window():
     stage = Stage()
     stage.second(stage.stream(10), dropped={DropReason.LATE: 7})
     stage.second(stage.stream(10), dropped={DropReason.OVERFLOW: 2})
-    assert stage.inputs[0].dropped == {DropReason.OVERFLOW: 2}
-    for _ in range(10):
+    assert stage.inputs[0].dropped == {DropReason.LATE: 7, DropReason.OVERFLOW: 2}
+    for _ in range(9):
         stage.second(stage.stream(10))
+    assert stage.inputs[0].dropped == {DropReason.OVERFLOW: 2}
+    stage.second(stage.stream(10))
     assert stage.inputs[0].dropped == {}
 
 
