@@ -63,7 +63,7 @@ def run(
         stop.wake_with(relay.wake)
         if server is not None:
             server.serve(relay.state)
-            LOGGER.info("status and metrics: http://%s/", server.address)
+            LOGGER.info("status and metrics: http://%s/, `syncrelay top` shows them", server.address)
         if explain_s is not None:
             return explain(relay, explain_s, stop=stop)
         changes = FileChanges(config_path) if watch else None

@@ -14,14 +14,18 @@ class InputFigures:
     """One input; times and durations in nanoseconds, counts over the window.
 
     `usual_hz` is the rate of the last messages while they came, 0 of too few to tell; `longest_pause` the longest
-    time between two of them. `delay` is the median of time of receipt minus stamp, `jitter` the 95th percentile of
-    how far the time between two stamps is off its median; both are None while all stamps are 0. `fell_by` and
-    `fell_at` tell of the last backward jump of its stamps.
+    time between two of them. `pace_hz` is the rate by the median period, `slowed_from_hz` the steady pace that the
+    input had before it fell to less than half of it, None if it has not. `delay` is the median of time of receipt
+    minus stamp, `jitter` the 95th percentile of how far the time between two stamps is off its median; both are None
+    while all stamps are 0. `nearest` holds, of an optional input, the spans of the tightest sets with it, whenever its
+    messages came. `fell_by` and `fell_at` tell of the last backward jump of its stamps.
     """
 
     rate_hz: float = 0.0
     usual_hz: float = 0.0
     longest_pause: int = 0
+    pace_hz: float = 0.0
+    slowed_from_hz: float | None = None
     fed: int = 0
     dropped: Mapping[DropReason, int] = field(default_factory=dict)
     last_received: int | None = None
@@ -30,6 +34,7 @@ class InputFigures:
     drift: Drift | None = None
     duplicates: int = 0
     out_of_order: int = 0
+    nearest: Distribution = NOTHING
     fell_by: int | None = None
     fell_at: int | None = None
 
@@ -40,7 +45,8 @@ class GroupFigures:
 
     `last_sets` are spans and latencies, the newest first. `nearest` holds the span of the tightest set that each
     message of the input that sets the pace could have had, `nearest_since` those measured after the last set;
-    `missing` is the share of the window's sets, 0 to 1, that each input was missing from.
+    `missing` is the share of the window's sets, 0 to 1, that each input was missing from. `resumed` is when the first
+    set left after a silence.
     """
 
     now: int
@@ -49,6 +55,7 @@ class GroupFigures:
     rate_hz: float = 0.0
     best_hz: float = 0.0
     last_set: int | None = None
+    resumed: int | None = None
     last_sets: tuple[tuple[int, int], ...] = ()
     span_histogram: Histogram = EMPTY
     latency_histogram: Histogram = EMPTY

@@ -23,6 +23,7 @@ _RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.time_jump),
     of_each_input(rules_flow.messages_lost),
     rules_flow.too_slow,
+    of_each_input(rules_flow.slowed),
     of_each_input(rules_stamps.out_of_order),
     of_each_input(rules_stamps.duplicates),
     rules_stamps.clock_drift,
@@ -35,10 +36,12 @@ def find(facts: GroupFacts) -> tuple[Finding, ...]:
     found = [finding for rule in _RULES for finding in rule(facts)]
     if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
         found.append(_unexplained(facts))
+    elif any(finding.severity is not Severity.OK for finding in found):
+        pass
     elif facts.figures.last_set is None:
         since = words.seconds(facts.figures.now - facts.figures.began)
         found.append(Finding(Code.STARTING, Severity.OK, f"no set yet, {since} after the start"))
-    elif all(finding.severity is Severity.OK for finding in found):
+    else:
         # Few sets are what other findings come to: it is said where none of them is there.
         found += [*rules_flow.few_sets(facts)] or [_healthy(facts)]
     return tuple(found)

@@ -37,6 +37,7 @@ class Code(Enum):
     TIME_JUMP = "time_jump"
     MESSAGES_LOST = "messages_lost"
     TOO_SLOW = "too_slow"
+    SLOWED = "slowed"
     OUT_OF_ORDER = "out_of_order"
     DUPLICATES = "duplicates"
     CLOCK_DRIFT = "clock_drift"

@@ -1,7 +1,7 @@
 """What is seen of one input over its last messages: rate, delay, jitter, drift, faults of its stamps."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from operator import sub
 from statistics import median_low
 from typing import Final, NamedTuple, TypeAlias
@@ -9,6 +9,7 @@ from typing import Final, NamedTuple, TypeAlias
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.drift import Drift, drift
 from syncrelay.explain.figures import InputFigures
+from syncrelay.explain.pace import Pace
 from syncrelay.sync.messages import DropReason
 
 Arrivals: TypeAlias = Sequence[tuple[int, int]]
@@ -44,6 +45,8 @@ class InputObservation:
         self._stamps: deque[int] = deque(maxlen=_LAST_MESSAGES)
         self._received: deque[int] = deque(maxlen=_LAST_MESSAGES)
         self._longest_pause = 0
+        self._pace = Pace()
+        self._nearest: deque[int] = deque(maxlen=_LAST_MESSAGES)
         self._delays: deque[int] = deque(maxlen=_LAST_MESSAGES)
         self._delay: int | None = None
         self._jitter: int | None = None
@@ -69,11 +72,16 @@ class InputObservation:
         self._faults.append(_Faults(last, duplicates, out_of_order))
         self._received.extend(received for _, received in arrivals)
         self._longest_pause = _greatest_step(self._received)
+        self._pace.look(self._received)
         # A stamp of 0 was never set: it tells nothing of a clock.
         stamped = [arrival for arrival in arrivals if arrival[0]]
         if stamped:
             self._measure(stamped)
         return fallen
+
+    def add_nearest(self, spans: Iterable[int]) -> None:
+        """Take the spans of the tightest sets with this input."""
+        self._nearest.extend(spans)
 
     def figures(self, *, fed: int, dropped: Mapping[DropReason, int], seconds: float, now: int) -> InputFigures:
         """Give the figures; counts are those of the window, which is so many seconds long."""
@@ -83,6 +91,8 @@ class InputObservation:
         return InputFigures(
             rate_hz=rate_hz,
             usual_hz=usual_hz,
+            pace_hz=self._pace.now_hz,
+            slowed_from_hz=self._pace.slowed_from if rate_hz else None,
             longest_pause=self._longest_pause,
             fed=fed,
             dropped=dropped,
@@ -92,6 +102,7 @@ class InputObservation:
             drift=self._drift,
             duplicates=sum(each.duplicates for each in faults),
             out_of_order=sum(each.out_of_order for each in faults),
+            nearest=Distribution(self._nearest),
             fell_by=fell_by,
             fell_at=fell_at,
         )
@@ -102,6 +113,7 @@ class InputObservation:
         self._delays.clear()
         self._received.clear()
         self._faults.clear()
+        self._nearest.clear()
         self._points.clear()
         self._drift = None
 

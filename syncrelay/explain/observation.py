@@ -17,6 +17,7 @@ SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
 
 _SECOND: Final = 1_000_000_000
 _LAST_SETS: Final = 500
+_SILENCE: Final = 5 * _SECOND
 _SHOWN_SETS: Final = 100
 
 
@@ -39,10 +40,16 @@ class Observation:
         self._looks = deque([_Look(began, nothing, 0, 0, (0,) * len(nothing))])
         self._span_histogram, self._latency_histogram = Tallied(), Tallied()
         self._last_set: int | None = None
+        self._resumed: int | None = None
         self._sets: deque[tuple[int, int]] = deque(maxlen=_LAST_SETS)
         self._nearest_spans = NearestSpans(
             len(self._required), measure=tightest_span if trigger is None else greatest_age
         )
+        self._with_optional = {
+            index: NearestSpans(len(self._required) + 1)
+            for index, needed in enumerate(required)
+            if not needed and trigger is None
+        }
         self._nearest: deque[int] = deque(maxlen=_LAST_SETS)
         self._nearest_since: deque[int] = deque(maxlen=_LAST_SETS)
 
@@ -71,6 +78,7 @@ class Observation:
             rate_hz=self._rate_hz(),
             best_hz=min(inputs[index].rate_hz for index in counted),
             last_set=self._last_set,
+            resumed=self._resumed,
             last_sets=tuple(islice(reversed(self._sets), _SHOWN_SETS)),
             span_histogram=self._span_histogram.histogram(),
             latency_histogram=self._latency_histogram.histogram(),
@@ -87,29 +95,40 @@ class Observation:
         self._looks.clear()
         self._began = min(self._began, now)
         self._last_set = None if self._last_set is None else now
+        self._resumed = None if self._resumed is None else now
 
     def _measure_nearest(self, arrivals: Sequence[Arrivals], *, has_jumped: bool) -> None:
         if has_jumped:
-            self._nearest_spans.clear()
             self._nearest_since.clear()
-        elif len(self._required) > 1:
-            pivot = self._slowest() if self._trigger is None else self._trigger
-            shifted = [
-                [stamp + self._offsets[index] for stamp, _ in arrivals[index] if stamp] for index in self._required
-            ]
-            measured = self._nearest_spans.add(shifted, pivot=self._required.index(pivot))
+            for spans in (self._nearest_spans, *self._with_optional.values()):
+                spans.clear()
+            return
+        shifted = [
+            [stamp + offset for stamp, _ in came if stamp] for came, offset in zip(arrivals, self._offsets, strict=True)
+        ]
+        if len(self._required) > 1:
+            pivot = self._slowest(self._required) if self._trigger is None else self._trigger
+            measured = self._nearest_spans.add(
+                [shifted[index] for index in self._required], pivot=self._required.index(pivot)
+            )
             self._nearest.extend(measured)
             self._nearest_since.extend(measured)
+        for optional, spans in self._with_optional.items():
+            among = [*self._required, optional]
+            pivot = among.index(self._slowest(among))
+            self._inputs[optional].add_nearest(spans.add([shifted[index] for index in among], pivot=pivot))
 
-    def _slowest(self) -> int:
-        """Give the required input of which the fewest came in the window."""
+    def _slowest(self, among: Sequence[int]) -> int:
+        """Give the input of these of which the fewest came in the window."""
         last = self._looks[-1].counts
         before = [each.fed for each in self._looks[0].counts] if len(self._looks) > 1 else [0] * len(last)
-        return min(self._required, key=lambda index: last[index].fed - before[index])
+        return min(among, key=lambda index: last[index].fed - before[index])
 
     def _take_sets(self, sets: SentSets, now: int) -> None:
         if not sets:
             return
+        if self._last_set is None or now - self._last_set >= _SILENCE:
+            self._resumed = now
         self._last_set = now
         self._nearest_since.clear()
         spans = [self._span(stamps) for stamps, _ in sets]

@@ -1,13 +1,16 @@
 """Findings about the flow: queues, waiting, losses, how many of the possible sets leave."""
 
+from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted
+from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted, nodes
+from syncrelay.explain.rules_stamps import other_clock
 from syncrelay.sync.messages import DropReason
 
 _MISSING: Final = 0.05
+_FEWEST: Final = 5
 _TOO_SLOW: Final = 500_000_000
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
 _FEW: Final = 0.8
@@ -33,6 +36,8 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         return
     if not facts.is_silent and facts.figures.rate_hz >= _NEARLY_ALL * facts.possible_hz:
         return
+    if next(other_clock(facts), None):
+        return  # what waits for a partner of another clock overflows any queue
     yield Finding(
         Code.SHORT_QUEUE,
         Severity.ERROR if facts.is_silent else Severity.WARN,
@@ -49,14 +54,46 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     if an_input.required or missing <= _MISSING or not facts.figures.rate_hz:
         return
     waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
-    longer = "" if facts.max_wait is None else ", or write a larger `max_wait`"
+    why, what_helps = _why_without(facts, an_input)
     yield Finding(
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
-        f"{words.share(missing)} of the sets leave without {an_input.name}{waits}",
-        f"see why {an_input.name} does not come in time{longer}",
+        f"{words.share(missing)} of the sets leave without {an_input.name}{waits}{why}",
+        what_helps,
         index,
     )
+
+
+def _why_without(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str]:
+    """Tell stamps that fit no set from messages that come after theirs has left."""
+    name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
+    if tolerance is None or not an_input.figures.rate_hz or len(nearest) < _FEWEST:
+        longer = "" if facts.max_wait is None else ", or write a larger `max_wait`"
+        return "", f"see why {name} does not come in time{longer}"
+    behind = _behind(facts, an_input)
+    if abs(behind) > max(SECOND, tolerance.ns):
+        side = "behind" if behind > 0 else "ahead of"
+        return (
+            f": its stamps are {words.duration(abs(behind))} {side} those of the others",
+            f"synchronize their clocks, or write `offset: {words.exactly(behind + an_input.offset)}` at {name}",
+        )
+    if nearest.quantile(0.5) > tolerance.ns:
+        widths = f"{words.duration(nearest.quantile(0))} to {words.duration(nearest.quantile(0.95))}"
+        return (
+            f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
+            f"write `{tolerance.key}: {words.at_least(nearest.quantile(0.99))}`, which would take in 99 %",
+        )
+    later = f", {words.duration(behind)} after the others," if behind > 0 else ""
+    return f": it comes{later} too late", f"write a larger `max_wait`, or see what holds {name} up"
+
+
+def _behind(facts: GroupFacts, an_input: InputFacts) -> int:
+    """Return how much later after its stamp a message comes than those of the required inputs, in nanoseconds."""
+    delays = [
+        each.figures.delay - each.offset for each in facts.inputs if each.required and each.figures.delay is not None
+    ]
+    own = an_input.figures.delay
+    return own - an_input.offset - median_low(delays) if own is not None and delays else 0
 
 
 def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -66,9 +103,8 @@ def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found
         yield Finding(
             Code.MESSAGES_LOST,
             Severity.WARN,
-            f"DDS lost {messages} of {an_input.name} on their way here in the last 10 s",
-            f"look at the network and the load; if its publisher offers it, `qos: {{reliability: reliable}}` at"
-            f" {an_input.name} asks again for what is lost",
+            f"DDS lost {messages} of {an_input.name} on the way here in the last 10 s",
+            f"look at the network and the load; what {nodes(an_input)} offers as reliable, `qos: auto` asks for again",
             index,
         )
 
@@ -84,10 +120,25 @@ def too_slow(facts: GroupFacts) -> Found:
         )
 
 
+def slowed(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find an input that comes at less than half of the rate that it always had."""
+    figures = an_input.figures
+    if figures.slowed_from_hz is not None:
+        yield Finding(
+            Code.SLOWED,
+            Severity.WARN,
+            f"{an_input.name} comes at {words.rate(figures.pace_hz)}, it came at {words.rate(figures.slowed_from_hz)}",
+            f"look at {nodes(an_input)}: its settings, its load, and the network on the way",
+            index,
+        )
+
+
 def few_sets(facts: GroupFacts) -> Found:
     """Find that far fewer sets leave than the input that sets the pace would allow."""
     figures = facts.figures
-    if facts.is_silent or figures.last_set is None or figures.now - figures.began < _WATCHED:
+    # The window's rate counts a silence that is over.
+    since = max(figures.began, figures.resumed or 0)
+    if facts.is_silent or figures.last_set is None or figures.now - since < _WATCHED:
         return
     if facts.possible_hz * _WATCHED < _POSSIBLE * SECOND or figures.rate_hz >= _FEW * facts.possible_hz:
         return

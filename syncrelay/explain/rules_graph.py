@@ -9,6 +9,8 @@ from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, b
 # Discovery takes this long.
 _GRACE: Final = 2 * SECOND
 _NO_MESSAGE: Final = 5 * SECOND
+# Fast DDS's lease: for so long one that was killed is still in the graph.
+_LEASE: Final = 20 * SECOND
 # A pause that is so many times the longest before it is news.
 _PAUSES: Final = 3
 
@@ -103,9 +105,13 @@ def silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             Code.SILENT,
             blocks(facts, an_input),
             f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
-            f"look at {node}, which still publishes it{_or_hold_longer(facts, index)}",
+            f"look at {node}, which {_is_there(quiet)}{_or_hold_longer(facts, index)}",
             index,
         )
+
+
+def _is_there(quiet: int) -> str:
+    return "still publishes it" if quiet > _LEASE else "publishes it, or died: the graph shows a dead node for 20 s"
 
 
 def _is_enough(facts: GroupFacts, an_input: InputFacts) -> bool:

@@ -13,6 +13,8 @@ _LONGEST_PAUSE: Final = 600 * _SECOND
 # A warning has to last this long to be worth a line, and to be gone this long to be worth another.
 _LASTING: Final = 5 * _SECOND
 _FORGOTTEN: Final = 60 * _SECOND
+# It is over when it has been gone for this long.
+_OVER: Final = 10 * _SECOND
 
 
 class Remark(NamedTuple):
@@ -69,18 +71,23 @@ class Silence:
             warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
             if now - warning.seen > _FORGOTTEN:
                 warning.began, warning.told = now, False
-            warning.seen = now
+            warning.seen, warning.text = now, finding.text
             if not warning.told and now - warning.began >= _LASTING:
-                warning.told = True
+                warning.told = warning.holds = True
                 yield Remark(Severity.WARN, in_words(finding), finding.code)
+        for (code, _), warning in self._warned.items():
+            if warning.holds and now - warning.seen >= _OVER:
+                warning.holds = False
+                yield Remark(Severity.OK, f"over for {words.seconds(now - warning.seen)}: {warning.text}", code)
 
 
 class _Warning:
-    """Since when something is so, when it was last, and whether it has been said."""
+    """Since when something is so, when it was last, in which words, whether it has been said, and no end of it yet."""
 
     def __init__(self, now: int) -> None:
         self.began = self.seen = now
-        self.told = False
+        self.told = self.holds = False
+        self.text = ""
 
 
 def in_words(finding: Finding) -> str:

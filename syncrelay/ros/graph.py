@@ -14,6 +14,8 @@ _LIVELINESS: Final = {
     QoSLivelinessPolicy.AUTOMATIC: "automatic",
     QoSLivelinessPolicy.MANUAL_BY_TOPIC: "manual_by_topic",
 }
+# What rmw_dds_common has in the place of a name that did not arrive.
+_NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 # In a namespace of its own a sensor has the same last words.
 _ALIKE: Final = 0.5
 
@@ -55,6 +57,8 @@ def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None
 
 
 def _node(info: Any) -> str:
+    if info.node_name == _NAMELESS:
+        return "a node of unknown name"
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 

@@ -28,8 +28,10 @@ _LOG = logging.getLogger("syncrelay")
 _LEVELS: Final = {Severity.OK: logging.INFO, Severity.WARN: logging.WARNING, Severity.ERROR: logging.ERROR}
 
 LOOK_S: Final = 1.0
-# Lost messages are told as those of the last ten looks.
-_LOSS_LOOKS: Final = 10
+# What was lost, and what had to wait, is told as that of the last ten looks.
+_LAST_LOOKS: Final = 10
+# So long after a publisher was found its first messages are here.
+_SETTLING_LOOKS: Final = 2
 # Who listens to the outputs changes rarely, and asking costs as much as all the rest.
 _SUBSCRIBERS_EVERY: Final = 5
 # A /clock at 1 Hz stands still for a second between two ticks.
@@ -60,9 +62,11 @@ class Monitor:
         self._clock = _ClockWatch(node) if simulated else None
         self._wirings: Sequence[Wiring] = ()
         self._watched: dict[GroupRelay, _Watched] = {}
-        self._losses: dict[TopicInput, deque[int]] = {}
+        self._losses: dict[TopicInput, _Losses] = {}
         self._subscribers: dict[tuple[str, int], Any] = {}
         self._looks = 0
+        self._waits: deque[int] = deque(maxlen=_LAST_LOOKS)
+        self._overslept = 0
         self.watch(wirings)
 
     def watch(self, wirings: Sequence[Wiring]) -> None:
@@ -75,23 +79,29 @@ class Monitor:
             for wiring in wirings
         }
         inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
-        self._losses = {each: self._losses.get(each) or deque([0], maxlen=_LOSS_LOOKS) for each in inputs}
+        self._losses = {each: self._losses.get(each) or _Losses() for each in inputs}
         self._subscribers.clear()
+
+    def overslept(self, seconds: float) -> None:
+        """Hear by how much a rest was longer than it should be: what kept this thread kept all messages waiting."""
+        self._overslept = max(self._overslept, round(seconds * 1e9))
 
     def look(self) -> None:
         """Gather, find, log. Raises CancelledError where the receive loop has ended."""
         waited, seen = self._loop.call(self._gather).result()
         now = time.time_ns()
+        self._waits.append(max(waited, self._overslept))
+        self._overslept = 0
         stopped = self._clock.stopped_for(now) if self._clock else None
         for topic_input, losses in self._losses.items():
-            losses.append(topic_input.lost())
+            losses.look(topic_input)
         reports = []
         for wiring, gathered in zip(self._wirings, seen, strict=True):
             watch, silence = self._watched[wiring.group]
             batch = gathered.batch
             watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
             shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
-            facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=waited)
+            facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=max(self._waits))
             findings = find(facts)
             reports.append(GroupReport(facts, findings, gathered.recent))
             for remark in silence.look(facts, findings):
@@ -112,7 +122,6 @@ class Monitor:
         key = (group.config.name, index)
         if self._looks % _SUBSCRIBERS_EVERY == 0 or key not in self._subscribers:
             self._subscribers[key] = topic_input.subscribers(group, index)
-        losses = self._losses[topic_input]
         return InputGraph(
             name=topic_input.name,
             output=self._node.resolve_topic_name(group.config.topics[index].output),
@@ -120,7 +129,7 @@ class Monitor:
             subscribers=self._subscribers[key],
             alike=() if topic_input.publishers else self._alike(topic_input),
             not_importable=topic_input.not_importable,
-            lost=losses[-1] - losses[0],
+            lost=self._losses[topic_input].lately,
         )
 
     def _alike(self, topic_input: TopicInput) -> tuple[str, ...]:
@@ -131,6 +140,31 @@ class Monitor:
             (name, types) for name, types in topics if name not in outputs and self._node.count_publishers(name)
         ]
         return topics_alike(topic_input.name, topic_input.type, published)
+
+
+class _Losses:
+    """What DDS lost of a topic. Whoever begins to publish is heard from the middle on: that is no loss."""
+
+    def __init__(self) -> None:
+        self._counts: deque[int] = deque(maxlen=_LAST_LOOKS)
+        self._publishers = 0
+        self._unsettled = 0
+
+    def look(self, topic_input: TopicInput) -> None:
+        """Take the count of now."""
+        count, publishers = topic_input.lost(), len(topic_input.publishers)
+        if publishers > self._publishers or (self._counts and count < self._counts[-1]):
+            self._unsettled = _SETTLING_LOOKS
+        if self._unsettled:
+            self._unsettled -= 1
+            self._counts.clear()
+        self._publishers = publishers
+        self._counts.append(count)
+
+    @property
+    def lately(self) -> int:
+        """How many were lost in the last ten looks."""
+        return self._counts[-1] - self._counts[0] if self._counts else 0
 
 
 class _ClockWatch:

@@ -176,8 +176,10 @@ class Relay:
             self.look()
         is_waiting = any(wiring.waiting_for for wiring in self._wirings.all)
         until_look = max(0.0, self._next_look - time.monotonic())
-        self._wake.wait(min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S))
+        rest_s, began = min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
+        self._wake.wait(rest_s)
         self._wake.clear()
+        self.monitor.overslept(time.monotonic() - began - rest_s)
 
     def look(self) -> tuple[GroupReport, ...]:
         """Look at all groups now, tell of it, and give what there is to say."""

@@ -39,6 +39,11 @@ def wide(*spans_ms, **figures):
     return {"nearest": spans, "nearest_since": spans, **figures}
 
 
+def without_camera(**figures):
+    inputs = camera(required=False, figures=figures), LIDAR, an_input("/imu")
+    return a_group(*inputs, figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS)
+
+
 def drifting(slope, *, watched=60 * S, bend=0.0):
     return camera(figures={"drift": Drift(slope, bend, watched)})
 
@@ -122,6 +127,13 @@ FOUND = {
         Severity.ERROR,
         a_silent_group(camera(figures=QUIET), LIDAR),
         "/camera has been silent for 7 s; until then it came at 10 Hz",
+        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+    ),
+    "nothing came for long": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures={**QUIET, "last_received": NOW - 21 * S}), LIDAR),
+        "/camera has been silent for 21 s; until then it came at 10 Hz",
         "look at /usb_cam, which still publishes it",
     ),
     "nothing of what is held comes any more, which always came": (
@@ -129,13 +141,13 @@ FOUND = {
         Severity.WARN,
         a_group(camera(figures=QUIET), LIDAR, **AGES),
         "/camera has been silent for 7 s; until then it came at 10 Hz",
-        "look at /usb_cam, which still publishes it",
+        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
     ),
     "what was sent once is too old": (
         Code.SILENT,
         Severity.ERROR,
-        a_silent_group(camera(figures=ONCE), LIDAR, **HALF_A_SECOND),
-        "/camera has been silent for 7 s",
+        a_silent_group(camera(figures={**ONCE, "last_received": NOW - 60 * S}), LIDAR, **HALF_A_SECOND),
+        "/camera has been silent for 60 s",
         (
             "look at /usb_cam, which still publishes it; if it is sent that rarely by design, write a larger `max_age`"
             " than 500 ms, or none"
@@ -274,6 +286,36 @@ FOUND = {
         "100 % of the sets leave without /camera after waiting 100 ms for it",
         "see why /camera does not come in time, or write a larger `max_wait`",
     ),
+    "an optional input whose stamps fit no set": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=45 * MS, nearest=Distribution([40 * MS] * 99 + [63 * MS])),
+        (
+            "100 % of the sets leave without /camera after waiting 100 ms for it: the nearest sets with it span 40 ms"
+            " to 40 ms, over slop 20 ms"
+        ),
+        "write `slop: 40ms`, which would take in 99 %",
+    ),
+    "an optional input of another clock": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=37_205 * MS, nearest=Distribution([40 * MS] * 100)),
+        (
+            "100 % of the sets leave without /camera after waiting 100 ms for it: its stamps are 37.2 s behind those of"
+            " the others"
+        ),
+        "synchronize their clocks, or write `offset: 37.2s` at /camera",
+    ),
+    "an optional input that comes late": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100)),
+        (
+            "100 % of the sets leave without /camera after waiting 100 ms for it: it comes, 300 ms after the others,"
+            " too late"
+        ),
+        "write a larger `max_wait`, or see what holds /camera up",
+    ),
     "stamps that fell": (
         Code.TIME_JUMP,
         Severity.OK,
@@ -285,11 +327,8 @@ FOUND = {
         Code.MESSAGES_LOST,
         Severity.WARN,
         a_group(camera(lost=1), LIDAR),
-        "DDS lost 1 message of /camera on their way here in the last 10 s",
-        (
-            "look at the network and the load; if its publisher offers it, `qos: {reliability: reliable}` at /camera"
-            " asks again for what is lost"
-        ),
+        "DDS lost 1 message of /camera on the way here in the last 10 s",
+        "look at the network and the load; what /usb_cam offers as reliable, `qos: auto` asks for again",
     ),
     "a relay that does not keep up": (
         Code.TOO_SLOW,
@@ -297,6 +336,13 @@ FOUND = {
         a_group(waited=700 * MS),
         "messages lay here for 700 ms before the relay came to them",
         "give it more CPU, or spread the groups over several relays with --group",
+    ),
+    "an input that comes at a tenth of its rate": (
+        Code.SLOWED,
+        Severity.WARN,
+        a_group(camera(figures={"pace_hz": 1.0, "slowed_from_hz": 10.0}), LIDAR),
+        "/camera comes at 1 Hz, it came at 10 Hz",
+        "look at /usb_cam: its settings, its load, and the network on the way",
     ),
     "disorder": (
         Code.OUT_OF_ORDER,
@@ -433,6 +479,10 @@ QUIETLY = {
     ),
     "an overflow of what nobody missed": (Code.SHORT_QUEUE, a_silent_group(overflowing(None), LIDAR)),
     "a queue that was long enough": (Code.SHORT_QUEUE, a_silent_group(overflowing(10), LIDAR)),
+    "an overflow beside a stream of another clock": (
+        Code.SHORT_QUEUE,
+        a_silent_group(overflowing(40), an_input("/lidar", figures={"delay": 37 * S})),
+    ),
     "an overflow while all sets leave": (Code.SHORT_QUEUE, a_group(overflowing(40), LIDAR)),
     "an overflow long ago": (
         Code.SHORT_QUEUE,
@@ -466,6 +516,14 @@ QUIETLY = {
     ),
     "four of five possible sets": (Code.FEW_SETS, a_group(figures={"rate_hz": 8.0})),
     "few sets in the first ten seconds": (Code.FEW_SETS, a_group(figures={"rate_hz": 4.0, "began": NOW - 9 * S})),
+    "few sets in the window of a silence": (
+        Code.FEW_SETS,
+        a_group(figures={"rate_hz": 4.0, "resumed": NOW - 9 * S}),
+    ),
+    "no set yet where something is wrong": (
+        Code.STARTING,
+        a_group(camera(not_importable="no package"), LIDAR, figures={"began": NOW - 3 * S, "last_set": None}),
+    ),
     "few sets because they are thinned": (Code.FEW_SETS, a_group(figures={"rate_hz": 2.0}, every=5)),
     "few sets at a greatest rate": (Code.FEW_SETS, a_group(figures={"rate_hz": 2.0}, least_period=500 * MS)),
     "few sets where few are possible": (Code.FEW_SETS, a_group(figures={"rate_hz": 0.1, "best_hz": 0.9})),

@@ -156,6 +156,50 @@ def test_drops_are_those_of_the_window():
     assert stage.inputs[0].dropped == {}
 
 
+def test_an_input_that_falls_to_a_tenth_of_its_pace_has_slowed_until_it_is_back():
+    stage = Stage()
+    for _ in range(20):
+        stage.second(stage.stream(20))
+    assert (stage.inputs[0].pace_hz, stage.inputs[0].slowed_from_hz) == (pytest.approx(20), None)
+    for _ in range(8):
+        stage.second(stage.stream(2))
+    assert (stage.inputs[0].pace_hz, stage.inputs[0].slowed_from_hz) == (pytest.approx(2), pytest.approx(20))
+    for _ in range(300):
+        stage.second(stage.stream(2))
+    assert stage.inputs[0].slowed_from_hz == pytest.approx(20)
+    for _ in range(2):
+        stage.second(stage.stream(20))
+    assert stage.inputs[0].slowed_from_hz is None
+
+
+def test_a_pause_does_not_slow_an_input():
+    stage = Stage()
+    for _ in range(20):
+        stage.second(stage.stream(20))
+    for _ in range(30):
+        stage.second()
+    for _ in range(3):
+        stage.second(stage.stream(20))
+        assert stage.inputs[0].slowed_from_hz is None
+
+
+def test_an_input_whose_rate_varies_has_none_to_fall_from():
+    stage = Stage()
+    for hz in (5, 10, 20, 40) * 10:
+        stage.second(stage.stream(hz))
+    for _ in range(30):
+        stage.second(stage.stream(2))
+    assert stage.inputs[0].slowed_from_hz is None
+
+
+def test_the_nearest_sets_with_an_optional_input_are_measured_whenever_it_comes():
+    stage = Stage(3, required=[True, True, False])
+    for _ in range(10):
+        stage.second(stage.stream(10), stage.stream(10, shift=4 * MS), stage.stream(10, shift=-30 * MS, delay=500 * MS))
+    assert set(stage.inputs[2].nearest.values) == {34 * MS}
+    assert not len(stage.inputs[0].nearest)
+
+
 def a_set(stage, *, span=5 * MS, latency=MS, second=True):
     return (stage.now, stage.now + span if second else None), latency
 

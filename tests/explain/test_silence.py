@@ -96,14 +96,27 @@ def test_a_warning_of_each_input_is_said():
 def test_a_warning_that_comes_back_within_a_minute_is_not_said_again():
     silence = Silence()
     assert len(warned(silence, range(10), REPEATS)) == 1
-    assert warned(silence, range(10, 60)) == []
+    assert warned(silence, range(10, 60)) == [(19, "over for 10 s: stamps repeat")]
     assert warned(silence, range(60, 100), REPEATS) == []
+
+
+def test_the_end_of_a_warning_is_said_once_in_its_last_words():
+    silence = Silence()
+    warned(silence, range(10), REPEATS)
+    warned(silence, [10], Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat still", None, 0))
+    assert warned(silence, range(11, 40)) == [(20, "over for 10 s: stamps repeat still")]
+
+
+def test_what_did_not_last_has_no_end_to_say():
+    silence = Silence()
+    warned(silence, range(3), REPEATS)
+    assert warned(silence, range(3, 40)) == []
 
 
 def test_a_warning_is_forgotten_after_a_minute():
     silence = Silence()
     assert len(warned(silence, range(10), REPEATS)) == 1
-    assert warned(silence, range(10, 71)) == []
+    assert len(warned(silence, range(10, 71))) == 1
     assert warned(silence, range(71, 100), REPEATS) == [(76, "stamps repeat; look there")]
 
 

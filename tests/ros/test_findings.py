@@ -128,7 +128,7 @@ def test_a_topic_that_falls_silent_and_comes_back_is_told(stage: Stage):
     assert_logged(
         relay,
         r"no more sets for [\d.]+ s: /lidar has been silent for [\d.]+ s; until then it came at [\d.]+ Hz;"
-        r" look at /ouster, which still publishes it\n",
+        r" look at /ouster, which publishes it, or died: the graph shows a dead node for 20 s\n",
     )
     lidar.finish()
     lidar.start(stream("/lidar", hz=10), speed=1)
@@ -226,6 +226,48 @@ def test_sets_that_leave_without_an_optional_input_are_told(stage: Stage):
         r"\[WARN\] .* front: 100 % of the sets leave without /imu after waiting 100 ms for it; see why /imu does not"
         r" come in time, or write a larger `max_wait`\n",
     )
+
+
+def test_an_optional_input_whose_stamps_fit_no_set_is_told_with_the_slop_that_would_do(stage: Stage):
+    topics = [*inputs(PAIR), *inputs({"/imu": VECTOR}, required=False)]
+    relay = stage.relay(front(topics, max_wait="100ms"))
+    play(
+        stage, merged(stream("/camera", hz=10), stream("/lidar", hz=10), stream("/imu", hz=10, late_ms=3, shift_ms=-37))
+    )
+    assert_logged(
+        relay,
+        r"\[WARN\] .* front: 100 % of the sets leave without /imu after waiting 100 ms for it: the nearest sets with it"
+        r" span 37 ms to 37 ms, over slop 20 ms; write `slop: 40ms`, which would take in 99 %\n",
+    )
+
+
+def test_an_input_that_slows_down_is_told_and_its_recovery_too(stage: Stage):
+    relay = stage.relay(front(BY_RECEIPT, slop="500ms"))
+    play(stage, stream("/lidar", hz=20))
+    usb_cam = stage.player({"/camera": VECTOR}, node="usb_cam")
+    usb_cam.match()
+    usb_cam.play(stream("/camera", hz=20, last_ms=13_000), speed=1)
+    usb_cam.start(stream("/camera", hz=2, last_ms=16_000), speed=1)
+    assert_logged(
+        relay,
+        r"\[WARN\] .* front: /camera comes at 2(\.\d+)? Hz, it came at (20|19\.\d|20\.\d) Hz; look at /usb_cam: its"
+        r" settings, its load, and the network on the way\n",
+    )
+    usb_cam.finish()
+    usb_cam.start(stream("/camera", hz=20, last_ms=25_000), speed=1)
+    assert_logged(relay, r"\[INFO\] .* front: over for [\d.]+ s: /camera comes at 2(\.\d+)? Hz, it came at ")
+
+
+def test_a_relay_that_stood_still_is_told(stage: Stage):
+    relay = stage.relay(front())
+    collector = stage.collector({"/camera": VECTOR})
+    play(stage, merged(stream("/camera", hz=10), stream("/lidar", hz=10)))
+    wait_for_finding(relay, "healthy")
+    relay.send(signal.SIGSTOP)
+    collector.wait_for("/camera", collector.count("/camera") + 30)
+    relay.send(signal.SIGCONT)
+    finding = wait_for_finding(relay, "too_slow")
+    assert re.fullmatch(r"messages lay here for [\d.]+ s before the relay came to them", finding["text"])
 
 
 def test_a_recording_that_is_looped_is_told_without_blame(stage: Stage):
@@ -360,7 +402,7 @@ def test_messages_that_dds_lost_are_told(stage: Stage):
     collector.wait_for("/camera", sent + 500)
     relay.send(signal.SIGCONT)
     finding = wait_for_finding(relay, "messages_lost")
-    assert re.fullmatch(r"DDS lost \d+ messages of /camera on their way here in the last 10 s", finding["text"])
+    assert re.fullmatch(r"DDS lost \d+ messages of /camera on the way here in the last 10 s", finding["text"])
 
 
 def test_a_relay_that_cannot_keep_up_is_told(stage: Stage):

@@ -1,0 +1,46 @@
+"""How fast an input comes, and how fast it used to: a sensor that has slowed down does not pass for well."""
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import median
+from typing import Final
+
+_SECOND: Final = 1_000_000_000
+# The median of so many periods is the pace of now: neither a pause nor a burst changes it.
+_PERIODS: Final = 20
+_LOOKS: Final = 120
+_FEWEST_LOOKS: Final = 10
+# What varies by more than this share of its median has no pace to fall from.
+_STEADY: Final = 0.25
+_SLOWED: Final = 0.5
+
+
+class Pace:
+    """The pace of one input, look by look. Remembers a steady one while the input is slower than that."""
+
+    def __init__(self) -> None:
+        self.now_hz = 0.0
+        """The pace of the last messages, 0 of too few to tell."""
+        self._looks: deque[float] = deque(maxlen=_LOOKS)
+
+    def look(self, received: Sequence[int]) -> None:
+        """Take the times of receipt of the last messages, in nanoseconds."""
+        last = list(received)[-_PERIODS - 1 :]
+        if len(last) <= _PERIODS:
+            self.now_hz = 0.0
+            return
+        period = median(after - before for before, after in pairwise(last))
+        self.now_hz = _SECOND / period if period > 0 else 0.0
+        if self.now_hz and self.slowed_from is None:
+            self._looks.append(self.now_hz)
+
+    @property
+    def slowed_from(self) -> float | None:
+        """The steady pace that it had before it fell to less than half of it, None if it has not."""
+        if not self.now_hz or len(self._looks) < _FEWEST_LOOKS:
+            return None
+        usual = median(self._looks)
+        if max(self._looks) - min(self._looks) > 2 * _STEADY * usual:
+            return None
+        return usual if self.now_hz < _SLOWED * usual else None
