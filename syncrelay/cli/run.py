@@ -36,12 +36,15 @@ def run(
     Raises ConfigError for a faulty file, UsageError for a group that it lacks, RosUnavailableError where ROS
     cannot be used.
     """
-    from syncrelay.config import Severity, load
+    from syncrelay.config import Severity, load, where
     from syncrelay.ros.environment import require_rclpy
     from syncrelay.ros.logs import LOGGER, configure
 
     configure(log_level, log_format)
     config = load(config_path, package_missing=Severity.NOTE)
+    for note in config.notes:
+        if note.code == "unit":
+            LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)
     _require_groups(groups, [group.name for group in config.groups], config_path)
     require_rclpy()
     from syncrelay.cli.explain import explain

@@ -6,7 +6,7 @@ from syncrelay.config.load import load, load_text
 from syncrelay.config.models import DiagnosticsConfig, NodeConfig, StampField, StampSource, Transport
 from syncrelay.config.problems import Problem, Severity, Span
 from syncrelay.config.qos import AUTO, QosOverrides, QosPreset
-from syncrelay.config.render import render
+from syncrelay.config.render import render, where
 from syncrelay.config.resolved import Config, GroupConfig, TopicConfig
 
 __all__ = [
@@ -29,4 +29,5 @@ __all__ = [
     "load",
     "load_text",
     "render",
+    "where",
 ]

@@ -1,11 +1,13 @@
 """What single keys can't tell: names that meet, topics that groups share, a restamp that names no input."""
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
-from syncrelay.config.document import Document, MappingNode, SequenceNode
+from syncrelay.config.document import Document, MappingNode, ScalarNode, SequenceNode, plain
 from syncrelay.config.drafts import GroupDraft, TopicDraft
 from syncrelay.config.names import LONGEST_TOPIC
-from syncrelay.config.problems import Path, Problem
+from syncrelay.config.problems import Path, Problem, Severity
 from syncrelay.config.wording import did_you_mean, quoted
 
 _RESTAMP_WORDS = ("none", "earliest", "latest")
@@ -20,6 +22,7 @@ def check_between(groups: Sequence[GroupDraft], document: Document) -> Iterator[
         yield from _trigger(group, document)
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
+        yield from _unit(group, document)
     yield from _shared_topics(groups, document)
     yield from _outputs(groups, document)
     yield from _too_long(groups, document)
@@ -86,6 +89,17 @@ def _optional_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]
     if optional and group.needs_max_wait:
         text = "an optional input needs the group's `max_wait`: how long a set waits for it, for example 100ms"
         yield _at(document, (*optional[0].path, "required"), text, code="missing")
+
+
+def _unit(group: GroupDraft, document: Document) -> Iterator[Problem]:
+    """Yield a slop of whole seconds that is written without a unit: milliseconds are what people mean."""
+    path = (*group.path, "slop")
+    node = document.find(path)
+    slop = plain(node) if isinstance(node, ScalarNode) else None
+    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop < math.inf:
+        text = f"{slop:g} without a unit is {slop:g} s; write {slop:g}ms if milliseconds are meant, else {slop:g}s"
+        problem = _at(document, path, text, code="unit")
+        yield replace(problem, severity=Severity.NOTE)
 
 
 def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:

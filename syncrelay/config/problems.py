@@ -15,7 +15,7 @@ _PLAIN_KEY = re.compile(r"[A-Za-z_][\w-]*")
 
 
 class Severity(Enum):
-    """An error refuses the file; a note says what could not be checked."""
+    """An error refuses the file; a note says what could not be checked, or is hardly meant."""
 
     ERROR = "error"
     NOTE = "note"

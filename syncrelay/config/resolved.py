@@ -64,7 +64,7 @@ class GroupConfig:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """A file that is in order. `notes` say what could not be checked.
+    """A file that is in order. `notes` say what could not be checked, or is hardly meant.
 
     `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published.
     """

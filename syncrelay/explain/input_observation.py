@@ -45,6 +45,7 @@ class InputObservation:
         self._stamps: deque[int] = deque(maxlen=_LAST_MESSAGES)
         self._received: deque[int] = deque(maxlen=_LAST_MESSAGES)
         self._longest_pause = 0
+        self._first: int | None = None
         self._pace = Pace()
         self._nearest: deque[int] = deque(maxlen=_LAST_MESSAGES)
         self._delays: deque[int] = deque(maxlen=_LAST_MESSAGES)
@@ -64,6 +65,8 @@ class InputObservation:
         last = arrivals[-1][1]
         if self._received and last < self._received[-1]:
             self._forget()
+        if self._first is None or last < self._first:
+            self._first = arrivals[0][1]
         duplicates, out_of_order, fallen = self._judge(arrivals)
         if fallen:
             self._forget()
@@ -159,7 +162,12 @@ class InputObservation:
         usual = mean if len(times) >= _RATE_FROM else 0.0
         if (now - times[-1]) * mean > _SILENT_PERIODS * _SECOND and now - times[-1] > _SILENT_NS:
             return 0.0, usual
-        return (fed / seconds if fed >= _RATE_FROM and seconds > 0 else mean), usual
+        if fed < _RATE_FROM or seconds <= 0:
+            return mean, usual
+        if self._first is not None and now - self._first < seconds * _SECOND and times[-1] > self._first:
+            # It began within the window and has not had all of it.
+            return (fed - 1) * _SECOND / (times[-1] - self._first), usual
+        return fed / seconds, usual
 
 
 def _greatest_step(times: Sequence[int]) -> int:

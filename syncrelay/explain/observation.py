@@ -145,6 +145,8 @@ class Observation:
         if not self._looks:
             return 0.0
         first, last = self._looks[0], self._looks[-1]
+        if self._resumed is not None and first.at < self._resumed < last.at:
+            first = next(look for look in self._looks if look.at >= self._resumed)
         return (last.sets - first.sets) * _SECOND / max(1, last.at - first.at)
 
     def _missing(self, now: int) -> tuple[float, ...]:

@@ -1,7 +1,9 @@
 """What must be so before rclpy is imported, and what to say when ROS cannot be used here."""
 
+import contextlib
 import importlib
 import importlib.util
+import io
 import os
 import sys
 from collections.abc import Mapping
@@ -9,6 +11,7 @@ from pathlib import Path
 
 from syncrelay.errors import RosUnavailableError
 
+_STDOUT, _STDERR = 1, 2
 _WHEELS = "pip install '.[ros]'                 in a clone of syncrelay: x86_64, Python 3.11 or 3.12, no other ROS"
 _SOURCED = "source /opt/ros/jazzy/setup.bash    where ROS 2 is installed; then start syncrelay from that shell"
 
@@ -29,6 +32,21 @@ def require_rclpy() -> None:
         importlib.import_module("rclpy")
     except ImportError as error:
         raise RosUnavailableError(_without_middleware(error)) from error
+
+
+def keep_stdout() -> None:
+    """Keep stdout for what is asked of us: what Fast DDS prints there goes to stderr from now on.
+
+    To be called before rclpy starts. A stdout that is none of the process's own, as under a test, stays as it is.
+    """
+    before = sys.stdout
+    if before is not sys.__stdout__ or not isinstance(before, io.TextIOWrapper) or before.fileno() != _STDOUT:
+        return
+    with contextlib.suppress(OSError):
+        before.flush()
+        own = os.dup(_STDOUT)
+        os.dup2(_STDERR, _STDOUT)
+        sys.stdout = os.fdopen(own, "w", encoding=before.encoding, errors=before.errors, buffering=1)
 
 
 def _require_middleware(asked: str | None) -> None:

@@ -15,7 +15,7 @@ from syncrelay.cdr import read_stamp
 from syncrelay.config import TopicConfig
 from syncrelay.config.wording import nearest
 from syncrelay.errors import RosUnavailableError, TypeImportError
-from syncrelay.ros.environment import log_arguments
+from syncrelay.ros.environment import keep_stdout, log_arguments
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 from syncrelay.ros.types import StampReader, import_type, stamp_reader
@@ -50,6 +50,7 @@ def look(topics: Mapping[str, TopicConfig], *, seconds: float, use_sim_time: boo
 
 
 def _join(context: Context) -> Any:
+    keep_stdout()
     rclpy.init(
         args=["--ros-args", "--disable-stdout-logs", "--disable-rosout-logs", *log_arguments()],
         context=context,

@@ -22,7 +22,7 @@ from syncrelay.config import Config
 from syncrelay.errors import ReloadError, RosUnavailableError, UsageError
 from syncrelay.explain import GroupReport
 from syncrelay.ros.diagnostics import Diagnostics, Scalars
-from syncrelay.ros.environment import log_arguments
+from syncrelay.ros.environment import keep_stdout, log_arguments
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.inputs import Wiring, Wirings
 from syncrelay.ros.logs import RosoutHandler, name_after
@@ -362,6 +362,7 @@ def _init(config: Config, ros_args: Sequence[str]) -> Context:
     simulated = ["-p", "use_sim_time:=true"] if config.node.use_sim_time else []
     ours = ["--ros-args", "--disable-stdout-logs", *log_arguments(), *simulated, "--"]
     apply_transport(config.node.transport, os.environ)
+    keep_stdout()
     context = Context()
     try:
         rclpy.init(

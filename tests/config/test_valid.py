@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -76,3 +77,19 @@ def test_a_duration_of_the_middleware_has_a_largest_value(environ):
     config = load_text(text.replace("qos: {}", no_limit), environ=environ)
     qos = config.groups[1].topics[1].qos
     assert (qos.lifespan, qos.deadline) == (2**63 - 1, 2**63 - 1)
+
+
+@pytest.mark.parametrize(
+    ("slop", "note"),
+    [
+        ("40", "40 without a unit is 40 s; write 40ms if milliseconds are meant, else 40s"),
+        ("1.5", "1.5 without a unit is 1.5 s; write 1.5ms if milliseconds are meant, else 1.5s"),
+        ("0.04", None),
+        ("40s", None),
+    ],
+)
+def test_a_slop_of_seconds_without_a_unit_is_doubted(slop, note, environ):
+    topics = [{"topic": name, "type": "sensor_msgs/msg/Image"} for name in ("/a", "/b")]
+    text = f"version: 1\ngroups: {{g: {{policy: approximate_time, slop: {slop}, topics: {json.dumps(topics)}}}}}"
+    found = load_text(text, environ=environ).notes
+    assert [each.text for each in found] == ([note] if note else [])

@@ -25,12 +25,15 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from syncrelay.ros.environment import keep_stdout
 from tests.ros import frames
 from tests.ros.message_types import import_type
 
 
 def main() -> None:
     arguments = _parser().parse_args()
+    # Fast DDS's own lines would be taken for answers.
+    keep_stdout()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(arguments.node)
     profile = QoSProfile(

@@ -21,6 +21,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
+from syncrelay.ros.environment import keep_stdout
 from tests.ros import frames
 from tests.ros.message_types import import_type
 
@@ -30,6 +31,8 @@ _ACKNOWLEDGE = Duration(seconds=60)
 
 def main() -> None:
     arguments = _parser().parse_args()
+    # Fast DDS's own lines would be taken for answers.
+    keep_stdout()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(arguments.node)
     profile = QoSProfile(

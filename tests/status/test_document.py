@@ -78,7 +78,7 @@ def test_what_is_said_of_an_input():
         "output": "/front/camera",
         "required": True,
         "offset_ms": 0.0,
-        "rate_hz": 11.333,
+        "rate_hz": 11.379,
         "age_ms": 99.0,
         "lag_ms": 1.0,
         "jitter_ms": 0.0,

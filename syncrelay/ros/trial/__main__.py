@@ -5,7 +5,7 @@ import sys
 from typing import Any
 
 from syncrelay.errors import RosUnavailableError, TypeImportError
-from syncrelay.ros.environment import log_arguments, require_rclpy
+from syncrelay.ros.environment import keep_stdout, log_arguments, require_rclpy
 from syncrelay.ros.trial import Step
 from syncrelay.ros.types import import_type
 
@@ -43,6 +43,7 @@ def _start(plan: dict[str, Any]) -> None:
     from rclpy.utilities import get_rmw_implementation_identifier  # noqa: PLC0415
 
     refused = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
+    keep_stdout()
     context = Context()
     step = Step.INIT
     _say(step, middleware=get_rmw_implementation_identifier())
