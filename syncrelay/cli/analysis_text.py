@@ -28,20 +28,22 @@ def report(name: str, analysis: Analysis) -> Iterator[str]:
 def _topic(topic: TopicFigures) -> Iterator[str]:
     yield f"{topic.topic} ({topic.type})"
     yield f"  {', '.join(_rhythm(topic))}"
-    faults = [
-        f"{count} {word}"
-        for count, word in (
-            (topic.unstamped, "with stamp 0"),
-            (topic.unreadable, "without a readable stamp"),
-            (topic.duplicates, "repeat a stamp"),
-            (topic.out_of_order, "out of order"),
-        )
-        if count
-    ]
+    faults = faults_of(topic)
     if faults:
         yield f"  stamps: {', '.join(faults)}"
     if topic.delay is not None:
-        yield f"  {_delay(topic)}"
+        yield f"  {delay_line(topic)}"
+
+
+def faults_of(topic: TopicFigures) -> list[str]:
+    """Return what is wrong with a topic's stamps, and how often."""
+    faults = (
+        (topic.unstamped, "with stamp 0"),
+        (topic.unreadable, "without a readable stamp"),
+        (topic.duplicates, "repeat a stamp"),
+        (topic.out_of_order, "out of order"),
+    )
+    return [f"{count} {word}" for count, word in faults if count]
 
 
 def _rhythm(topic: TopicFigures) -> Iterator[str]:
@@ -53,7 +55,8 @@ def _rhythm(topic: TopicFigures) -> Iterator[str]:
         yield f"{topic.gaps} gaps, the longest {words.duration(topic.longest_gap)}"
 
 
-def _delay(topic: TopicFigures) -> str:
+def delay_line(topic: TopicFigures) -> str:
+    """Return how long after their stamps the messages of a topic were received; asked only where that is known."""
     delay = topic.delay
     assert delay is not None  # noqa: S101  asked for only where there is one
     drift = "" if topic.drift_ppm is None else f"; drift {words.figure(topic.drift_ppm)} ppm"
@@ -74,7 +77,7 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
     suggestion = each.suggestion
     yield f"group {name}, {each.group.keys.policy}"
     for pair in each.pairs:
-        yield f"  {_pair(pair)}"
+        yield f"  {pair_line(pair)}"
     yield from (f"  {line}" for line in _curves(each))
     topics = [topic.topic for topic in each.group.topics]
     inputs = tuple(InputResult(*row) for row in zip(topics, each.trial.counts, strict=True))
@@ -94,7 +97,8 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
         yield f"    # {reason}"
 
 
-def _pair(pair: Pair) -> str:
+def pair_line(pair: Pair) -> str:
+    """Return how far the messages of one topic lie from the nearest of another."""
     low, middle, high = (_signed(each) for each in (pair.signed.low, pair.signed.median, pair.signed.high))
     distance = pair.distance
     return (

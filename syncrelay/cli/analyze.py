@@ -4,7 +4,6 @@ import json
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 
 from syncrelay.bag import Channel, Recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, with_changes
@@ -12,6 +11,7 @@ from syncrelay.bag.wiring import wire
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.new_file import write_again, write_new
 from syncrelay.cli.progress import progress_of
 from syncrelay.config import Severity, load_text
 from syncrelay.config.source import read_source
@@ -28,6 +28,7 @@ class Asked:
     config: str | None
     topics: tuple[str, ...]
     write: str | None
+    html: str | None
     json: bool
 
 
@@ -74,14 +75,9 @@ def _print(bag: str, analysis: Analysis, asked: Asked) -> None:
             put(line)
         if asked.config is None:
             put(f"\nA file that gives these sets:\n\n{analysis.text.rstrip()}")
-    if asked.write is None:
-        return
-    path = Path(asked.write)
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(with_changes(analysis.text, analysis.changes))
-    except FileExistsError as error:
-        raise BagError(f"{path}: exists already, and is not overwritten") from error
-    except OSError as error:
-        raise BagError(f"{path}: cannot be written: {error.strerror}") from error
-    say(f"syncrelay: {path} is written")
+    if asked.write is not None:
+        write_new(asked.write, with_changes(analysis.text, analysis.changes))
+    if asked.html is not None:
+        from syncrelay.cli.analysis_html import MARK, as_html
+
+        write_again(asked.html, as_html(bag, analysis), mark=MARK)

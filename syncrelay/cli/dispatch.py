@@ -183,6 +183,9 @@ def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
     parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics to match, where there is no file yet")
     parser.add_argument("--config", metavar="FILE", help="the file whose groups are looked at")
     parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values, comments kept")
+    parser.add_argument(
+        "--html", metavar="REPORT", help="write all of it with drawings, as one HTML file to open offline"
+    )
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
     _add_help(parser)
     if _asks_for_help(words):
@@ -190,7 +193,7 @@ def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
     arguments = parser.read(words)
     from syncrelay.cli.analyze import Asked, analyze_bag
 
-    asked = Asked(arguments.config, tuple(arguments.topics), arguments.write, arguments.json)
+    asked = Asked(arguments.config, tuple(arguments.topics), arguments.write, arguments.html, arguments.json)
     return analyze_bag(arguments.bag, asked)
 
 

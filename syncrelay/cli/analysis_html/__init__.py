@@ -1,0 +1,5 @@
+"""An analysis as one HTML file that needs nothing else: no network, no other file."""
+
+from syncrelay.cli.analysis_html.document import MARK, as_html
+
+__all__ = ["MARK", "as_html"]

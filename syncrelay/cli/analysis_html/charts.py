@@ -1,0 +1,83 @@
+"""What the page draws of a group beside its messages: how far stamps lie apart, and what slop and queues would give."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from syncrelay.bag.analysis import GroupAnalysis
+from syncrelay.bag.analysis.curves import queue_curve, slop_curve
+from syncrelay.bag.analysis.nearest import Pair
+from syncrelay.config import GroupConfig
+
+_BINS: Final = 60
+# What lies so many times farther out than most do is counted, not drawn: it would press all others into one bar.
+_FARTHEST: Final = 1.5
+# A slop line so many times farther out than the offsets is left out for the same reason.
+_FARTHEST_LINE: Final = 3
+_SHARES: Final = (*(step / 40 for step in range(1, 40)), 0.99, 0.995, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """The values of a key as they are in the file and as they are suggested; None where there is none, or no better."""
+
+    now: int | None
+    then: int | None
+
+    @property
+    def known(self) -> tuple[int, ...]:
+        """Both, or what there is of them."""
+        return tuple(each for each in (self.now, self.then) if each is not None)
+
+
+def slop_marks(now: GroupConfig, then: GroupConfig) -> Marks:
+    """Return the slops of a group as it is and as it is suggested; that of exact_time is 0."""
+    return _marks(_slop(now), _slop(then))
+
+
+def queue_marks(now: GroupConfig, then: GroupConfig) -> Marks:
+    """Return the queue sizes of a group as it is and as it is suggested."""
+    return _marks(now.keys.queue_size, then.keys.queue_size)
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """How many offsets of a pair lie from one edge to the next, in nanoseconds, and how many outside of all."""
+
+    edges: tuple[float, ...]
+    counts: tuple[int, ...]
+    outside: int
+
+
+def histogram(pair: Pair, slops: Marks) -> Histogram:
+    """Return how the offsets of a pair are spread, slops within what is drawn if they are not far out."""
+    margin = round(_FARTHEST * (pair.signed.high - pair.signed.low))
+    low = max(pair.signed.least, pair.signed.low - margin)
+    high = min(pair.signed.greatest, pair.signed.high + margin)
+    reach = max(abs(low), abs(high), 1)
+    lines = [slop for slop in slops.known if slop <= _FARTHEST_LINE * reach]
+    low, high = (min([low, *(-slop for slop in lines)]), max([high, *lines]))
+    margin = max((high - low) // 20, 10)
+    edges = np.linspace(low - margin, high + margin, _BINS + 1)
+    counts, _ = np.histogram(pair.offsets, edges)
+    return Histogram(tuple(edges.tolist()), tuple(counts.tolist()), len(pair.offsets) - int(counts.sum()))
+
+
+def by_slop(group: GroupAnalysis, slops: Marks, shares: Sequence[float] = _SHARES) -> list[tuple[int, float, int]]:
+    """Return slops, the share that each matches, and the median span; none where that cannot be measured."""
+    return [] if group.tightest is None else slop_curve(group.tightest, marks=slops.known, shares=shares)
+
+
+def by_queue_size(group: GroupAnalysis, sizes: Marks, shares: Sequence[float] = _SHARES) -> list[tuple[int, float]]:
+    """Return queue sizes and the share that each holds at the group's slop."""
+    return [] if group.tightest is None else queue_curve(group.tightest, group.slop, marks=sizes.known, shares=shares)
+
+
+def _slop(group: GroupConfig) -> int | None:
+    return 0 if group.keys.policy == "exact_time" else getattr(group.keys, "slop", None)
+
+
+def _marks(now: int | None, then: int | None) -> Marks:
+    return Marks(now, None if then == now else then)

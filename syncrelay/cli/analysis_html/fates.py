@@ -1,0 +1,44 @@
+"""How each fate of a message looks: a shape and a name for a colour, so that no fate is told by colour alone."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from syncrelay.sync import DropReason
+
+MATCHED: Final = "matched"
+
+
+@dataclass(frozen=True, slots=True)
+class Fate:
+    """A fate, its word, and its shape as an SVG path within 5 units around the origin, filled or stroked.
+
+    Its colour is the style sheet's `--NAME`.
+    """
+
+    name: str
+    word: str
+    path: str
+    is_filled: bool
+
+
+_SHAPES: Final = {
+    DropReason.LATE: ("M4-4.5L-4.5 0L4 4.5Z", True),
+    DropReason.DUPLICATE: ("M-4-2H4M-4 2H4", False),
+    DropReason.OVERFLOW: ("M-4.5-4H4.5L0 4.5Z", True),
+    DropReason.SUPERSEDED: ("M0-4.5L4.5 0L0 4.5L-4.5 0Z", False),
+    DropReason.TOO_FAR: ("M-3.5-3.5L3.5 3.5M-3.5 3.5L3.5-3.5", False),
+    DropReason.EXPIRED: ("M-4-4.5H4L-4 4.5H4Z", False),
+    DropReason.TIME_JUMP: ("M0-4L-4 0L0 4M4-4L0 0L4 4", False),
+    DropReason.UNSTAMPED: ("M-4 0A4 4 0 1 0 4 0A4 4 0 1 0-4 0M-3 3L3-3", False),
+    DropReason.MALFORMED: ("M-4-4H4V4H-4Z", True),
+    DropReason.THINNED: ("M-4-4H4V4H-4Z", False),
+    DropReason.SHUTDOWN: ("M-4.5 0H4.5M0-4.5V4.5", False),
+}
+
+FATES: Final = (
+    Fate(MATCHED, "in sets", "M-4 0A4 4 0 1 0 4 0A4 4 0 1 0-4 0", is_filled=True),
+    *(Fate(reason.value, reason.value, path, is_filled) for reason, (path, is_filled) in _SHAPES.items()),
+)
+"""All fates; a message's is told by its place here."""
+
+CODES: Final = {fate.name: code for code, fate in enumerate(FATES)}

@@ -1,0 +1,145 @@
+"""Where the messages of a group stand on a line of time, what became of each, and which are a set."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from syncrelay.bag.analysis import GroupAnalysis
+from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds
+from syncrelay.cli.analysis_html.fates import CODES, MATCHED
+
+_SECOND: Final = 1_000_000_000
+_STRETCH: Final = 10 * _SECOND
+# So far outside of the recording a stamp says nothing of when its message was made.
+_ASTRAY: Final = 60 * _SECOND
+_NONE: Final = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """The messages of one input: nanoseconds since the recording's begin, rising, and codes of their fates."""
+
+    topic: str
+    times: Nanoseconds
+    fates: Nanoseconds
+
+
+@dataclass(frozen=True, slots=True)
+class Lanes:
+    """A group's messages. A row of `members` is a set: places in the lanes, -1 where an input is missing.
+
+    Sets are in the order of their earliest messages, `begins`. `astray` is how many messages stand where they were
+    received, because their stamps are unset or far outside of the recording. Of every `each` stretches of 10 s one is
+    kept, whole; 1 if all are.
+    """
+
+    lanes: tuple[Lane, ...]
+    members: Nanoseconds
+    begins: Nanoseconds
+    spans: Nanoseconds
+    latencies: Nanoseconds
+    astray: int
+    each: int
+    stretch: int = _STRETCH
+
+
+def lanes_of(group: GroupAnalysis, begin: int, end: int, *, most: int) -> Lanes:
+    """Return the lanes of a group in a recording from `begin` to `end`, with about `most` messages."""
+    delay = _usual_delay(group)
+    origin = begin - delay
+    sets = group.trial.sets
+    n_inputs = len(group.streams)
+    missing = np.array([[stamp is None for stamp in each.stamps] for each in sets], dtype=bool).reshape(-1, n_inputs)
+    stamps = np.array([[stamp or 0 for stamp in each.stamps] for each in sets], dtype=np.int64).reshape(-1, n_inputs)
+    times = stamps + np.array([topic.offset_ns for topic in group.group.topics], dtype=np.int64) - origin
+    latest = np.max(np.where(missing, np.iinfo(np.int64).min, times), axis=1, initial=np.iinfo(np.int64).min)
+    complete = np.array([each.left - each.latency for each in sets], dtype=np.int64) - begin
+    is_astray = _is_astray(latest, end - begin)
+    times = np.where(is_astray[:, None], times - latest[:, None] + complete[:, None], times)
+
+    lanes, places, astray = [], [], int(np.count_nonzero(is_astray[:, None] & ~missing))
+    for index, stream in enumerate(group.streams):
+        there = ~missing[:, index]
+        # A message may serve many sets: it stands in its lane once.
+        _, first, which = np.unique(stamps[there, index], return_index=True, return_inverse=True)
+        matched = times[there, index][first]
+        dropped, codes, n_astray = _dropped(group, index, origin, begin, end)
+        astray += n_astray
+        all_times = np.concatenate([matched, dropped])
+        all_codes = np.concatenate([np.full(len(matched), CODES[MATCHED], dtype=np.int64), codes])
+        order = np.argsort(all_times, kind="stable")
+        lanes.append(Lane(stream.topic, all_times[order], all_codes[order]))
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        column = np.full(len(sets), _NONE, dtype=np.int64)
+        column[there] = rank[which]
+        places.append(column)
+    begins = np.min(np.where(missing, np.iinfo(np.int64).max, times), axis=1, initial=np.iinfo(np.int64).max)
+    by_begin = np.argsort(begins, kind="stable")
+    found = Lanes(
+        lanes=tuple(lanes),
+        members=np.stack(places, axis=1)[by_begin],
+        begins=begins[by_begin],
+        spans=np.array([each.span for each in sets], dtype=np.int64)[by_begin],
+        latencies=np.array([each.latency for each in sets], dtype=np.int64)[by_begin],
+        astray=astray,
+        each=1,
+    )
+    return _thinned(found, most)
+
+
+def _usual_delay(group: GroupAnalysis) -> int:
+    """Return how long after its stamp, offset included, a message was usually received."""
+    delays = []
+    for topic, stream in zip(group.group.topics, group.streams, strict=True):
+        stamps, received, _ = stream.numbers()
+        is_set = (stamps != 0) & (stamps != UNREADABLE)
+        delays.append(received[is_set] - stamps[is_set] - topic.offset_ns)
+    every = np.concatenate(delays)
+    return int(np.quantile(every, 0.5, method="inverted_cdf")) if len(every) else 0
+
+
+def _dropped(
+    group: GroupAnalysis, index: int, origin: int, begin: int, end: int
+) -> tuple[Nanoseconds, Nanoseconds, int]:
+    """Return when the dropped messages of an input were made, the codes of their fates, and how many are astray."""
+    drops = [each for each in group.trial.drops if each.input == index]
+    stamps = np.array([each.stamp for each in drops], dtype=np.int64)
+    received = np.array([each.received for each in drops], dtype=np.int64)
+    times = stamps + group.group.topics[index].offset_ns - origin
+    is_astray = (stamps == 0) | _is_astray(times, end - begin)
+    codes = np.array([CODES[each.reason.value] for each in drops], dtype=np.int64)
+    return np.where(is_astray, received - begin, times), codes, int(np.count_nonzero(is_astray))
+
+
+def _is_astray(times: Nanoseconds, duration: int) -> npt.NDArray[np.bool_]:
+    return (times < -_ASTRAY) | (times > duration + _ASTRAY)
+
+
+def _thinned(found: Lanes, most: int) -> Lanes:
+    """Keep whole stretches, evenly spread, where there is more than the page can hold."""
+    messages = sum(len(lane.times) for lane in found.lanes)
+    if messages <= most:
+        return found
+    each = -(-messages // most)
+    kept_sets = found.begins // _STRETCH % each == 0
+    lanes, columns = [], []
+    for index, lane in enumerate(found.lanes):
+        places = found.members[kept_sets, index]
+        kept = lane.times // _STRETCH % each == 0
+        # A set is whole even where it reaches out of its stretch.
+        kept[places[places != _NONE]] = True
+        rank = np.cumsum(kept) - 1
+        columns.append(np.where(places == _NONE, _NONE, rank[places]))
+        lanes.append(replace(lane, times=lane.times[kept], fates=lane.fates[kept]))
+    return replace(
+        found,
+        lanes=tuple(lanes),
+        members=np.stack(columns, axis=1),
+        begins=found.begins[kept_sets],
+        spans=found.spans[kept_sets],
+        latencies=found.latencies[kept_sets],
+        each=each,
+    )

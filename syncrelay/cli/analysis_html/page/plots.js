@@ -1,0 +1,144 @@
+// What all drawings share, and those that uPlot makes alone: histograms and curves.
+
+const SECOND = 1e9;
+const UNITS = [[1e9, "s"], [1e6, "ms"], [1e3, "us"], [1, "ns"]];
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const plots = [];
+
+function duration(ns) {
+  const [size, unit] = UNITS.find(([size]) => Math.abs(ns) >= size) ?? UNITS[3];
+  return `${Number((ns / size).toPrecision(3))} ${unit}`;
+}
+
+function unitOf(ns) {
+  return UNITS.find(([size]) => ns >= size) ?? UNITS[3];
+}
+
+function decimals(step) {
+  return Math.max(0, Math.min(9, -Math.floor(Math.log10(step) + 1e-9)));
+}
+
+function axis(label, options = {}) {
+  return {
+    label, size: 34, labelSize: 18, labelFont: "12px system-ui, sans-serif", font: "12px system-ui, sans-serif",
+    stroke: () => colour("faint"),
+    grid: {stroke: () => colour("line"), width: 1},
+    ticks: {stroke: () => colour("line"), width: 1, size: 5},
+    values: (plot, splits, at, space, step) => splits.map((value) => value.toFixed(decimals(step))),
+    ...options,
+  };
+}
+
+// A plot as wide as its place, drawn anew when that or the scheme of colours changes.
+function plotIn(place, height, options, data) {
+  const plot = new uPlot({
+    width: Math.max(200, place.clientWidth), height, legend: {show: false}, padding: [14, 12, 0, 0], ...options,
+  }, data, place);
+  new ResizeObserver(() => {
+    if (place.clientWidth && place.clientWidth !== plot.width) plot.setSize({width: place.clientWidth, height});
+  }).observe(place);
+  plots.push(plot);
+  return plot;
+}
+
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => plots.forEach((plot) => plot.redraw()));
+
+// Upright lines with a word at the top; each [value, word, name of its colour, dash].
+function drawMarks(plot, marks) {
+  const {ctx, bbox} = plot, scale = devicePixelRatio;
+  ctx.save();
+  ctx.textAlign = "left";
+  ctx.textBaseline = "alphabetic";
+  ctx.font = `600 ${11 * scale}px system-ui, sans-serif`;
+  ctx.lineWidth = 2 * scale;
+  const taken = [];
+  for (let [value, word, name, dash] of marks) {
+    const x = plot.valToPos(value, "x", true);
+    const isBeyond = x > bbox.left + bbox.width + 1;
+    ctx.strokeStyle = ctx.fillStyle = colour(name);
+    if (x >= bbox.left - 1 && !isBeyond) {
+      ctx.setLineDash(dash.map((part) => part * scale));
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+    }
+    if (!word) continue;
+    word += isBeyond ? " \u2192" : "";
+    const width = ctx.measureText(word).width;
+    const left = Math.min(Math.max(x - width / 2, bbox.left), bbox.left + bbox.width - width);
+    const row = taken.filter(([begin, end]) => left < end + 6 * scale && left + width > begin - 6 * scale).length;
+    taken.push([left, left + width]);
+    ctx.fillText(word, left, bbox.top - 4 * scale - row * 13 * scale);
+  }
+  ctx.restore();
+}
+
+function bothMarks({now, then}, text) {
+  const marks = [];
+  if (now !== null) marks.push([now, `now ${text(now)}`, "now", []]);
+  if (then !== null) marks.push([then, `suggested ${text(then)}`, "then", [6, 4]]);
+  return marks;
+}
+
+function drawHistogram(place, {edges, counts}, slops) {
+  const [size, unit] = unitOf(Math.max(-edges[0], edges.at(-1)) / 2);
+  const middles = counts.map((_, at) => (edges[at] + edges[at + 1]) / 2 / size);
+  const lines = bothMarks(slops, (slop) => `±${duration(slop)}`).flatMap(([slop, word, name, dash]) => (
+    slop === 0 ? [[0, word, name, dash]] : [[-slop / size, "", name, dash], [slop / size, word, name, dash]]
+  ));
+  plotIn(place, 210, {
+    padding: [30, 12, 0, 0],
+    cursor: {drag: {x: true, y: false}},
+    scales: {x: {time: false}, y: {range: (plot, low, high) => [0, Math.max(1, high * 1.05)]}},
+    axes: [axis(`offset, ${unit}`), axis("messages", {size: 60})],
+    series: [{}, {
+      stroke: () => colour("curve"), fill: () => colour("curve"), width: 0, points: {show: false},
+      paths: uPlot.paths.bars({size: [0.92, 100]}),
+    }],
+    hooks: {draw: [(plot) => drawMarks(plot, lines)]},
+  }, [middles, counts]);
+}
+
+const PERCENT = {range: () => [0, 104]};
+
+function curveSeries(name, dash, scale) {
+  return {scale, stroke: () => colour(name), width: 2, dash, points: {show: false}, paths: uPlot.paths.stepped({align: 1})};
+}
+
+// A few sets without partners would press all that matters into a corner: the table has those too.
+function withoutTail(points, {now, then}) {
+  const enough = points.find(([, share]) => share >= 0.9)?.[0] ?? points.at(-1)[0];
+  const last = 4 * Math.max(enough, now ?? 0, then ?? 0);
+  return points.filter(([slop], at) => slop <= last || at < 2);
+}
+
+function drawBySlop(place, all, slops) {
+  const points = withoutTail(all, slops);
+  const [size, unit] = unitOf(points.at(-1)[0] / 2);
+  const spans = Math.max(...points.map(([, , span]) => span));
+  const [spanSize, spanUnit] = unitOf(spans / 2);
+  plotIn(place, 260, {
+    padding: [30, 0, 0, 0],
+    scales: {x: {time: false}, y: PERCENT, span: {range: [0, Math.max(1, spans / spanSize) * 1.04]}},
+    axes: [
+      axis(`slop, ${unit}`), axis("matched, %, solid", {size: 50}),
+      axis(`median span, ${spanUnit}, dotted`, {scale: "span", side: 1, size: 50, grid: {show: false}}),
+    ],
+    series: [{}, curveSeries("curve", [], "y"), curveSeries("second", [2, 4], "span")],
+    hooks: {draw: [(plot) => drawMarks(plot, bothMarks(slops, duration).map(([at, ...rest]) => [at / size, ...rest]))]},
+  }, [
+    points.map(([slop]) => slop / size), points.map(([, share]) => 100 * share),
+    points.map(([, , span]) => span / spanSize),
+  ]);
+}
+
+function drawByQueue(place, points, sizes) {
+  plotIn(place, 260, {
+    padding: [30, 12, 0, 0],
+    scales: {x: {time: false, range: (plot, low, high) => [Math.min(low, 0), high + 1]}, y: PERCENT},
+    axes: [axis("queue size"), axis("matched, %", {size: 50})],
+    series: [{}, {...curveSeries("curve", [], "y"), points: {show: true, size: 6, fill: () => colour("curve")}}],
+    hooks: {draw: [(plot) => drawMarks(plot, bothMarks(sizes, String))]},
+  }, [points.map(([size]) => size), points.map(([, share]) => 100 * share)]);
+}

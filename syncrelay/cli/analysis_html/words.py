@@ -1,0 +1,198 @@
+"""What the page says in words and tables."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+from syncrelay.bag.analysis import GroupAnalysis, patch
+from syncrelay.bag.analysis.nearest import Pair
+from syncrelay.bag.analysis.topics import TopicFigures
+from syncrelay.bag.analysis.trial import LastingFinding
+from syncrelay.cli.analysis_html.charts import by_queue_size, by_slop
+from syncrelay.cli.analysis_html.drawings import Drawings
+from syncrelay.cli.analysis_html.fates import FATES, MATCHED
+from syncrelay.cli.analysis_text import delay_line, faults_of, pair_line
+from syncrelay.explain import Severity, in_words, words
+from syncrelay.sync import InputCounts
+
+_SHARES = (0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
+_GOOD = 0.99
+_SIGNS = {Severity.ERROR: "\N{MULTIPLICATION X}", Severity.WARN: "!"}
+
+
+@dataclass(frozen=True, slots=True)
+class TopicRow:
+    """A topic's figures, a cell for each of COLUMNS."""
+
+    COLUMNS: ClassVar = ("Type", "Messages", "Rate", "Period", "Gaps", "Faults of stamps", "Received")
+
+    topic: str
+    cells: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A finding: a class of the style sheet, a sign, its severity in a word, what is so."""
+
+    tone: str
+    sign: str
+    word: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A part of a bar, from `begin` on, in percent of the whole."""
+
+    fate: str
+    count: int
+    begin: float
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class FateRow:
+    """Where an input's messages went: a count for each fate of the table, which add up to those received."""
+
+    topic: str
+    received: int
+    counts: tuple[int, ...]
+    bar: tuple[Segment, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupWords:
+    """All that is said of a group."""
+
+    name: str
+    policy: str
+    sets: int
+    verdict: str
+    tone: str
+    notes: tuple[Note, ...]
+    hints: tuple[str, ...]
+    promise: str
+    patch: str
+    reasons: tuple[str, ...]
+    fates: tuple[str, ...]
+    rows: tuple[FateRow, ...]
+    pairs: tuple[str, ...]
+    by_slop: tuple[tuple[str, str, str], ...]
+    by_queue_size: tuple[tuple[str, str], ...]
+    curve_slop: str
+    thinned: str
+    astray: str
+
+
+def topic_row(topic: TopicFigures) -> TopicRow:
+    """Return the row of a topic."""
+    period = "" if topic.period is None else words.duration(topic.period)
+    if topic.jitter is not None:
+        period += f", 95 % within {words.duration(topic.jitter)} of it"
+    gaps = str(topic.gaps)
+    if topic.gaps and topic.longest_gap is not None:
+        gaps += f", the longest {words.duration(topic.longest_gap)}"
+    cells = (
+        topic.type,
+        str(topic.messages),
+        words.rate(topic.rate_hz),
+        period,
+        gaps,
+        ", ".join(faults_of(topic)) or "none",
+        "" if topic.delay is None else delay_line(topic),
+    )
+    return TopicRow(topic.topic, cells)
+
+
+def group_words(group: GroupAnalysis, drawings: Drawings) -> GroupWords:
+    """Return what is said of a group."""
+    suggestion, config = group.suggestion, group.group
+    topics = [topic.topic for topic in config.topics]
+    counts = group.trial.counts
+    fates = tuple(fate.name for fate in FATES if any(_count(each, fate.name) for each in counts))
+    verdict, tone = _verdict(group)
+    return GroupWords(
+        name=config.name,
+        policy=config.keys.policy,
+        sets=len(group.trial.sets),
+        verdict=verdict,
+        tone=tone,
+        notes=tuple(_note(each) for each in group.findings()),
+        hints=suggestion.hints,
+        promise=f"{suggestion.then} of {suggestion.possible} possible sets, in place of {suggestion.now}",
+        patch=patch(suggestion.changes, {config.name: topics}).rstrip() if suggestion.changes else "",
+        reasons=tuple(dict.fromkeys(f"{change.key}: {change.reason}" for change in suggestion.changes)),
+        fates=fates,
+        rows=tuple(_fate_row(topic, each, fates) for topic, each in zip(topics, counts, strict=True)),
+        pairs=tuple(_pair(pair, each.outside) for pair, each in zip(group.pairs, drawings.histograms, strict=True)),
+        by_slop=tuple(
+            (words.duration(slop), words.share(share), words.duration(span))
+            for slop, share, span in by_slop(group, drawings.slops, _SHARES)
+        ),
+        by_queue_size=tuple(
+            (str(size), words.share(share)) for size, share in by_queue_size(group, drawings.sizes, _SHARES)
+        ),
+        curve_slop=words.duration(group.slop),
+        thinned=_thinned(drawings),
+        astray=_astray(drawings),
+    )
+
+
+def _verdict(group: GroupAnalysis) -> tuple[str, str]:
+    """Return how a group does, and the class of the style sheet for it."""
+    suggestion = group.suggestion
+    if not suggestion.possible:
+        sets = len(group.trial.sets)
+        return f"{sets} sets come together", "ok" if sets else "error"
+    share = suggestion.now / suggestion.possible
+    tone = "ok" if share >= _GOOD else "warn" if suggestion.now else "error"
+    return f"{suggestion.now} of {suggestion.possible} possible sets come together", tone
+
+
+def _note(lasting: LastingFinding) -> Note:
+    severity = lasting.finding.severity
+    text = f"{in_words(lasting.finding)} (for {lasting.seconds} s of the recording)"
+    return Note(severity.name.lower(), _SIGNS[severity], severity.name.lower(), text)
+
+
+def _count(counts: InputCounts, fate: str) -> int:
+    if fate == MATCHED:
+        return counts.matched
+    return sum(count for reason, count in counts.dropped.items() if reason.value == fate)
+
+
+def _fate_row(topic: str, counts: InputCounts, fates: tuple[str, ...]) -> FateRow:
+    of_each = tuple(_count(counts, fate) for fate in fates)
+    return FateRow(topic, counts.fed, of_each, tuple(_segments(fates, of_each, counts.fed)))
+
+
+def _segments(fates: tuple[str, ...], counts: tuple[int, ...], whole: int) -> Iterator[Segment]:
+    begin = 0
+    for fate, count in zip(fates, counts, strict=True):
+        if count:
+            yield Segment(fate, count, 100 * begin / whole, 100 * count / whole)
+        begin += count
+
+
+def _pair(pair: Pair, outside: int) -> str:
+    return f"{pair_line(pair)}{f'; {outside} are farther off than is drawn' if outside else ''}"
+
+
+def _thinned(drawings: Drawings) -> str:
+    lanes = drawings.lanes
+    if lanes.each == 1:
+        return ""
+    stretch = words.seconds(lanes.stretch)
+    return (
+        f"This recording has more messages than the page can hold: of every {lanes.each} stretches of {stretch} one is"
+        " drawn, with all its messages. Figures, tables and curves are of all."
+    )
+
+
+def _astray(drawings: Drawings) -> str:
+    if not drawings.lanes.astray:
+        return ""
+    return (
+        f"{drawings.lanes.astray} messages stand where they were received: their stamps are unset, or far outside of"
+        " the recording."
+    )

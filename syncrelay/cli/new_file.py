@@ -1,0 +1,38 @@
+"""Files that a command writes, and never over something of the user's."""
+
+from pathlib import Path
+from typing import Final
+
+from syncrelay.cli.boundary import say
+from syncrelay.errors import BagError
+
+_HEAD: Final = 500
+
+
+def write_new(name: str, text: str) -> None:
+    """Write a file that is not there yet, and say so; raises BagError for one that is, or cannot be written."""
+    path = Path(name)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise BagError(f"{path}: exists already, and is not overwritten") from error
+    except OSError as error:
+        raise BagError(f"{path}: cannot be written: {error.strerror}") from error
+    say(f"syncrelay: {path} is written")
+
+
+def write_again(name: str, text: str, *, mark: str) -> None:
+    """Write a file as write_new does, but also over one that has a mark near its begin: a former one of the kind."""
+    path = Path(name)
+    if path.is_file() and _bears(path, mark):
+        path.unlink()
+    write_new(name, text)
+
+
+def _bears(path: Path, mark: str) -> bool:
+    try:
+        with path.open("rb") as file:
+            return mark.encode() in file.read(_HEAD)
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from error

@@ -1,0 +1,74 @@
+"""Analyses of simulated recordings, and what a page packs, unpacked by a plain reader."""
+
+import gzip
+import json
+import re
+from base64 import b64decode
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from syncrelay.bag import open_recording
+from syncrelay.bag.analysis import Analysis, analyze
+from syncrelay.bag.wiring import wire
+from syncrelay.config import Severity, load_text
+from tests.bag.making import write_mcap
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.frames import Frame
+from tests.ros.streams import jittery, merged
+
+TOPICS = ("/camera", "/lidar", "/imu")
+HOSTILE = "</script><script>window.stranger=1</script><img src=x onerror='window.stranger=1'>\"'`<b>`&amp;"
+
+
+def drive(*, seconds: int, slow_down: int = 1) -> list[Frame]:
+    """A camera at 10 Hz, a lidar at 10 Hz and an IMU at 50 Hz, or so many times slower."""
+    periods = [100 * slow_down, 100 * slow_down, 20 * slow_down]
+    streams = [
+        jittery(topic, period_ms=period, jitter_ms=3, count=1000 * seconds // period, seed=seed)
+        for seed, (topic, period) in enumerate(zip(TOPICS, periods, strict=True))
+    ]
+    return merged(*streams)
+
+
+def analyzed(folder: Path, frames: Sequence[Frame], **keys: Any) -> Analysis:
+    """What the analysis makes of a group of TOPICS."""
+    group = {"policy": "approximate_time", "slop": "4ms", "topics": inputs(dict.fromkeys(TOPICS, VECTOR)), **keys}
+    text = config({"fused": group})
+    with closing(open_recording([str(write_mcap(folder / "drive.mcap", frames))])) as recording:
+        return analyze(recording, text, wire(load_text(text, package_missing=Severity.NOTE), recording))
+
+
+def renamed(analysis: Analysis) -> Analysis:
+    """The same with HOSTILE wherever a name stands that a recording or its owner could have chosen."""
+    (group,) = analysis.groups
+    topics = tuple(replace(topic, topic=HOSTILE, type=HOSTILE) for topic in group.group.topics)
+    hostile = replace(
+        group,
+        group=replace(group.group, name=HOSTILE, topics=topics),
+        streams=tuple(replace(stream, topic=HOSTILE, type=HOSTILE) for stream in group.streams),
+        pairs=tuple(replace(pair, first=HOSTILE, second=HOSTILE) for pair in group.pairs),
+        suggestion=replace(group.suggestion, changes=(), hints=(HOSTILE,)),
+    )
+    named = tuple(replace(topic, topic=HOSTILE, type=HOSTILE) for topic in analysis.topics)
+    return replace(analysis, topics=named, groups=(hostile,))
+
+
+def drawings_in(page: str) -> dict[str, Any]:
+    """What a page hands to its script."""
+    found = re.search(r'<script type="application/json" id="drawings">(.*?)</script>', page, re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def unpacked(packed: dict[str, Any]) -> list[int]:
+    """The numbers that were packed, in units."""
+    planes, count = gzip.decompress(b64decode(packed["steps"])), packed["count"]
+    values, value = [], 0
+    for at in range(count):
+        value += int.from_bytes(planes[at::count][:4], "little", signed=True)
+        values.append(value * packed["unit"])
+    return values

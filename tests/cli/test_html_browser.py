@@ -1,0 +1,230 @@
+"""The page of an analysis in a real Chromium, without screen or network: what it draws, and what one can do there."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from syncrelay.bag.analysis import Analysis
+from syncrelay.cli.analysis_html import as_html
+from syncrelay.cli.analysis_json import as_json
+from tests.cli.html_reports import HOSTILE, TOPICS, analyzed, drive, renamed
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install '.[test]'")
+
+_CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+# Two tests may share one core with as many others; none takes a second alone.
+_PATIENCE_MS = 120_000
+
+pytestmark = pytest.mark.skipif(_CHROMIUM is None, reason="there is no chromium: apt-get install chromium")
+
+_DRAWN = """() => [...document.querySelectorAll(".chart")].map((chart) => {
+  const canvas = chart.querySelector("canvas");
+  if (!canvas) return 0;
+  const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return data.reduce((sum, value, at) => sum + (at % 4 === 3 && value > 0), 0);
+})"""
+_HAS_COLOUR = """([place, name]) => {
+  const [r, g, b] = colour(name).match(/[0-9a-f]{2}/g).map((part) => parseInt(part, 16));
+  const canvas = document.querySelector(`${place} canvas`);
+  const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  for (let at = 0; at < data.length; at += 4) {
+    if (data[at] === r && data[at + 1] === g && data[at + 2] === b && data[at + 3] === 255) return true;
+  }
+  return false;
+}"""
+_SHOWN = '() => { const {x} = plots.find((plot) => plot.root.closest(".lanes")).scales; return [x.min, x.max]; }'
+
+
+class Opened:
+    """A page, what it asked for, and what it complained of."""
+
+    def __init__(self, page) -> None:
+        self.page = page
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.on("console", lambda message: self.complaints.append(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+
+    def shown(self) -> list[float]:
+        """The part of the recording that the lanes show, in seconds."""
+        return self.page.evaluate(_SHOWN)
+
+    def told(self) -> str:
+        """What stands below the lanes."""
+        return self.page.locator(".readout").first.text_content()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_api.sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=_CHROMIUM, timeout=_PATIENCE_MS)
+        yield running
+        running.close()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("browser")
+
+
+@pytest.fixture(scope="module")
+def analysis(folder) -> Analysis:
+    return analyzed(folder, drive(seconds=30))
+
+
+@pytest.fixture(scope="module")
+def report(folder, analysis) -> Path:
+    path = folder / "report.html"
+    path.write_text(as_html("drive.mcap", analysis))
+    return path
+
+
+@contextmanager
+def _opened(browser, path: Path, *, scheme: str = "light", width: int = 1200) -> Iterator[Opened]:
+    context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}, offline=True)
+    context.set_default_timeout(_PATIENCE_MS)
+    opened = Opened(context.new_page())
+    opened.page.goto(path.as_uri())
+    opened.page.wait_for_selector("html[data-drawn]", state="attached")
+    yield opened
+    context.close()
+
+
+@pytest.mark.parametrize("width", [360, 1200])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_everything_is_drawn_without_a_complaint_or_a_request(scheme, width, browser, report):
+    with _opened(browser, report, scheme=scheme, width=width) as opened:
+        drawn = opened.page.evaluate(_DRAWN)
+        assert len(drawn) == 9
+        assert min(drawn) > 1000
+        assert opened.complaints == []
+        assert opened.requests == [report.as_uri()]
+        assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
+        for name in ("matched", "too_far"):
+            assert opened.page.evaluate(_HAS_COLOUR, [".lanes", name])
+        assert opened.page.evaluate(_HAS_COLOUR, [".by-slop", "now"])
+        paper = opened.page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert paper == {"light": "rgb(255, 255, 255)", "dark": "rgb(18, 22, 27)"}[scheme]
+
+
+def test_a_change_of_scheme_is_drawn_at_once(browser, report):
+    with _opened(browser, report) as opened:
+        light = opened.page.evaluate("colour('matched')")
+        opened.page.emulate_media(color_scheme="dark")
+        opened.page.wait_for_function(_HAS_COLOUR, arg=[".lanes", "matched"])
+        assert opened.page.evaluate("colour('matched')") != light
+
+
+def test_the_tables_hold_the_figures_of_the_json(browser, report, analysis):
+    told = json.loads(json.dumps(as_json("drive.mcap", analysis)))
+    (group,) = told["groups"]
+    with _opened(browser, report) as opened:
+        fates = [head.strip() for head in opened.page.locator(".fates thead th").all_text_contents()]
+        rows = [row.split() for row in opened.page.locator(".fates tbody tr").all_inner_texts()]
+        cells = opened.page.locator("#topics ~ .wide tbody tr td:nth-child(3)").all_text_contents()
+    assert [int(cell) for cell in cells] == [topic["messages"] for topic in told["topics"]]
+    for row, expected in zip(rows, group["inputs"], strict=True):
+        counts = dict(zip(fates[1:-1], map(int, row[1:-1]), strict=True))
+        assert row[0] == expected["topic"]
+        assert int(row[-1]) == expected["received"] == sum(counts.values())
+        assert counts.pop("in sets") == expected["matched"]
+        assert {fate: count for fate, count in counts.items() if count} == expected["dropped"]
+
+
+def test_what_is_drawn_of_each_lane_adds_up(browser, report, analysis):
+    with _opened(browser, report) as opened:
+        drawn = opened.page.evaluate(
+            "async () => { const {groups} = JSON.parse(document.getElementById('drawings').textContent);"
+            " const {lanes} = await unpackTimeline(groups[0].timeline);"
+            " return lanes.map(({fates}) => [fates.length, fates.filter((fate) => fate === MATCHED).length]); }"
+        )
+    assert drawn == [[counts.fed, counts.matched] for counts in analysis.groups[0].trial.counts]
+
+
+def test_keys_move_zoom_and_step_through_what_went_into_no_set(browser, report):
+    with _opened(browser, report) as opened:
+        lanes, keyboard = opened.page.locator(".lanes"), opened.page.keyboard
+        lanes.focus()
+        begin, end = opened.shown()
+        keyboard.press("+")
+        closer = opened.shown()
+        assert closer[1] - closer[0] == pytest.approx((end - begin) / 2)
+        keyboard.press("ArrowRight")
+        assert opened.shown()[0] == pytest.approx(closer[0] + (closer[1] - closer[0]) / 4)
+        keyboard.press("0")
+        assert opened.shown()[1] - opened.shown()[0] > 29
+        keyboard.press("n")
+        first = opened.told()
+        assert "no set, " in first
+        keyboard.press("n")
+        assert opened.told() != first
+        keyboard.press("p")
+        assert opened.told() == first
+
+
+def test_buttons_do_the_same_and_are_reached_by_tab(browser, report):
+    with _opened(browser, report) as opened:
+        before = opened.shown()
+        opened.page.get_by_role("button", name="Zoom in").focus()
+        opened.page.keyboard.press("Enter")
+        assert opened.shown() != before
+        opened.page.keyboard.press("Tab")
+        assert opened.page.evaluate("document.activeElement.textContent") == "Zoom out"
+        opened.page.keyboard.press("Enter")
+        assert opened.shown() == pytest.approx(before)
+
+
+def test_dragging_over_the_whole_shows_that_part(browser, report):
+    with _opened(browser, report) as opened:
+        over = opened.page.locator(".overview .u-over")
+        over.scroll_into_view_if_needed()
+        box = over.bounding_box()
+        mouse, middle = opened.page.mouse, box["y"] + box["height"] / 2
+        mouse.move(box["x"] + box["width"] * 0.25, middle)
+        mouse.down()
+        mouse.move(box["x"] + box["width"] * 0.5, middle, steps=4)
+        mouse.up()
+        low, high = opened.shown()
+        assert (low, high) == (pytest.approx(7.5, abs=0.5), pytest.approx(15, abs=0.5))
+
+
+def test_pointing_at_a_message_tells_what_became_of_it(browser, report):
+    with _opened(browser, report) as opened:
+        lanes = opened.page.locator(".lanes .u-over")
+        lanes.scroll_into_view_if_needed()
+        box = lanes.bounding_box()
+        for step in range(40):
+            opened.page.mouse.move(box["x"] + 300 + step * 8, box["y"] + 10)
+            if "in a set of span" in opened.told():
+                break
+        assert opened.told().startswith(f"{TOPICS[0]} at ")
+        assert "in a set of span" in opened.told()
+
+
+def test_all_that_is_drawn_has_words(browser, report):
+    with _opened(browser, report) as opened:
+        nameless = opened.page.evaluate(
+            "() => [...document.querySelectorAll('[role=img], [role=group], [role=region], .chart')]"
+            ".filter((each) => !each.getAttribute('aria-label')).length"
+        )
+        assert nameless == 0
+        for name in ("Zoom in", "Earlier", "Next unmatched"):
+            assert opened.page.get_by_role("button", name=name).count() == 1
+        assert opened.page.get_by_role("img", name="/camera: 300 received").count() == 1
+        assert opened.page.get_by_role("group", name="Messages and sets of fused").count() == 1
+
+
+def test_names_from_strangers_run_nothing(browser, folder, analysis):
+    path = folder / "hostile.html"
+    path.write_text(as_html(HOSTILE, renamed(analysis)))
+    with _opened(browser, path) as opened:
+        assert opened.page.evaluate("window.stranger") is None
+        assert opened.page.locator("h1").text_content() == HOSTILE
+        assert opened.page.locator("tbody code").first.text_content() == HOSTILE
+        assert opened.page.locator("img").count() == 0
+        assert (opened.complaints, opened.requests) == ([], [path.as_uri()])

@@ -1,0 +1,179 @@
+"""The page of an analysis: what it holds, adds up and leaves out. How a browser shows it: test_html_browser.py."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from syncrelay.cli.analysis_html import as_html
+from syncrelay.cli.analysis_html.fates import CODES, FATES, MATCHED
+from syncrelay.cli.analysis_html.lanes import Lanes, lanes_of
+from syncrelay.cli.analysis_html.packing import pack
+from syncrelay.sync import DropReason
+from tests.bag.making import rig, write_mcap
+from tests.cli.command import run
+from tests.cli.html_reports import HOSTILE, analyzed, drawings_in, drive, renamed, unpacked
+from tests.ros.cdr_messages import VECTOR, vector
+from tests.ros.configs import config, inputs
+
+_SECOND = 1_000_000_000
+_NEVER = 10**9
+
+
+@pytest.fixture(scope="module")
+def analysis(tmp_path_factory):
+    return analyzed(tmp_path_factory.mktemp("html"), drive(seconds=30))
+
+
+def _lanes(analysis, *, most: int = _NEVER) -> Lanes:
+    return lanes_of(analysis.groups[0], analysis.begin, analysis.end, most=most)
+
+
+def _counts(lanes: Lanes) -> list[dict[str, int]]:
+    return [
+        {fate.name: count for code, fate in enumerate(FATES) if (count := int(np.count_nonzero(lane.fates == code)))}
+        for lane in lanes.lanes
+    ]
+
+
+@settings(deadline=None)
+@given(st.lists(st.integers(min_value=-(2**62), max_value=2**62)), st.integers(min_value=0, max_value=10**9))
+def test_what_is_packed_comes_out_again(values, step):
+    rising = np.cumsum(np.full(50, step, dtype=np.int64))
+    assert unpacked(pack(rising)) == rising.tolist()
+    far = pack(np.array(values, dtype=np.int64))
+    assert unpacked(far) == [value // far["unit"] * far["unit"] for value in values]
+
+
+def test_every_reason_has_a_shape_of_its_own():
+    assert set(CODES) == {MATCHED, *(reason.value for reason in DropReason)}
+    assert len({(fate.path, fate.is_filled) for fate in FATES}) == len(FATES)
+
+
+def test_every_message_stands_in_its_lane_with_its_fate(analysis):
+    counts = _counts(_lanes(analysis))
+    for each, of_input in zip(analysis.groups[0].trial.counts, counts, strict=True):
+        expected = {reason.value: count for reason, count in each.dropped.items()}
+        assert of_input == {MATCHED: each.matched, **expected}
+        assert sum(of_input.values()) == each.fed
+
+
+def test_a_line_joins_the_messages_of_a_set(analysis):
+    lanes = _lanes(analysis)
+    columns = zip(lanes.lanes, lanes.members.T, strict=True)
+    times = np.stack([lane.times[places] for lane, places in columns], axis=1)
+    assert (np.max(times, axis=1) - np.min(times, axis=1)).tolist() == lanes.spans.tolist()
+    for lane, places in zip(lanes.lanes, lanes.members.T, strict=True):
+        assert set(lane.fates[places].tolist()) == {CODES[MATCHED]}
+    assert len(lanes.spans) == len(analysis.groups[0].trial.sets)
+
+
+def test_a_set_without_an_optional_input_joins_the_others(tmp_path):
+    frames = [frame for frame in drive(seconds=10) if frame.topic != "/imu"]
+    topics = inputs(dict.fromkeys(("/camera", "/lidar"), VECTOR))
+    topics.append({"topic": "/imu", "type": VECTOR, "required": False})
+    lanes = _lanes(analyzed(tmp_path, frames, topics=topics, max_wait="10ms"))
+    assert len(lanes.members) > 50
+    assert set(lanes.members[:, 2].tolist()) == {-1}
+    assert len(lanes.lanes[2].times) == 0
+
+
+def test_unset_stamps_stand_where_they_were_received(tmp_path):
+    frames = [
+        frame._replace(payload=vector(0)) if frame.topic == "/imu" and number % 2 else frame
+        for number, frame in enumerate(drive(seconds=10))
+    ]
+    analysis = analyzed(tmp_path, frames)
+    lanes = _lanes(analysis)
+    assert lanes.astray == sum(1 for frame in frames if frame.payload == vector(0))
+    assert lanes.lanes[2].times[0] >= -_SECOND
+    assert lanes.lanes[2].times[-1] <= analysis.end - analysis.begin + _SECOND
+    assert "stand where they were received" in as_html("rig", analysis)
+
+
+def test_what_is_too_much_is_thinned_by_whole_stretches(tmp_path):
+    frames = drive(seconds=120, slow_down=5)
+    analysis = analyzed(tmp_path, frames)
+    whole, thinned = _lanes(analysis), _lanes(analysis, most=len(frames) // 4)
+    assert (whole.each, thinned.each) == (1, 4)
+    sets = zip(whole.begins.tolist(), whole.spans.tolist(), strict=True)
+    kept = [each for each in sets if each[0] // whole.stretch % thinned.each == 0]
+    assert list(zip(thinned.begins.tolist(), thinned.spans.tolist(), strict=True)) == kept
+    for lane, places in zip(thinned.lanes, thinned.members.T, strict=True):
+        assert set(lane.fates[places].tolist()) == {CODES[MATCHED]}
+
+
+def test_the_page_says_what_was_thinned_and_its_tables_are_of_all(analysis, monkeypatch):
+    whole = as_html("rig", analysis)
+    monkeypatch.setattr("syncrelay.cli.analysis_html.document._MOST_MESSAGES", 500)
+    thinned = as_html("rig", analysis)
+    assert "more messages than the page can hold" not in whole
+    assert "of every 5 stretches of 10 s one is drawn" in thinned
+    tables = [re.findall(r"<table.*?</table>", page, re.DOTALL) for page in (whole, thinned)]
+    assert tables[0] == tables[1]
+
+
+def test_18_minutes_of_three_sensors_stay_below_6_mb(tmp_path):
+    analysis = analyzed(tmp_path, drive(seconds=18 * 60))
+    page = as_html("drive", analysis)
+    assert len(page.encode()) < 6_000_000
+    (group,) = drawings_in(page)["groups"]
+    drawn = sum(lane["times"]["count"] for lane in group["timeline"]["lanes"])
+    assert drawn == sum(topic.messages for topic in analysis.topics) > 70_000
+
+
+def test_nothing_is_fetched_from_anywhere(analysis):
+    page = as_html("rig", analysis)
+    assert not re.findall(r'(?:src|href|action|data)="(?!#)', page)
+    assert not re.findall(r"@import|url\((?!#)|fetch\(|XMLHttpRequest|WebSocket", page)
+    assert "default-src 'none'" in page
+
+
+def test_what_strangers_name_is_text_and_nothing_else(analysis):
+    page, plain = as_html(HOSTILE, renamed(analysis)), as_html("rig", analysis)
+    assert "<b>" not in page
+    assert "<img" not in page
+    assert page.count("<script") == plain.count("<script")
+    assert page.count("&lt;/script&gt;") > 10
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("command")
+    group = {
+        "policy": "approximate_time",
+        "slop": "1ms",
+        "topics": inputs(dict.fromkeys(("/camera", "/lidar"), VECTOR)),
+    }
+    (made / "f.yaml").write_text(config({"front": group}))
+    write_mcap(made / "rig.mcap", rig(100))
+    return made
+
+
+def test_the_command_writes_it_beside_what_it_prints(folder):
+    plain = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
+    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", "--html", "report.html", folder=folder)
+    assert (done.returncode, done.stderr) == (0, "syncrelay: report.html is written\n")
+    assert done.stdout == plain.stdout
+    assert (folder / "report.html").read_text().startswith("<!doctype html>")
+
+
+def test_a_former_report_is_replaced_and_nothing_else_is(folder):
+    (folder / "again.html").write_text(_FORMER)
+    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--html", "again.html", folder=folder)
+    assert (done.returncode, done.stderr) == (0, "syncrelay: again.html is written\n")
+    (folder / "mine.html").write_text("<!doctype html><title>mine</title>")
+    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--html", "mine.html", folder=folder)
+    assert (done.returncode, done.stderr) == (1, "syncrelay: mine.html: exists already, and is not overwritten\n")
+    assert (folder / "mine.html").read_text() == "<!doctype html><title>mine</title>"
+
+
+_FORMER = '<!doctype html>\n<html lang="en">\n<head>\n<meta name="generator" content="syncrelay">\nformer'
+
+
+def test_topics_without_a_file_are_drawn_too(folder):
+    done = run("analyze", "rig.mcap", "/camera", "/lidar", "--html", "topics.html", folder=folder)
+    assert done.returncode == 0
+    assert "100 of 100 possible sets come together" in (folder / "topics.html").read_text()
