@@ -1,7 +1,10 @@
 """The application: asks a relay once a second, in a thread, and holds what the screens show."""
 
 import asyncio
+import os
 import signal
+import sys
+import termios
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,6 +35,14 @@ class Heard(Message):
         self.url, self.heard = url, heard
 
 
+def end_without_terminal() -> None:
+    """End the process at once where its terminal is gone: there is nothing to restore, and no one to tell."""
+    try:
+        termios.tcgetattr(sys.__stderr__.fileno() if sys.__stderr__ else 2)
+    except (termios.error, OSError, ValueError):
+        os._exit(128 + signal.SIGHUP)
+
+
 class TopApp(App[None]):
     """Watches one of the relays that were found, of several the one that the user chooses.
 
@@ -60,8 +71,10 @@ class TopApp(App[None]):
     def on_mount(self) -> None:
         """Show the only relay, or ask which one."""
         # Without it, the terminal would be left as it was drawn upon.
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            asyncio.get_running_loop().add_signal_handler(number, self.exit)
+        loop = asyncio.get_running_loop()
+        loop.add_signal_handler(signal.SIGTERM, self.exit)
+        # Not as the loop's handler: one whose terminal goes while it is set up may wait for it for ever.
+        signal.signal(signal.SIGHUP, lambda *_: end_without_terminal() or loop.call_soon_threadsafe(self.exit))
         if len(self._relays) > 1:
             self.push_screen(RelaysScreen(self._relays))
         else:
