@@ -5,7 +5,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.cli.heartbeat import VARIABLE
@@ -13,6 +13,8 @@ from syncrelay.doctor.diagnosis import Diagnosis, Severity
 from syncrelay.doctor.examine import Examination, Request, examine
 from syncrelay.doctor.stamps import delay_of
 from syncrelay.doctor.text import diagnosis_lines, sighting_lines, verdict
+
+_LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
 
 
 def doctor(
@@ -59,6 +61,7 @@ def _heading(examination: Examination) -> str:
             examination.middleware or "no middleware",
             "no valid domain" if examination.domain is None else f"domain {examination.domain}",
             f"discovery {examination.discovery_range}",
+            *([f"messages through {_LIBRARIES[examination.path]}"] if examination.path else []),
         ]
     )
 
@@ -72,6 +75,7 @@ def _as_json(examination: Examination) -> dict[str, Any]:
         "middleware": examination.middleware or None,
         "domain": examination.domain,
         "discovery_range": examination.discovery_range,
+        "receives_by": examination.path or None,
         "diagnoses": [{**asdict(each), "severity": each.severity.value} for each in examination.diagnoses],
         "graph": _graph_as_json(examination),
     }

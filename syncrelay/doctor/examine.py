@@ -9,8 +9,9 @@ from syncrelay.doctor.container import check_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, know, worst_first
 from syncrelay.doctor.discovery import check_discovery, domain_of, range_of
 from syncrelay.doctor.folders import check_folders
-from syncrelay.doctor.graph import check_clock, check_company, check_own_name, check_topics
+from syncrelay.doctor.graph import check_clock, check_company, check_own_name, check_sizes, check_topics
 from syncrelay.doctor.installation import Installation, check_installation, middleware_of
+from syncrelay.doctor.listen import check_listen
 from syncrelay.doctor.machine.discovery import look_at_discovery, look_at_transport
 from syncrelay.doctor.machine.folders import look_at_folders
 from syncrelay.doctor.machine.installation import look_at_installation
@@ -21,7 +22,7 @@ from syncrelay.doctor.network import check_network
 from syncrelay.doctor.shared_memory import check_shared_memory
 from syncrelay.doctor.stamps import Matched, check_stamps
 from syncrelay.doctor.start import check_start
-from syncrelay.doctor.transport import check_transport, uses_shared_memory
+from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
 from syncrelay.ros.sighting import Sighting
 from syncrelay.ros.trial import Plan, Trial, try_out
 
@@ -39,7 +40,11 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """What was found, the worst first. `domain` is None where the environment names none that ROS takes."""
+    """What was found, the worst first.
+
+    `domain` is None where the environment names none that ROS takes; `path` is how messages would pass, direct or
+    rclpy, empty where no node starts.
+    """
 
     installation: Installation
     middleware: str
@@ -47,6 +52,7 @@ class Examination:
     discovery_range: str
     diagnoses: tuple[Diagnosis, ...]
     sighting: Sighting | None
+    path: str = ""
 
 
 def examine(request: Request) -> Examination:
@@ -77,6 +83,7 @@ def examine(request: Request) -> Examination:
         range_of(environ),
         tuple(worst_first(found)),
         sighting,
+        trial.path if trial is not None else "",
     )
 
 
@@ -122,6 +129,7 @@ def _plan(config: Config | None, problems: Sequence[Problem], ros_args: Sequence
 
 def _of_file(config: Config | None, trial: Trial) -> Iterator[Diagnosis]:
     if config is not None:
+        yield from check_listen(config.listen)
         yield from check_types(config, trial.unusable)
         if trial.names:
             yield from check_remaps(config, trial.names)
@@ -154,6 +162,8 @@ def _of_graph(
     yield from check_clock(sighting, use_sim_time=trial.use_sim_time)
     yield from check_own_name(sighting, trial.node)
     yield from check_topics(sighting, optional=_optional(config, trial))
+    if config.node.transport == "default" and uses_defaults(environ):
+        yield from check_sizes(sighting)
     yield from check_stamps(sighting.topics, _matched(config, trial))
 
 

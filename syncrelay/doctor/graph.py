@@ -1,12 +1,16 @@
 """The graph held against the file: who publishes what, and whether it arrives."""
 
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.doctor.diagnosis import Diagnosis, Severity, know, mend
 from syncrelay.doctor.discovery import ports_of
 from syncrelay.doctor.words import counted
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
+
+# Of Fast DDS's shared memory by default, in bytes: a message has to fit into it as a whole.
+_SEGMENT: Final = 512 * 1024
 
 
 def check_company(sighting: Sighting, *, domain: int, discovery_range: str) -> Iterator[Diagnosis]:
@@ -100,6 +104,8 @@ def _check_topic(topic: SeenTopic, seconds: float) -> Iterator[Diagnosis]:
         yield _incompatible(topic, mismatched)
     elif any(each.node for each in fitting) and not topic.received:
         yield _silent(topic, fitting, seconds)
+    if len(fitting) > 1:
+        yield _several(topic, fitting)
 
 
 def _no_publisher(topic: SeenTopic, seconds: float) -> Diagnosis:
@@ -143,6 +149,29 @@ def _silent(topic: SeenTopic, fitting: Sequence[SeenPublisher], seconds: float) 
         do="see whether the driver sends: ros2 topic hz on its own machine, in its own container, as its own user.\n"
         "If it does, data get lost on the way: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4 on both sides, and start anew",
     )
+
+
+def _several(topic: SeenTopic, fitting: Sequence[SeenPublisher]) -> Diagnosis:
+    return know(
+        "several_publishers",
+        f"{topic.name} is published by {all_of(_name(each) for each in fitting)}",
+        so="where their stamps are not in one order, messages are dropped as late or repeated",
+        do="nothing if they take turns; else give each a topic of its own",
+    )
+
+
+def check_sizes(sighting: Sighting) -> Iterator[Diagnosis]:
+    """Yield topics whose messages do not fit into the shared memory that Fast DDS takes by itself."""
+    large = [topic for topic in sighting.topics if topic.largest > _SEGMENT]
+    if large:
+        yield know(
+            "large_messages",
+            f"messages of {all_of(f'{topic.name} ({topic.largest / 1e6:.1f} MB)' for topic in large)} are larger than"
+            " the 0.5 MB of shared memory that Fast DDS takes",
+            so="on one machine they take ten times as long as they could, and some are lost",
+            do="for the relay write into the file: node: {transport: large_messages}\n"
+            "for every other process: export FASTRTPS_DEFAULT_PROFILES_FILE=.../configs/large_messages.xml",
+        )
 
 
 def _name(publisher: SeenPublisher) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from syncrelay.doctor.diagnosis import Diagnosis, Severity, mend
+from syncrelay.doctor.diagnosis import Diagnosis, Severity, know, mend
 from syncrelay.ros.trial import Step, Trial
 
 _WHAT: Final = {
@@ -16,7 +16,17 @@ _WHAT: Final = {
 
 
 def check_start(trial: Trial, *, ros_args: Sequence[str], before: Sequence[Diagnosis]) -> Iterator[Diagnosis]:
-    """Yield why a node does not start, unless something to mend that was found `before` explains it."""
+    """Yield why a node does not start, unless something to mend that was found `before` explains it.
+
+    Of one that starts, yield why it receives at a higher cost, if it does.
+    """
+    if trial.path_fault:
+        yield know(
+            "receive_path",
+            f"messages pass through rclpy: librcl is not as expected here ({trial.path_fault})",
+            so="the relay works, and each message costs it more CPU",
+            do="report it, with the first line of this examination",
+        )
     if trial.failed is None or any(found.severity is Severity.MEND for found in before):
         return
     if trial.failed is Step.INIT and ros_args:

@@ -30,6 +30,11 @@ def uses_shared_memory(environ: Mapping[str, str]) -> bool:
     return word in _WITH_SHARED_MEMORY or word not in _TRANSPORTS
 
 
+def uses_defaults(environ: Mapping[str, str]) -> bool:
+    """Whether Fast DDS carries messages as it does where nothing is said: over 0.5 MB of shared memory."""
+    return environ.get(_VARIABLE, "DEFAULT") == "DEFAULT" and not environ.get(_PROFILES)
+
+
 def check_transport(found: Transport) -> Iterator[Diagnosis]:
     """Yield values that Fast DDS refuses, and those that narrow whom data reach."""
     if found.profiles_fault:

@@ -75,9 +75,11 @@ class _Watched:
     delays: list[int] = field(default_factory=list)
     unstamped: int = 0
     unreadable: int = 0
+    largest: int = 0
 
     def take(self, payload: bytes, received: int, now: int | None) -> None:
         self.arrivals.append(received)
+        self.largest = max(self.largest, len(payload))
         if self.read_stamp is None or len(self.delays) >= _MOST_SAMPLED:
             return
         stamp = self.read_stamp(payload)
@@ -189,6 +191,7 @@ def _seen(node: Any, topic: _Watched, listed: Mapping[str, Sequence[str]]) -> Se
         unreadable=topic.unreadable,
         delays=tuple(topic.delays),
         alike=() if publishers else tuple(_alike(node, topic, listed)),
+        largest=topic.largest,
     )
 
 

@@ -22,7 +22,7 @@ class SeenTopic:
 
     `delays` are receive time minus stamp of each message that had both, in nanoseconds, the file's offset left out;
     with simulated time the clock's value at that moment stands for the time. `alike` are topics of the graph that
-    may have been meant.
+    may have been meant. `largest` is the size of the largest message, in bytes.
     """
 
     name: str
@@ -34,6 +34,7 @@ class SeenTopic:
     unreadable: int = 0
     delays: tuple[int, ...] = ()
     alike: tuple[str, ...] = ()
+    largest: int = 0
 
 
 @dataclass(frozen=True, slots=True)

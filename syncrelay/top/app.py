@@ -35,7 +35,7 @@ class Heard(Message):
         self.url, self.heard = url, heard
 
 
-def end_without_terminal() -> None:
+def _end_without_terminal() -> None:
     """End the process at once where its terminal is gone: there is nothing to restore, and no one to tell."""
     try:
         termios.tcgetattr(sys.__stderr__.fileno() if sys.__stderr__ else 2)
@@ -74,11 +74,15 @@ class TopApp(App[None]):
         loop = asyncio.get_running_loop()
         loop.add_signal_handler(signal.SIGTERM, self.exit)
         # Not as the loop's handler: one whose terminal goes while it is set up may wait for it for ever.
-        signal.signal(signal.SIGHUP, lambda *_: end_without_terminal() or loop.call_soon_threadsafe(self.exit))
+        signal.signal(signal.SIGHUP, lambda *_: self._hang_up(loop))
         if len(self._relays) > 1:
             self.push_screen(RelaysScreen(self._relays))
         else:
             self._watch(self._relays[0])
+
+    def _hang_up(self, loop: asyncio.AbstractEventLoop) -> None:
+        _end_without_terminal()
+        loop.call_soon_threadsafe(self.exit)
 
     def on_unmount(self) -> None:
         """Let the thread end."""

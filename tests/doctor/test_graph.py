@@ -3,7 +3,7 @@
 import pytest
 
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.graph import check_clock, check_company, check_own_name, check_topics
+from syncrelay.doctor.graph import check_clock, check_company, check_own_name, check_sizes, check_topics
 from syncrelay.doctor.stamps import Matched, check_stamps
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 
@@ -45,6 +45,21 @@ def test_a_stranger_beside_a_fitting_publisher_is_only_to_know():
     (found,) = check_topics(sighting(topic), optional=frozenset())
     assert found.severity is KNOW
     assert f"/x ({IMU})" in found.what
+
+
+def test_two_publishers_of_one_topic_are_to_know():
+    (found,) = check_topics(
+        sighting(image(publishers=(CAMERA, SeenPublisher("/twin", IMAGE, "")))), optional=frozenset()
+    )
+    assert (found.code, found.severity) == ("several_publishers", KNOW)
+    assert found.what == "/image is published by /camera_driver and /twin"
+
+
+def test_messages_over_the_shared_memory_are_to_know_with_their_size():
+    assert list(check_sizes(sighting(image(largest=524_288)))) == []
+    (found,) = check_sizes(sighting(image(largest=6_220_856), image(largest=524_289)))
+    assert (found.code, found.severity) == ("large_messages", KNOW)
+    assert found.what.startswith("messages of /image (6.2 MB) and /image (0.5 MB) are larger than the 0.5 MB")
 
 
 def test_alone_is_said_once():

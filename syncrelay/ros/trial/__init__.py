@@ -39,7 +39,8 @@ class Plan:
 class Trial:
     """What came of it. `failed` is the step that failed, None if all went well, and `fault` says why.
 
-    `unusable` has the fault of every type that cannot be imported. `names` are the topics after all remaps.
+    `unusable` has the fault of every type that cannot be imported. `names` are the topics after all remaps. `path` is
+    how messages pass, direct or rclpy, and `path_fault` why not directly.
     """
 
     failed: Step | None = None
@@ -49,6 +50,8 @@ class Trial:
     names: Mapping[str, str] = field(default_factory=dict)
     use_sim_time: bool = False
     middleware: str = ""
+    path: str = ""
+    path_fault: str = ""
 
 
 def try_out(plan: Plan, environ: Mapping[str, str]) -> Trial:
@@ -91,7 +94,17 @@ def _read(objects: Sequence[Mapping[str, Any]], code: int, stderr: str) -> Trial
     unusable = said.get("unusable", {})
     middleware = said.get("middleware", "")
     if code == 0 and "names" in said:
-        return Trial(None, "", unusable, said["full_name"], said["names"], said["use_sim_time"], middleware)
+        return Trial(
+            None,
+            "",
+            unusable,
+            said["full_name"],
+            said["names"],
+            said["use_sim_time"],
+            middleware,
+            said["path"],
+            said["path_fault"],
+        )
     step = Step(said.get("step", Step.IMPORT.value))
     if "fault" in said:
         return Trial(step, said["fault"], unusable, middleware=middleware)

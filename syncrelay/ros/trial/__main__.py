@@ -1,11 +1,13 @@
 """The process of a trial: a plan as JSON on stdin, then one object a line on stdout for every step begun or done."""
 
 import json
+import os
 import sys
 from typing import Any
 
 from syncrelay.errors import RosUnavailableError, TypeImportError
 from syncrelay.ros.environment import keep_stdout, log_arguments, require_rclpy
+from syncrelay.ros.path import PathName
 from syncrelay.ros.trial import Step
 from syncrelay.ros.types import import_type
 
@@ -64,9 +66,24 @@ def _start(plan: dict[str, Any]) -> None:
         full_name=node.get_fully_qualified_name(),
         names={name: node.resolve_topic_name(name) for name in plan["names"]},
         use_sim_time=bool(node.get_parameter("use_sim_time").value),
+        **_path(node),
     )
     node.destroy_node()
     context.try_shutdown()
+
+
+def _path(node: Any) -> dict[str, str]:
+    """Find how messages would pass, and why not directly."""
+    from syncrelay.ros.direct.check import DirectPathUnusableError, checked_path  # noqa: PLC0415  after require_rclpy
+    from syncrelay.ros.path_choice import VARIABLE  # noqa: PLC0415  after require_rclpy
+
+    if os.environ.get(VARIABLE) == PathName.RCLPY.value:
+        return {"path": PathName.RCLPY.value, "path_fault": ""}
+    try:
+        checked_path(node)
+    except DirectPathUnusableError as error:
+        return {"path": PathName.RCLPY.value, "path_fault": str(error)}
+    return {"path": PathName.DIRECT.value, "path_fault": ""}
 
 
 def _say(step: Step, **facts: Any) -> None:
