@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-container lint bench clean
+.PHONY: demo test test-container faults lint bench clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -16,6 +16,10 @@ test: $(VENV)/test
 # Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
 test-container: $(VENV)/test
 	tests/container/run $(BIN)/python $(ARGS)
+
+# Breaks what a robot breaks, at length, and prints what was survived; `make test` has the short form of each.
+faults: $(VENV)/test
+	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m "faults and not soak" $(ARGS)
 
 lint: $(VENV)/lint
 	$(BIN)/ruff check .

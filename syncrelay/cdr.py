@@ -47,10 +47,15 @@ def read_stamp(payload: Payload) -> int | None:
     return int(seconds * _NS_PER_SECOND + nanoseconds)
 
 
+def has_place_for_stamp(payload: Payload) -> bool:
+    """Whether a payload can hold the stamp of a leading Header, whatever stands there now."""
+    return len(payload) >= _STAMP_END and not payload[0] and payload[1] in _STAMP_LAYOUTS
+
+
 def patch_stamp(payload: Payload, stamp: int) -> bytes:
     """Return the payload with the stamp of its leading Header set to `stamp` nanoseconds.
 
-    Raises ValueError where `read_stamp` would give None, and for a stamp whose seconds don't fit an int32.
+    Raises ValueError for a payload that has no place for one, and for a stamp whose seconds don't fit an int32.
     """
     whole = memoryview(payload)
     return b"".join((whole[:_STAMP_AT], _stamp_bytes(payload, stamp), whole[_STAMP_END:]))
@@ -62,7 +67,7 @@ def write_stamp(payload: bytearray | memoryview, stamp: int) -> None:
 
 
 def _stamp_bytes(payload: Payload, stamp: int) -> bytes:
-    if read_stamp(payload) is None:
+    if not has_place_for_stamp(payload):
         raise ValueError("the payload has no stamp to patch")
     seconds, nanoseconds = divmod(stamp, _NS_PER_SECOND)
     if not _MIN_SECONDS <= seconds <= _MAX_SECONDS:

@@ -2,7 +2,7 @@
 
 import importlib.util
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -11,12 +11,22 @@ from tests.ros.domain import claimed_domain
 from tests.ros.stage import Stage, running_stage
 
 _REAL_DATA = "SYNCRELAY_REAL_DATA"
+_FIGURES = "figures"
 
 
 def pytest_configure() -> None:
     named = os.environ.get(_REAL_DATA)
     if named and not Path(named).is_dir():
         raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    reports = [report for reports in terminalreporter.stats.values() for report in reports]
+    lines = [line for report in reports for name, line in getattr(report, "user_properties", ()) if name == _FIGURES]
+    if lines:
+        terminalreporter.section("what it survived")
+    for line in dict.fromkeys(lines):
+        terminalreporter.write_line(line)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -43,6 +53,12 @@ def ros_domain() -> Iterator[int]:
 def receive_path() -> str:
     """The path of the relay's messages; tests marked `both_paths` run on each."""
     return "direct"
+
+
+@pytest.fixture
+def figures(record_property: Callable[[str, object], None]) -> Callable[[str], None]:
+    """Takes a line of figures, which are told when all tests have run."""
+    return lambda line: record_property(_FIGURES, line)
 
 
 @pytest.fixture

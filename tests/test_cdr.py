@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.cdr import patch_stamp, read_stamp
+from syncrelay.cdr import has_place_for_stamp, patch_stamp, read_stamp
 
 LITTLE_ENDIAN_IMAGE = (
     b"\x00\x01\x00\x00"  # CDR_LE, no options
@@ -49,13 +49,21 @@ def test_plain_encapsulations_are_read_whatever_their_options_say(kind, body):
         pytest.param(b"\x00\x02" + LITTLE_ENDIAN_IMAGE[2:], id="parameter list"),
         pytest.param(b"\x00\x09" + LITTLE_ENDIAN_IMAGE[2:], id="delimited XCDR2"),
         pytest.param(b"\x01\x01" + LITTLE_ENDIAN_IMAGE[2:], id="first byte is not zero"),
-        pytest.param(b"\x00\x01\x00\x00\x00\x00\x00\x00\x00\xca\x9a\x3b", id="nanosec of a whole second"),
     ],
 )
 def test_a_malformed_payload_has_no_stamp_and_cannot_be_patched(payload):
     assert read_stamp(payload) is None
+    assert not has_place_for_stamp(payload)
     with pytest.raises(ValueError, match="no stamp to patch"):
         patch_stamp(payload, 1)
+
+
+@pytest.mark.parametrize("nanoseconds", [b"\x00\xca\x9a\x3b", b"\xff\xff\xff\xff"], ids=["a second", "the most"])
+def test_a_nanosecond_part_that_no_stamp_has_is_malformed_but_can_be_patched(nanoseconds):
+    payload = b"\x00\x01\x00\x00\x00\x00\x00\x00" + nanoseconds
+    assert read_stamp(payload) is None
+    assert has_place_for_stamp(payload)
+    assert read_stamp(patch_stamp(payload, 1)) == 1
 
 
 def test_the_last_nanosecond_of_a_second_is_valid():

@@ -4,9 +4,11 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
+from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.payloads import stamp_reader, value_reader
-from syncrelay.bag.recording import Channel, RawMessage, Recording
+from syncrelay.bag.recording import Channel, Encoding, RawMessage, Recording
 from syncrelay.bag.wiring import Wiring
+from syncrelay.cdr import has_place_for_stamp
 from syncrelay.sync import DropReason, InputCounts, Message, Outcome, SyncGroup
 
 Listener: TypeAlias = Callable[[Wiring, Outcome, int], None]
@@ -65,6 +67,25 @@ class GroupReplay:
         return GroupResult(self.wiring.group.name, inputs, self.engine.sets)
 
     def _feed(self, index: int, channel: Channel) -> _Feed:
+        feed = self._feed_any(index, channel)
+        if not self._is_to_be_restamped(index, channel):
+            return feed
+
+        def feed_if_it_can_be_restamped(raw: RawMessage) -> None:
+            if has_place_for_stamp(raw[2]):
+                feed(raw)
+            else:
+                self._reject(index, raw)
+
+        return feed_if_it_can_be_restamped
+
+    def _is_to_be_restamped(self, index: int, channel: Channel) -> bool:
+        """Whether a stamp is to be written where none is read: else reading it shows that there is a place for it."""
+        by_header = self.wiring.inputs[index].config.stamp == "header"
+        is_ros2 = channel.encoding is not Encoding.ROS1
+        return self.wiring.group.restamp is not None and is_ros2 and not by_header and bool(begins_with_header(channel))
+
+    def _feed_any(self, index: int, channel: Channel) -> _Feed:
         topic = self.wiring.inputs[index].config
         read_stamp = stamp_reader(topic.stamp, channel)
         read_key = None if topic.key is None else value_reader(channel, topic.key)

@@ -11,6 +11,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
+from syncrelay.cdr import has_place_for_stamp
 from syncrelay.config import TopicConfig
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint
@@ -239,6 +240,21 @@ class TopicInput:
 
 def taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
     """What feeds one input of a group from messages of a type; raises TypeImportError where a field is not there."""
+    take = _taker(group, index, message_type)
+    topic = group.config.topics[index]
+    if group.config.restamp is None or topic.stamp == "header" or not begins_with_header(message_type):
+        return take
+
+    def take_if_it_can_be_restamped(payload: Any, content: Content, received: int) -> None:
+        if has_place_for_stamp(content):
+            take(payload, content, received)
+        else:
+            group.receive(index, payload, received, None)
+
+    return take_if_it_can_be_restamped
+
+
+def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
     topic = group.config.topics[index]
     read_stamp = stamp_reader(topic.stamp, message_type)
     if topic.key is not None:

@@ -164,3 +164,14 @@ def test_the_presets_are_those_of_rclpy():
         for key in ("deadline", "lifespan", "liveliness_lease_duration"):
             assert getattr(theirs, key).nanoseconds == getattr(ours, key)
         assert theirs.depth == ours.depth
+
+
+def test_where_sets_are_restamped_a_payload_without_a_place_for_a_stamp_is_malformed(tmp_path):
+    cut = Frame("/camera", VECTOR, _RIG[3].time + 1, _RIG[3].payload[:8])
+    frames = sorted([*_RIG, cut], key=lambda frame: frame.time)
+    topics = inputs(_PAIR, stamp="receive")
+    written = _written(
+        write_mcap(tmp_path / "rig.mcap", frames), tmp_path / "out.mcap", topics=topics, restamp="earliest"
+    )
+    assert len(_payloads(written, "/front/lidar")) > 5
+    assert all(len(frame.payload) == len(_RIG[0].payload) for frame in written)

@@ -1,0 +1,113 @@
+"""Whatever a file holds, reading it gives a configuration or says what is wrong with it, and does nothing else."""
+
+import json
+import random
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import ConfigError, load
+from tests.faults.extent import chosen
+from tests.faults.mutations import mutated
+
+pytestmark = pytest.mark.faults
+
+_EXAMPLES = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
+_FILES = chosen(short=1500, long=10_000)
+_BATCHES = 4
+
+
+@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.parametrize("batch", range(_BATCHES))
+def test_a_file_of_any_content_is_in_order_or_an_error_that_says_why(batch: int, tmp_path: Path, figures):
+    path, became = tmp_path / "fusion.yaml", Counter()
+    for number in range(batch, _FILES, _BATCHES):
+        content = mutated(_EXAMPLES[number % len(_EXAMPLES)].read_bytes(), random.Random(number))
+        path.write_bytes(content)
+        became[_loaded(path)] += 1
+    assert became.keys() == {"in order", "refused"}
+    figures(f"{sum(became.values())} fuzzed files (part {batch + 1} of {_BATCHES}): {dict(became)}, nothing else")
+
+
+def _loaded(path: Path) -> str:
+    """What became of a file; anything but a configuration or an error with words flies on, with its content."""
+    try:
+        load(str(path))
+    except ConfigError as error:
+        return "refused" if str(error) else "refused without a word"
+    except Exception as error:
+        error.add_note(repr(path.read_bytes()))
+        raise
+    return "in order"
+
+
+# What would run or read something, if whoever reads the file obeyed it.
+_ORDERS = (
+    "!!python/object/apply:os.system ['touch written']",
+    "!!python/object/new:os.system ['touch written']",
+    "!!python/name:os.system",
+    "!!python/module:os",
+    "!include /etc/hostname",
+    "!ENV ${HOME}",
+    "{$ref: /etc/hostname}",
+    "/etc/hostname",
+    "$(touch written)",
+    "`touch written`",
+    "${HOME:-$(touch written)}",
+    "{{ lipsum.__globals__ }}",
+    "__import__('os').system('touch written')",
+)
+
+# A process of its own says what Python audits while it reads files: what is opened, run, compiled or connected to.
+_AUDITED = """
+import json, sys
+from syncrelay.config import ConfigError, load
+def read(path):
+    try:
+        load(path)
+    except ConfigError:
+        pass
+read(sys.argv[1])
+seen = []
+sys.addaudithook(lambda event, arguments: seen.append([event, str(arguments[0]) if arguments else ""]))
+for path in sys.argv[2:]:
+    read(path)
+print(json.dumps(list(seen)))
+"""
+_HARMLESS = re.compile(r"object\.__\w+__|os\.(listdir|scandir)|sys\._getframe|builtins\.id|re\..*|marshal\..*")
+
+
+def test_no_value_has_anything_run_or_read(tmp_path: Path):
+    paths = [tmp_path / f"{number}.yaml" for number in range(len(_ORDERS) + 1)]
+    for path, value in zip(paths, ("10ms", *_ORDERS), strict=True):
+        keys = [f"{key}: {value}" for key in ("slop", "output_prefix", "restamp")]
+        path.write_text(_FILE.format(value=value, keys="\n    ".join(keys)))
+    done = subprocess.run(
+        [sys.executable, "-c", _AUDITED, *map(str, paths)], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    seen = [(event, what) for event, what in json.loads(done.stdout) if not _HARMLESS.fullmatch(event)]
+    opened = {what for event, what in seen if event == "open"}
+    assert {event for event, _ in seen} == {"open"}
+    assert {str(path) for path in paths[1:]} <= opened
+    assert {what for what in opened - set(map(str, paths)) if "/share/" not in what} == set()
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
+
+
+_FILE = """\
+version: 1
+groups:
+  front:
+    policy: approximate_time
+    {keys}
+    topics:
+      - topic: {value}
+        type: sensor_msgs/msg/Image
+      - topic: /lidar
+        type: {value}
+        qos: {value}
+        stamp: {{field: {value}}}
+"""
