@@ -18,7 +18,7 @@ from syncrelay.explain import Endpoint
 from syncrelay.ros import graph
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.path import Content, Deliver, Path, Source
-from syncrelay.ros.qos import input_profile
+from syncrelay.ros.qos import input_profile, output_profile
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.types import begins_with_header, import_type, stamp_reader, value_reader
 from syncrelay.sync import DropReason
@@ -200,7 +200,8 @@ class TopicInput:
         self._loop.call(lambda: self._swap(subscription, publishers)).result()
 
     def _publisher(self, user: User, profile: Any) -> Any:
-        return self._node.create_publisher(self._message_type, user.group.config.topics[user.index].output, profile)
+        output = user.group.config.topics[user.index].output
+        return self._node.create_publisher(self._message_type, output, output_profile(profile))
 
     def _swap(self, subscription: Any, publishers: list[Any]) -> None:
         old = [user.publisher for user in self._users if user.publisher is not None]

@@ -18,6 +18,9 @@ from syncrelay.config import QosOverrides, QosPreset
 # DDS history, not queue_size: deep enough that a hiccup of half a second costs a 200 Hz input nothing.
 _DEPTH = 100
 
+# As many as Fast DDS keeps where it is to keep all.
+_KEPT = 5000
+
 _Policies: TypeAlias = dict[str, Any]
 
 
@@ -33,6 +36,28 @@ def input_profile(asked: QosPreset | QosOverrides, offered: Sequence[QoSProfile]
     if not offered and not {"reliability", "durability"} <= policies.keys():
         return None
     return QoSProfile(**{"depth": _DEPTH, **_served_by_all(offered), **policies})
+
+
+def output_profile(received: QoSProfile) -> QoSProfile:
+    """What to publish with: what a topic is received with, but so that no subscriber can hold the relay up.
+
+    A publisher that keeps all waits for the slowest subscriber, and fails when that hangs. So the last are kept.
+    """
+    if received.history != QoSHistoryPolicy.KEEP_ALL:
+        return received
+    policies = {name: getattr(received, name) for name in _OUTPUT_POLICIES}
+    return QoSProfile(history=QoSHistoryPolicy.KEEP_LAST, depth=_KEPT, **policies)
+
+
+_OUTPUT_POLICIES = (
+    "reliability",
+    "durability",
+    "deadline",
+    "lifespan",
+    "liveliness",
+    "liveliness_lease_duration",
+    "avoid_ros_namespace_conventions",
+)
 
 
 def _served_by_all(offered: Sequence[QoSProfile]) -> _Policies:
