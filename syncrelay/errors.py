@@ -17,6 +17,10 @@ class BagError(SyncRelayError):
     """A recording cannot be read, or not as the file asks for."""
 
 
+class NothingToMatchError(SyncRelayError):
+    """What was recorded or heard is too little to propose a file from."""
+
+
 class UsageError(SyncRelayError):
     """The command line asks for something that is not there."""
 

@@ -19,7 +19,7 @@ commands:
   validate FILE...      check files and report everything that is wrong with them
   schema                print the JSON Schema of the file, for editors
   replay BAG...         show what a file makes of a recording; write its outputs as one
-  init --from-bag BAG   propose a file for a recording
+  init --from-bag BAG   propose a file for a recording, or with --from-graph for what is published
   analyze BAG           measure a recording, and suggest the values that fit
   demo                  show it all on a simulated rig, without a robot
   doctor                tell what can go wrong before a message flows
@@ -200,17 +200,24 @@ def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
 def _init(words: Sequence[str], _stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay init",
-        description="Proposes a file, without ROS: groups of the topics that a recording has, types, and values that\n"
-        "fit, with what was measured as comments. The file gives sets of that recording.",
+        description="Proposes a file: groups of the topics that a recording or the ROS graph has, types, and values\n"
+        "that fit, with what was measured as comments. The file gives sets of what it was made from.",
     )
-    parser.add_argument("--from-bag", metavar="BAG", required=True, help="a recording, as for replay")
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
+    source.add_argument("--from-graph", action="store_true", help="what is published now, listened to for a while")
+    parser.add_argument("--seconds", metavar="N", type=_positive, help="with --from-graph: listen for N s (10)")
     parser.add_argument("-o", "--output", metavar="NEW", help="write the file; without it, it is printed")
     _add_help(parser)
     if _asks_for_help(words):
         return _print(parser.format_help())
     arguments = parser.read(words)
-    from syncrelay.cli.init import init_from_bag
+    from syncrelay.cli.init import init_from_bag, init_from_graph
 
+    if arguments.from_graph:
+        return init_from_graph(arguments.seconds or 10.0, arguments.output)
+    if arguments.seconds is not None:
+        parser.error("--seconds N is for how long --from-graph listens, and --from-graph is missing")
     return init_from_bag(arguments.from_bag, arguments.output)
 
 

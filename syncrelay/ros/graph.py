@@ -56,8 +56,13 @@ def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None
     return tuple(Endpoint(_node(info), info.topic_type, why(info.qos_profile)) for info in infos)
 
 
+def is_nameless(info: Any) -> bool:
+    """Whether DDS found an endpoint, but not yet the message that tells its node."""
+    return bool(info.node_name == _NAMELESS)
+
+
 def _node(info: Any) -> str:
-    if info.node_name == _NAMELESS:
+    if is_nameless(info):
         return "a node of unknown name"
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 

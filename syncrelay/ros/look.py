@@ -5,17 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-import rclpy
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
-from rclpy.signals import SignalHandlerOptions
 
 from syncrelay.cdr import read_stamp
 from syncrelay.config import TopicConfig
 from syncrelay.config.wording import nearest
 from syncrelay.errors import RosUnavailableError, TypeImportError
-from syncrelay.ros.environment import keep_stdout, log_arguments
+from syncrelay.ros.hidden_node import join
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 from syncrelay.ros.types import StampReader, import_type, stamp_reader
@@ -39,7 +37,7 @@ def look(topics: Mapping[str, TopicConfig], *, seconds: float, use_sim_time: boo
     context = Context()
     node = None
     try:
-        node = _join(context)
+        node = join(context, _NODE)
         return _watch(node, topics, seconds=seconds, use_sim_time=use_sim_time)
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"the graph cannot be looked at: {error}") from error
@@ -47,18 +45,6 @@ def look(topics: Mapping[str, TopicConfig], *, seconds: float, use_sim_time: boo
         if node is not None:
             node.destroy_node()
         context.try_shutdown()
-
-
-def _join(context: Context) -> Any:
-    keep_stdout()
-    rclpy.init(
-        args=["--ros-args", "--disable-stdout-logs", "--disable-rosout-logs", *log_arguments()],
-        context=context,
-        signal_handler_options=SignalHandlerOptions.NO,
-    )
-    return rclpy.create_node(
-        _NODE, context=context, use_global_arguments=False, start_parameter_services=False, enable_rosout=False
-    )
 
 
 @dataclass(slots=True)

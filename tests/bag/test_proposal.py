@@ -10,12 +10,14 @@ from syncrelay.bag.analysis import propose
 from syncrelay.bag.replay import replay
 from syncrelay.bag.wiring import wire
 from syncrelay.config import Severity, load_text
-from syncrelay.errors import BagError
+from syncrelay.errors import NothingToMatchError
 from tests.bag.making import BEST_EFFORT, write_mcap, write_rosbag2
 from tests.ros import recordings
-from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
+from tests.ros.cdr_messages import STRING, VECTOR, header, serialize, vector
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS, at, jittery, merged
+
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 
 def _proposed(bag: Path) -> tuple[str, dict[str, int]]:
@@ -67,10 +69,25 @@ def test_topics_without_stamps_or_with_few_messages_are_left_out(tmp_path):
         assert topic not in proposed
 
 
+def test_what_nodes_say_of_themselves_is_no_sensor(tmp_path):
+    said = [
+        Frame(
+            "/diagnostics", DIAGNOSTICS, BEGIN + n * 100 * MS, serialize(DIAGNOSTICS, header(BEGIN + n * 100 * MS), [])
+        )
+        for n in range(50)
+    ]
+    proposed, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(said, _stereo_and_lidar())))
+    assert "/diagnostics" not in proposed
+    assert sets["fused"] >= 49
+
+
 @pytest.mark.parametrize("frames", [[], at("/one", *range(0, 5000, 100))], ids=["few", "one"])
 def test_a_recording_with_nothing_to_match_is_named(frames, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", [*frames, *at("/rare", 1)])
-    with closing(open_recording([str(path)])) as recording, pytest.raises(BagError, match="there is nothing to match"):
+    with (
+        closing(open_recording([str(path)])) as recording,
+        pytest.raises(NothingToMatchError, match="there is nothing to match"),
+    ):
         propose(recording)
 
 

@@ -27,7 +27,10 @@ def test_what_it_writes_is_in_order_and_gives_sets(folder):
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ([], 2, "the following arguments are required: --from-bag"),
+        ([], 2, "one of the arguments --from-bag --from-graph is required"),
+        (["--from-bag", "rig.mcap", "--from-graph"], 2, "argument --from-graph: not allowed with argument --from-bag"),
+        (["--from-bag", "rig.mcap", "--seconds", "3"], 2, "--seconds N is for how long --from-graph listens"),
+        (["--from-graph", "--seconds", "0"], 2, "argument --seconds: expected a number above 0, found 0"),
         (["--from-bag", "none.mcap"], 1, "none.mcap: no such file or folder"),
         (["--from-bag", "rig.mcap", "-o", "rig.mcap"], 1, "rig.mcap: exists already, and is not overwritten"),
     ],

@@ -2,7 +2,7 @@
 
 from syncrelay.bag.analysis.analysis import Analysis, GroupAnalysis, analyze, proposed_text, settled
 from syncrelay.bag.analysis.changes import Change, patch, with_changes
-from syncrelay.bag.analysis.proposal import propose
+from syncrelay.bag.analysis.proposal import propose, propose_for
 
 __all__ = [
     "Analysis",
@@ -11,6 +11,7 @@ __all__ = [
     "analyze",
     "patch",
     "propose",
+    "propose_for",
     "proposed_text",
     "settled",
     "with_changes",

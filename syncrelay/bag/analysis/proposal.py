@@ -1,4 +1,4 @@
-"""A file for a recording of which nothing is known: groups, types and values as measured, the evidence as comments."""
+"""A file for topics of which nothing is known: groups, types and values as measured, the evidence as comments."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.recording import Channel, Encoding, Recording
 from syncrelay.bag.wiring import wire
 from syncrelay.config import Severity, load_text
-from syncrelay.errors import BagError
+from syncrelay.errors import NothingToMatchError
 from syncrelay.explain import words
 
 # Fewer messages tell nothing of a rhythm.
@@ -21,6 +21,8 @@ _FEWEST: Final = 10
 # Topics of one rate whose stamps lie within a tenth of a period of each other come from one epoch.
 _TOGETHER: Final = 0.1
 _SAME_RATE: Final = 1.1
+# Stamped, but of nodes, not of the world.
+_OF_NO_SENSOR: Final = ("diagnostic_msgs/msg/DiagnosticArray",)
 _EPOCH: Final = "epoch"
 _FUSED: Final = "fused"
 _HEAD: Final = "version: 1\ngroups:\n"
@@ -36,26 +38,33 @@ class _Topic:
 
 
 def propose(recording: Recording) -> str:
-    """Read a recording to its end and return the text of a file that gives sets of it.
+    """Read a recording to its end and return the text of a file that gives sets of it, as propose_for does."""
+    return propose_for(_recorded(recording), source="the recording")
+
+
+def propose_for(streams: Sequence[tuple[Channel, Stream]], *, source: str) -> str:
+    """Return the text of a file that gives sets of topics with headers; `source` says what they were measured in.
 
     Topics that one driver stamps together become a group each, and one topic of each of those and all others one
-    more. Raises BagError where there are no two topics to match.
+    more. Raises NothingToMatchError where there are no two topics to match.
     """
-    topics = _topics(recording)
+    topics = list(_measurable(streams))
     epochs = list(_epochs(topics))
     together = [epoch for epoch in epochs if len(epoch) > 1]
     groups = {f"{_EPOCH}_{number}": epoch for number, epoch in enumerate(together, start=1)}
     if len(epochs) > 1:
         groups[_FUSED] = [epoch[0] for epoch in epochs]
     if not groups:
-        raise BagError("no two topics of the recording have stamps and 10 messages or more: there is nothing to match")
-    texts = [text for name, members in groups.items() if (text := _measured(name, members))]
+        raise NothingToMatchError(
+            f"no two topics of {source} have stamps and {_FEWEST} messages or more: there is nothing to match"
+        )
+    texts = [text for name, members in groups.items() if (text := _measured(name, members, source))]
     if not texts:
-        raise BagError("no two topics of the recording give a set")
+        raise NothingToMatchError(f"no two topics of {source} give a set")
     return _HEAD + "".join(text.removeprefix(_HEAD) for text in texts)
 
 
-def _topics(recording: Recording) -> list[_Topic]:
+def _recorded(recording: Recording) -> list[tuple[Channel, Stream]]:
     channels = {
         channel.topic: channel
         for channel in recording.channels
@@ -65,8 +74,15 @@ def _topics(recording: Recording) -> list[_Topic]:
         return []
     text = proposed_text("all", list(channels.values()))
     (streams,) = read_streams(recording, wire(load_text(text, package_missing=Severity.NOTE), recording))
-    found = [_Topic(channels[stream.topic], stream, figures_of(stream)) for stream in streams]
-    return [each for each in found if each.figures.messages - each.figures.unstamped >= _FEWEST and each.figures.period]
+    return [(channels[stream.topic], stream) for stream in streams]
+
+
+def _measurable(streams: Sequence[tuple[Channel, Stream]]) -> Iterator[_Topic]:
+    for channel, stream in streams:
+        figures = figures_of(stream)
+        is_stamped = figures.messages - figures.unstamped >= _FEWEST and figures.period
+        if is_stamped and channel.type not in _OF_NO_SENSOR:
+            yield _Topic(channel, stream, figures)
 
 
 def _epochs(topics: Sequence[_Topic]) -> Iterator[list[_Topic]]:
@@ -87,7 +103,7 @@ def _are_together(first: _Topic, second: _Topic) -> bool:
     return found.distance.high <= _TOGETHER * (first.figures.period or 0)
 
 
-def _measured(name: str, members: Sequence[_Topic]) -> str | None:
+def _measured(name: str, members: Sequence[_Topic], source: str) -> str | None:
     """Return the text of a file with one group and the values that fit, None where it gives no set."""
     text = proposed_text(name, [each.channel for each in members])
     streams = tuple(each.stream for each in members)
@@ -95,7 +111,7 @@ def _measured(name: str, members: Sequence[_Topic]) -> str | None:
     if not suggestion.then:
         return None
     changed = with_changes(text, suggestion.changes)
-    sets = f"{suggestion.then} of {suggestion.possible} possible sets of the recording"
+    sets = f"{suggestion.then} of {suggestion.possible} possible sets of {source}"
     hints = "".join(f"    # {hint}\n" for hint in suggestion.hints)
     told = changed.replace(f"  {name}:\n", f"  {name}:  # {sets}\n{hints}", 1)
     return with_evidence(told, name, [_evidence(each) for each in members])

@@ -1,0 +1,175 @@
+"""The graph listened to for a while: of every topic that is stamped, when its messages were made and received."""
+
+import os
+import time
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from rclpy.context import Context
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.node import NodeNameNonExistentError
+from rclpy.qos import QoSReliabilityPolicy
+
+from syncrelay.cdr import read_stamp
+from syncrelay.config import QosOverrides
+from syncrelay.errors import RosUnavailableError, TypeImportError
+from syncrelay.ros.graph import is_nameless
+from syncrelay.ros.hidden_node import join
+from syncrelay.ros.path import Content, Path, Source
+from syncrelay.ros.path_choice import VARIABLE, choose_path
+from syncrelay.ros.qos import input_profile
+from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.ros.types import begins_with_header, import_type
+
+_NODE: Final = "_syncrelay_init"
+_LOOK_NS: Final = 200_000_000
+_OF_EVERY_NODE: Final = ("/parameter_events", "/rosout")
+_SECOND: Final = 1_000_000_000
+
+
+@dataclass(slots=True)
+class HeardTopic:
+    """A topic whose type begins with a header, in the order of arrival.
+
+    A stamp that cannot be read is None in `stamps`; `places` number the messages of all topics. `is_reliable` if all
+    of its publishers are.
+    """
+
+    name: str
+    type: str
+    is_reliable: bool
+    stamps: list[int | None] = field(default_factory=list)
+    received: "array[int]" = field(default_factory=lambda: array("q"))
+    places: "array[int]" = field(default_factory=lambda: array("q"))
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What was heard.
+
+    `relayed` are outputs of relays that run already; `headerless` are topics without stamps, with their types;
+    `unusable` says why a type cannot be had.
+    """
+
+    topics: tuple[HeardTopic, ...]
+    relayed: tuple[str, ...]
+    headerless: Mapping[str, str]
+    unusable: tuple[str, ...]
+
+
+def listen(*, seconds: float) -> Heard:
+    """Join the graph and return what came in a time.
+
+    Raises RosUnavailableError where rclpy does not start.
+    """
+    context = Context()
+    node = None
+    try:
+        node = join(context, _NODE)
+        listener = _Listener(node, choose_path(os.environ.get(VARIABLE), node=node, context=context), seconds=seconds)
+        return listener.run()
+    except _rclpy.RCLError as error:
+        raise RosUnavailableError(f"the graph cannot be listened to: {error}") from error
+    finally:
+        if node is not None:
+            node.destroy_node()
+        context.try_shutdown()
+
+
+class _Listener:
+    """Subscribes to what it finds, as the relay would, and notes what comes."""
+
+    def __init__(self, node: Any, path: Path, *, seconds: float) -> None:
+        self._node, self._path = node, path
+        now = time.monotonic_ns()
+        self._due, self._end = now, now + round(seconds * _SECOND)
+        self._loop = ReceiveLoop(
+            path.watch(), now=time.monotonic_ns, deadline=lambda: min(self._due, self._end), expire=self._turn
+        )
+        self._topics: dict[str, HeardTopic] = {}
+        self._relayed: set[str] = set()
+        self._headerless: dict[str, str] = {}
+        self._unusable: dict[str, str] = {}
+        self._subscribed: list[tuple[Any, Source]] = []
+        self._count = 0
+
+    def run(self) -> Heard:
+        try:
+            self._loop.run()
+            for _, source in self._subscribed:
+                self._loop.remove(source)
+        finally:
+            self._loop.close()
+            for subscription, _ in self._subscribed:
+                self._node.destroy_subscription(subscription)
+        heard = sorted(self._topics.values(), key=lambda topic: topic.name)
+        return Heard(tuple(heard), tuple(sorted(self._relayed)), self._headerless, tuple(self._unusable.values()))
+
+    def _turn(self, now: int) -> None:
+        if now >= self._end:
+            self._loop.stop()
+            return
+        self._due = now + _LOOK_NS
+        for name, types in self._node.get_topic_names_and_types():
+            is_known = name in self._topics or name in self._headerless or name in self._relayed
+            if not is_known and name not in _OF_EVERY_NODE and not _is_hidden(name):
+                self._find(name, types)
+
+    def _find(self, name: str, types: Sequence[str]) -> None:
+        publishers = self._node.get_publishers_info_by_topic(name)
+        is_unknown = not publishers or any(map(is_nameless, publishers))
+        if is_unknown or any(type_name in self._unusable for type_name in types):
+            return
+        # Of a topic with publishers of several types, no group could take more than one.
+        type_name = publishers[0].topic_type
+        try:
+            message_type = import_type(type_name)
+        except TypeImportError as error:
+            self._unusable[type_name] = str(error)
+            return
+        if not begins_with_header(message_type):
+            self._headerless[name] = type_name
+            return
+        if any(_subscribes_original(self._node, each, name) for each in publishers):
+            self._relayed.add(name)
+            return
+        offered = [each.qos_profile for each in publishers if each.topic_type == type_name]
+        self._topics[name] = HeardTopic(name, type_name, all(map(_is_reliable, offered)))
+        self._subscribe(self._topics[name], message_type, input_profile(QosOverrides(), offered))
+
+    def _subscribe(self, topic: HeardTopic, message_type: Any, profile: Any) -> None:
+        def take(_payload: Any, content: Content, received: int) -> None:
+            topic.stamps.append(read_stamp(content))
+            topic.received.append(received)
+            topic.places.append(self._count)
+            self._count += 1
+
+        subscription = self._node.create_subscription(message_type, topic.name, _never_called, profile, raw=True)
+        source = self._path.source(subscription, take)
+        self._subscribed.append((subscription, source))
+        self._loop.add(source)
+
+
+def _subscribes_original(node: Any, publisher: Any, name: str) -> bool:
+    """Tell whether a topic is a relay's output: its publisher subscribes what its name ends with, as that type."""
+    try:
+        subscribed = node.get_subscriber_names_and_types_by_node(publisher.node_name, publisher.node_namespace)
+    except NodeNameNonExistentError:
+        return False
+    return any(
+        name != original and name.endswith(original) and publisher.topic_type in types for original, types in subscribed
+    )
+
+
+def _is_reliable(profile: Any) -> bool:
+    return bool(profile.reliability == QoSReliabilityPolicy.RELIABLE)
+
+
+def _is_hidden(name: str) -> bool:
+    return any(part.startswith("_") for part in name.split("/"))
+
+
+def _never_called(_: bytes) -> None:
+    """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""

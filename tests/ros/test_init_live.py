@@ -1,0 +1,123 @@
+"""A file proposed for the topics of a graph, over real DDS: it is in order, and gives sets there."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import load
+from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
+from tests.ros.frames import Frame
+from tests.ros.stage import Stage
+from tests.ros.streams import merged
+
+pytestmark = pytest.mark.ros
+
+_MS = 1_000_000
+# Longer than listening and a relay's start take, also on a busy machine.
+_SPAN_MS = 90_000
+_LISTEN = ("--seconds", "5")
+
+
+def _now(topic: str, *, period_ms: int, after_ms: int = 0, is_stamped: bool = True) -> list[Frame]:
+    """Vectors sent from now on, each stamped as it is sent, or not at all."""
+    begin = time.time_ns()
+    sent = [begin + (n + after_ms) * _MS for n in range(0, _SPAN_MS, period_ms)]
+    return [Frame(topic, VECTOR, at, vector(at if is_stamped else 0)) for at in sent]
+
+
+def _init(stage: Stage, *words: str) -> subprocess.CompletedProcess[str]:
+    argv = [sys.executable, "-m", "syncrelay", "init", "--from-graph", *words]
+    return subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
+
+
+def _end(stage: Stage, *players) -> None:
+    """End players in the midst of what they play, whose end nobody waits for."""
+    stage.note_shared_memory()
+    for player in players:
+        player.process.send(signal.SIGTERM)
+
+
+@pytest.mark.parametrize("receive_path", ["direct", "rclpy"])
+def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
+    reliable = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
+    lossy = stage.player({"/imu": VECTOR, "/log": STRING}, reliability="best_effort")
+    reliable.start(merged(_now("/camera", period_ms=50), _now("/lidar", period_ms=100, after_ms=12)), speed=1)
+    words = [Frame("/log", STRING, time.time_ns() + n * 100 * _MS, serialize(STRING, "x")) for n in range(300)]
+    lossy.start(merged(_now("/imu", period_ms=20), words), speed=1)
+    written = stage.folder / "new.yaml"
+    done = _init(stage, *_LISTEN, "-o", str(written))
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    assert done.stderr == f"syncrelay: {written} is written\n"
+
+    (group,) = load(str(written)).groups
+    assert {topic.topic for topic in group.topics} == {"/camera", "/lidar", "/imu"}
+    assert group.keys.policy == "approximate_time"
+    text = written.read_text()
+    assert "possible sets of 5 s of the graph" in text
+    (imu,) = (line for line in text.splitlines() if "topic: /imu" in line)
+    assert imu.endswith(", best_effort")
+
+    collector = stage.collector({topic.output: VECTOR for topic in group.topics}, reliability="best_effort")
+    stage.relay(text)
+    for topic in group.topics:
+        collector.wait_for(topic.output, 10)
+
+    again = _init(stage, *_LISTEN, "-o", str(stage.folder / "again.yaml"))
+    outputs = ", ".join(sorted(topic.output for topic in group.topics))
+    assert f"left out, as outputs of a relay that runs: {outputs}\n" in again.stderr
+    (group,) = load(str(stage.folder / "again.yaml")).groups
+    assert {topic.topic for topic in group.topics} == {"/camera", "/lidar", "/imu"}
+    _end(stage, reliable, lossy)
+
+
+def test_an_empty_graph_is_named(stage: Stage):
+    done = _init(stage, "--seconds", "1")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("syncrelay: no two topics of 1 s of the graph have stamps and 10 messages or more")
+    assert "nobody publishes anything that can be used here" in done.stderr
+
+
+def test_topics_without_stamps_are_named_with_the_reason(stage: Stage):
+    player = stage.player({"/text": STRING, "/unset": VECTOR})
+    words = [Frame("/text", STRING, time.time_ns() + n * 50 * _MS, serialize(STRING, "x")) for n in range(1000)]
+    player.start(merged(words, _now("/unset", period_ms=50, is_stamped=False)), speed=1)
+    done = _init(stage, *_LISTEN)
+    _end(stage, player)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert f"/text ({STRING}): its type has no header, and so no stamp to match by" in done.stderr
+    (unset,) = (line for line in done.stderr.splitlines() if "/unset" in line)
+    assert unset.endswith(" with stamp 0")
+    assert int(unset.split("messages, ")[1].split()[0]) > 0
+
+
+def test_a_file_that_is_there_is_left_alone(stage: Stage):
+    player = stage.player({"/left": VECTOR, "/right": VECTOR})
+    player.start(merged(_now("/left", period_ms=50), _now("/right", period_ms=50)), speed=1)
+    taken = stage.folder / "taken.yaml"
+    taken.write_text("mine")
+    done = _init(stage, *_LISTEN, "-o", str(taken))
+    _end(stage, player)
+    assert (done.returncode, taken.read_text()) == (1, "mine")
+    assert done.stderr == f"syncrelay: {taken}: exists already, and is not overwritten\n"
+
+
+def test_it_can_be_stopped_while_it_listens(stage: Stage):
+    player = stage.player({"/left": VECTOR})
+    process = stage.start("init", [sys.executable, "-m", "syncrelay", "init", "--from-graph", "--seconds", "600"])
+    player.match()
+    process.send(signal.SIGINT)
+    assert (process.wait(), process.stdout) == (130, "")
+
+
+def test_without_ros_the_way_to_it_is_said(tmp_path: Path):
+    # A module of this name that cannot be imported stands for a ROS that is broken or not there.
+    (tmp_path / "rclpy.py").write_text("raise ImportError('no such middleware')")
+    code = "import sys; sys.path.insert(0, sys.argv[1]); from syncrelay.cli import main; sys.exit(main(sys.argv[2:]))"
+    argv = [sys.executable, "-c", code, str(tmp_path), "init", "--from-graph"]
+    done = subprocess.run(argv, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (69, "")
+    assert "no such middleware" in done.stderr
