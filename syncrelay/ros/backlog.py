@@ -50,6 +50,7 @@ class Backlog:
     def deliver_until(self, until: int, sources: Iterable[Source]) -> None:
         """Deliver what these sources received up to a time, in nanoseconds of the system clock, however much it is."""
         for source in sources:
+            source.doubt()
             if source not in self._held:
                 self._take(source)
         while self._heads and self._heads[0][0] <= until:

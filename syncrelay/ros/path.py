@@ -25,7 +25,11 @@ class Source(Protocol):
     deliver: Deliver
 
     def take(self) -> Taken | None:
-        """Take its oldest message; None if there is none."""
+        """Take its oldest message; None if there is none that it has heard of."""
+        ...
+
+    def doubt(self) -> None:
+        """Have `take` look for messages that it has not heard of, too, until there are none."""
         ...
 
 

@@ -19,6 +19,9 @@ class _Source:
         received, payload = self.messages.popleft()
         return received, payload, payload.encode()
 
+    def doubt(self):
+        pass
+
 
 def test_messages_of_all_sources_leave_by_their_time_of_receipt():
     delivered: list[str] = []

@@ -3,6 +3,7 @@
 import ctypes
 import gc
 import threading
+import time
 import tracemalloc
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -91,14 +92,20 @@ def _source(here, topic, deliver, pool=None):
     return messages.DirectSource(here.rcl, pool or buffers.Pool(here.rcl), topic.subscription, deliver)
 
 
+def _take(source):
+    """Its oldest message, whether anybody told it or not."""
+    source.doubt()
+    return source.take()
+
+
 def test_a_message_comes_out_as_it_went_in(here, topic):
     source = here.path.source(topic.subscription, print)
     payload = vector(BEGIN, frame_id="a frame")
     topic.publisher.publish(payload)
-    received, _, content = source.take()
+    received, _, content = _take(source)
     assert bytes(content) == padded(payload)
     assert received > BEGIN
-    assert source.take() is None
+    assert _take(source) is None
 
 
 def test_every_memory_comes_back_once_whatever_became_of_its_message(here, topic, tmp_path):
@@ -118,7 +125,7 @@ def test_every_memory_comes_back_once_whatever_became_of_its_message(here, topic
     for n in range(2000):
         # Even and odd stamps never match, so the queues are always full and most overflow.
         topic.publisher.publish(vector(BEGIN + n * MS))
-        received, payload, content = source.take()
+        received, payload, content = _take(source)
         source.deliver(payload, content, received)
     assert pool.lendings == 2001
     # Both groups keep twenty of each input at most; one is being delivered and one is for the next message.
@@ -135,12 +142,12 @@ def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, topic):
     outlet = here.path.outlet(topic.publisher)
     original = padded(vector(BEGIN))
     topic.publisher.publish(original)
-    _, payload, content = source.take()
+    _, payload, content = _take(source)
     outlet.send_stamped(payload, BEGIN + 5)
     assert bytes(content) == original
     outlet.send(payload)
-    _, stamped, stamped_content = source.take()
-    _, unchanged, unchanged_content = source.take()
+    _, stamped, stamped_content = _take(source)
+    _, unchanged, unchanged_content = _take(source)
     assert bytes(stamped_content) == with_stamp(original, BEGIN + 5)
     assert bytes(unchanged_content) == original
     assert len({payload.memory.address, stamped.memory.address, unchanged.memory.address}) == 3
@@ -152,7 +159,7 @@ def test_a_burst_takes_no_more_memory_than_the_queues_and_gives_it_back(here, to
     source = _source(here, topic, lambda *_: None, pool)
     for n in range(500):
         topic.publisher.publish(vector(BEGIN + n * MS))
-    while (taken := source.take()) is not None:
+    while (taken := _take(source)) is not None:
         received, payload, content = taken
         group.receive(0, payload, received, stamp_of(bytes(content)))
     counts = group.engine.counts()[0]
@@ -177,13 +184,13 @@ def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):
         topic.publisher.publish(with_stamp(payload, stamp))
     tracemalloc.start()
     for n in range(2 * len(stamps)):
-        received, message, content = kept.take()
+        received, message, content = _take(kept)
         takers[n % 2](message, content, received)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert group.engine.sets == len(stamps)
     assert peak < _IMAGE_BYTES / 10
-    sent = [bytes(kept.take()[2]) for _ in range(2 * len(stamps))]
+    sent = [bytes(_take(kept)[2]) for _ in range(2 * len(stamps))]
     assert sent == [with_stamp(payload, stamp) for stamp in stamps for _ in range(2)]
 
 
@@ -204,10 +211,46 @@ def test_a_watch_sees_what_came_before_it_what_comes_later_and_a_wake(here, topi
     while watch.wait(0).sources:
         assert source.take() is None
     threading.Timer(0, watch.wake).start()
-    assert watch.wait(-1).sources == []
+    # Once a second it looks into all, whatever it was told.
+    assert not [each for each in watch.wait(-1).sources if each.take()]
     watch.remove(source)
     topic.publisher.publish(vector(BEGIN + 2 * MS))
     assert watch.wait(0).sources == []
+    watch.close()
+
+
+def test_a_message_that_dds_never_told_of_is_found_within_a_second(here, topic, monkeypatch):
+    source, watch = here.path.source(topic.subscription, print), here.path.watch()
+    watch.add(source)
+    while watch.wait(0).sources:
+        assert source.take() is None
+    here.rcl.set_on_new_message(source.address, None, None)
+    topic.publisher.publish(vector(BEGIN))
+    assert source.take() is None
+    later = time.time_ns() + 1_000_000_000
+    monkeypatch.setattr(time, "time_ns", lambda: later)
+    assert watch.wait(0).sources == [source]
+    assert source.take() is not None
+    assert source.take() is None
+    assert watch.wait(0).sources == []
+    watch.close()
+
+
+def test_what_it_has_heard_of_is_taken_without_asking_once_more(here, topic, monkeypatch):
+    asked = []
+    take = here.rcl.take
+    monkeypatch.setattr(here.rcl, "take", lambda *words: asked.append(words) or take(*words))
+    source, watch = _source(here, topic, print), here.path.watch()
+    watch.add(source)
+    while watch.wait(0).sources:
+        assert source.take() is None
+    asked.clear()
+    for n in range(3):
+        topic.publisher.publish(vector(BEGIN + n * MS))
+    while source.heard_of < 3:
+        watch.wait(-1)
+    assert [source.take() is None for _ in range(5)] == [False] * 3 + [True] * 2
+    assert len(asked) == 3
     watch.close()
 
 
@@ -261,4 +304,4 @@ def test_a_call_that_rcl_refuses_says_why(here, topic):
 def _published_and_taken(here, topic):
     source = _source(here, topic, print)
     topic.publisher.publish(vector(BEGIN))
-    return source.take()
+    return _take(source)

@@ -4,6 +4,7 @@ An rcl wait set is filled, attached to every reader and taken apart again for ea
 of the subscription when a message arrives, and an edge-triggered epoll gives those that were written to.
 """
 
+import contextlib
 import os
 import select
 import time
@@ -29,6 +30,7 @@ class EventWatch:
         self._sources: dict[int, DirectSource] = {}
         self._wake = os.eventfd(0, _FLAGS)
         self._epoll.register(self._wake, _EDGE)
+        self._doubted = time.time_ns()
 
     def add(self, source: DirectSource) -> None:
         """Watch one more source; what it has already is found by the next wait. Raises RclCallError."""
@@ -37,6 +39,7 @@ class EventWatch:
         self._sources[event] = source
         code = self._rcl.set_on_new_message(source.address, self._notify, event)
         self._rcl.require(code, "rcl_subscription_set_on_new_message_callback")
+        source.doubt()
         os.eventfd_write(event, 1)
 
     def remove(self, source: DirectSource) -> None:
@@ -55,7 +58,23 @@ class EventWatch:
         # What woke us says nothing of the sources that were written to a moment later.
         seen_until = time.time_ns()
         events += self._epoll.poll(0)
-        return Look([self._sources[event] for event, _ in events if event != self._wake], seen_until)
+        if seen_until - self._doubted >= _NS_PER_SECOND or seen_until < self._doubted:
+            return self._doubt(seen_until)
+        ready = []
+        for event, _ in events:
+            if (source := self._sources.get(event)) is not None:
+                ready.append(source)
+                # Twice in `events`, it has been read.
+                with contextlib.suppress(BlockingIOError):
+                    source.heard_of += os.eventfd_read(event)
+        return Look(ready, seen_until)
+
+    def _doubt(self, now: int) -> Look:
+        """Look into all sources, once a second: an event that was never written must not silence a topic."""
+        self._doubted = now
+        for source in self._sources.values():
+            source.doubt()
+        return Look(list(self._sources.values()), now)
 
     def wake(self) -> None:
         """Have `wait` return. Any thread."""

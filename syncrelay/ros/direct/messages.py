@@ -8,12 +8,17 @@ from syncrelay.ros.direct.buffers import Payload, Pool
 from syncrelay.ros.direct.rcl import NOTHING_TAKEN, MessageInfo, Rcl
 from syncrelay.ros.path import Deliver, Taken
 
+# More than any history holds.
+_ALL: Final = 2**62
+
 
 class DirectSource:
     """A subscription drained by librcl."""
 
     def __init__(self, rcl: Rcl, pool: Pool, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver
+        self.heard_of = 0
+        """How many messages are to be taken: asking librcl once more costs nearly as much as a message."""
         self._pool = pool
         self.address: Final[int] = subscription.handle.pointer
         # It owns what the address points to.
@@ -25,15 +30,24 @@ class DirectSource:
         self._next = self._pool.lend()
 
     def take(self) -> Taken | None:
-        """Take its oldest message; None if there is none. Raises RclCallError."""
+        """Take its oldest message; None if there is none that it has heard of. Raises RclCallError."""
+        if not self.heard_of:
+            return None
         memory = self._next
         code = self._call(self.address, memory.address, self._info_address, None)
         if code:
             if code != NOTHING_TAKEN:
                 self._rcl.require(code, "rcl_take_serialized_message")
+            # Of those it heard of, a full history has replaced some.
+            self.heard_of = 0
             return None
+        self.heard_of -= 1
         self._next = self._pool.lend()
         return self._info.received_timestamp, Payload(memory, self._pool), memory.content()
+
+    def doubt(self) -> None:
+        """Have `take` ask librcl until there are no more."""
+        self.heard_of = _ALL
 
 
 class DirectOutlet:
