@@ -11,7 +11,17 @@ import sys
 import tempfile
 from pathlib import Path
 
-from relay_runs import Load, floor, interleaved, ours, ours_through_rclpy, start_and_idle, typed
+from relay_runs import (
+    Load,
+    floor,
+    interleaved,
+    ours,
+    ours_telling_all,
+    ours_telling_nothing,
+    ours_through_rclpy,
+    start_and_idle,
+    typed,
+)
 
 LARGE = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[1] / "configs/large_messages.xml")}
 COSTS = {
@@ -59,6 +69,14 @@ def large(runs):
         print(f"| {name} | {each.cpu_us:.0f} us | {each.latency_ms:.1f} ms | {each.lost:.1%} |", flush=True)
 
 
+def telling(runs):
+    print("\n| what it tells | CPU a message | to nothing |\n|---|---|---|")
+    load = COSTS["2 x 200 Hz x 1 kB"]
+    figures = interleaved({"nothing": ours_telling_nothing, "all, as scalars too": ours_telling_all}, load, runs)
+    for name, each in figures.items():
+        print(f"| {name} | {each.cpu_us:.0f} us | {each.cpu_us / figures['nothing'].cpu_us:.2f} |", flush=True)
+
+
 def scale(runs):
     print("\n| scale | CPU a message | to the first | p50 latency | lost |\n|---|---|---|---|---|")
     first = None
@@ -81,9 +99,9 @@ def rest():
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=5, help="runs of each relay and load (default: %(default)s)")
-    parser.add_argument("parts", nargs="*", metavar="PART", help="of cost, large, scale, rest (default: all)")
+    parser.add_argument("parts", nargs="*", metavar="PART", help="of cost, telling, large, scale, rest (default: all)")
     options = parser.parse_args()
-    parts = options.parts or ["cost", "large", "scale", "rest"]
+    parts = options.parts or ["cost", "telling", "large", "scale", "rest"]
     print(f"Python {sys.version.split()[0]}, {os.cpu_count()} cores\n")
     with tempfile.TemporaryDirectory() as folder:
         relays = {"typed rclpy": typed, "syncrelay through rclpy": ours_through_rclpy, "syncrelay": ours}
@@ -91,6 +109,8 @@ def main():
             relays["C on rcl"] = bare
         if "cost" in parts:
             cost(options.runs, relays)
+    if "telling" in parts:
+        telling(options.runs)
     if "large" in parts:
         large(options.runs)
     if "scale" in parts:

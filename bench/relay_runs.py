@@ -75,7 +75,7 @@ Relay = Callable[[Load, Path], Sequence[str]]
 """From a load and a folder for files to the command of a relay for it."""
 
 
-def ours(load, folder):
+def ours(load, folder, **keys):
     path = folder / "relay.yaml"
     groups = {
         f"g{group}": {
@@ -88,8 +88,17 @@ def ours(load, folder):
         }
         for group in range(load.groups)
     }
-    path.write_text(json.dumps({"version": 1, "groups": groups}))
+    path.write_text(json.dumps({"version": 1, **keys, "groups": groups}))
     return [sys.executable, "-m", "syncrelay", "--config", str(path)]
+
+
+def ours_telling_all(load, folder):
+    return ours(load, folder, diagnostics={"scalars": True})
+
+
+def ours_telling_nothing(load, folder):
+    *_, path = ours(load, folder, metrics=None, diagnostics=None)
+    return [sys.executable, str(HERE / "untold.py"), path]
 
 
 def ours_through_rclpy(load, folder):
