@@ -35,8 +35,9 @@ def drive(*, seconds: int, slow_down: int = 1) -> list[Frame]:
 
 
 def analyzed(folder: Path, frames: Sequence[Frame], **keys: Any) -> Analysis:
-    """What the analysis makes of a group of TOPICS."""
-    group = {"policy": "approximate_time", "slop": "4ms", "topics": inputs(dict.fromkeys(TOPICS, VECTOR)), **keys}
+    """What the analysis makes of a group of TOPICS; a key that is None is left out."""
+    defaults = {"policy": "approximate_time", "slop": "4ms", "topics": inputs(dict.fromkeys(TOPICS, VECTOR))}
+    group = {key: value for key, value in {**defaults, **keys}.items() if value is not None}
     text = config({"fused": group})
     with closing(open_recording([str(write_mcap(folder / "drive.mcap", frames))])) as recording:
         return analyze(recording, text, wire(load_text(text, package_missing=Severity.NOTE), recording))

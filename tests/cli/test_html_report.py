@@ -1,6 +1,7 @@
 """The page of an analysis: what it holds, adds up and leaves out. How a browser shows it: test_html_browser.py."""
 
 import re
+from html import escape
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ def analysis(tmp_path_factory):
 
 
 def _lanes(analysis, *, most: int = _NEVER) -> Lanes:
-    return lanes_of(analysis.groups[0], analysis.begin, analysis.end, most=most)
+    return lanes_of(analysis.groups[0], analysis.begin, most=most)
 
 
 def _counts(lanes: Lanes) -> list[dict[str, int]]:
@@ -70,6 +71,13 @@ def test_a_line_joins_the_messages_of_a_set(analysis):
     assert len(lanes.spans) == len(analysis.groups[0].trial.sets)
 
 
+def test_a_message_that_serves_many_sets_stands_in_its_lane_once(tmp_path):
+    analysis = analyzed(tmp_path, drive(seconds=10), policy="latest_time", trigger="/imu", slop=None)
+    lanes, counts = _lanes(analysis), analysis.groups[0].trial.counts
+    assert [each[MATCHED] for each in _counts(lanes)] == [each.matched for each in counts]
+    assert len(lanes.members) > 4 * counts[0].matched
+
+
 def test_a_set_without_an_optional_input_joins_the_others(tmp_path):
     frames = [frame for frame in drive(seconds=10) if frame.topic != "/imu"]
     topics = inputs(dict.fromkeys(("/camera", "/lidar"), VECTOR))
@@ -91,6 +99,17 @@ def test_unset_stamps_stand_where_they_were_received(tmp_path):
     assert lanes.lanes[2].times[0] >= -_SECOND
     assert lanes.lanes[2].times[-1] <= analysis.end - analysis.begin + _SECOND
     assert "stand where they were received" in as_html("rig", analysis)
+
+
+def test_the_passes_of_a_recording_that_began_again_stand_side_by_side(tmp_path):
+    first = drive(seconds=10)
+    again = [frame._replace(time=frame.time + 11 * _SECOND) for frame in first]
+    analysis = analyzed(tmp_path, [*first, *again])
+    lanes = _lanes(analysis)
+    first_pass = int(np.count_nonzero(lanes.begins < 10.5 * _SECOND))
+    assert first_pass == pytest.approx(len(lanes.begins) / 2, abs=5)
+    assert lanes.begins[-1] > 20 * _SECOND
+    assert _counts(lanes)[0][MATCHED] == analysis.groups[0].trial.counts[0].matched
 
 
 def test_what_is_too_much_is_thinned_by_whole_stretches(tmp_path):
@@ -176,4 +195,7 @@ _FORMER = '<!doctype html>\n<html lang="en">\n<head>\n<meta name="generator" con
 def test_topics_without_a_file_are_drawn_too(folder):
     done = run("analyze", "rig.mcap", "/camera", "/lidar", "--html", "topics.html", folder=folder)
     assert done.returncode == 0
-    assert "100 of 100 possible sets come together" in (folder / "topics.html").read_text()
+    page = (folder / "topics.html").read_text()
+    assert "100 of 100 possible sets come together" in page
+    text = done.stdout.partition("A file that gives these sets:\n\n")[2]
+    assert escape(text.rstrip()) in page

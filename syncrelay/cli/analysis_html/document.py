@@ -9,7 +9,7 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from syncrelay.bag.analysis import Analysis
+from syncrelay.bag.analysis import Analysis, with_changes
 from syncrelay.cli.analysis_html.drawings import drawings_of
 from syncrelay.cli.analysis_html.fates import FATES, Fate
 from syncrelay.cli.analysis_html.words import TopicRow, group_words, topic_row
@@ -43,6 +43,7 @@ def as_html(name: str, analysis: Analysis) -> str:
         groups=told,
         fates={fate.name: fate for fate in FATES},
         drawings={"fates": [_fate(fate) for fate in FATES], "groups": [each.for_script for each in drawings]},
+        file=with_changes(analysis.text, analysis.changes).rstrip(),
         script=script,
         style=style,
         script_hash=_hash(script),

@@ -40,7 +40,7 @@ def drawings_of(group: GroupAnalysis, analysis: Analysis, *, most: int) -> Drawi
     """Return what is drawn of a group, with about `most` messages."""
     suggested = _suggested(group, analysis.text)
     slops, sizes = slop_marks(group.group, suggested), queue_marks(group.group, suggested)
-    lanes = lanes_of(group, analysis.begin, analysis.end, most=most)
+    lanes = lanes_of(group, analysis.begin, most=most)
     histograms = tuple(histogram(pair, slops) for pair in group.pairs)
     return Drawings(
         lanes,

@@ -12,9 +12,12 @@ from syncrelay.cli.analysis_html.fates import CODES, MATCHED
 
 _SECOND: Final = 1_000_000_000
 _STRETCH: Final = 10 * _SECOND
-# So far outside of the recording a stamp says nothing of when its message was made.
-_ASTRAY: Final = 60 * _SECOND
+# So far off the time of receipt, the usual delay aside, a stamp says nothing of when its message was made: it is of
+# another clock, or of a recording that began again.
+_ASTRAY: Final = 2 * _SECOND
 _NONE: Final = -1
+# Its messages serve many sets, and stand in their lane once.
+_REPEATING: Final = "latest_time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +34,7 @@ class Lanes:
     """A group's messages. A row of `members` is a set: places in the lanes, -1 where an input is missing.
 
     Sets are in the order of their earliest messages, `begins`. `astray` is how many messages stand where they were
-    received, because their stamps are unset or far outside of the recording. Of every `each` stretches of 10 s one is
+    received, because their stamps are unset or seconds off the usual. Of every `each` stretches of 10 s one is
     kept, whole; 1 if all are.
     """
 
@@ -45,8 +48,8 @@ class Lanes:
     stretch: int = _STRETCH
 
 
-def lanes_of(group: GroupAnalysis, begin: int, end: int, *, most: int) -> Lanes:
-    """Return the lanes of a group in a recording from `begin` to `end`, with about `most` messages."""
+def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
+    """Return the lanes of a group in a recording that begins at `begin`, with about `most` messages."""
     delay = _usual_delay(group)
     origin = begin - delay
     sets = group.trial.sets
@@ -56,16 +59,16 @@ def lanes_of(group: GroupAnalysis, begin: int, end: int, *, most: int) -> Lanes:
     times = stamps + np.array([topic.offset_ns for topic in group.group.topics], dtype=np.int64) - origin
     latest = np.max(np.where(missing, np.iinfo(np.int64).min, times), axis=1, initial=np.iinfo(np.int64).min)
     complete = np.array([each.left - each.latency for each in sets], dtype=np.int64) - begin
-    is_astray = _is_astray(latest, end - begin)
+    is_astray = np.abs(latest - complete) > _ASTRAY
     times = np.where(is_astray[:, None], times - latest[:, None] + complete[:, None], times)
 
     lanes, places, astray = [], [], int(np.count_nonzero(is_astray[:, None] & ~missing))
     for index, stream in enumerate(group.streams):
         there = ~missing[:, index]
-        # A message may serve many sets: it stands in its lane once.
-        _, first, which = np.unique(stamps[there, index], return_index=True, return_inverse=True)
+        is_new = _is_new(stamps[there, index]) if group.group.keys.policy == _REPEATING else np.ones(there.sum(), bool)
+        first, which = np.flatnonzero(is_new), np.cumsum(is_new) - 1
         matched = times[there, index][first]
-        dropped, codes, n_astray = _dropped(group, index, origin, begin, end)
+        dropped, codes, n_astray = _dropped(group, index, origin, begin)
         astray += n_astray
         all_times = np.concatenate([matched, dropped])
         all_codes = np.concatenate([np.full(len(matched), CODES[MATCHED], dtype=np.int64), codes])
@@ -90,6 +93,12 @@ def lanes_of(group: GroupAnalysis, begin: int, end: int, *, most: int) -> Lanes:
     return _thinned(found, most)
 
 
+def _is_new(stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
+    """Tell which stamps, in the order of the sets, are not of the message that served the set before."""
+    is_new: npt.NDArray[np.bool_] = np.diff(stamps, prepend=stamps[:1] - 1) != 0
+    return is_new
+
+
 def _usual_delay(group: GroupAnalysis) -> int:
     """Return how long after its stamp, offset included, a message was usually received."""
     delays = []
@@ -101,21 +110,15 @@ def _usual_delay(group: GroupAnalysis) -> int:
     return int(np.quantile(every, 0.5, method="inverted_cdf")) if len(every) else 0
 
 
-def _dropped(
-    group: GroupAnalysis, index: int, origin: int, begin: int, end: int
-) -> tuple[Nanoseconds, Nanoseconds, int]:
+def _dropped(group: GroupAnalysis, index: int, origin: int, begin: int) -> tuple[Nanoseconds, Nanoseconds, int]:
     """Return when the dropped messages of an input were made, the codes of their fates, and how many are astray."""
     drops = [each for each in group.trial.drops if each.input == index]
     stamps = np.array([each.stamp for each in drops], dtype=np.int64)
     received = np.array([each.received for each in drops], dtype=np.int64)
     times = stamps + group.group.topics[index].offset_ns - origin
-    is_astray = (stamps == 0) | _is_astray(times, end - begin)
+    is_astray = (stamps == 0) | (np.abs(times - received + begin) > _ASTRAY)
     codes = np.array([CODES[each.reason.value] for each in drops], dtype=np.int64)
     return np.where(is_astray, received - begin, times), codes, int(np.count_nonzero(is_astray))
-
-
-def _is_astray(times: Nanoseconds, duration: int) -> npt.NDArray[np.bool_]:
-    return (times < -_ASTRAY) | (times > duration + _ASTRAY)
 
 
 def _thinned(found: Lanes, most: int) -> Lanes:

@@ -193,6 +193,6 @@ def _astray(drawings: Drawings) -> str:
     if not drawings.lanes.astray:
         return ""
     return (
-        f"{drawings.lanes.astray} messages stand where they were received: their stamps are unset, or far outside of"
-        " the recording."
+        f"{drawings.lanes.astray} messages stand where they were received: their stamps are unset, or seconds off the"
+        " usual."
     )

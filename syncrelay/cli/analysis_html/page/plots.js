@@ -14,8 +14,11 @@ function unitOf(ns) {
   return UNITS.find(([size]) => ns >= size) ?? UNITS[3];
 }
 
+// As few as tell every tick from the next: 2 for steps of 0.25.
 function decimals(step) {
-  return Math.max(0, Math.min(9, -Math.floor(Math.log10(step) + 1e-9)));
+  let digits = 0;
+  while (digits < 9 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits++;
+  return digits;
 }
 
 function axis(label, options = {}) {

@@ -1,6 +1,8 @@
 // Puts the drawings in their places, and has keys, buttons and the mouse choose what part of a recording is shown.
 
 const SETS_AT_FIRST = 12;
+// Room for a number below either end.
+const LANE_PADDING = [14, 16, 0, 14];
 const KEYS = {
   ArrowLeft: "earlier", ArrowRight: "later", "+": "in", "=": "in", "-": "out", 0: "all", Home: "first", End: "last",
   n: "next", p: "previous",
@@ -40,6 +42,7 @@ class Timeline {
     const place = this.section.querySelector(".lanes");
     const drawing = this.drawing = new LaneDrawing(this.timeline, this.fates, {isOverview: false});
     return plotIn(place, 76 * this.timeline.lanes.length + 66, {
+      padding: LANE_PADDING,
       cursor: {
         x: true, y: false, points: {show: false}, drag: {x: true, y: false, setScale: false},
         bind: {dblclick: () => () => { this.show(this.bounds); return null; }},
@@ -59,7 +62,7 @@ class Timeline {
     const place = this.section.querySelector(name);
     const drawing = new LaneDrawing(this.timeline, this.fates, {isOverview: true});
     return plotIn(place, height, this.whole([axis("seconds since the recording began"), {show: false}], {
-      series: [{}, {show: false}], scale: {range: [0, 1]}, draw: (plot) => drawing.draw(plot),
+      padding: LANE_PADDING, series: [{}, {show: false}], scale: {range: [0, 1]}, draw: (plot) => drawing.draw(plot),
     }), [this.bounds, [null, null]]);
   }
 
@@ -76,14 +79,14 @@ class Timeline {
   }
 
   // The options of a drawing of the whole recording, with a frame around what the lanes show.
-  whole(axes, {series, scale, draw}) {
+  whole(axes, {scale, draw, ...options}) {
     return {
+      ...options, axes,
       cursor: {
         y: false, points: {show: false}, drag: {x: true, y: false, setScale: false},
         bind: {dblclick: () => () => { this.show(this.bounds); return null; }},
       },
       scales: {x: {time: false, auto: false, range: () => this.bounds}, y: scale},
-      axes, series,
       hooks: {
         draw: [(plot) => { draw(plot); this.frame(plot); }],
         setSelect: [(plot) => this.select(plot)],
