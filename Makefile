@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-container faults lint bench clean
+.PHONY: demo test test-container faults soak lint bench clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -19,7 +19,12 @@ test-container: $(VENV)/test
 
 # Breaks what a robot breaks, at length, and prints what was survived; `make test` has the short form of each.
 faults: $(VENV)/test
+	.ci/network-tools
 	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m "faults and not soak" $(ARGS)
+
+# A quarter of an hour and two million messages.
+soak: $(VENV)/test
+	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m soak $(ARGS)
 
 lint: $(VENV)/lint
 	$(BIN)/ruff check .

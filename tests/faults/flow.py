@@ -74,12 +74,16 @@ class Witness:
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """One group, `front`, of topics that are published alike. Times in nanoseconds."""
+    """One group, `front`, of topics that are published alike. Times in nanoseconds.
+
+    `before` are words to put before each command, such as those that start it in another namespace.
+    """
 
     stage: Stage
     topics: tuple[str, ...] = ("/camera", "/lidar")
     slop: int = 4 * MS
     pairing: Pairing = Pairing.BY_STAMP
+    before: tuple[str, ...] = ()
 
     def relay(
         self,
@@ -99,7 +103,7 @@ class Rig:
             **(keys or {}),
             "topics": topics,
         }
-        return self.stage.relay(config({"front": group}, metrics=ANY_PORT, **top), *arguments)
+        return self.stage.relay(config({"front": group}, metrics=ANY_PORT, **top), *arguments, before=self.before)
 
     def source(self, *topics: str, node: str = "source", **options: Any) -> Source:
         """A process that publishes on these topics, on all of the group if none are named."""
@@ -114,7 +118,8 @@ class Rig:
         return Witness(self._start("witness", [*argv, *_options(options)]))
 
     def _start(self, name: str, argv: Sequence[str]) -> Process:
-        return self.stage.start(name, [sys.executable, "-m", f"tests.faults.{name}", *argv], stdin=subprocess.PIPE)
+        words = [*self.before, sys.executable, "-m", f"tests.faults.{name}", *argv]
+        return self.stage.start(name, words, stdin=subprocess.PIPE)
 
 
 def _options(options: Mapping[str, Any]) -> list[str]:

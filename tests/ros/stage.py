@@ -118,11 +118,12 @@ class Stage:
         self._processes.append(process)
         return process
 
-    def relay(self, config: str, *arguments: str) -> Process:
-        """The relay on a file with this text."""
+    def relay(self, config: str, *arguments: str, before: Sequence[str] = ()) -> Process:
+        """The relay on a file with this text; `before` are words to put before its command."""
         path = self.folder / f"config-{len(self._processes)}.yaml"
         path.write_text(config)
-        return self.start("relay", [sys.executable, "-m", "syncrelay", "--config", str(path), *arguments])
+        words = [*before, sys.executable, "-m", "syncrelay", "--config", str(path), *arguments]
+        return self.start("relay", words)
 
     def player(
         self,
