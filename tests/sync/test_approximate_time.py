@@ -188,6 +188,24 @@ def test_an_overflow_is_excused_in_a_long_search_too_once_another_input_has_the_
     assert search == "n: " + "".join(f"{letter} too_far, " for letter in "bcdefghij") + "l superseded"
 
 
+def test_a_search_never_goes_back_to_what_it_has_passed():
+    # The lidar's 27 and the camera's 27 were passed together: looked at again, they would be passed for ever.
+    policy = approximate(3, queue=6, slop=30)
+    arriving = [(1, 18), (0, 26), (0, 27), (1, 27), (1, 42), (0, 34), (1, 57), (0, 35), (0, 57), (0, 72)]
+    for place, stamp in arriving:
+        assert not policy.add(Message(place, stamp * TICK_NS, None))
+    dropped = [each.message for each in policy.add(Message(2, 72 * TICK_NS, None))]
+    assert [(each.input, each.stamp // TICK_NS) for each in dropped] == [
+        (1, 18),
+        (0, 26),
+        (0, 27),
+        (1, 27),
+        (0, 34),
+        (0, 35),
+        (1, 42),
+    ]
+
+
 def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
     # Input 0 every tick, input 1 a message twelve ticks late; the queue of 5 has lost its partner.
     policy = approximate(queue=5, slop=1)
