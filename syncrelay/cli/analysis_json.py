@@ -39,7 +39,7 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
         ],
         "pairs": [_pair(pair) for pair in each.pairs],
         **_curves(each),
-        "findings": [_finding(lasting) for lasting in each.findings()],
+        "findings": [_finding(lasting) for lasting in each.findings],
         "suggestion": {
             "possible": suggestion.possible,
             "now": suggestion.now,

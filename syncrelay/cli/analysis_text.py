@@ -82,7 +82,7 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
     topics = [topic.topic for topic in each.group.topics]
     inputs = tuple(InputResult(*row) for row in zip(topics, each.trial.counts, strict=True))
     yield from (f"  {line}" for line in summarize(GroupResult(name, inputs, len(each.trial.sets))))
-    for lasting in each.findings():
+    for lasting in each.findings:
         yield f"  {lasting.finding.severity.name.lower()}, {lasting.seconds} s: {in_words(lasting.finding)}"
     for hint in suggestion.hints:
         yield f"  hint: {hint}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import yaml
@@ -18,7 +19,8 @@ from syncrelay.bag.wiring import Wiring
 from syncrelay.config import GroupConfig, Severity, load_text
 
 
-@dataclass(frozen=True, slots=True)
+# No slots: what takes long is found when it is first asked for, and kept.
+@dataclass(frozen=True)
 class GroupAnalysis:
     """One group. `tightest` is None where an input has no stamps; `possible` are the spans of sets there could be."""
 
@@ -30,8 +32,9 @@ class GroupAnalysis:
     trial: Trial
     suggestion: Suggestion
 
+    @cached_property
     def findings(self) -> tuple[LastingFinding, ...]:
-        """Return what the running relay would have found, the worst first: it looks once a second of the recording."""
+        """What the running relay would have found, the worst first: it looks once a second of the recording."""
         return watch_group(self.group, self.streams)
 
     @property

@@ -117,7 +117,7 @@ def group_words(group: GroupAnalysis, drawings: Drawings) -> GroupWords:
         sets=len(group.trial.sets),
         verdict=verdict,
         tone=tone,
-        notes=tuple(_note(each) for each in group.findings()),
+        notes=tuple(_note(each) for each in group.findings),
         hints=suggestion.hints,
         promise=f"{suggestion.then} of {suggestion.possible} possible sets, in place of {suggestion.now}",
         patch=patch(suggestion.changes, {config.name: topics}).rstrip() if suggestion.changes else "",
