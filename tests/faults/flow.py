@@ -85,13 +85,7 @@ class Rig:
     pairing: Pairing = Pairing.BY_STAMP
     before: tuple[str, ...] = ()
 
-    def relay(
-        self,
-        *arguments: str,
-        keys: Mapping[str, Any] | None = None,
-        qos: Mapping[str, Any] | None = None,
-        **top: Any,
-    ) -> Process:
+    def relay(self, *, keys: Mapping[str, Any] | None = None, qos: Mapping[str, Any] | None = None) -> Process:
         """A relay of the group with these keys, whose inputs have this QoS."""
         topics = inputs(dict.fromkeys(self.topics, VECTOR), **({"qos": qos} if qos else {}))
         restamp = {"restamp": "earliest"} if self.pairing is Pairing.BY_STAMP else {}
@@ -103,7 +97,7 @@ class Rig:
             **(keys or {}),
             "topics": topics,
         }
-        return self.stage.relay(config({"front": group}, metrics=ANY_PORT, **top), *arguments, before=self.before)
+        return self.stage.relay(config({"front": group}, metrics=ANY_PORT), before=self.before)
 
     def source(self, *topics: str, node: str = "source", **options: Any) -> Source:
         """A process that publishes on these topics, on all of the group if none are named."""

@@ -60,10 +60,6 @@ class SetLaw:
         self._newest[index] = stamp
         self._pair(index, stamp, stamp_of(payload))
 
-    def begin_anew(self) -> None:
-        """Let stamps be smaller from now on: the publishers' time has begun again."""
-        self._newest = [None] * len(self._topics)
-
     def _pair_by_place(self, index: int, stamp: int, header_stamp: int) -> None:
         if header_stamp != stamp:
             self._fault(f"{self._topics[index]}: {stamp} left with the stamp {header_stamp}")

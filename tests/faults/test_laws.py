@@ -74,10 +74,3 @@ def test_what_is_wrong_is_told(messages, fault: str):
 def test_a_common_stamp_that_is_not_the_earliest_is_told():
     law = judged(restamped(camera(T), T + 5), lidar(T + 5), pairing=Pairing.BY_STAMP)
     assert law.faults == [f"a set of [{T}, {T + 5}] left with the stamp {T + 5}"]
-
-
-def test_time_may_begin_again_when_it_is_said():
-    law = judged(camera(T))
-    law.begin_anew()
-    law.take(*camera(T - 1))
-    assert law.faults == []
