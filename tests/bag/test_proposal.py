@@ -69,6 +69,13 @@ def test_topics_without_stamps_or_with_few_messages_are_left_out(tmp_path):
         assert topic not in proposed
 
 
+def test_topics_that_ros_could_not_have_are_left_out(tmp_path):
+    strange = jittery("/a<script>", period_ms=100, jitter_ms=3, count=50, seed=3)
+    proposed, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(strange, _stereo_and_lidar())))
+    assert "script" not in proposed
+    assert sets["fused"] >= 49
+
+
 def test_what_nodes_say_of_themselves_is_no_sensor(tmp_path):
     said = [
         Frame(

@@ -13,6 +13,8 @@ from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.recording import Channel, Encoding, Recording
 from syncrelay.bag.wiring import wire
 from syncrelay.config import Severity, load_text
+from syncrelay.config.names import check_topic_name
+from syncrelay.config.typenames import check_type_name
 from syncrelay.errors import NothingToMatchError
 from syncrelay.explain import words
 
@@ -68,13 +70,23 @@ def _recorded(recording: Recording) -> list[tuple[Channel, Stream]]:
     channels = {
         channel.topic: channel
         for channel in recording.channels
-        if isinstance(channel.encoding, Encoding) and begins_with_header(channel)
+        if isinstance(channel.encoding, Encoding) and _has_ros_names(channel) and begins_with_header(channel)
     }
     if len(channels) < 2:  # noqa: PLR2004  one alone has nothing to be matched with
         return []
     text = proposed_text("all", list(channels.values()))
     (streams,) = read_streams(recording, wire(load_text(text, package_missing=Severity.NOTE), recording))
     return [(channels[stream.topic], stream) for stream in streams]
+
+
+def _has_ros_names(channel: Channel) -> bool:
+    """Tell whether a file may name a channel: not all who write recordings keep to ROS's rules."""
+    try:
+        check_topic_name(channel.topic)
+        check_type_name(channel.type)
+    except ValueError:
+        return False
+    return True
 
 
 def _measurable(streams: Sequence[tuple[Channel, Stream]]) -> Iterator[_Topic]:
