@@ -13,15 +13,17 @@ _ADDRESSES = ("198.18.77.1", "198.18.77.2")
 
 
 def why_not() -> str | None:
-    """Why no networks can be made here; None where they can."""
+    """Why no network can be made to fail here; None where one can."""
     missing = [tool for tool in _TOOLS if shutil.which(tool) is None]
     if os.geteuid() != 0 or missing:
         return f"needs root, and {', '.join(_TOOLS)}"
     try:
-        with two_machines():
+        with two_machines() as cable:
+            cable.lose(0.1)
+            cable.throttle("1mbit")
             return None
     except RuntimeError as error:
-        return f"no network can be made here: {error}"
+        return f"no network can be made to fail here: {error}"
 
 
 @dataclass(frozen=True, slots=True)
