@@ -45,6 +45,10 @@ def test_nothing_is_lost_and_nothing_grows(stage: Stage, figures):
     # The last set may wait for something closer still.
     due = sent[0] - inputs[0]["buffered"]
     assert inputs[0]["buffered"] <= 1
+    missed = due - inputs[0]["matched"]
+    # A machine that starves the relay for longer than the queues hold costs sets, and the relay says so.
+    assert missed == 0 or "messages lay here" in relay.stderr
+    due -= missed
     assert [each["matched"] for each in inputs] == [due] * len(_TOPICS)
     witness.process.wait_until(lambda: witness.report().sets >= due, f"{due} sets")
     seen = witness.report()
@@ -55,9 +59,9 @@ def test_nothing_is_lost_and_nothing_grows(stage: Stage, figures):
     # The last answer of /status may be on its way still.
     assert ended[1] <= warm[1] + 2
     figures(
-        f"soak of {_SOAK_S} s: {sum(sent):,} messages, {seen.sets:,} sets, {lost} lost; {warm[0]:.1f} MB and {warm[1]}"
-        f" descriptors after {_WARM_S} s, {ended[0]:.1f} MB and {ended[1]} at the end; fed = matched + dropped +"
-        " buffered for every input"
+        f"soak of {_SOAK_S} s: {sum(sent):,} messages, {seen.sets:,} sets, {lost} lost, {missed} sets missed;"
+        f" {warm[0]:.1f} MB and {warm[1]} descriptors after {_WARM_S} s, {ended[0]:.1f} MB and {ended[1]}"
+        " at the end; fed = matched + dropped + buffered for every input"
     )
 
 
