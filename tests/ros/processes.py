@@ -84,6 +84,11 @@ class Process:
     def stderr(self) -> str:
         return self._stderr.read_text()
 
+    @property
+    def said(self) -> list[str]:
+        """The lines of stderr but those of Fast DDS, which complains there of what others do to its shared memory."""
+        return [line for line in self.stderr.splitlines() if "RTPS_" not in line]
+
     def running(self) -> bool:
         return self._child.poll() is None
 

@@ -62,7 +62,7 @@ def test_a_working_rig_is_healthy_and_nothing_is_said(stage: Stage):
         r"[\d.]+ of [\d.]+ possible sets a second, span 7 ms and latency [\d.]+ m?s at the 95th percentile",
         findings(relay)["healthy"]["text"],
     )
-    assert not [line for line in relay.stderr.splitlines() if not line.startswith("[INFO]")]
+    assert not [line for line in relay.said if not line.startswith("[INFO]")]
     assert status(relay)["groups"][0]["level"] == "ok"
 
 

@@ -105,7 +105,7 @@ def test_when_simulated_time_begins_again_what_is_buffered_is_dropped(
 def test_json_logs_are_an_object_a_line(stage: Stage):
     relay, _ = relaying.relay(stage, _front(), _RECORDING, _PAIR_OUT, arguments=["--log-format", "json"])
     _end(relay)
-    lines = [json.loads(line) for line in relay.stderr.splitlines()]
+    lines = [json.loads(line) for line in relay.said]
     assert all({"time", "level", "logger", "message"} <= line.keys() for line in lines)
     assert any(line["message"].startswith("front: running") and line["group"] == "front" for line in lines)
 
