@@ -13,14 +13,13 @@ from syncrelay.cdr import read_stamp
 from syncrelay.config import TopicConfig
 from syncrelay.config.wording import nearest
 from syncrelay.errors import RosUnavailableError, TypeImportError
+from syncrelay.ros.graph import is_nameless
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 from syncrelay.ros.types import StampReader, import_type, stamp_reader
 
 _NODE: Final = "_syncrelay_doctor"
-# What rmw_dds_common has in the place of a name that did not arrive.
-_NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 _POLL_S: Final = 0.02
 _OF_EVERY_NODE: Final = ("/parameter_events", "/rosout")
 _CLOCK: Final = "/clock"
@@ -120,7 +119,7 @@ def _watch(
         seconds=time.monotonic() - began,
         nodes=tuple(_others(node)),
         n_topics=len(published),
-        n_nameless=sum(1 for name in published if any(map(_is_nameless, _publishers(node, name)))),
+        n_nameless=sum(1 for name in published if any(map(is_nameless, _publishers(node, name)))),
         topics=tuple(_seen(node, topic, listed) for topic in watched),
         clocks=node.count_publishers(_CLOCK),
         ticks=clock.ticks,
@@ -188,16 +187,11 @@ def _seen_publisher(endpoint: Any, topic: _Watched) -> SeenPublisher:
         compatibility, reason = qos_check_compatible(offered, topic.profile)
         mismatch = _in_words(reason) if compatibility == QoSCompatibility.ERROR else None
     return SeenPublisher(
-        node="" if _is_nameless(endpoint) else f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}",
+        node="" if is_nameless(endpoint) else f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}",
         type=endpoint.topic_type,
         offers=f"{_word(offered.reliability)}, {_word(offered.durability)}",
         mismatch=mismatch,
     )
-
-
-def _is_nameless(endpoint: Any) -> bool:
-    """Whether DDS found a publisher, but not yet the message that tells its node."""
-    return bool(endpoint.node_name == _NAMELESS)
 
 
 def _word(policy: Any) -> str:
