@@ -5,7 +5,7 @@ fields. Where the first field is a std_msgs/Header, its stamp stands first: int3
 nanoseconds, in the byte order that the encapsulation names. Plain CDR and plain XCDR2 lay it out alike.
 """
 
-from struct import Struct
+from struct import Struct, error
 from typing import Final, TypeAlias
 
 Payload: TypeAlias = bytes | bytearray | memoryview
@@ -27,7 +27,10 @@ _STAMP_LAYOUTS: Final = {
     0x06: _BIG_ENDIAN,  # CDR2_BE
     0x07: _LITTLE_ENDIAN,  # CDR2_LE
 }
-_UNPACK_STAMP: Final = {kind: layout.unpack_from for kind, layout in _STAMP_LAYOUTS.items()}
+# Both bytes of the encapsulation header as a little-endian number, and the stamp: one call for nearly all there are.
+_ENCAPSULATED: Final = Struct("<H2xiI").unpack_from
+_LITTLE_ENDIANS: Final = frozenset(kind << 8 for kind, layout in _STAMP_LAYOUTS.items() if layout is _LITTLE_ENDIAN)
+_BIG_ENDIANS: Final = frozenset(kind << 8 for kind, layout in _STAMP_LAYOUTS.items() if layout is _BIG_ENDIAN)
 
 
 def read_stamp(payload: Payload) -> int | None:
@@ -36,15 +39,18 @@ def read_stamp(payload: Payload) -> int | None:
     Malformed: shorter than its stamp, an encapsulation that is neither plain CDR nor plain XCDR2, or a
     nanosecond part of a second or more. Negative seconds are valid (builtin_interfaces/Time).
     """
-    if len(payload) < _STAMP_END or payload[0]:
+    try:
+        encapsulation, seconds, nanoseconds = _ENCAPSULATED(payload)
+    except error:
         return None
-    unpack = _UNPACK_STAMP.get(payload[1])
-    if unpack is None:
-        return None
-    seconds, nanoseconds = unpack(payload, _STAMP_AT)
+    if encapsulation not in _LITTLE_ENDIANS:
+        if encapsulation not in _BIG_ENDIANS:
+            return None
+        seconds, nanoseconds = _BIG_ENDIAN.unpack_from(payload, _STAMP_AT)
     if nanoseconds >= _NS_PER_SECOND:
         return None
-    return int(seconds * _NS_PER_SECOND + nanoseconds)
+    stamp: int = seconds * _NS_PER_SECOND + nanoseconds
+    return stamp
 
 
 def has_place_for_stamp(payload: Payload) -> bool:
