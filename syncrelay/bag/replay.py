@@ -134,9 +134,10 @@ def replay(recording: Recording, wirings: Sequence[Wiring], *, listeners: Sequen
         for channel, feed in group.feeds():
             feeds.setdefault(channel, []).append(feed)
     for raw in recording.messages(feeds.keys()):
+        channel, now, _ = raw
         for group in limited:
-            group.let_go(raw[1])
-        for feed in feeds[raw[0]]:
+            group.let_go(now)
+        for feed in feeds[channel]:
             feed(raw)
     for group in groups:
         group.finish(recording.end)

@@ -12,7 +12,7 @@ from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
 from syncrelay.cli.new_file import write_again, write_new
-from syncrelay.cli.progress import progress_of
+from syncrelay.cli.reading import reading
 from syncrelay.config import Severity, load_text
 from syncrelay.config.source import read_source
 from syncrelay.config.wording import did_you_mean
@@ -45,7 +45,7 @@ def analyze_bag(bag: str, asked: Asked) -> int:
         wirings = wire(load_text(text, name=asked.config or "<topics>", package_missing=Severity.NOTE), recording)
         for problem in (problem for wiring in wirings for problem in wiring.problems):
             say(f"syncrelay: {problem}")
-        with progress_of(recording):
+        with reading(recording):
             analysis = analyze(recording, text, wirings)
         if asked.config is None:
             analysis = settled(analysis)

@@ -11,7 +11,7 @@ from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.qos import Profile
 from syncrelay.cli.boundary import DONE, put, say
 from syncrelay.cli.new_file import write_new
-from syncrelay.cli.progress import progress_of
+from syncrelay.cli.reading import reading
 from syncrelay.errors import NothingToMatchError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def init_from_bag(bag: str, output: str | None) -> int:
     Raises BagError for a recording that cannot be read, NothingToMatchError where it holds too little.
     """
     with closing(open_recording([bag])) as recording:
-        with progress_of(recording):
+        with reading(recording):
             text = propose(recording)
         for fault in recording.faults:
             say(f"syncrelay: {fault}")

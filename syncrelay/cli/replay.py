@@ -13,7 +13,7 @@ from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.wiring import Wiring, wire
 from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
-from syncrelay.cli.progress import progress_of
+from syncrelay.cli.reading import reading
 from syncrelay.cli.summary import summarize
 from syncrelay.config import Severity, load
 from syncrelay.sync import Match, Outcome
@@ -41,7 +41,7 @@ def replay(bags: Sequence[str], config_path: str, wanted: Wanted) -> int:
         wirings = wire(config, recording)
         _say_all(problem for wiring in wirings for problem in wiring.problems)
         listeners = [*_printing(wanted), *_writing(wanted, wirings, opened)]
-        with progress_of(recording):
+        with reading(recording):
             results = replay_groups(recording, wirings, listeners=listeners)
         _say_all(recording.faults)
     tell = say if wanted.sets or wanted.drops else put
