@@ -178,10 +178,12 @@ class ApproximateTime(Policy):
     def _overflow(self, place: int, outcomes: list[Outcome]) -> list[Outcome]:
         self._losses.lose(place, self._stamps[place][0])
         self._overflowed.add(place)
-        had_candidate = self._pivot != _NO_PIVOT
+        if self._pivot == _NO_PIVOT:
+            self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
+            return outcomes
         self._forget_candidate()
         self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
-        return self._search(outcomes) if had_candidate else outcomes
+        return self._search(outcomes)
 
     def _search(self, outcomes: list[Outcome]) -> list[Outcome]:
         heads = self._heads
@@ -199,7 +201,7 @@ class ApproximateTime(Policy):
                 self._excuse_all_but_latest(end)
             if self._pivot == _NO_PIVOT:
                 if end - start > self._slop or overflowed:
-                    self._drop_head(first, outcomes)
+                    self._drop_heads(first, end, outcomes)
                     continue
                 self._pivot = self._latest_place(end)
                 self._pivot_stamp = end
@@ -211,24 +213,25 @@ class ApproximateTime(Policy):
                 if later_end < later_start and later_end * numerator < later_start * denominator:
                     self._drop_skipped(outcomes)
                     self._take_candidate(start, end)
-            self._pass_head(first)
-            if first == self._pivot or end >= self._proof_end or (self._empty and self._is_proved()):
+            stamps = self._stamps[first]
+            cursor = self._cursors[first] = self._cursors[first] + 1
+            if cursor < len(stamps):
+                heads[first] = stamps[cursor]
+            else:
+                self._empty = 1
+            if first == self._pivot or end >= self._proof_end or (self._empty and self._is_proved(first)):
                 self._emit(outcomes)
         self._note_wait()
         return outcomes
 
-    def _pass_head(self, place: int) -> None:
+    def _drop_heads(self, place: int, end: int, outcomes: list[Outcome]) -> None:
+        """Drop the earliest head, and at once those behind it that are too far as well and would be the earliest."""
         stamps = self._stamps[place]
-        cursor = self._cursors[place] = self._cursors[place] + 1
-        if cursor == len(stamps):
-            self._empty = 1
-        else:
-            self._heads[place] = stamps[cursor]
-
-    def _drop_head(self, place: int, outcomes: list[Outcome]) -> None:
-        if len(self._stamps[place]) == 1:
-            self._note_missed(self._heads[place])
-        self._drop_oldest(place, 1, DropReason.TOO_FAR, outcomes)
+        next_head = min([head for other, head in enumerate(self._heads) if other != place], default=end)
+        count = bisect_left(stamps, min(next_head, end - self._slop)) or 1
+        if len(stamps) == count:
+            self._note_missed(stamps[-1])
+        self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
 
     def _note_wait(self) -> None:
         """Count the wait for something better than the candidate: over, begun, or the one there was."""
@@ -322,18 +325,16 @@ class ApproximateTime(Policy):
             del stamps[0]
         self._forget_candidate()
 
-    def _is_proved(self) -> bool:
-        """Whether no message that may still come could better the candidate.
+    def _is_proved(self, awaited: int) -> bool:
+        """Whether no message that may still come could better the candidate; that of one input is not here yet.
 
         The virtual search of message_filters, taken in strides: as long as the end stays, every start up to
         `reach` is as good as passed. An input's head moves the end at most once, when it leaves the pivot
         behind: so there are at most as many strides as inputs, however long the queues.
         """
         numerator, denominator = self._scale
-        heads = [
-            self._heads[place] if cursor < len(stamps) else self._bound(place)
-            for place, (cursor, stamps) in enumerate(zip(self._cursors, self._stamps, strict=True))
-        ]
+        heads = self._heads.copy()
+        heads[awaited] = self._bound(awaited)
         while True:
             end = max(heads)
             if end >= self._proof_end:

@@ -47,9 +47,11 @@ class ApproximateTimeEager(Policy):
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         stamps = self._stamps[place]
         outcomes: list[Outcome] = []
-        if stamps and stamp > stamps[-1]:
+        if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
             self._messages[place].append(message)
+            if len(stamps) == 1:
+                self._begin(stamp, outcomes)
         else:
             self._insert(place, stamp, message, outcomes)
         if all(self._stamps):
@@ -77,36 +79,36 @@ class ApproximateTimeEager(Policy):
         return self._losses.needed[place]
 
     def _insert(self, place: int, stamp: int, message: Message, outcomes: list[Outcome]) -> None:
-        """Put in place what is not newer than its whole queue."""
+        """Put in place what is not newer than its whole queue, which is not empty."""
         stamps = self._stamps[place]
         messages = self._messages[place]
         position = bisect_left(stamps, stamp)
-        if position < len(stamps) and stamps[position] == stamp:
+        if stamps[position] == stamp:
             outcomes.append(Drop(messages[position], DropReason.DUPLICATE))
             messages[position] = message
             return
         stamps.insert(position, stamp)
         messages.insert(position, message)
-        if len(stamps) == 1:
-            self._note_missed(stamp)
         if position == 0:
             self._drop_too_far(outcomes)
 
-    def _note_missed(self, stamp: int) -> None:
+    def _begin(self, stamp: int, outcomes: list[Outcome]) -> None:
+        """See what the only message of its input has missed, and what is too far from it."""
+        firsts = [stamps[0] for stamps in self._stamps if stamps]
+        if max(firsts) - min(firsts) <= self._slop:
+            return
         for place, stamps in enumerate(self._stamps):
             if stamps and stamps[0] > stamp + self._slop:
                 self._losses.miss(place, stamps, stamp, self._slop)
+        self._drop_too_far(outcomes)
 
     def _drop_too_far(self, outcomes: list[Outcome]) -> None:
         """Drop what no message that any other input still has, or will show, lies within slop of."""
-        known = -1
-        while len(outcomes) != known:
-            known = len(outcomes)
-            latest = max([stamps[0] for stamps in self._stamps if stamps], default=0)
+        while (firsts := [stamps[0] for stamps in self._stamps if stamps]) and min(firsts) < max(firsts) - self._slop:
+            near = max(firsts) - self._slop
             for place, stamps in enumerate(self._stamps):
-                if stamps and stamps[0] < latest - self._slop:
-                    count = bisect_left(stamps, latest - self._slop)
-                    self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
+                if stamps and stamps[0] < near:
+                    self._drop_oldest(place, bisect_left(stamps, near), DropReason.TOO_FAR, outcomes)
 
     def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
         messages = self._messages[place]
@@ -115,6 +117,12 @@ class ApproximateTimeEager(Policy):
         del self._stamps[place][:count]
 
     def _match(self, stamp: int, outcomes: list[Outcome]) -> None:
+        if max(map(len, self._stamps)) == 1:
+            # No choice and nothing left over, as it is most of the time.
+            outcomes.append(Match(tuple([messages.pop() for messages in self._messages])))
+            for stamps in self._stamps:
+                stamps.clear()
+            return
         members = []
         for place, wanted in enumerate(_tightest(stamp, self._stamps)):
             stamps = self._stamps[place]

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from syncrelay.sync.messages import Message
+
 JUMP_NS = 1_000_000_000
 """A stamp that falls by more than this on one input is a looped recording or a reset clock, not lateness."""
 
@@ -19,23 +21,30 @@ class Arrivals:
     the one that jumped.
     """
 
-    __slots__ = ("_before", "_jumped", "_offsets", "given", "newest")
+    __slots__ = ("_before", "_given", "_jumped", "_offsets", "newest")
 
     def __init__(self, offsets_ns: Sequence[int]) -> None:
         self._offsets = offsets_ns
         self.newest = [_UNSEEN] * len(offsets_ns)
-        self.given = [_NEVER] * len(offsets_ns)
+        self._given = [_NEVER] * len(offsets_ns)
         self.forget()
 
     def forget(self) -> None:
         """Start afresh."""
         self._before: list[int | None] = [None] * len(self._offsets)
         self.newest[:] = [_UNSEEN] * len(self._offsets)
-        self.given[:] = [_NEVER] * len(self._offsets)
+        self._given[:] = [_NEVER] * len(self._offsets)
+
+    def give(self, messages: Sequence[Message | None]) -> None:
+        """Note the newest stamp that each input has given to a set."""
+        given = self._given
+        for message in messages:
+            if message is not None and message.stamp > given[message.input]:
+                given[message.input] = message.stamp
 
     def is_late(self, index: int, stamp: int, *, or_equal: bool) -> bool:
         """Whether a set of this input's messages would go back; of equal stamps only if they mean the same."""
-        given = self.given[index]
+        given = self._given[index]
         return stamp < given or (or_equal and stamp == given)
 
     def has_fallen(self, index: int, stamp: int) -> bool:

@@ -31,6 +31,7 @@ class SyncGroup:
     __slots__ = (
         "_arrivals",
         "_by_stamp",
+        "_feed",
         "_is_limited",
         "_ledger",
         "_matching",
@@ -75,11 +76,13 @@ class SyncGroup:
         self._is_limited = max_wait_ns is not None
         self._matching: Matching
         if max_wait_ns is None:
-            self._matching = Unlimited(policy, self._arrivals, required=required)
+            self._matching = Unlimited(policy, required=required)
         else:
             self._matching = Limited(
                 policy, self._arrivals, required=required, max_wait_ns=max_wait_ns, offsets_ns=offsets
             )
+
+        self._feed = self._matching.feed
 
     @property
     def sets(self) -> int:
@@ -93,10 +96,10 @@ class SyncGroup:
         self._ledger.fed[index] += 1
         due = self.expire(now=now) if self._is_limited else ()
         if stamp <= self._newest[index]:
-            outcomes = self._take_behind(message, now)
+            outcomes = self._take_behind(message)
         else:
             self._newest[index] = stamp
-            outcomes = self._matching.feed(stamp + self._offsets[index], message, now)
+            outcomes = self._feed(index, stamp + self._offsets[index], message)
         if outcomes:
             outcomes = self._leave(outcomes, now)
         return [*due, *outcomes] if due else outcomes
@@ -132,13 +135,13 @@ class SyncGroup:
             buffered = [held + self._thinning.buffered(index) for index, held in enumerate(buffered)]
         return self._ledger.counts(buffered, [self._matching.needed_queue(index) for index in inputs])
 
-    def _take_behind(self, message: Message, now: int) -> Sequence[Outcome]:
+    def _take_behind(self, message: Message) -> Sequence[Outcome]:
         """Take a message that is not newer than all before: unset, late, out of order or of another time."""
         index, stamp = message.input, message.stamp
         if stamp == 0:
             if self._by_stamp:
                 return (Drop(message, DropReason.UNSTAMPED),)
-            return self._matching.feed(stamp, message, now)
+            return self._feed(index, stamp, message)
         if self._arrivals.is_left_over(index, stamp):
             return (Drop(message, DropReason.TIME_JUMP),)
         drops: list[Drop] = []
@@ -148,7 +151,7 @@ class SyncGroup:
         if self._arrivals.is_late(index, stamp, or_equal=self._by_stamp):
             return (Drop(message, DropReason.LATE),)
         self._newest[index] = max(stamp, self._newest[index])
-        return [*drops, *self._matching.feed(stamp + self._offsets[index], message, now)]
+        return [*drops, *self._feed(index, stamp + self._offsets[index], message)]
 
     def _empty(self, reason: DropReason) -> list[Drop]:
         drops = self._matching.flush(reason)
@@ -159,6 +162,9 @@ class SyncGroup:
 
     def _leave(self, outcomes: Sequence[Outcome], now: int) -> Sequence[Outcome]:
         """Thin, restamp and count what leaves."""
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                self._arrivals.give(outcome.messages)
         if self._thinning is not None:
             outcomes = self._thinned(outcomes, self._thinning, now)
         self._ledger.note(outcomes)

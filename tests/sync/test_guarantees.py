@@ -229,7 +229,7 @@ def test_optional_inputs_never_change_which_required_messages_go_together(policy
     expected = []
     for step in taken:
         if step.message is not None and step.message.input in places:
-            moved = replace(step, message=step.message._replace(input=places[step.message.input]))
+            moved = replace(step, message=replace(step.message, input=places[step.message.input]))
         else:
             moved = replace(step, message=None)
         expected += [[message.payload for message in match.messages] for match in sets_of(take(group, moved))]
@@ -253,7 +253,7 @@ def test_an_offset_is_as_if_the_stamps_were_other_ones(policy, rig):
         if step.message is None or step.message.stamp == 0
         else replace(
             step,
-            message=step.message._replace(stamp=step.message.stamp + chosen.offsets[step.message.input] * TICK),
+            message=replace(step.message, stamp=step.message.stamp + chosen.offsets[step.message.input] * TICK),
         )
         for step in taken
     ]

@@ -105,8 +105,7 @@ class _Run:
         there = [message for message in match.messages if message is not None]
         shifted = [message.stamp + self.group.topics[message.input].offset_ns for message in there]
         latency = now - max(message.payload for message in there)
-        stamps = tuple(message and message.stamp for message in match.messages)
-        return SetOut(stamps, now, max(shifted) - min(shifted), latency)
+        return SetOut(match.stamps, now, max(shifted) - min(shifted), latency)
 
 
 def try_group(group: GroupConfig, streams: Sequence[Stream]) -> Trial:

@@ -12,7 +12,7 @@ the moment of its stamp. Rows of one label are one input: two messages of one st
 `-` where an input is missing; a drop is a letter and its reason. `keys: aA bB` gives letters common keys.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from syncrelay.sync import Drop, Match, Message
 
@@ -54,7 +54,7 @@ def parse(drawing):
                     drawn[letter] = (column, Message(labels.index(label), stamp(column), letter, key=letter))
     for letter, key in keys.items():
         column, message = drawn[letter]
-        drawn[letter] = column, message._replace(key=key)
+        drawn[letter] = column, replace(message, key=key)
     letters = order or sorted(drawn, key=lambda letter: (drawn[letter][0], drawn[letter][1].input))
     assert sorted(letters) == sorted(drawn), "arrive: must name each letter once"
     arrivals, newest = [], 0
@@ -97,5 +97,5 @@ def play_group(group, drawing, raw_stamp=lambda message: message.stamp):
             note(f"@{column}", group.expire(now=stamp(column)))
         while arrivals and arrivals[0][0] == column:
             message = arrivals.pop(0)[1]
-            note(message.payload, group.add(message._replace(stamp=raw_stamp(message)), now=stamp(column)))
+            note(message.payload, group.add(replace(message, stamp=raw_stamp(message)), now=stamp(column)))
     return tuple(lines), timeline.expected
