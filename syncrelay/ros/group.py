@@ -16,13 +16,6 @@ _RECENT = 256
 _WATCHED = 10_000
 
 
-class Received(NamedTuple):
-    """What the engine carries: a payload, and when DDS received it, in nanoseconds of the system clock."""
-
-    payload: Any
-    at: int
-
-
 class Batch(NamedTuple):
     """What came and left since the last look, oldest first.
 
@@ -63,7 +56,9 @@ class GroupRelay:
             self._reject(index, payload, received)
             return
         self._arrivals[index].append((stamp, received))
-        self._settle(self.engine.add(Message(index, stamp, Received(payload, received)), now=self._now()))
+        outcomes = self.engine.add(Message(index, stamp, (payload, received)), now=self._now())
+        if outcomes:
+            self._settle(outcomes)
 
     def receive_keyed(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable) -> None:
         """Take in a message that is matched by its key; None where none could be read."""
@@ -72,7 +67,7 @@ class GroupRelay:
             return
         self._arrivals[index].append((stamp, received))
         self._keys[index] = key
-        self._settle(self.engine.add(Message(index, stamp, Received(payload, received), key), now=self._now()))
+        self._settle(self.engine.add(Message(index, stamp, (payload, received), key), now=self._now()))
 
     def watched(self) -> Batch:
         """Give what came and left since this was last asked for."""
@@ -85,7 +80,7 @@ class GroupRelay:
         self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
 
     def _reject(self, index: int, payload: Any, received: int) -> None:
-        self._settle([self.engine.reject(Message(index, 0, Received(payload, received)), DropReason.MALFORMED)])
+        self._settle([self.engine.reject(Message(index, 0, (payload, received)), DropReason.MALFORMED)])
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""
@@ -99,7 +94,7 @@ class GroupRelay:
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 newest = self._send(outcome)
-                stamps = tuple(m and m.stamp for m in outcome.messages)
+                stamps = outcome.stamps
                 self._sets.append((stamps, time.time_ns() - newest))
                 self.recent.append(RecentSet(stamps))
             else:
@@ -107,7 +102,7 @@ class GroupRelay:
                 self.recent.append(RecentDrop(message.input, message.stamp, outcome.reason))
 
     def _send(self, match: Match) -> int:
-        """Publish a set; when its newest message was received."""
+        """Publish a set; when its newest message was received. What the engine carries is made in `receive`."""
         newest = 0
         for message, outlet, restamped in zip(match.messages, self._outlets, self._restamped, strict=True):
             if message is None:

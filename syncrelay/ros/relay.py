@@ -77,6 +77,8 @@ class Relay:
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
+        # Nanoseconds of a clock that only measures waiting: ROS time if simulated, else one that never jumps.
+        self._now: Callable[[], int] = self._simulated_now if self._sim_time else time.monotonic_ns
         self._config, self._names = config, groups
         path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
         self.receive_path = path.name
@@ -282,13 +284,12 @@ class Relay:
         for group in self._wirings.groups:
             group.flush(DropReason.TIME_JUMP)
 
-    def _now(self) -> int:
-        """Nanoseconds of a clock that only measures waiting: ROS time if simulated, else one that never jumps."""
-        return int(self.node.get_clock().now().nanoseconds) if self._sim_time else time.monotonic_ns()
+    def _simulated_now(self) -> int:
+        return int(self.node.get_clock().now().nanoseconds)
 
     def _deadline(self) -> int | None:
         # Simulated time does not pass while we sleep: its ticks call expire instead.
-        if self._sim_time:
+        if self._sim_time or not self._limited:
             return None
         deadlines = (group.engine.next_deadline() for group in self._limited)
         return min((deadline for deadline in deadlines if deadline is not None), default=None)
