@@ -27,7 +27,7 @@ _STAMP_LAYOUTS: Final = {
     0x06: _BIG_ENDIAN,  # CDR2_BE
     0x07: _LITTLE_ENDIAN,  # CDR2_LE
 }
-# Both bytes of the encapsulation header as a little-endian number, and the stamp: one call for nearly all there are.
+# The first two bytes of the encapsulation header as a little-endian number, and the stamp: one call for nearly all.
 _ENCAPSULATED: Final = Struct("<H2xiI").unpack_from
 _LITTLE_ENDIANS: Final = frozenset(kind << 8 for kind, layout in _STAMP_LAYOUTS.items() if layout is _LITTLE_ENDIAN)
 _BIG_ENDIANS: Final = frozenset(kind << 8 for kind, layout in _STAMP_LAYOUTS.items() if layout is _BIG_ENDIAN)

@@ -33,7 +33,7 @@ class _Bar(Progress):
 
 @contextmanager
 def reading(recording: Recording) -> Iterator[None]:
-    """Show how far the recording has been read, while it is."""
+    """Show how far the recording has been read, while it is, with the garbage collector at ease."""
     with _eased_collector():
         if not sys.stderr.isatty():
             yield

@@ -102,11 +102,12 @@ class GroupRelay:
                 self.recent.append(RecentDrop(message.input, message.stamp, outcome.reason))
 
     def _send(self, match: Match) -> int:
-        """Publish a set; when its newest message was received. What the engine carries is made in `receive`."""
+        """Publish a set; when its newest message was received."""
         newest = 0
         for message, outlet, restamped in zip(match.messages, self._outlets, self._restamped, strict=True):
             if message is None:
                 continue
+            # As it was fed: what DDS received, and when, in nanoseconds of the system clock.
             payload, received = message.payload
             newest = max(newest, received)
             if outlet is None:

@@ -11,7 +11,7 @@ from syncrelay.sync.queues import Losses
 _NO_PIVOT = -1
 
 _STEPS = 8
-"""So many steps of a search are taken singly: most searches take fewer, and a stride costs as much as some."""
+"""So many steps of a search are taken one by one: most searches take fewer, and a stride costs as much as some."""
 
 
 class ApproximateTime(Policy):
@@ -225,9 +225,12 @@ class ApproximateTime(Policy):
         return outcomes
 
     def _drop_heads(self, place: int, end: int, outcomes: list[Outcome]) -> None:
-        """Drop the earliest head, and at once those behind it that are too far as well and would be the earliest."""
+        """Drop the earliest head, and at once those behind it that are too far and would be the earliest.
+
+        After an overflow, that head goes even if it is near enough.
+        """
         stamps = self._stamps[place]
-        next_head = min([head for other, head in enumerate(self._heads) if other != place], default=end)
+        next_head = min([head for other, head in enumerate(self._heads) if other != place])
         count = bisect_left(stamps, min(next_head, end - self._slop)) or 1
         if len(stamps) == count:
             self._note_missed(stamps[-1])

@@ -93,7 +93,7 @@ class ApproximateTimeEager(Policy):
             self._drop_too_far(outcomes)
 
     def _begin(self, stamp: int, outcomes: list[Outcome]) -> None:
-        """See what the only message of its input has missed, and what is too far from it."""
+        """Note what the only message of its input has missed, and drop what is too far."""
         firsts = [stamps[0] for stamps in self._stamps if stamps]
         if max(firsts) - min(firsts) <= self._slop:
             return

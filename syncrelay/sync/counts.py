@@ -38,18 +38,11 @@ class Ledger:
 
     def note(self, outcomes: Sequence[Outcome]) -> None:
         """Count what leaves."""
-        matched = self._matched
         for outcome in outcomes:
-            if not isinstance(outcome, Match):
+            if isinstance(outcome, Match):
+                self._note_set(outcome)
+            else:
                 self._dropped[outcome.message.input][outcome.reason] += 1
-                continue
-            self.sets += 1
-            if self._repeats:
-                self._note_repeating_set(outcome)
-                continue
-            for message in outcome.messages:
-                if message is not None:
-                    matched[message.input] += 1
 
     def forget(self) -> None:
         """Take what comes from now on for new, whatever its stamps."""
@@ -61,6 +54,16 @@ class Ledger:
         return tuple(
             InputCounts(fed, matched, dict(dropped), held, needed) for fed, matched, dropped, held, needed in rows
         )
+
+    def _note_set(self, match: Match) -> None:
+        self.sets += 1
+        matched = self._matched
+        if self._repeats:
+            self._note_repeating_set(match)
+            return
+        for message in match.messages:
+            if message is not None:
+                matched[message.input] += 1
 
     def _note_repeating_set(self, match: Match) -> None:
         for message in match.messages:

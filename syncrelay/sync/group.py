@@ -161,7 +161,7 @@ class SyncGroup:
         return drops
 
     def _leave(self, outcomes: Sequence[Outcome], now: int) -> Sequence[Outcome]:
-        """Thin, restamp and count what leaves."""
+        """Note what was given to sets, also to those that are thinned; thin, restamp and count what leaves."""
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 self._arrivals.give(outcome.messages)

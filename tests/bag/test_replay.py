@@ -34,7 +34,7 @@ def _replayed(path, group, **file_keys):
 
 
 def _sets(left):
-    return [tuple(m and m.stamp for m in outcome.messages) for outcome, _ in left if isinstance(outcome, Match)]
+    return [outcome.stamps for outcome, _ in left if isinstance(outcome, Match)]
 
 
 def _drops(left):

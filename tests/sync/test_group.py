@@ -587,7 +587,10 @@ def test_of_three_that_fit_the_nearest_to_the_middle_is_taken_to_the_nanosecond(
     for index, time in ((2, 1002), (2, 1003), (2, 1009), (0, 1000)):
         assert list(group.add(Message(index, time, None), now=0)) == []
     (match,) = group.add(Message(1, 1005, None), now=0)
-    assert match.messages[2].stamp == 1002
+    assert match.stamps == (1000, 1005, 1002)
+    group.add(Message(0, 2000, None), now=0)
+    *_, without = group.add(Message(1, 2001, None), now=0)
+    assert without.stamps == (2000, 2001, None)
 
 
 def test_an_input_that_fell_too_belongs_to_the_new_time_however_far_ahead_it_is():
