@@ -56,9 +56,7 @@ class GroupRelay:
             self._reject(index, payload, received)
             return
         self._arrivals[index].append((stamp, received))
-        outcomes = self.engine.add(Message(index, stamp, (payload, received)), now=self._now())
-        if outcomes:
-            self._settle(outcomes)
+        self._settle(self.engine.add(Message(index, stamp, (payload, received)), now=self._now()))
 
     def receive_keyed(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable) -> None:
         """Take in a message that is matched by its key; None where none could be read."""

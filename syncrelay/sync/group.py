@@ -81,7 +81,6 @@ class SyncGroup:
             self._matching = Limited(
                 policy, self._arrivals, required=required, max_wait_ns=max_wait_ns, offsets_ns=offsets
             )
-
         self._feed = self._matching.feed
 
     @property

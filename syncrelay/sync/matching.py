@@ -48,7 +48,7 @@ class Unlimited:
         self._policy, stage = policy.narrowed(required)
         if stage.inputs:
             raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
-        # The policy's own: a call between costs a tenth of what a message takes.
+        # The policy's own: every message would pay for a call between.
         self.feed = self._policy.feed
 
     def due(self, now: int) -> Sequence[Outcome]:
