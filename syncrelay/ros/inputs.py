@@ -84,6 +84,11 @@ class TopicInput:
         return self._profile is not None
 
     @property
+    def has_type(self) -> bool:
+        """Whether its type is imported; until then it is to be looked at though the graph be as before."""
+        return self._message_type is not None
+
+    @property
     def publisher_count(self) -> int:
         """How many publish it as the file's type."""
         return sum(publisher.type == self.type for publisher in self.publishers)

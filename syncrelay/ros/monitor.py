@@ -5,15 +5,16 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import Any, Final, NamedTuple
 
 from syncrelay.explain import (
+    Endpoint,
     GroupReport,
     GroupWatch,
     InputGraph,
     RecentDrop,
     RecentSet,
-    SentSets,
     Severity,
     Silence,
     find,
@@ -32,8 +33,10 @@ LOOK_S: Final = 1.0
 _LAST_LOOKS: Final = 10
 # So long after a publisher was found its first messages are here.
 _SETTLING_LOOKS: Final = 2
-# Who listens to the outputs changes rarely, and asking costs as much as all the rest.
-_SUBSCRIBERS_EVERY: Final = 5
+# Of many groups, so many are looked at at a time: a look at one takes about half a millisecond from the data ...
+_IN_TURN: Final = 10
+# ... and none waits for more than so many looks.
+_LONGEST_TURN: Final = 5
 # A /clock at 1 Hz stands still for a second between two ticks.
 _CLOCK_STOPPED_NS: Final = 2_500_000_000
 
@@ -51,23 +54,36 @@ class _Watched(NamedTuple):
     silence: Silence
 
 
+class _Ends(NamedTuple):
+    """What the graph shows around an input of a group, beside its publishers."""
+
+    output: str
+    subscribers: tuple[Endpoint, ...]
+    alike: tuple[str, ...]
+
+
 class Monitor:
     """Makes a report of every group at each look, and logs what is worth a line. On the main thread."""
 
     def __init__(self, wirings: Sequence[Wiring], *, node: Any, loop: ReceiveLoop, simulated: bool) -> None:
-        self.reports: tuple[GroupReport, ...] = ()
-        self.new_sets: tuple[SentSets, ...] = ()
         self._node = node
         self._loop = loop
         self._clock = _ClockWatch(node) if simulated else None
         self._wirings: Sequence[Wiring] = ()
         self._watched: dict[GroupRelay, _Watched] = {}
+        self._reports: dict[GroupRelay, GroupReport] = {}
+        self._turns: deque[Wiring] = deque()
         self._losses: dict[TopicInput, _Losses] = {}
-        self._subscribers: dict[tuple[str, int], Any] = {}
-        self._looks = 0
+        self._ends: dict[tuple[GroupRelay, int], _Ends] = {}
         self._waits: deque[int] = deque(maxlen=_LAST_LOOKS)
         self._overslept = 0
         self.watch(wirings)
+
+    @property
+    def reports(self) -> tuple[GroupReport, ...]:
+        """What was found at the last look at each group, in the file's order; nothing before the first."""
+        reports = self._reports
+        return tuple(reports[wiring.group] for wiring in self._wirings if wiring.group in reports)
 
     def watch(self, wirings: Sequence[Wiring]) -> None:
         """Look at these groups from now on; what is known of those that were there before stays."""
@@ -80,54 +96,73 @@ class Monitor:
         }
         inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
         self._losses = {each: self._losses.get(each) or _Losses() for each in inputs}
-        self._subscribers.clear()
+        self._reports = {group: report for group, report in self._reports.items() if group in self._watched}
+        self._turns = deque(wirings)
+        self._ends.clear()
+
+    def graph_changed(self) -> None:
+        """Hear that what is known of the graph may no longer be so."""
+        self._ends.clear()
 
     def overslept(self, seconds: float) -> None:
         """Hear by how much a rest was longer than it should be: what kept this thread kept all messages waiting."""
         self._overslept = max(self._overslept, round(seconds * 1e9))
 
     def look(self) -> None:
-        """Gather, find, log. Raises CancelledError where the receive loop has ended."""
-        waited, seen = self._loop.call(self._gather).result()
+        """Look at all groups: gather, find, log. Raises CancelledError where the receive loop has ended."""
+        self._look(self._wirings)
+
+    def look_in_turn(self) -> None:
+        """Look at those groups whose turn it is, and at all where there are new ones. Raises as `look` does."""
+        if len(self._reports) < len(self._wirings):
+            self._look(self._wirings)
+            return
+        due = min(len(self._turns), max(_IN_TURN, ceil(len(self._turns) / _LONGEST_TURN)))
+        chosen = [self._turns[index] for index in range(due)]
+        self._turns.rotate(-due)
+        self._look(chosen)
+
+    def _look(self, wirings: Sequence[Wiring]) -> None:
+        waited, seen = self._loop.call(lambda: self._gather(wirings)).result()
         now = time.time_ns()
         self._waits.append(max(waited, self._overslept))
         self._overslept = 0
         stopped = self._clock.stopped_for(now) if self._clock else None
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
-        reports = []
-        for wiring, gathered in zip(self._wirings, seen, strict=True):
+        for wiring, gathered in zip(wirings, seen, strict=True):
             watch, silence = self._watched[wiring.group]
             batch = gathered.batch
             watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
             shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
             facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=max(self._waits))
             findings = find(facts)
-            reports.append(GroupReport(facts, findings, gathered.recent))
+            self._reports[wiring.group] = GroupReport(facts, findings, gathered.recent)
             for remark in silence.look(facts, findings):
                 about = {"group": facts.name, "finding": remark.code and remark.code.value}
                 _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
-        self.reports = tuple(reports)
-        self.new_sets = tuple(gathered.batch.sets for gathered in seen)
-        self._looks += 1
 
-    def _gather(self) -> tuple[int, list[_Seen]]:
+    def _gather(self, wirings: Sequence[Wiring]) -> tuple[int, list[_Seen]]:
         """Take what came and left, between two messages. On the loop's thread."""
-        groups = [wiring.group for wiring in self._wirings]
+        groups = [wiring.group for wiring in wirings]
         return self._loop.longest_wait(), [
             _Seen(group.watched(), group.engine.counts(), group.engine.sets, tuple(group.recent)) for group in groups
         ]
 
     def _graph(self, group: GroupRelay, index: int, topic_input: TopicInput) -> InputGraph:
-        key = (group.config.name, index)
-        if self._looks % _SUBSCRIBERS_EVERY == 0 or key not in self._subscribers:
-            self._subscribers[key] = topic_input.subscribers(group, index)
+        ends = self._ends.get((group, index))
+        if ends is None:
+            ends = self._ends[group, index] = _Ends(
+                output=self._node.resolve_topic_name(group.config.topics[index].output),
+                subscribers=topic_input.subscribers(group, index),
+                alike=() if topic_input.publishers else self._alike(topic_input),
+            )
         return InputGraph(
             name=topic_input.name,
-            output=self._node.resolve_topic_name(group.config.topics[index].output),
+            output=ends.output,
             publishers=topic_input.publishers,
-            subscribers=self._subscribers[key],
-            alike=() if topic_input.publishers else self._alike(topic_input),
+            subscribers=ends.subscribers,
+            alike=ends.alike,
             not_importable=topic_input.not_importable,
             lost=self._losses[topic_input].lately,
         )

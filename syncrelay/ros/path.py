@@ -80,6 +80,14 @@ class Watch(Protocol):
         ...
 
 
+class GraphChanges(Protocol):
+    """Tells when the graph is worth another look. Used on one thread."""
+
+    def seen(self) -> bool:
+        """Whether anything may have changed since this was last asked; the first time it has."""
+        ...
+
+
 class Path(Protocol):
     """One way through rcl. What its sources give, its outlets take."""
 
@@ -95,4 +103,8 @@ class Path(Protocol):
 
     def watch(self) -> Watch:
         """Make a watch, with no sources yet."""
+        ...
+
+    def graph_changes(self, node: Any) -> GraphChanges:
+        """Follow the graph as a node sees it."""
         ...

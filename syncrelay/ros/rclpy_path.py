@@ -86,6 +86,14 @@ class WaitSetWatch:
         self._guard.destroy()
 
 
+class NoGraphEvents:
+    """What rclpy tells of changes in the graph: nothing, so there may always be some."""
+
+    def seen(self) -> bool:
+        """Whether anything may have changed: always."""
+        return True
+
+
 class RclpyPath:
     """Takes and publishes bytes through rclpy: what works wherever rclpy does."""
 
@@ -105,3 +113,7 @@ class RclpyPath:
     def watch(self) -> WaitSetWatch:
         """Make a watch, with no sources yet."""
         return WaitSetWatch(self._context)
+
+    def graph_changes(self, node: Any) -> NoGraphEvents:  # noqa: ARG002  the protocol's signature
+        """Follow the graph as a node sees it."""
+        return NoGraphEvents()

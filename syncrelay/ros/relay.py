@@ -36,10 +36,13 @@ from syncrelay.sync import DropReason
 
 _LOG = logging.getLogger("syncrelay")
 
-# The graph is looked at this often while something is missing, so that a rig that starts loses little ...
+# Changes of the graph are looked for this often while something is missing, so that a rig that starts loses
+# little ...
 _EAGER_LOOK_S = 0.1
 # ... and this often when all is there.
 _LOOK_S = 1.0
+# Whoever asks for the state every second or two sees all groups as of the last second.
+_ASKED_S = 3.0
 # Discovery takes a few tenths of a second: before that, everything would be reported as missing.
 _GRACE_S = 2.0
 # What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
@@ -85,6 +88,7 @@ class Relay:
         self._loop = ReceiveLoop(
             path.watch(), now=self._now, deadline=self._deadline, expire=self._expire, beat=self._turn
         )
+        self._graph_changes = path.graph_changes(self.node)
         self._wirings = Wirings(node=self.node, path=path, loop=self._loop)
         # Asked for their deadlines at every turn of the loop: the others never have one.
         self._limited: list[GroupRelay] = []
@@ -97,6 +101,7 @@ class Relay:
         self._config_path = config_path
         self._phase = Phase.STARTING
         self._turned = time.monotonic()
+        self._asked = -_ASKED_S
         self._next_look = time.monotonic() + LOOK_S
         self._announced: dict[str, str] = {}
         self._started = time.monotonic()
@@ -171,11 +176,10 @@ class Relay:
         """
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
-        for topic_input in self._wirings.inputs:
-            topic_input.look()
+        self._look_at_graph()
         self._announce()
-        if time.monotonic() >= self._next_look:
-            self.look()
+        if (now := time.monotonic()) >= self._next_look:
+            self._look(self.monitor.look if self._is_watched(now) else self.monitor.look_in_turn)
         is_waiting = any(wiring.waiting_for for wiring in self._wirings.all)
         until_look = max(0.0, self._next_look - time.monotonic())
         rest_s, began = min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
@@ -183,11 +187,27 @@ class Relay:
         self._wake.clear()
         self.monitor.overslept(time.monotonic() - began - rest_s)
 
+    def _look_at_graph(self) -> None:
+        has_changed = self._graph_changes.seen()
+        for topic_input in self._wirings.inputs:
+            if has_changed or not topic_input.has_type:
+                topic_input.look()
+        if has_changed:
+            self.monitor.graph_changed()
+
+    def _is_watched(self, now: float) -> bool:
+        """Whether somebody wants all groups every second: who plots them, or asks for the state."""
+        plotted = self._config.diagnostics is not None and self._config.diagnostics.scalars
+        return plotted or now - self._asked < _ASKED_S
+
     def look(self) -> tuple[GroupReport, ...]:
         """Look at all groups now, tell of it, and give what there is to say."""
+        return self._look(self.monitor.look)
+
+    def _look(self, look: Callable[[], None]) -> tuple[GroupReport, ...]:
         self._next_look = time.monotonic() + LOOK_S
         try:
-            self.monitor.look()
+            look()
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
@@ -198,7 +218,7 @@ class Relay:
 
     def state(self) -> RelayState:
         """What there is to tell of the relay, as of its last look. Any thread."""
-        now = time.monotonic()
+        self._asked = now = time.monotonic()
         return RelayState(
             node=self.node.get_fully_qualified_name(),
             config=self._config_path,

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.faults.extent import chosen
-from tests.faults.flow import Rig, Source, Witness
+from tests.faults.flow import Rig, Source, Witness, with_fast_heartbeats
 from tests.faults.networks import Cable, two_machines, why_not
 from tests.ros.processes import Process, wait_until
 from tests.ros.stage import Stage
@@ -73,8 +73,11 @@ class _Scene:
 
 
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("reliability", ["reliable", "best_effort"])
-def test_a_network_that_loses_throttles_and_breaks(stage: Stage, cable: Cable, reliability: str, figures):
+@pytest.mark.parametrize("way", ["reliable", "reliable, with fast heartbeats", "best_effort"])
+def test_a_network_that_loses_throttles_and_breaks(stage: Stage, cable: Cable, way: str, figures):
+    reliability = way.split(",")[0]
+    if way != reliability:
+        with_fast_heartbeats(stage)
     scene = _Scene(stage, cable, reliability)
     cable.lose(0.1)
     lossy_hz = scene.run(_FAULT_S)

@@ -17,12 +17,14 @@ from syncrelay.ros.path import PathName
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR, padded, stamp_of, vector, with_stamp
 from tests.ros.configs import config, inputs
+from tests.ros.processes import wait_until
 from tests.ros.streams import BEGIN, MS
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 qos = pytest.importorskip("rclpy.qos")
 Vector3Stamped = pytest.importorskip("geometry_msgs.msg").Vector3Stamped
 check = pytest.importorskip("syncrelay.ros.direct.check")
+DirectPath = pytest.importorskip("syncrelay.ros.direct.path").DirectPath
 messages = pytest.importorskip("syncrelay.ros.direct.messages")
 rcl = pytest.importorskip("syncrelay.ros.direct.rcl")
 buffers = pytest.importorskip("syncrelay.ros.direct.buffers")
@@ -252,6 +254,45 @@ def test_what_it_has_heard_of_is_taken_without_asking_once_more(here, topic, mon
     assert [source.take() is None for _ in range(5)] == [False] * 3 + [True] * 2
     assert len(asked) == 3
     watch.close()
+
+
+def _drained(changes):
+    """Whether nothing changes any more, as what other processes of the domain do is known after a while."""
+    return not changes.seen()
+
+
+def test_changes_of_the_graph_are_seen_once_each(here, ros_domain):
+    changes = here.path.graph_changes(here.node)
+    assert changes.seen()
+    wait_until(lambda: _drained(changes), "the end of changes")
+    publisher = here.node.create_publisher(Vector3Stamped, "/new", 10)
+    assert changes.seen()
+    wait_until(lambda: _drained(changes), "the end of changes")
+    here.node.destroy_publisher(publisher)
+    assert changes.seen()
+    wait_until(lambda: _drained(changes), "the end of changes")
+    there = rclpy.context.Context()
+    rclpy.init(context=there, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
+    try:
+        wait_until(changes.seen, "another participant")
+    finally:
+        there.try_shutdown()
+
+
+def test_a_change_of_the_graph_that_was_never_told_is_looked_for_every_ten_seconds(here, monkeypatch):
+    changes = here.path.graph_changes(here.node)
+    changes.seen()
+    wait_until(lambda: _drained(changes), "the end of changes")
+    later = time.monotonic() + 10
+    monkeypatch.setattr(time, "monotonic", lambda: later)
+    assert changes.seen()
+    assert not changes.seen()
+
+
+def test_without_word_of_changes_in_the_graph_rclpy_is_used(here, monkeypatch):
+    monkeypatch.setattr(DirectPath, "graph_changes", lambda *_: SimpleNamespace(seen=lambda: False))
+    with pytest.raises(check.DirectPathUnusableError, match="does not tell of changes in the graph"):
+        check.checked_path(here.node)
 
 
 def _structure(*fields):

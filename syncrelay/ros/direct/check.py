@@ -77,7 +77,10 @@ def _check_serialized_message(rcl: Rcl) -> None:
 
 def _check_there_and_back(rcl: Rcl, node: Any) -> None:
     path = DirectPath(rcl)
+    changes = path.graph_changes(node)
+    changes.seen()
     with _endpoints(node) as (subscription, publisher):
+        _require(changes.seen(), "librcl does not tell of changes in the graph")
         source, watch = path.source(subscription, _never_called), path.watch()
         try:
             watch.add(source)

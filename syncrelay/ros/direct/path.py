@@ -4,6 +4,7 @@ from typing import Any
 
 from syncrelay.ros.direct.buffers import Pool
 from syncrelay.ros.direct.events import EventWatch
+from syncrelay.ros.direct.graph_changes import GraphChanges
 from syncrelay.ros.direct.messages import DirectOutlet, DirectSource
 from syncrelay.ros.direct.rcl import Rcl
 from syncrelay.ros.path import Deliver, PathName
@@ -28,3 +29,7 @@ class DirectPath:
     def watch(self) -> EventWatch:
         """Make a watch, with no sources yet."""
         return EventWatch(self._rcl)
+
+    def graph_changes(self, node: Any) -> GraphChanges:
+        """Follow the graph as a node sees it."""
+        return GraphChanges(self._rcl, node)

@@ -84,6 +84,11 @@ class Rcl:
         self.array_fini.argtypes = [c_void_p]
         self.default_allocator = rcutils.rcutils_get_default_allocator
         self.default_allocator.restype = Allocator
+        self.graph_guard_condition = rcl.rcl_node_get_graph_guard_condition
+        self.graph_guard_condition.argtypes = [c_void_p]
+        self.graph_guard_condition.restype = c_void_p
+        self.add_guard_condition = rcl.rcl_wait_set_add_guard_condition
+        self.add_guard_condition.argtypes = [c_void_p, c_void_p, c_void_p]
         # Called by DDS's threads in the place of a callback, whose arguments are alike: it needs no Python there.
         self.eventfd_write = libc.eventfd_write
         self.eventfd_write.restype = c_int

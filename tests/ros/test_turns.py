@@ -1,0 +1,94 @@
+"""Which groups the relay looks at: all of a few, of many some in turn, and all while somebody watches."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from syncrelay.config import load
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+Relay = pytest.importorskip("syncrelay.ros.relay").Relay
+
+pytestmark = pytest.mark.ros
+
+_GROUPS = 12
+
+
+@pytest.fixture
+def relay_of(ros_domain: int, tmp_path, monkeypatch) -> Iterator:
+    """Start a relay of this process whose file has these keys."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(ros_domain))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    started = []
+
+    def start(n_groups, **keys):
+        started.append(Relay(_loaded(tmp_path, [f"g{n}" for n in range(n_groups)], **keys)))
+        return started[-1].__enter__()
+
+    yield start
+    for relay in started:
+        relay.close()
+
+
+def _loaded(folder, names, **keys):
+    group = {"policy": "exact_time", "topics": inputs({"/a": VECTOR, "/b": VECTOR})}
+    path = folder / "groups.yaml"
+    path.write_text(config(dict.fromkeys(names, group), metrics=None, **keys))
+    return load(str(path))
+
+
+def _seen(relay):
+    """When each group was looked at last."""
+    return {report.facts.name: report.facts.figures.now for report in relay.monitor.reports}
+
+
+def _after_a_look(relay):
+    """Names of those that the relay looks at when it next looks at any."""
+    before = _seen(relay)
+    while (now := _seen(relay)) == before:
+        relay.step()
+    return [name for name, seen in now.items() if seen != before.get(name)]
+
+
+def test_of_many_groups_some_are_looked_at_at_a_time_and_none_is_left_out(relay_of):
+    relay = relay_of(_GROUPS)
+    assert len(_after_a_look(relay)) == _GROUPS
+    looked_at = [_after_a_look(relay) for _ in range(6)]
+    assert [len(names) for names in looked_at] == [10] * 6
+    for names in zip(*[iter(looked_at)] * 2, strict=True):
+        assert set().union(*names) == set(_seen(relay))
+
+
+def test_of_very_many_none_waits_for_more_than_five_looks(relay_of):
+    relay = relay_of(61)
+    _after_a_look(relay)
+    assert set().union(*(_after_a_look(relay) for _ in range(5))) == set(_seen(relay))
+
+
+def test_a_few_are_looked_at_every_time(relay_of):
+    relay = relay_of(10)
+    assert [len(_after_a_look(relay)) for _ in range(3)] == [10] * 3
+
+
+def test_whoever_asks_for_the_state_sees_all_as_they_are(relay_of):
+    relay = relay_of(_GROUPS)
+    _after_a_look(relay)
+    assert len(_after_a_look(relay)) == 10
+    relay.state()
+    assert len(_after_a_look(relay)) == _GROUPS
+
+
+def test_whoever_plots_them_sees_all_as_they_are(relay_of):
+    relay = relay_of(_GROUPS, diagnostics={"scalars": True})
+    assert [len(_after_a_look(relay)) for _ in range(3)] == [_GROUPS] * 3
+
+
+def test_groups_that_a_reload_brings_are_looked_at_at_once(relay_of, tmp_path):
+    relay = relay_of(_GROUPS)
+    _after_a_look(relay)
+    names = [*_seen(relay), "new"]
+    relay.reload(_loaded(tmp_path, names))
+    assert "new" in _after_a_look(relay)
+    assert list(_seen(relay)) == names
