@@ -18,7 +18,8 @@ class InputFigures:
     input had before it fell to less than half of it, None if it has not. `delay` is the median of time of receipt
     minus stamp, `jitter` the 95th percentile of how far the time between two stamps is off its median; both are None
     while all stamps are 0. `nearest` holds, of an optional input, the spans of the tightest sets with it, whenever its
-    messages came. `fell_by` and `fell_at` tell of the last backward jump of its stamps.
+    messages came. `bursts` counts how often messages were held up and came at once, `held` is for how long at most.
+    `fell_by` and `fell_at` tell of the last backward jump of its stamps.
     """
 
     rate_hz: float = 0.0
@@ -35,6 +36,8 @@ class InputFigures:
     duplicates: int = 0
     out_of_order: int = 0
     nearest: Distribution = NOTHING
+    bursts: int = 0
+    held: int = 0
     fell_by: int | None = None
     fell_at: int | None = None
 

@@ -17,6 +17,7 @@ _RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.unstamped),
     rules_stamps.other_clock,
     rules_stamps.no_common_key,
+    of_each_input(rules_flow.bursts),
     rules_stamps.over_slop,
     of_each_input(rules_flow.short_queue),
     of_each_input(rules_flow.waiting_for_optional),

@@ -31,6 +31,7 @@ class Code(Enum):
     UNSTAMPED = "unstamped"
     OTHER_CLOCK = "other_clock"
     NO_COMMON_KEY = "no_common_key"
+    BURSTS = "bursts"
     OVER_SLOP = "over_slop"
     SHORT_QUEUE = "short_queue"
     WAITING_FOR_OPTIONAL = "waiting_for_optional"

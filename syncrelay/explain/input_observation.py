@@ -6,6 +6,7 @@ from operator import sub
 from statistics import median_low
 from typing import Final, NamedTuple, TypeAlias
 
+from syncrelay.explain.bursts import LEAST_HELD_NS, Burst, bursts
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.drift import Drift, drift
 from syncrelay.explain.figures import InputFigures
@@ -52,6 +53,8 @@ class InputObservation:
         self._delay: int | None = None
         self._jitter: int | None = None
         self._faults: deque[_Faults] = deque()
+        self._bursts: deque[Burst] = deque()
+        self._last: tuple[int, int] | None = None
         self._points: deque[tuple[int, int]] = deque(maxlen=_DRIFT_POINTS)
         self._points_seen = 0
         self._drift: Drift | None = None
@@ -91,6 +94,7 @@ class InputObservation:
         fell_by, fell_at = self._fell or (None, None)
         rate_hz, usual_hz = self._rates(fed, seconds, now)
         faults = [each for each in self._faults if each.at > now - WINDOW_NS]
+        held = [each.held for each in self._bursts if each.at > now - WINDOW_NS]
         return InputFigures(
             rate_hz=rate_hz,
             usual_hz=usual_hz,
@@ -106,6 +110,8 @@ class InputObservation:
             duplicates=sum(each.duplicates for each in faults),
             out_of_order=sum(each.out_of_order for each in faults),
             nearest=Distribution(self._nearest),
+            bursts=len(held),
+            held=max(held, default=0),
             fell_by=fell_by,
             fell_at=fell_at,
         )
@@ -116,6 +122,8 @@ class InputObservation:
         self._delays.clear()
         self._received.clear()
         self._faults.clear()
+        self._bursts.clear()
+        self._last = None
         self._nearest.clear()
         self._points.clear()
         self._drift = None
@@ -141,10 +149,11 @@ class InputObservation:
         return duplicates, out_of_order, fallen
 
     def _measure(self, stamped: Arrivals) -> None:
-        """Measure delay, jitter and drift anew, from messages that have stamps."""
+        """Measure delay, jitter, drift and bursts anew, from messages that have stamps."""
         self._stamps.extend(stamp for stamp, _ in stamped)
         delays = [received - stamp for stamp, received in stamped]
         self._delays.extend(delays)
+        self._find_bursts(stamped, delays)
         self._delay = median_low(self._delays)
         self._jitter = _jitter(self._stamps)
         # What came fastest was held up least: the least delay tells more of the clock than of the load.
@@ -152,6 +161,14 @@ class InputObservation:
         self._points_seen += 1
         if self._points_seen % _DRIFT_EVERY == 0:
             self._drift = drift(self._points)
+
+    def _find_bursts(self, stamped: Arrivals, delays: Sequence[int]) -> None:
+        while self._bursts and self._bursts[0].at <= stamped[-1][1] - WINDOW_NS:
+            self._bursts.popleft()
+        arrivals = [self._last, *stamped] if self._last else stamped
+        self._last = stamped[-1]
+        if max(delays) - min(delays) >= LEAST_HELD_NS // 2:
+            self._bursts.extend(bursts(arrivals))
 
     def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:
         """Give messages a second, of the window or of the last few where it held fewer, and while they came."""

@@ -28,6 +28,24 @@ _WHAT_HELPS: Final = {
 }
 
 
+def bursts(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find messages that are held up on their way and then come at once."""
+    figures = an_input.figures
+    # Where the relay itself stood still, all messages come at once.
+    if not figures.bursts or facts.waited >= _TOO_SLOW:
+        return
+    times = "once" if figures.bursts == 1 else f"{figures.bursts} times"
+    who = nodes(an_input)
+    yield Finding(
+        Code.BURSTS,
+        Severity.WARN,
+        f"{times} in the last 10 s messages of {an_input.name} came at once, up to {words.duration(figures.held)} late",
+        "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
+        f" default: run {who} with configs/fast_heartbeats.xml, or best effort; or see whether {who} sends in bursts",
+        index,
+    )
+
+
 def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that overflowed and then were missed."""
     needed = an_input.counts.needed_queue

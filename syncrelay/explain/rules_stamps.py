@@ -108,6 +108,8 @@ def over_slop(facts: GroupFacts) -> Found:
     nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
     if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
         return
+    if any(each.figures.bursts for each in facts.inputs) and not facts.is_silent:
+        return  # a wider slop would pair what only came together
     over = nearest.share_over(tolerance.ns)
     if facts.is_silent and over > 1 - _MISSED:
         text, suggestion = _too_wide(facts, tolerance, nearest), _wide_enough(facts, tolerance, nearest)

@@ -323,6 +323,15 @@ FOUND = {
         "stamps of /camera fell by 2.9 s 3 s ago: the group began anew",
         "a recording that is looped does this, or a reset clock",
     ),
+    "messages that were held up": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(camera(figures={"bursts": 4, "held": 2900 * MS}), LIDAR),
+        "4 times in the last 10 s messages of /camera came at once, up to 2.9 s late",
+        "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
+        " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; or see whether /usb_cam sends in"
+        " bursts",
+    ),
     "a message that DDS lost": (
         Code.MESSAGES_LOST,
         Severity.WARN,
@@ -495,6 +504,14 @@ QUIETLY = {
     "stamps that fell half a minute ago": (
         Code.TIME_JUMP,
         a_group(camera(figures={"fell_by": 3 * S, "fell_at": NOW - 30 * S}), LIDAR),
+    ),
+    "messages that came at once because the relay stood still": (
+        Code.BURSTS,
+        a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, waited=S),
+    ),
+    "stamps that are apart only because messages came at once": (
+        Code.OVER_SLOP,
+        a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, figures=wide(3, 3, 3, 3, 300)),
     ),
     "messages that lay for less than half a second": (Code.TOO_SLOW, a_group(waited=499 * MS)),
     "one message in a hundred out of order": (Code.OUT_OF_ORDER, a_group(camera(figures={"out_of_order": 1}), LIDAR)),

@@ -297,3 +297,16 @@ def test_memory_does_not_grow_with_time():
     for _ in range(200):
         stage.second(stage.stream(10), stage.stream(20), sets=[a_set(stage)] * 10)
     assert held() == after_a_while
+
+
+def test_bursts_are_counted_for_ten_seconds_also_where_a_look_parts_them():
+    stage = Stage()
+    stage.second(stage.stream(100))
+    held = stage.stream(100)
+    stage.second()
+    as_ever = stage.stream(100)
+    stage.second([(stamp, as_ever[0][1]) for stamp, _ in held] + as_ever)
+    assert (stage.inputs[0].bursts, stage.inputs[0].held) == (1, pytest.approx(S, rel=0.02))
+    for _ in range(11):
+        stage.second(stage.stream(100))
+    assert (stage.inputs[0].bursts, stage.inputs[0].held) == (0, 0)

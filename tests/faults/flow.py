@@ -150,9 +150,15 @@ def without_shared_memory(stage: Stage) -> None:
     }
 
 
-def with_fast_heartbeats(stage: Stage) -> None:
-    """Have all publishers of a stage say every 0.1 s what they sent, not every 3 s."""
-    stage.environment["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(_CONFIGS / "fast_heartbeats.xml")
+WAYS = ("reliable", "reliable, fast_heartbeats", "best_effort")
+
+
+def go_way(stage: Stage, way: str) -> str:
+    """Have a stage publish in one of WAYS; its reliability, for sources and witnesses."""
+    reliability, _, profile = way.partition(", ")
+    if profile:
+        stage.environment["FASTRTPS_DEFAULT_PROFILES_FILE"] = str(_CONFIGS / f"{profile}.xml")
+    return reliability
 
 
 def accounts(relay: Process, group: str = "front") -> list[dict[str, Any]]:

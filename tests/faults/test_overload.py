@@ -6,7 +6,7 @@ import time
 import pytest
 
 from tests.faults.extent import chosen
-from tests.faults.flow import MS, Rig, accounts, with_fast_heartbeats, without_shared_memory
+from tests.faults.flow import MS, WAYS, Rig, accounts, go_way, without_shared_memory
 from tests.faults.vitals import memory_mb
 from tests.ros.processes import Process, wait_until
 from tests.ros.stage import Stage
@@ -23,17 +23,13 @@ _EXPLANATIONS = {"messages_lost", "too_slow", "short_queue"}
 
 
 @pytest.mark.timeout(chosen(short=300, long=600))
-@pytest.mark.parametrize("way", ["reliable", "reliable, with fast heartbeats", "best_effort"])
+@pytest.mark.parametrize("way", WAYS)
 def test_what_is_too_much_is_lost_in_order_and_told_and_then_all_is_as_before(stage: Stage, way: str, figures):
     rig = Rig(stage, slop=MS // 100)
-    reliability = way.split(",")[0]
-    if way != reliability:
-        with_fast_heartbeats(stage)
+    reliability = go_way(stage, way)
     relay = rig.relay()
     witness = rig.witness(reliability=reliability)
-    sources = [
-        rig.source(topic, node=topic.strip("/"), depth=1000, reliability=reliability) for topic in rig.topics
-    ]
+    sources = [rig.source(topic, node=topic.strip("/"), depth=1000, reliability=reliability) for topic in rig.topics]
     for source in sources:
         source.match()
         source.pace(_HZ)
@@ -62,10 +58,11 @@ def test_what_is_too_much_is_lost_in_order_and_told_and_then_all_is_as_before(st
     dropped = [each["dropped"] for each in accounts(relay)]
     wait_until(lambda: list(findings(relay)) == ["healthy"], "the relay to be healthy again")
     figures(
-        f"{_OVERLOAD_S} s of overload, {way}: {sent / _OVERLOAD_S:,.0f} messages a second sent, {taken / _OVERLOAD_S:,.0f}"
-        f" taken, {lost:,} lost before the relay; told as {', '.join(sorted(told & _EXPLANATIONS))}; dropped {dropped};"
-        f" memory {most_mb:.0f} MB at most; usual sets leave {again_s:.1f} s after the end, as seen once a second, and"
-        f" {witness_s:.1f} s after it the subscriber has read its way to them"
+        f"{_OVERLOAD_S} s of overload ({way}): {sent / _OVERLOAD_S:,.0f} messages a second sent,"
+        f" {taken / _OVERLOAD_S:,.0f} taken, {lost:,} lost before the relay; told as"
+        f" {', '.join(sorted(told & _EXPLANATIONS))}; dropped {dropped}; memory {most_mb:.0f} MB at most; usual sets"
+        f" leave {again_s:.1f} s after the end, as seen once a second, and {witness_s:.1f} s after it the subscriber"
+        " has read its way to them"
     )
 
 

@@ -1,0 +1,45 @@
+"""What is a burst, and what only looks like one."""
+
+import pytest
+from groups import MS, S
+
+from syncrelay.explain.bursts import Burst, bursts
+
+
+def _stream(first, last, *, period=10 * MS, delay=MS):
+    return [(stamp, stamp + delay) for stamp in range(first, last, period)]
+
+
+def _held(first, last, *, period=10 * MS):
+    """Messages of a stretch of time that all come at its end."""
+    return [(stamp, last + n * MS // 10) for n, stamp in enumerate(range(first, last, period))]
+
+
+def test_messages_that_come_at_once_after_a_pause_are_a_burst():
+    arrivals = _stream(S, 2 * S) + _held(2 * S, 3 * S) + _stream(3 * S + 20 * MS, 4 * S)
+    assert list(bursts(arrivals)) == [Burst(3 * S, 999 * MS)]
+
+
+def test_every_burst_is_found():
+    arrivals = [each for second in range(1, 5) for each in _held(second * S, (second + 1) * S)]
+    assert [burst.at for burst in bursts(arrivals)] == [3 * S, 4 * S, 5 * S]
+
+
+@pytest.mark.parametrize(
+    "arrivals",
+    [
+        pytest.param([], id="nothing"),
+        pytest.param([(S, S)], id="one message"),
+        pytest.param(_stream(S, 9 * S), id="an even stream"),
+        pytest.param(_stream(S, 2 * S) + _stream(5 * S, 6 * S), id="a publisher that paused"),
+        pytest.param(_stream(S, 2 * S) + _held(2 * S, 2 * S + 400 * MS) + _stream(3 * S, 4 * S), id="too short a time"),
+        pytest.param(_stream(S, 2 * S) + _stream(2 * S, 4 * S, delay=2 * S), id="late from now on"),
+        pytest.param(
+            _stream(S, 20 * S, period=S) + [(20 * S, 22 * S), *_stream(23 * S, 30 * S, period=S)],
+            id="one message that took longer",
+        ),
+        pytest.param(_stream(9 * S, 10 * S) + _stream(S, 2 * S, delay=9 * S), id="stamps that fall"),
+    ],
+)
+def test_no_burst(arrivals):
+    assert list(bursts(arrivals)) == []
