@@ -1,6 +1,6 @@
 """approximate_time: the best match, as C++ message_filters' ApproximateTime finds it."""
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left, bisect_right, insort
 from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
@@ -40,7 +40,6 @@ class ApproximateTime(Policy):
         "_candidate_end",
         "_candidate_start",
         "_cursors",
-        "_empty",
         "_heads",
         "_losses",
         "_messages",
@@ -48,6 +47,7 @@ class ApproximateTime(Policy):
         "_overflowed",
         "_pivot",
         "_pivot_stamp",
+        "_places",
         "_proof_end",
         "_queue_size",
         "_scale",
@@ -74,6 +74,7 @@ class ApproximateTime(Policy):
         if len(periods) != n_inputs or min(periods) < 0:
             raise ValueError(f"min_periods_ns {periods} must be {n_inputs} numbers, 0 or more")
         self.n_inputs = n_inputs
+        self._places = range(n_inputs)
         self._queue_size = queue_size
         self._slop = slop_ns
         self._age_penalty = age_penalty
@@ -82,6 +83,8 @@ class ApproximateTime(Policy):
         self._stamps: list[list[int]] = [[] for _ in periods]
         self._messages: list[list[Message]] = [[] for _ in periods]
         self._losses = Losses(n_inputs)
+        # (stamp, place) of the head of each input that has one, in this order: the earliest first, the latest last.
+        self._heads: list[tuple[int, int]] = []
         self.opened = 0
         self._reset()
 
@@ -110,9 +113,8 @@ class ApproximateTime(Policy):
         stamps.append(stamp)
         self._messages[place].append(message)
         if was_empty:
-            self._heads[place] = stamp
-            self._empty -= 1
-            if not self._empty:
+            insort(self._heads, (stamp, place))
+            if len(self._heads) == self.n_inputs:
                 outcomes = self._search([])
         if len(stamps) > self._queue_size:
             return self._overflow(place, list(outcomes))
@@ -141,20 +143,19 @@ class ApproximateTime(Policy):
         self.closed = self.opened
         self._losses.forget()
         self._overflowed: set[int] = set()
-        self._heads = [0] * self.n_inputs
-        self._cursors = [0] * self.n_inputs
         self._forget_candidate()
 
     def _forget_candidate(self) -> None:
         """Bring back what the candidate skipped, and its members unless they were taken out before."""
         self._pivot = _NO_PIVOT
-        self._empty = 0
-        for place, stamps in enumerate(self._stamps):
-            self._cursors[place] = 0
+        self._cursors = [0] * self.n_inputs
+        heads = []
+        for place in self._places:
+            stamps = self._stamps[place]
             if stamps:
-                self._heads[place] = stamps[0]
-            else:
-                self._empty += 1
+                heads.append((stamps[0], place))
+        heads.sort()
+        self._heads = heads
 
     def _feed_behind(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         stamps = self._stamps[place]
@@ -170,7 +171,7 @@ class ApproximateTime(Policy):
         outcomes: list[Outcome] = []
         if passed:
             self._forget_candidate()
-            self._search(outcomes)
+            self._search_again(outcomes)
         if len(stamps) > self._queue_size:
             self._overflow(place, outcomes)
         return outcomes
@@ -183,28 +184,36 @@ class ApproximateTime(Policy):
             return outcomes
         self._forget_candidate()
         self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
-        return self._search(outcomes)
+        return self._search_again(outcomes)
+
+    def _search_again(self, outcomes: list[Outcome]) -> list[Outcome]:
+        """Search after a candidate was forgotten: the wait for a better one goes on if there is one again."""
+        self._search(outcomes)
+        if self._pivot == _NO_PIVOT:
+            self.closed = self.opened
+        return outcomes
 
     def _search(self, outcomes: list[Outcome]) -> list[Outcome]:
-        heads = self._heads
         overflowed = self._overflowed
         numerator, denominator = self._scale
         steps = 0
-        while not self._empty:
+        while len(self._heads) == self.n_inputs:
             steps += 1
             if steps > _STEPS:
                 self._stride(outcomes)
-            start = min(heads)
-            end = max(heads)
-            first = heads.index(start)
+            heads = self._heads
+            start, first = heads[0]
+            end, latest = heads[-1]
             if overflowed:
-                self._excuse_all_but_latest(end)
+                self._excuse_all_but(latest)
             if self._pivot == _NO_PIVOT:
                 if end - start > self._slop or overflowed:
-                    self._drop_heads(first, end, outcomes)
+                    self._drop_heads(outcomes)
                     continue
-                self._pivot = self._latest_place(end)
+                self._pivot = latest
                 self._pivot_stamp = end
+                if self.opened == self.closed:
+                    self.opened += 1
                 self._take_candidate(start, end)
             else:
                 later_end = end - self._candidate_end
@@ -215,33 +224,27 @@ class ApproximateTime(Policy):
                     self._take_candidate(start, end)
             stamps = self._stamps[first]
             cursor = self._cursors[first] = self._cursors[first] + 1
-            if cursor < len(stamps):
-                heads[first] = stamps[cursor]
-            else:
-                self._empty = 1
-            if first == self._pivot or end >= self._proof_end or (self._empty and self._is_proved(first)):
+            del heads[0]
+            awaited = cursor == len(stamps)
+            if not awaited:
+                insort(heads, (stamps[cursor], first))
+            if first == self._pivot or end >= self._proof_end or (awaited and self._is_proved(first)):
                 self._emit(outcomes)
-        self._note_wait()
         return outcomes
 
-    def _drop_heads(self, place: int, end: int, outcomes: list[Outcome]) -> None:
+    def _drop_heads(self, outcomes: list[Outcome]) -> None:
         """Drop the earliest head, and at once those behind it that are too far and would be the earliest.
 
         After an overflow, that head goes even if it is near enough.
         """
+        _, place = self._heads[0]
+        next_head, _ = self._heads[1]
+        end, _ = self._heads[-1]
         stamps = self._stamps[place]
-        next_head = min([head for other, head in enumerate(self._heads) if other != place])
         count = bisect_left(stamps, min(next_head, end - self._slop)) or 1
         if len(stamps) == count:
             self._note_missed(stamps[-1])
         self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
-
-    def _note_wait(self) -> None:
-        """Count the wait for something better than the candidate: over, begun, or the one there was."""
-        if self._pivot == _NO_PIVOT:
-            self.closed = self.opened
-        elif self.closed == self.opened:
-            self.opened += 1
 
     def _stride(self, outcomes: list[Outcome]) -> None:
         """Pass at once all heads that single steps would pass to no other end.
@@ -251,15 +254,15 @@ class ApproximateTime(Policy):
         Without one: all that is too far from the latest head, or all before it if it is of an input that
         overflowed; in either case not the last message of any input, which would end the search.
         """
-        end = max(self._heads)
+        end, latest = self._heads[-1]
         if self._pivot != _NO_PIVOT:
             if end < self._proof_end:
                 self._pass_until(min(self._pivot_stamp, *self._last_stamps(end)))
             return
-        self._excuse_all_but_latest(end)
+        self._excuse_all_but(latest)
         target = min(self._last_stamps(end - 1), default=end) if self._overflowed else end - self._slop
         target = min(target, *[stamps[-1] for stamps in self._stamps])
-        for place, head in enumerate(self._heads):
+        for head, place in self._heads.copy():
             if head < target:
                 count = bisect_left(self._stamps[place], target)
                 self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
@@ -267,29 +270,27 @@ class ApproximateTime(Policy):
     def _last_stamps(self, end: int) -> list[int]:
         """The last stamp up to `end` of each input that has one."""
         lasts = []
-        for head, stamps in zip(self._heads, self._stamps, strict=True):
+        for head, place in self._heads:
             if head <= end:
+                stamps = self._stamps[place]
                 lasts.append(stamps[bisect_right(stamps, end) - 1])
         return lasts
 
     def _pass_until(self, target: int) -> None:
-        for place, head in enumerate(self._heads):
+        for index, (head, place) in enumerate(self._heads):
             if head < target:
                 stamps = self._stamps[place]
-                self._cursors[place] = bisect_left(stamps, target)
-                self._heads[place] = stamps[self._cursors[place]]
+                cursor = self._cursors[place] = bisect_left(stamps, target)
+                self._heads[index] = (stamps[cursor], place)
+        self._heads.sort()
 
-    def _excuse_all_but_latest(self, end: int) -> None:
+    def _excuse_all_but(self, latest: int) -> None:
         """Forget the overflow of inputs that don't have the latest head: they may be the pivot again."""
-        self._overflowed.intersection_update((self._latest_place(end),))
-
-    def _latest_place(self, end: int) -> int:
-        """The last of the inputs whose head is the latest."""
-        return self.n_inputs - 1 - self._heads[::-1].index(end)
+        self._overflowed.intersection_update((latest,))
 
     def _note_missed(self, start: int) -> None:
         """See whether what would have matched the only message of an input had overflowed."""
-        for place, head in enumerate(self._heads):
+        for head, place in self._heads:
             if head > start:
                 self._losses.miss(place, self._stamps[place], start, self._slop)
 
@@ -297,13 +298,12 @@ class ApproximateTime(Policy):
         """Drop heads while there is no candidate."""
         stamps = self._stamps[place]
         messages = self._messages[place]
+        self._heads.remove((stamps[0], place))
         outcomes += [Drop(message, reason) for message in messages[:count]]
         del messages[:count]
         del stamps[:count]
         if stamps:
-            self._heads[place] = stamps[0]
-        else:
-            self._empty = 1
+            insort(self._heads, (stamps[0], place))
 
     def _take_candidate(self, start: int, end: int) -> None:
         numerator, denominator = self._scale
@@ -336,20 +336,20 @@ class ApproximateTime(Policy):
         behind: so there are at most as many strides as inputs, however long the queues.
         """
         numerator, denominator = self._scale
-        heads = self._heads.copy()
-        heads[awaited] = self._bound(awaited)
+        heads = [*self._heads, (self._bound(awaited), awaited)]
         while True:
-            end = max(heads)
+            heads.sort()
+            end, _ = heads[-1]
             if end >= self._proof_end:
                 return True
             reach = self._candidate_start + (end - self._candidate_end) * numerator // denominator
-            if min(heads) > reach:
+            if heads[0][0] > reach:
                 return False
-            for place, head in enumerate(heads):
+            for index, (head, place) in enumerate(heads):
                 if head <= reach:
                     stamps = self._stamps[place]
                     position = bisect_right(stamps, reach)
-                    heads[place] = stamps[position] if position < len(stamps) else self._bound(place)
+                    heads[index] = (stamps[position] if position < len(stamps) else self._bound(place), place)
 
     def _bound(self, place: int) -> int:
         """Give the least stamp that matters of the message that this input has yet to show."""
