@@ -26,12 +26,13 @@ class InputCounts:
 class Ledger:
     """Counts what comes in and what leaves. A message that `repeats` in sets is counted once."""
 
-    __slots__ = ("_dropped", "_last", "_matched", "_repeats", "fed", "sets")
+    __slots__ = ("_absent", "_dropped", "_last", "_repeats", "fed", "sets")
 
     def __init__(self, n_inputs: int, *, repeats: bool) -> None:
         self.fed = [0] * n_inputs
         self.sets = 0
-        self._matched = [0] * n_inputs
+        # Sets without a message of this input, or with one that was counted: most sets are whole, and need no count.
+        self._absent = [0] * n_inputs
         self._dropped: list[dict[DropReason, int]] = [defaultdict(int) for _ in self.fed]
         self._repeats = repeats
         self._last: list[int | None] = [None] * n_inputs
@@ -40,7 +41,11 @@ class Ledger:
         """Count what leaves."""
         for outcome in outcomes:
             if isinstance(outcome, Match):
-                self._note_set(outcome)
+                self.sets += 1
+                if self._repeats:
+                    self._note_repeated(outcome)
+                elif not all(outcome.messages):
+                    self._note_absent(outcome)
             else:
                 self._dropped[outcome.message.input][outcome.reason] += 1
 
@@ -50,23 +55,20 @@ class Ledger:
 
     def counts(self, buffered: Sequence[int], needed_queues: Sequence[int | None]) -> tuple[InputCounts, ...]:
         """Give the counts of each input, with what its buffers hold now."""
-        rows = zip(self.fed, self._matched, self._dropped, buffered, needed_queues, strict=True)
+        rows = zip(self.fed, self._absent, self._dropped, buffered, needed_queues, strict=True)
         return tuple(
-            InputCounts(fed, matched, dict(dropped), held, needed) for fed, matched, dropped, held, needed in rows
+            InputCounts(fed, self.sets - absent, dict(dropped), held, needed)
+            for fed, absent, dropped, held, needed in rows
         )
 
-    def _note_set(self, match: Match) -> None:
-        self.sets += 1
-        matched = self._matched
-        if self._repeats:
-            self._note_repeating_set(match)
-            return
-        for message in match.messages:
-            if message is not None:
-                matched[message.input] += 1
+    def _note_absent(self, match: Match) -> None:
+        for index, message in enumerate(match.messages):
+            if message is None:
+                self._absent[index] += 1
 
-    def _note_repeating_set(self, match: Match) -> None:
-        for message in match.messages:
-            if message is not None and message.stamp != self._last[message.input]:
-                self._last[message.input] = message.stamp
-                self._matched[message.input] += 1
+    def _note_repeated(self, match: Match) -> None:
+        for index, message in enumerate(match.messages):
+            if message is None or message.stamp == self._last[index]:
+                self._absent[index] += 1
+            else:
+                self._last[index] = message.stamp
