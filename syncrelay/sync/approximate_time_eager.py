@@ -94,8 +94,9 @@ class ApproximateTimeEager(Policy):
 
     def _begin(self, stamp: int, outcomes: list[Outcome]) -> None:
         """Note what the only message of its input has missed, and drop what is too far."""
-        firsts = [stamps[0] for stamps in self._stamps if stamps]
-        if max(firsts) - min(firsts) <= self._slop:
+        # The first messages of the other inputs lie within slop of each other.
+        far = [stamps for stamps in self._stamps if stamps and abs(stamps[0] - stamp) > self._slop]
+        if not far:
             return
         for place, stamps in enumerate(self._stamps):
             if stamps and stamps[0] > stamp + self._slop:

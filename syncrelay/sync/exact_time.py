@@ -43,7 +43,7 @@ class ExactTime(Policy):
         messages[place] = message
         if replaced is not None:
             return (Drop(replaced, DropReason.DUPLICATE),)
-        if None in messages:
+        if not all(messages):
             return ()
         return self._emit(stamp, messages)
 
