@@ -35,7 +35,7 @@ def test_every_burst_is_found():
         pytest.param(_stream(S, 2 * S) + _held(2 * S, 2 * S + 400 * MS) + _stream(3 * S, 4 * S), id="too short a time"),
         pytest.param(_stream(S, 2 * S) + _stream(2 * S, 4 * S, delay=2 * S), id="late from now on"),
         pytest.param(
-            _stream(S, 20 * S, period=S) + [(20 * S, 22 * S), *_stream(23 * S, 30 * S, period=S)],
+            [*_stream(S, 20 * S, period=S), (20 * S, 22 * S), *_stream(23 * S, 30 * S, period=S)],
             id="one message that took longer",
         ),
         pytest.param(_stream(9 * S, 10 * S) + _stream(S, 2 * S, delay=9 * S), id="stamps that fall"),

@@ -328,9 +328,11 @@ FOUND = {
         Severity.WARN,
         a_group(camera(figures={"bursts": 4, "held": 2900 * MS}), LIDAR),
         "4 times in the last 10 s messages of /camera came at once, up to 2.9 s late",
-        "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
-        " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; or see whether /usb_cam sends in"
-        " bursts",
+        (
+            "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
+            " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; or see whether /usb_cam sends in"
+            " bursts"
+        ),
     ),
     "a message that DDS lost": (
         Code.MESSAGES_LOST,
