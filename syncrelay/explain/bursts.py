@@ -6,8 +6,8 @@ from statistics import median_low
 from typing import Final, NamedTuple
 
 LEAST_HELD_NS: Final = 500_000_000
-# So many periods, so that it is several messages that come at once and not one that took longer.
-_LEAST_PERIODS: Final = 3
+# So many come within one period: several messages at once, and not one that took longer.
+_AT_ONCE: Final = 3
 
 
 class Burst(NamedTuple):
@@ -18,11 +18,12 @@ class Burst(NamedTuple):
 
 
 def bursts(arrivals: Sequence[tuple[int, int]]) -> Iterator[Burst]:
-    """Yield the bursts among stamps and times of receipt, in nanoseconds; whoever is just slow from then on is none."""
-    delays = [received - stamp for stamp, received in arrivals]
-    periods = [after - before for (before, _), (after, _) in pairwise(arrivals)]
-    least = max(LEAST_HELD_NS, _LEAST_PERIODS * median_low(periods)) if periods else 0
-    for index, period in enumerate(periods, start=1):
-        held = delays[index] - delays[index - 1]
-        if held >= least and period > 0 and min(delays[index:]) <= delays[index] - held // 2:
-            yield Burst(arrivals[index][1], held)
+    """Yield the bursts among stamps and times of receipt, in nanoseconds, in the order of their receipt."""
+    if len(arrivals) <= _AT_ONCE:
+        return
+    usual = median_low([after - before for (before, _), (after, _) in pairwise(arrivals)])
+    least = max(LEAST_HELD_NS, _AT_ONCE * usual)
+    for before, first, last in zip(arrivals, arrivals[1:], arrivals[_AT_ONCE:], strict=False):
+        held = (first[1] - first[0]) - (before[1] - before[0])
+        if held >= least and first[0] > before[0] and last[1] - first[1] < usual:
+            yield Burst(first[1], held)

@@ -165,10 +165,9 @@ class InputObservation:
     def _find_bursts(self, stamped: Arrivals, delays: Sequence[int]) -> None:
         while self._bursts and self._bursts[0].at <= stamped[-1][1] - WINDOW_NS:
             self._bursts.popleft()
-        arrivals = [self._last, *stamped] if self._last else stamped
-        self._last = stamped[-1]
-        if max(delays) - min(delays) >= LEAST_HELD_NS // 2:
-            self._bursts.extend(bursts(arrivals))
+        last, self._last = self._last or stamped[0], stamped[-1]
+        if max(delays) - min(*delays, last[1] - last[0]) >= LEAST_HELD_NS:
+            self._bursts.extend(bursts([last, *stamped]))
 
     def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:
         """Give messages a second, of the window or of the last few where it held fewer, and while they came."""

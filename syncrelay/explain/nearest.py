@@ -4,7 +4,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
-# More than comes between two looks; what an input piles up while another is silent is cut to this.
+# More than comes between two looks, at 1 kHz; what an input piles up while another is silent is cut to this.
 _KEPT = 5_000
 
 Sides: TypeAlias = Sequence[tuple[int | None, int]]

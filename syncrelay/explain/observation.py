@@ -1,4 +1,4 @@
-"""What is seen of a group over its last seconds: rates, spans, latencies, delays, misses; fed once a second or so."""
+"""What is seen of a group over its last seconds: rates, spans, latencies, delays, misses; fed every second or few."""
 
 from collections import Counter, deque
 from collections.abc import Sequence
@@ -127,7 +127,7 @@ class Observation:
     def _take_sets(self, sets: SentSets, now: int) -> None:
         if not sets:
             return
-        if self._last_set is None or now - self._last_set >= _SILENCE:
+        if self._last_set is None or (now - self._last_set >= _SILENCE and self._saw_none_before()):
             self._resumed = now
         self._last_set = now
         self._nearest_since.clear()
@@ -136,6 +136,10 @@ class Observation:
         self._sets.extend(zip(spans, latencies, strict=True))
         self._span_histogram.add(spans)
         self._latency_histogram.add(latencies)
+
+    def _saw_none_before(self) -> bool:
+        """Whether no set left in the look before this one: two looks may be as far apart as a silence is long."""
+        return len(self._looks) > 1 and not self._looks[-2].sent
 
     def _span(self, stamps: Sequence[int | None]) -> int:
         there = [stamp + offset for stamp, offset in zip(stamps, self._offsets, strict=True) if stamp is not None]

@@ -41,7 +41,8 @@ def bursts(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         Severity.WARN,
         f"{times} in the last 10 s messages of {an_input.name} came at once, up to {words.duration(figures.held)} late",
         "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
-        f" default: run {who} with configs/fast_heartbeats.xml, or best effort; or see whether {who} sends in bursts",
+        f" default: run {who} with configs/fast_heartbeats.xml, or best effort; else see whether {who} sends in bursts,"
+        " or a recorder stood still",
         index,
     )
 

@@ -16,6 +16,7 @@ _TOLD_JUMP: Final = 30 * SECOND
 # A share of the slowest input's messages that could have no set, and from how many on it means something.
 _MISSED: Final = 0.05
 _FEWEST: Final = 5
+_MOST: Final = 0.5
 # Below this drift is noise: so much apart since it was watched, so long watched, so much more than it bends.
 _DRIFTED: Final = 5_000_000
 _DRIFT_WATCHED: Final = 20 * SECOND
@@ -108,15 +109,18 @@ def over_slop(facts: GroupFacts) -> Found:
     nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
     if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
         return
-    if any(each.figures.bursts for each in facts.inputs) and not facts.is_silent:
-        return  # a wider slop would pair what only came together
     over = nearest.share_over(tolerance.ns)
     if facts.is_silent and over > 1 - _MISSED:
         text, suggestion = _too_wide(facts, tolerance, nearest), _wide_enough(facts, tolerance, nearest)
         yield Finding(Code.OVER_SLOP, Severity.ERROR, text, suggestion)
-    elif not facts.is_silent and over > _MISSED:
+    elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
         text, suggestion = _often_too_wide(facts, tolerance, nearest)
         yield Finding(Code.OVER_SLOP, Severity.WARN, text, suggestion)
+
+
+def _come_at_once(facts: GroupFacts) -> bool:
+    """Whether what is measured as far apart may only have been held up: a wider slop would pair what came together."""
+    return any(each.required and each.figures.bursts for each in facts.inputs)
 
 
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> tuple[str, str]:

@@ -24,10 +24,12 @@ class Backlog:
     def __init__(self) -> None:
         self.longest_wait = 0
         """How long a message at most has waited since DDS received it, in nanoseconds; the reader sets it back."""
-        self.heads: list[_Head] = []
-        """A heap of what is held."""
+        self._heads: list[_Head] = []
         self._held: set[Source] = set()
         self._ties = count()
+
+    def __bool__(self) -> bool:
+        return bool(self._heads)
 
     def deliver(self, look: Look) -> None:
         """Deliver what is certain to be the oldest, a batch at most.
@@ -36,16 +38,14 @@ class Backlog:
         source of which nothing is held is drained.
         """
         for source in look.sources:
-            if source not in self._held and source.heard_of:
+            if source not in self._held:
                 self._take(source)
-        if self.heads:
-            self.longest_wait = max(self.longest_wait, time.time_ns() - self.heads[0][0])
+        if self._heads:
+            self.longest_wait = max(self.longest_wait, time.time_ns() - self._heads[0][0])
         for _ in range(_BATCH):
-            if not self.heads or self.heads[0][0] > look.seen_until:
+            if not self._heads or self._heads[0][0] > look.seen_until:
                 return
-            source = self._hand_on(heappop(self.heads))
-            if source.heard_of:
-                self._take(source)
+            self._take(self._hand_on(heappop(self._heads)))
 
     def deliver_until(self, until: int, sources: Iterable[Source]) -> None:
         """Deliver what these sources received up to a time, in nanoseconds of the system clock, however much it is."""
@@ -53,20 +53,20 @@ class Backlog:
             source.doubt()
             if source not in self._held:
                 self._take(source)
-        while self.heads and self.heads[0][0] <= until:
-            self._take(self._hand_on(heappop(self.heads)))
+        while self._heads and self._heads[0][0] <= until:
+            self._take(self._hand_on(heappop(self._heads)))
 
     def deliver_held(self) -> None:
         """Deliver what is held, at the end: its sources are not drained."""
-        while self.heads:
-            self._hand_on(heappop(self.heads))
+        while self._heads:
+            self._hand_on(heappop(self._heads))
 
     def forget(self, source: Source) -> None:
         """Deliver what is held of a source that ends."""
         if source in self._held:
-            head = next(head for head in self.heads if head[4] is source)
-            self.heads.remove(head)
-            self.heads.sort()
+            head = next(head for head in self._heads if head[4] is source)
+            self._heads.remove(head)
+            self._heads.sort()
             self._hand_on(head)
 
     def _hand_on(self, head: _Head) -> Source:
@@ -80,4 +80,4 @@ class Backlog:
         if taken is not None:
             received, payload, content = taken
             self._held.add(source)
-            heappush(self.heads, (received, next(self._ties), payload, content, source))
+            heappush(self._heads, (received, next(self._ties), payload, content, source))

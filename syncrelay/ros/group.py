@@ -12,7 +12,7 @@ from syncrelay.sync import Drop, DropReason, Match, Message
 
 # Enough for the widest terminal's strip of recent sets.
 _RECENT = 256
-# What is kept for whoever watches, between two of his looks: more than comes in a second.
+# What is kept for whoever watches, between two of his looks: at 1 kHz they may be 10 s apart.
 _WATCHED = 10_000
 
 

@@ -35,8 +35,8 @@ _LAST_LOOKS: Final = 10
 _SETTLING_LOOKS: Final = 2
 # Of many groups, so many are looked at at a time: a look at one takes about half a millisecond from the data ...
 _IN_TURN: Final = 10
-# ... and none waits for more than so many looks.
-_LONGEST_TURN: Final = 5
+# ... and none waits for more than so many looks: a silence is one of 5 s.
+_LONGEST_TURN: Final = 4
 # A /clock at 1 Hz stands still for a second between two ticks.
 _CLOCK_STOPPED_NS: Final = 2_500_000_000
 
@@ -63,7 +63,7 @@ class _Ends(NamedTuple):
 
 
 class Monitor:
-    """Makes a report of every group at each look, and logs what is worth a line. On the main thread."""
+    """Makes a report of each group that it looks at, and logs what is worth a line. On the main thread."""
 
     def __init__(self, wirings: Sequence[Wiring], *, node: Any, loop: ReceiveLoop, simulated: bool) -> None:
         self._node = node
@@ -72,7 +72,6 @@ class Monitor:
         self._wirings: Sequence[Wiring] = ()
         self._watched: dict[GroupRelay, _Watched] = {}
         self._reports: dict[GroupRelay, GroupReport] = {}
-        self._turns: deque[Wiring] = deque()
         self._losses: dict[TopicInput, _Losses] = {}
         self._ends: dict[tuple[GroupRelay, int], _Ends] = {}
         self._waits: deque[int] = deque(maxlen=_LAST_LOOKS)
@@ -97,7 +96,6 @@ class Monitor:
         inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
         self._losses = {each: self._losses.get(each) or _Losses() for each in inputs}
         self._reports = {group: report for group, report in self._reports.items() if group in self._watched}
-        self._turns = deque(wirings)
         self._ends.clear()
 
     def graph_changed(self) -> None:
@@ -113,14 +111,12 @@ class Monitor:
         self._look(self._wirings)
 
     def look_in_turn(self) -> None:
-        """Look at those groups whose turn it is, and at all where there are new ones. Raises as `look` does."""
+        """Look at those that were not for longest, and at all where there are new ones. Raises as `look` does."""
         if len(self._reports) < len(self._wirings):
             self._look(self._wirings)
             return
-        due = min(len(self._turns), max(_IN_TURN, ceil(len(self._turns) / _LONGEST_TURN)))
-        chosen = [self._turns[index] for index in range(due)]
-        self._turns.rotate(-due)
-        self._look(chosen)
+        longest_ago = sorted(self._wirings, key=lambda wiring: self._reports[wiring.group].facts.figures.now)
+        self._look(longest_ago[: max(_IN_TURN, ceil(len(longest_ago) / _LONGEST_TURN))])
 
     def _look(self, wirings: Sequence[Wiring]) -> None:
         waited, seen = self._loop.call(lambda: self._gather(wirings)).result()

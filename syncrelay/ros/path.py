@@ -23,8 +23,6 @@ class Source(Protocol):
     """A subscription that is drained."""
 
     deliver: Deliver
-    heard_of: int
-    """How many messages there may be to take; asking in vain costs nearly as much as a message."""
 
     def take(self) -> Taken | None:
         """Take its oldest message; None if there is none that it has heard of."""

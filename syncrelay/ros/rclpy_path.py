@@ -11,9 +11,7 @@ from syncrelay.ros.path import Deliver, Look, PathName, Taken
 
 
 class RclpySource:
-    """A subscription drained through rclpy, which tells of messages but not of how many."""
-
-    heard_of = 1
+    """A subscription drained through rclpy."""
 
     def __init__(self, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver

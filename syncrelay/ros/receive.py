@@ -23,8 +23,8 @@ class ReceiveLoop:
     """Drains sources of one path on the thread that calls `run`.
 
     Only `call` and `stop` may be used from other threads. `deadline` says when `expire` wants to be called
-    next, by the clock of `now`, in nanoseconds; None for never. `beat` is called once a second; without it an
-    idle loop sleeps until something comes.
+    next, by the clock of `now`, in nanoseconds; None for never. `beat` is called at every turn, at least once
+    a second; without it an idle loop sleeps until something comes.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class ReceiveLoop:
         self._sources: list[Source] = []
         self._backlog = Backlog()
         self._calls: deque[tuple[Future[Any], Callable[[], None]]] = deque()
-        self._beaten = 0
+        self._next_deadline: int | None = None
         self._stopping = False
         self._ended = False
 
@@ -101,10 +101,9 @@ class ReceiveLoop:
         try:
             while not self._stopping:
                 self._carry_out_calls()
-                look = self._watch.wait(self._rest())
-                self._backlog.deliver(look)
-                if self._beat is not None and abs(look.seen_until - self._beaten) >= _BEAT_NS:
-                    self._beaten = look.seen_until
+                self._expire_due()
+                self._backlog.deliver(self._watch.wait(self._timeout()))
+                if self._beat is not None:
                     self._beat()
             self._backlog.deliver_until(time.time_ns(), self._sources)
             self._backlog.deliver_held()
@@ -125,16 +124,18 @@ class ReceiveLoop:
         while self._calls:
             self._calls.popleft()[0].cancel()
 
-    def _rest(self) -> int:
-        """Expire what is due; nanoseconds until the next deadline, none while messages are held, negative for ever."""
-        deadline = self._deadline()
-        if deadline is not None and (now := self._now()) >= deadline:
+    def _expire_due(self) -> None:
+        self._next_deadline = self._deadline()
+        if self._next_deadline is not None and (now := self._now()) >= self._next_deadline:
             self._expire(now)
-            deadline = self._deadline()
-        if self._backlog.heads:
+            self._next_deadline = self._deadline()
+
+    def _timeout(self) -> int:
+        """Nanoseconds until the next deadline, none while messages are held; negative waits for ever."""
+        if self._backlog:
             return 0
         longest = -1 if self._beat is None else _BEAT_NS
-        if deadline is None:
+        if self._next_deadline is None:
             return longest
-        left = max(0, deadline - self._now())
+        left = max(0, self._next_deadline - self._now())
         return left if self._beat is None else min(left, longest)

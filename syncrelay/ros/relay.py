@@ -144,6 +144,8 @@ class Relay:
         self._announced = {group.config.name: text for group, text in self._announcements(before)}
         self._reloads += 1
         self._reload_error = None
+        # What is new is to be told of at once.
+        self._next_look = time.monotonic()
         kept = sum(group in before for group in self._wirings.groups)
         _LOG.info("the file was read again: %d groups go on, %d begin", kept, len(self._wirings.groups) - kept)
 

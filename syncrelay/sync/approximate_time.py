@@ -47,7 +47,6 @@ class ApproximateTime(Policy):
         "_overflowed",
         "_pivot",
         "_pivot_stamp",
-        "_places",
         "_proof_end",
         "_queue_size",
         "_scale",
@@ -74,7 +73,6 @@ class ApproximateTime(Policy):
         if len(periods) != n_inputs or min(periods) < 0:
             raise ValueError(f"min_periods_ns {periods} must be {n_inputs} numbers, 0 or more")
         self.n_inputs = n_inputs
-        self._places = range(n_inputs)
         self._queue_size = queue_size
         self._slop = slop_ns
         self._age_penalty = age_penalty
@@ -150,8 +148,7 @@ class ApproximateTime(Policy):
         self._pivot = _NO_PIVOT
         self._cursors = [0] * self.n_inputs
         heads = []
-        for place in self._places:
-            stamps = self._stamps[place]
+        for place, stamps in enumerate(self._stamps):
             if stamps:
                 heads.append((stamps[0], place))
         heads.sort()

@@ -38,7 +38,14 @@ def test_every_burst_is_found():
             [*_stream(S, 20 * S, period=S), (20 * S, 22 * S), *_stream(23 * S, 30 * S, period=S)],
             id="one message that took longer",
         ),
-        pytest.param(_stream(9 * S, 10 * S) + _stream(S, 2 * S, delay=9 * S), id="stamps that fall"),
+        pytest.param(
+            [*_stream(S, 3 * S, period=100 * MS), (3700 * MS, 4400 * MS), *_stream(4500 * MS, 9 * S, period=100 * MS)],
+            id="a node that once took long and skipped the others",
+        ),
+        pytest.param(
+            sorted(_stream(S, 4 * S) + _stream(S, 4 * S, delay=800 * MS), key=lambda arrival: arrival[1]),
+            id="two publishers, one of them late",
+        ),
     ],
 )
 def test_no_burst(arrivals):

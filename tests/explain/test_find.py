@@ -256,6 +256,32 @@ FOUND = {
         "50 % of the last 10 messages of /lidar were farther from their partners than max_age 500 ms",
         "write `max_age: 700ms`, which would match 99 %",
     ),
+    "sets wider than slop, whose messages were held up too": (
+        Code.OVER_SLOP,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"bursts": 1, "held": S}), LIDAR, figures=wide(*[61] * 5, 63)),
+        "the nearest sets span 61 ms to 63 ms, over slop 20 ms",
+        "write `slop: 65ms`, which would match 99 %",
+    ),
+    "most sets wider than slop, whose messages were held up too": (
+        Code.OVER_SLOP,
+        Severity.WARN,
+        a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, figures=wide(*[5] * 40, *[30] * 60)),
+        "60 % of the last 100 messages of /camera were farther from their partners than slop 20 ms",
+        "write `slop: 30ms`, which would match 99 %",
+    ),
+    "sets wider than slop, beside an optional input that was held up": (
+        Code.OVER_SLOP,
+        Severity.WARN,
+        a_group(
+            camera(required=False, figures={"bursts": 1, "held": S}),
+            LIDAR,
+            an_input("/imu"),
+            figures=wide(*[5] * 90, *[30] * 10),
+        ),
+        "10 % of the last 100 messages of /lidar were farther from their partners than slop 20 ms",
+        "write `slop: 30ms`, which would match 99 %",
+    ),
     "some sets wider than slop": (
         Code.OVER_SLOP,
         Severity.WARN,
@@ -330,8 +356,8 @@ FOUND = {
         "4 times in the last 10 s messages of /camera came at once, up to 2.9 s late",
         (
             "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
-            " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; or see whether /usb_cam sends in"
-            " bursts"
+            " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; else see whether /usb_cam sends"
+            " in bursts, or a recorder stood still"
         ),
     ),
     "a message that DDS lost": (

@@ -310,3 +310,14 @@ def test_bursts_are_counted_for_ten_seconds_also_where_a_look_parts_them():
     for _ in range(11):
         stage.second(stage.stream(100))
     assert (stage.inputs[0].bursts, stage.inputs[0].held) == (0, 0)
+
+
+def test_looks_that_are_far_apart_are_no_silences():
+    stage = Stage()
+    for _ in range(3):
+        stage.second(stage.stream(10), sets=[a_set(stage)] * 10, length=5 * S + 10 * MS)
+    resumed = stage.group.resumed
+    stage.second(length=5 * S + 10 * MS)
+    assert resumed == BEGAN + 5 * S + 10 * MS
+    stage.second(stage.stream(10), sets=[a_set(stage)] * 10, length=5 * S + 10 * MS)
+    assert stage.group.resumed == stage.now

@@ -13,10 +13,6 @@ class _Source:
         self.messages = deque(messages)
         self.deliver = lambda payload, _content, _received: delivered.append(payload)
 
-    @property
-    def heard_of(self):
-        return len(self.messages)
-
     def take(self):
         if not self.messages:
             return None
@@ -40,11 +36,11 @@ def test_what_came_after_the_look_waits_for_the_next_one():
     slow, fast = _Source(delivered), _Source(delivered, (1, "a"), (6, "b"))
     backlog.deliver(Look([fast], seen_until=5))
     assert delivered == ["a"]
-    assert backlog.heads
+    assert backlog
     slow.messages.append((5, "A"))
     backlog.deliver(Look([slow], seen_until=10))
     assert delivered == ["a", "A", "b"]
-    assert not backlog.heads
+    assert not backlog
 
 
 def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
@@ -53,7 +49,7 @@ def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
     flood = _Source(delivered, *((n, f"{n}") for n in range(1000)))
     backlog.deliver(Look([flood], seen_until=1000))
     assert 0 < len(delivered) < 1000
-    while backlog.heads:
+    while backlog:
         backlog.deliver(Look([], seen_until=1000))
     assert delivered == [f"{n}" for n in range(1000)]
 
@@ -85,4 +81,4 @@ def test_messages_up_to_a_time_leave_however_many_they_are():
     assert len(delivered) == 901
     backlog.deliver_held()
     assert delivered == [f"{n}" for n in range(902)]
-    assert not backlog.heads
+    assert not backlog

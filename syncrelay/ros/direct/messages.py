@@ -18,6 +18,7 @@ class DirectSource:
     def __init__(self, rcl: Rcl, pool: Pool, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver
         self.heard_of = 0
+        """How many messages are to be taken: asking librcl once more costs nearly as much as a message."""
         self._pool = pool
         self.address: Final[int] = subscription.handle.pointer
         # It owns what the address points to.
