@@ -121,6 +121,11 @@ def test_a_topic_that_no_group_uses_any_more_is_not_subscribed_any_more(stage: S
     collector = stage.collector()
     other = stage.player({"/other": VECTOR, **_PAIR})
     other.match()
+    for topic in ("/other", "/camera"):
+        wait_until(
+            lambda topic=topic: collector.endpoints(topic, kind="subscription", node="/syncrelay"), "the subscriptions"
+        )
+    wait_until(lambda: collector.endpoints("/rear/camera", kind="publisher"), "the publisher")
     file.reload(front=_FRONT)
     wait_until(lambda: not collector.endpoints("/other", kind="subscription"), "the subscription to go")
     wait_until(lambda: not collector.endpoints("/rear/camera", kind="publisher"), "the publisher to go")
