@@ -16,6 +16,7 @@ _TOLD_JUMP: Final = 30 * SECOND
 # A share of the slowest input's messages that could have no set, and from how many on it means something.
 _MISSED: Final = 0.05
 _FEWEST: Final = 5
+# Where messages were held up, what is apart tells of slop only if it is most.
 _MOST: Final = 0.5
 # Below this drift is noise: so much apart since it was watched, so long watched, so much more than it bends.
 _DRIFTED: Final = 5_000_000

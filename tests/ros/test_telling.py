@@ -10,10 +10,10 @@ from rosbags.typesys import Stores, get_typestore
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
+from tests.ros.sensors import PAIR, front, play, stream
 from tests.ros.stage import Collector, Stage
 from tests.ros.status import findings
 from tests.ros.streams import merged
-from tests.ros.test_findings import PAIR, front, play, stream
 
 pytestmark = pytest.mark.ros
 

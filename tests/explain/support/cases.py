@@ -1,0 +1,56 @@
+"""Inputs and groups that findings are about."""
+
+from groups import IMAGE, MS, NOW, S, a_group, an_input
+
+from syncrelay.explain import Distribution, Endpoint, Mismatch, Tolerance
+from syncrelay.explain.drift import Drift
+from syncrelay.sync.counts import InputCounts
+from syncrelay.sync.messages import DropReason
+
+LIDAR = an_input("/lidar")
+
+UNFIT = Endpoint("/usb_cam", IMAGE, Mismatch("reliability", "best_effort", "reliable"))
+
+STRANGER = Endpoint("/usb_cam", "std_msgs/msg/Int64")
+
+QUIET = {"rate_hz": 0.0, "last_received": NOW - 7 * S, "fed": 0}
+
+ONCE = {**QUIET, "usual_hz": 0.0, "longest_pause": 0}
+
+AGES = {"policy": "latest_time", "trigger": 1, "tolerance": None}
+
+HALF_A_SECOND = {**AGES, "tolerance": Tolerance("max_age", 500 * MS)}
+
+
+def camera(**facts):
+    return an_input("/camera", node="/usb_cam", **facts)
+
+
+def dropped(reason, count, *, fed=100, **figures):
+    return camera(figures={"dropped": {reason: count}, "fed": fed, **figures})
+
+
+def fed(*, needed_queue=None):
+    return InputCounts(600, 0, {}, 10, needed_queue)
+
+
+def overflowing(needed):
+    figures = {"dropped": {DropReason.OVERFLOW: 90}}
+    return camera(counts=fed(needed_queue=needed), figures=figures)
+
+
+def wide(*spans_ms, **figures):
+    spans = Distribution([round(each * MS) for each in spans_ms])
+    return {"nearest": spans, "nearest_since": spans, **figures}
+
+
+def without_camera(**figures):
+    inputs = camera(required=False, figures=figures), LIDAR, an_input("/imu")
+    return a_group(*inputs, figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS)
+
+
+def drifting(slope, *, watched=60 * S, bend=0.0):
+    return camera(figures={"drift": Drift(slope, bend, watched)})
+
+
+STEADY = an_input("/lidar", figures={"drift": Drift(0.0, 0.0, 60 * S)})

@@ -1,0 +1,179 @@
+"""What the flow tells: facts that come to a finding, and the nearest that do not."""
+
+from cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
+from groups import MS, NOW, S, a_group, a_silent_group, an_input
+
+from syncrelay.explain import Code, Distribution, Severity
+from syncrelay.sync.messages import DropReason
+
+# Code, severity, facts, sentence, suggestion.
+FOUND = {
+    "a queue that is too short": (
+        Code.SHORT_QUEUE,
+        Severity.ERROR,
+        a_silent_group(overflowing(40), LIDAR),
+        "90 of the last 100 messages of /camera overflowed its queue of 10 before their partners came",
+        "write `queue_size: 40`",
+    ),
+    "a queue that is too short at times": (
+        Code.SHORT_QUEUE,
+        Severity.WARN,
+        a_group(overflowing(40), LIDAR, figures={"rate_hz": 9.0}),
+        "90 of the last 100 messages of /camera overflowed its queue of 10 before their partners came",
+        "write `queue_size: 40`",
+    ),
+    "sets without an optional input": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        a_group(
+            camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
+        ),
+        "100 % of the sets leave without /camera after waiting 100 ms for it",
+        "see why /camera does not come in time, or write a larger `max_wait`",
+    ),
+    "an optional input whose stamps fit no set": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=45 * MS, nearest=Distribution([40 * MS] * 99 + [63 * MS])),
+        (
+            "100 % of the sets leave without /camera after waiting 100 ms for it: the nearest sets with it span 40 ms"
+            " to 40 ms, over slop 20 ms"
+        ),
+        "write `slop: 40ms`, which would take in 99 %",
+    ),
+    "an optional input of another clock": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=37_205 * MS, nearest=Distribution([40 * MS] * 100)),
+        (
+            "100 % of the sets leave without /camera after waiting 100 ms for it: its stamps are 37.2 s behind those of"
+            " the others"
+        ),
+        "synchronize their clocks, or write `offset: 37.2s` at /camera",
+    ),
+    "an optional input that comes late": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100)),
+        (
+            "100 % of the sets leave without /camera after waiting 100 ms for it: it comes, 300 ms after the others,"
+            " too late"
+        ),
+        "write a larger `max_wait`, or see what holds /camera up",
+    ),
+    "messages that were held up": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(camera(figures={"bursts": 4, "held": 2900 * MS}), LIDAR),
+        "4 times in the last 10 s messages of /camera came at once, up to 2.9 s late",
+        (
+            "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
+            " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; else see whether /usb_cam sends"
+            " in bursts, or a recorder stood still"
+        ),
+    ),
+    "a message that DDS lost": (
+        Code.MESSAGES_LOST,
+        Severity.WARN,
+        a_group(camera(lost=1), LIDAR),
+        "DDS lost 1 message of /camera on the way here in the last 10 s",
+        "look at the network and the load; what /usb_cam offers as reliable, `qos: auto` asks for again",
+    ),
+    "a relay that does not keep up": (
+        Code.TOO_SLOW,
+        Severity.WARN,
+        a_group(waited=700 * MS),
+        "messages lay here for 700 ms before the relay came to them",
+        "give it more CPU, or spread the groups over several relays with --group",
+    ),
+    "an input that comes at a tenth of its rate": (
+        Code.SLOWED,
+        Severity.WARN,
+        a_group(camera(figures={"pace_hz": 1.0, "slowed_from_hz": 10.0}), LIDAR),
+        "/camera comes at 1 Hz, it came at 10 Hz",
+        "look at /usb_cam: its settings, its load, and the network on the way",
+    ),
+    "few sets": (
+        Code.FEW_SETS,
+        Severity.WARN,
+        a_group(dropped(DropReason.LATE, 60), LIDAR, figures={"rate_hz": 4.0}),
+        "4 of 10 possible sets a second leave; of /camera's last 100 messages 60 were dropped as late",
+        "a policy or a `queue_size` that waits longer, such as `approximate_time` would give more",
+    ),
+    "few sets of a trigger, told by its own messages": (
+        Code.FEW_SETS,
+        Severity.WARN,
+        a_group(
+            an_input("/map", figures={"rate_hz": 1.0}),
+            dropped(DropReason.EXPIRED, 60),
+            figures={"rate_hz": 4.0},
+            **AGES,
+        ),
+        "4 of 10 possible sets a second leave; of /camera's last 100 messages 60 were dropped as expired",
+        "a larger `max_wait` would give more",
+    ),
+    "what nothing explains": (
+        Code.UNEXPLAINED,
+        Severity.ERROR,
+        a_silent_group(
+            camera(figures={"dropped": {DropReason.TOO_FAR: 90, DropReason.LATE: 3}}),
+            an_input("/lidar", figures={"fed": 0}),
+        ),
+        (
+            "messages come on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as too_far"
+            " and 3 were dropped as late; of /lidar none came lately"
+        ),
+        "try a larger `queue_size`; `syncrelay doctor --live` looks at the graph and at the stamps",
+    ),
+    "a start": (
+        Code.STARTING,
+        Severity.OK,
+        a_group(figures={"began": NOW - 3 * S, "last_set": None}),
+        "no set yet, 3 s after the start",
+        None,
+    ),
+    "health": (
+        Code.HEALTHY,
+        Severity.OK,
+        a_group(),
+        "10 of 10 possible sets a second, span 5 ms and latency 2 ms at the 95th percentile",
+        None,
+    ),
+}
+
+# The code that must not be found, facts.
+QUIETLY = {
+    "an overflow of what nobody missed": (Code.SHORT_QUEUE, a_silent_group(overflowing(None), LIDAR)),
+    "a queue that was long enough": (Code.SHORT_QUEUE, a_silent_group(overflowing(10), LIDAR)),
+    "an overflow beside a stream of another clock": (
+        Code.SHORT_QUEUE,
+        a_silent_group(overflowing(40), an_input("/lidar", figures={"delay": 37 * S})),
+    ),
+    "an overflow while all sets leave": (Code.SHORT_QUEUE, a_group(overflowing(40), LIDAR)),
+    "an overflow long ago": (
+        Code.SHORT_QUEUE,
+        a_silent_group(camera(counts=fed(needed_queue=40)), LIDAR),
+    ),
+    "a set in twenty without an optional input": (
+        Code.WAITING_FOR_OPTIONAL,
+        a_group(camera(required=False), LIDAR, figures={"missing": (0.05, 0.0)}),
+    ),
+    "messages that came at once because the relay stood still": (
+        Code.BURSTS,
+        a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, waited=S),
+    ),
+    "messages that lay for less than half a second": (Code.TOO_SLOW, a_group(waited=499 * MS)),
+    "four of five possible sets": (Code.FEW_SETS, a_group(figures={"rate_hz": 8.0})),
+    "few sets in the first ten seconds": (Code.FEW_SETS, a_group(figures={"rate_hz": 4.0, "began": NOW - 9 * S})),
+    "few sets in the window of a silence": (
+        Code.FEW_SETS,
+        a_group(figures={"rate_hz": 4.0, "resumed": NOW - 9 * S}),
+    ),
+    "no set yet where something is wrong": (
+        Code.STARTING,
+        a_group(camera(not_importable="no package"), LIDAR, figures={"began": NOW - 3 * S, "last_set": None}),
+    ),
+    "few sets because they are thinned": (Code.FEW_SETS, a_group(figures={"rate_hz": 2.0}, every=5)),
+    "few sets at a greatest rate": (Code.FEW_SETS, a_group(figures={"rate_hz": 2.0}, least_period=500 * MS)),
+    "few sets where few are possible": (Code.FEW_SETS, a_group(figures={"rate_hz": 0.1, "best_hz": 0.9})),
+}

@@ -1,0 +1,143 @@
+"""What the graph tells: facts that come to a finding, and the nearest that do not."""
+
+from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
+from groups import IMAGE, MS, NOW, S, a_group, a_silent_group
+
+from syncrelay.explain import Code, Endpoint, Mismatch, Severity
+from syncrelay.sync.counts import InputCounts
+
+# Code, severity, facts, sentence, suggestion.
+FOUND = {
+    "a type that is not installed": (
+        Code.TYPE_NOT_IMPORTABLE,
+        Severity.ERROR,
+        a_group(camera(not_importable="no package fancy_msgs\nand more"), LIDAR),
+        "/camera: no package fancy_msgs",
+        "install the package where the relay runs, or source the workspace that has it",
+    ),
+    "a publisher of another type": (
+        Code.OTHER_TYPE,
+        Severity.ERROR,
+        a_silent_group(camera(publishers=(STRANGER,)), LIDAR),
+        f"/usb_cam publishes /camera as std_msgs/msg/Int64, the file says {IMAGE}",
+        "write `type: std_msgs/msg/Int64`",
+    ),
+    "one publisher of two of another type": (
+        Code.OTHER_TYPE,
+        Severity.WARN,
+        a_silent_group(camera(publishers=(Endpoint("/driver", IMAGE), STRANGER)), LIDAR),
+        f"/usb_cam publishes /camera as std_msgs/msg/Int64, the file says {IMAGE}",
+        "have /usb_cam use another topic",
+    ),
+    "nobody publishes": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(camera(publishers=(), figures={"last_received": None}), LIDAR),
+        f"nobody publishes /camera ({IMAGE})",
+        "start the node that publishes /camera, or correct the topic's name",
+    ),
+    "nobody publishes, but another name": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(camera(publishers=(), figures={"last_received": None}, alike=("/cam",)), LIDAR),
+        f"nobody publishes /camera ({IMAGE})",
+        f"did you mean `topic: /cam`? It is published as {IMAGE}",
+    ),
+    "nobody publishes any more": (
+        Code.NO_PUBLISHER,
+        Severity.WARN,
+        a_group(camera(publishers=(), figures={"last_received": NOW - 3 * S}), LIDAR),
+        f"nobody publishes /camera ({IMAGE}) any more, since 3 s",
+        "restart the node that published /camera",
+    ),
+    "QoS that does not fit": (
+        Code.INCOMPATIBLE_QOS,
+        Severity.ERROR,
+        a_silent_group(camera(publishers=(UNFIT,)), LIDAR),
+        "/usb_cam offers /camera with reliability best_effort, the group requests reliable",
+        "write `qos: auto` at /camera, or have /usb_cam offer reliable",
+    ),
+    "QoS of one of two that does not fit": (
+        Code.INCOMPATIBLE_QOS,
+        Severity.WARN,
+        a_silent_group(camera(publishers=(UNFIT, Endpoint("/driver", IMAGE))), LIDAR),
+        "/usb_cam offers /camera with reliability best_effort, the group requests reliable",
+        "write `qos: auto` at /camera, or have /usb_cam offer reliable",
+    ),
+    "a clock that stands still": (
+        Code.CLOCK_STOPPED,
+        Severity.ERROR,
+        a_silent_group(clock_stopped=4 * S),
+        "/clock has stood still for 4 s: nothing that waits expires",
+        "start or resume what publishes /clock, or run without use_sim_time",
+    ),
+    "nothing came ever": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(counts=InputCounts(0, 0, {}, 0), figures={**ONCE, "last_received": None}), LIDAR),
+        "/usb_cam publishes /camera, but no message has come",
+        "see with `ros2 topic hz /camera` whether /usb_cam sends; if it does, ask `syncrelay doctor`",
+    ),
+    "nothing comes any more": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures=QUIET), LIDAR),
+        "/camera has been silent for 7 s; until then it came at 10 Hz",
+        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+    ),
+    "nothing came for long": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures={**QUIET, "last_received": NOW - 21 * S}), LIDAR),
+        "/camera has been silent for 21 s; until then it came at 10 Hz",
+        "look at /usb_cam, which still publishes it",
+    ),
+    "nothing of what is held comes any more, which always came": (
+        Code.SILENT,
+        Severity.WARN,
+        a_group(camera(figures=QUIET), LIDAR, **AGES),
+        "/camera has been silent for 7 s; until then it came at 10 Hz",
+        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+    ),
+    "what was sent once is too old": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures={**ONCE, "last_received": NOW - 60 * S}), LIDAR, **HALF_A_SECOND),
+        "/camera has been silent for 60 s",
+        (
+            "look at /usb_cam, which still publishes it; if it is sent that rarely by design, write a larger `max_age`"
+            " than 500 ms, or none"
+        ),
+    ),
+    "a subscriber that gets nothing": (
+        Code.SUBSCRIBER_QOS,
+        Severity.WARN,
+        a_group(
+            camera(subscribers=(Endpoint("/fusion", IMAGE, Mismatch("durability", "volatile", "transient_local")),)),
+            LIDAR,
+        ),
+        "/fusion requests /front/camera with durability transient_local, the relay offers volatile, so it gets nothing",
+        "have /fusion request volatile, or /camera's publisher offer transient_local",
+    ),
+}
+
+# The code that must not be found, facts.
+QUIETLY = {
+    "no publisher in the first two seconds": (
+        Code.NO_PUBLISHER,
+        a_group(camera(publishers=()), LIDAR, figures={"began": NOW - 1900 * MS}),
+    ),
+    "another type is no QoS": (Code.INCOMPATIBLE_QOS, a_silent_group(camera(publishers=(STRANGER,)), LIDAR)),
+    "what nobody publishes is not silent": (Code.SILENT, a_silent_group(camera(publishers=(), figures=QUIET), LIDAR)),
+    "what does not fit is not silent": (Code.SILENT, a_silent_group(camera(publishers=(UNFIT,), figures=QUIET), LIDAR)),
+    "silence while /clock stands": (Code.SILENT, a_silent_group(camera(figures=QUIET), LIDAR, clock_stopped=4 * S)),
+    "a slow input between two messages": (
+        Code.SILENT,
+        a_group(camera(figures={"rate_hz": 0.1, "last_received": NOW - 9 * S}), LIDAR, figures={"best_hz": 0.1}),
+    ),
+    "a map that was sent once, long ago": (Code.SILENT, a_group(camera(figures=ONCE), LIDAR, **AGES)),
+    "a state that is sent at odds": (
+        Code.SILENT,
+        a_group(camera(figures={**QUIET, "usual_hz": 3.0, "longest_pause": 4 * S}), LIDAR, **AGES),
+    ),
+}
