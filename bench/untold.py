@@ -13,9 +13,9 @@ from syncrelay.ros.monitor import Monitor
 def _note_nothing(group):
     nothing = deque(maxlen=0)
     group._arrivals = (nothing,) * group._n_inputs
-    group._sets = group.recent = nothing
+    group._sets = group.last = nothing
 
 
 GroupRelay._watch = _note_nothing
-Monitor.look = lambda _: None
+Monitor.look = Monitor.look_in_turn = lambda _: None
 sys.exit(main(["--config", sys.argv[1]]))

@@ -4,13 +4,12 @@ DDS keeps order within a topic only. Drained one topic after the other, a backlo
 queues before a slow topic's messages of the same time are seen.
 """
 
-import time
 from collections.abc import Iterable
 from heapq import heappop, heappush
 from itertools import count
 from typing import Any, Final, TypeAlias
 
-from syncrelay.ros.path import Content, Look, Source
+from syncrelay.ros.path import Content, Look, Source, Taken
 
 _Head: TypeAlias = tuple[int, int, Any, Content, Source]
 
@@ -25,25 +24,27 @@ class Backlog:
         self.longest_wait = 0
         """How long a message at most has waited since DDS received it, in nanoseconds; the reader sets it back."""
         self._heads: list[_Head] = []
-        self._held: set[Source] = set()
+        self.held: set[Source] = set()
+        """The sources that a held message is of."""
         self._ties = count()
 
-    def __bool__(self) -> bool:
-        return bool(self._heads)
-
     def deliver(self, look: Look) -> None:
-        """Deliver what is certain to be the oldest, a batch at most.
+        """Deliver what is the oldest as far as the look tells, a batch at most.
 
         What came after the look is held: an older message may lie in a source that had none at the time. A
         source of which nothing is held is drained.
         """
-        for source in look.sources:
-            if source not in self._held:
+        sources, until = look
+        if len(sources) == 1 and not self.held:
+            self._deliver_alone(sources[0], until)
+            return
+        for source in sources:
+            if source not in self.held:
                 self._take(source)
         if self._heads:
-            self.longest_wait = max(self.longest_wait, time.time_ns() - self._heads[0][0])
+            self.longest_wait = max(self.longest_wait, until - self._heads[0][0])
         for _ in range(_BATCH):
-            if not self._heads or self._heads[0][0] > look.seen_until:
+            if not self._heads or self._heads[0][0] > until:
                 return
             self._take(self._hand_on(heappop(self._heads)))
 
@@ -51,7 +52,7 @@ class Backlog:
         """Deliver what these sources received up to a time, in nanoseconds of the system clock, however much it is."""
         for source in sources:
             source.doubt()
-            if source not in self._held:
+            if source not in self.held:
                 self._take(source)
         while self._heads and self._heads[0][0] <= until:
             self._take(self._hand_on(heappop(self._heads)))
@@ -63,21 +64,40 @@ class Backlog:
 
     def forget(self, source: Source) -> None:
         """Deliver what is held of a source that ends."""
-        if source in self._held:
+        if source in self.held:
             head = next(head for head in self._heads if head[4] is source)
             self._heads.remove(head)
             self._heads.sort()
             self._hand_on(head)
 
+    def _deliver_alone(self, source: Source, until: int) -> None:
+        """Deliver as the only one what one source has, a batch at most: nearly always, and without any sorting."""
+        taken = source.take()
+        if taken is None:
+            return
+        self.longest_wait = max(self.longest_wait, until - taken[0])
+        for _ in range(_BATCH):
+            received, payload, content = taken
+            if received > until:
+                break
+            source.deliver(payload, content, received)
+            taken = source.take()
+            if taken is None:
+                return
+        self._hold(source, taken)
+
     def _hand_on(self, head: _Head) -> Source:
         received, _, payload, content, source = head
-        self._held.discard(source)
+        self.held.discard(source)
         source.deliver(payload, content, received)
         return source
 
     def _take(self, source: Source) -> None:
         taken = source.take()
         if taken is not None:
-            received, payload, content = taken
-            self._held.add(source)
-            heappush(self._heads, (received, next(self._ties), payload, content, source))
+            self._hold(source, taken)
+
+    def _hold(self, source: Source, taken: Taken) -> None:
+        received, payload, content = taken
+        self.held.add(source)
+        heappush(self._heads, (received, next(self._ties), payload, content, source))

@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 from syncrelay.config import GroupConfig
@@ -34,7 +34,8 @@ class GroupRelay:
     def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
         self.config = config
         self.engine = config.engine()
-        self.recent: deque[RecentSet | RecentDrop] = deque(maxlen=_RECENT)
+        self.last: deque[tuple[int | None, ...] | RecentDrop] = deque(maxlen=_RECENT)
+        """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
         self._now = now
         self._n_inputs = len(config.topics)
         self._keys: list[Hashable] = [None] * self._n_inputs
@@ -94,24 +95,30 @@ class GroupRelay:
                 newest = self._send(outcome)
                 stamps = outcome.stamps
                 self._sets.append((stamps, time.time_ns() - newest))
-                self.recent.append(RecentSet(stamps))
+                self.last.append(stamps)
             else:
                 message = outcome.message
-                self.recent.append(RecentDrop(message.input, message.stamp, outcome.reason))
+                self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
 
     def _send(self, match: Match) -> int:
         """Publish a set; when its newest message was received."""
         newest = 0
-        for message, outlet, restamped in zip(match.messages, self._outlets, self._restamped, strict=True):
+        for message in match.messages:
             if message is None:
                 continue
             # As it was fed: what DDS received, and when, in nanoseconds of the system clock.
             payload, received = message.payload
             newest = max(newest, received)
+            outlet = self._outlets[message.input]
             if outlet is None:
                 continue
-            if match.stamp is not None and restamped:
+            if match.stamp is not None and self._restamped[message.input]:
                 outlet.send_stamped(payload, match.stamp)
             else:
                 outlet.send(payload)
         return newest
+
+
+def recent(last: Iterable[tuple[int | None, ...] | RecentDrop]) -> tuple[RecentSet | RecentDrop, ...]:
+    """What left last, for those who are told of it."""
+    return tuple(each if isinstance(each, RecentDrop) else RecentSet(each) for each in last)

@@ -14,13 +14,12 @@ from syncrelay.explain import (
     GroupWatch,
     InputGraph,
     RecentDrop,
-    RecentSet,
     Severity,
     Silence,
     find,
 )
 from syncrelay.ros.graph import topics_alike
-from syncrelay.ros.group import Batch, GroupRelay
+from syncrelay.ros.group import Batch, GroupRelay, recent
 from syncrelay.ros.inputs import TopicInput, Wiring
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.sync.counts import InputCounts
@@ -46,7 +45,7 @@ class _Seen:
     batch: Batch
     counts: tuple[InputCounts, ...]
     sets: int
-    recent: tuple[RecentSet | RecentDrop, ...]
+    last: tuple[tuple[int | None, ...] | RecentDrop, ...]
 
 
 class _Watched(NamedTuple):
@@ -133,7 +132,7 @@ class Monitor:
             shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
             facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=max(self._waits))
             findings = find(facts)
-            self._reports[wiring.group] = GroupReport(facts, findings, gathered.recent)
+            self._reports[wiring.group] = GroupReport(facts, findings, recent(gathered.last))
             for remark in silence.look(facts, findings):
                 about = {"group": facts.name, "finding": remark.code and remark.code.value}
                 _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
@@ -142,7 +141,7 @@ class Monitor:
         """Take what came and left, between two messages. On the loop's thread."""
         groups = [wiring.group for wiring in wirings]
         return self._loop.longest_wait(), [
-            _Seen(group.watched(), group.engine.counts(), group.engine.sets, tuple(group.recent)) for group in groups
+            _Seen(group.watched(), group.engine.counts(), group.engine.sets, tuple(group.last)) for group in groups
         ]
 
     def _graph(self, group: GroupRelay, index: int, topic_input: TopicInput) -> InputGraph:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from enum import Enum
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 Content: TypeAlias = bytes | memoryview
 """A message's bytes, to read fields from at once; they are not kept."""
@@ -45,15 +45,12 @@ class Outlet(Protocol):
         ...
 
 
-class Look(NamedTuple):
-    """Sources that may have got messages since they were drained.
+Look: TypeAlias = tuple[Sequence[Source], int]
+"""Sources that may have got messages since they were drained, and the time of the look.
 
-    Whatever was received up to `seen_until`, in nanoseconds of the system clock, is in one of them, or in one that
-    was not drained. A source is drained when `take` gave None.
-    """
-
-    sources: Sequence[Source]
-    seen_until: int
+Whatever was received up to that time, in nanoseconds of the system clock, is in one of them, or in one that was not
+drained, but for what DDS was just about to tell of. A source is drained when `take` gave None.
+"""
 
 
 class Watch(Protocol):
@@ -68,7 +65,7 @@ class Watch(Protocol):
         ...
 
     def wait(self, timeout_ns: int) -> Look:
-        """Wait until a source gets messages, for the timeout at most, or until a wake; a negative one is for ever."""
+        """Wait until a source gets messages, for the timeout at most, or until a wake."""
         ...
 
     def wake(self) -> None:

@@ -74,7 +74,7 @@ class WaitSetWatch:
         seen_until = time.time_ns()
         wait_set.wait(timeout_ns)
         ready = [source for index, source in enumerate(self._sources) if wait_set.is_ready("subscription", index)]
-        return Look(ready, seen_until)
+        return ready, seen_until
 
     def wake(self) -> None:
         """Have `wait` return. Any thread."""

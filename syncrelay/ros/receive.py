@@ -15,16 +15,15 @@ from syncrelay.ros.path import Source, Watch
 
 _Result = TypeVar("_Result")
 
-# With a heartbeat, an idle loop turns as often as this.
+# An idle loop turns as often as this.
 _BEAT_NS = 1_000_000_000
 
 
 class ReceiveLoop:
     """Drains sources of one path on the thread that calls `run`.
 
-    Only `call` and `stop` may be used from other threads. `deadline` says when `expire` wants to be called
-    next, by the clock of `now`, in nanoseconds; None for never. `beat` is called at every turn, at least once
-    a second; without it an idle loop sleeps until something comes.
+    Only `call`, `wake`, `stop` and the attributes may be used from other threads. `expire` is called with the time of
+    `now`, in nanoseconds, when that is due. `beat` is called at every turn, once a second at least.
     """
 
     def __init__(
@@ -32,19 +31,24 @@ class ReceiveLoop:
         watch: Watch,
         *,
         now: Callable[[], int],
-        deadline: Callable[[], int | None],
         expire: Callable[[int], None],
+        deadline: Callable[[], int | None] | None = None,
         beat: Callable[[], None] | None = None,
     ) -> None:
         self._watch = watch
         self._now = now
-        self._deadline = deadline
+        self.deadline = deadline
+        """Says when `expire` wants to be called next, by the clock of `now`; None while it never does.
+
+        Asked at every turn: whoever replaces it wakes the loop.
+        """
+        self.turned = time.monotonic()
+        """When the loop last turned."""
         self._expire = expire
         self._beat = beat
         self._sources: list[Source] = []
         self._backlog = Backlog()
         self._calls: deque[tuple[Future[Any], Callable[[], None]]] = deque()
-        self._next_deadline: int | None = None
         self._stopping = False
         self._ended = False
 
@@ -100,9 +104,12 @@ class ReceiveLoop:
         """Receive until `stop` is called."""
         try:
             while not self._stopping:
-                self._carry_out_calls()
-                self._expire_due()
-                self._backlog.deliver(self._watch.wait(self._timeout()))
+                if self._calls:
+                    self._carry_out_calls()
+                deadline = self.deadline
+                longest = _BEAT_NS if deadline is None else self._expire_due(deadline)
+                self._backlog.deliver(self._watch.wait(0 if self._backlog.held else longest))
+                self.turned = time.monotonic()
                 if self._beat is not None:
                     self._beat()
             self._backlog.deliver_until(time.time_ns(), self._sources)
@@ -124,18 +131,10 @@ class ReceiveLoop:
         while self._calls:
             self._calls.popleft()[0].cancel()
 
-    def _expire_due(self) -> None:
-        self._next_deadline = self._deadline()
-        if self._next_deadline is not None and (now := self._now()) >= self._next_deadline:
+    def _expire_due(self, deadline: Callable[[], int | None]) -> int:
+        """Nanoseconds until the next deadline, a beat at most."""
+        due, now = deadline(), self._now()
+        if due is not None and now >= due:
             self._expire(now)
-            self._next_deadline = self._deadline()
-
-    def _timeout(self) -> int:
-        """Nanoseconds until the next deadline, none while messages are held; negative waits for ever."""
-        if self._backlog:
-            return 0
-        longest = -1 if self._beat is None else _BEAT_NS
-        if self._next_deadline is None:
-            return longest
-        left = max(0, self._next_deadline - self._now())
-        return left if self._beat is None else min(left, longest)
+            due, now = deadline(), self._now()
+        return _BEAT_NS if due is None else min(max(0, due - now), _BEAT_NS)

@@ -23,7 +23,7 @@ from syncrelay.errors import ReloadError, RosUnavailableError, UsageError
 from syncrelay.explain import GroupReport
 from syncrelay.ros.diagnostics import Diagnostics, Scalars
 from syncrelay.ros.environment import keep_stdout, log_arguments
-from syncrelay.ros.group import GroupRelay
+from syncrelay.ros.group import GroupRelay, recent
 from syncrelay.ros.inputs import Wiring, Wirings
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
@@ -73,7 +73,6 @@ class Relay:
         `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
         turns, once a second at least.
         """
-        self._beat = beat
         self._context = _init(config, ros_args)
         self.node = rclpy.create_node(config.node.name, namespace=config.node.namespace, context=self._context)
         name_after(self.node.get_logger().name)
@@ -85,13 +84,9 @@ class Relay:
         self._config, self._names = config, groups
         path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
         self.receive_path = path.name
-        self._loop = ReceiveLoop(
-            path.watch(), now=self._now, deadline=self._deadline, expire=self._expire, beat=self._turn
-        )
+        self._loop = ReceiveLoop(path.watch(), now=self._now, expire=self._expire, beat=beat)
         self._graph_changes = path.graph_changes(self.node)
         self._wirings = Wirings(node=self.node, path=path, loop=self._loop)
-        # Asked for their deadlines at every turn of the loop: the others never have one.
-        self._limited: list[GroupRelay] = []
         self._run_groups(config)
         self.monitor = Monitor(self._wirings.all, node=self.node, loop=self._loop, simulated=self._sim_time)
         self._tellers = _tellers(config, self.node, self._wirings.groups)
@@ -100,7 +95,6 @@ class Relay:
         self._reload_error: str | None = None
         self._config_path = config_path
         self._phase = Phase.STARTING
-        self._turned = time.monotonic()
         self._asked = -_ASKED_S
         self._next_look = time.monotonic() + LOOK_S
         self._announced: dict[str, str] = {}
@@ -165,7 +159,10 @@ class Relay:
         self._wirings.wire(
             [group or GroupRelay(each, now=self._now) for group, each in zip(as_before, chosen, strict=True)]
         )
-        self._limited = [group for group in self._wirings.groups if group.config.keys.max_wait is not None]
+        limited = [group for group in self._wirings.groups if group.config.keys.max_wait is not None]
+        # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
+        self._loop.deadline = None if self._sim_time or not limited else lambda: _next_deadline(limited)
+        self._loop.wake()
 
     def wake(self) -> None:
         """Have `step` return at once. Safe in a signal handler."""
@@ -226,18 +223,13 @@ class Relay:
             config=self._config_path,
             phase=self._phase,
             uptime_s=now - self._started,
-            turned_s=now - self._turned,
+            turned_s=now - self._loop.turned,
             receives_by=self.receive_path.value,
             groups=self.monitor.reports,
             reloads=self._reloads,
             refused_reloads=self._refused_reloads,
             reload_error=self._reload_error,
         )
-
-    def _turn(self) -> None:
-        self._turned = time.monotonic()
-        if self._beat is not None:
-            self._beat()
 
     def snapshot(self) -> RelaySnapshot:
         """What is known of all groups, taken between two messages. Any thread."""
@@ -309,13 +301,6 @@ class Relay:
     def _simulated_now(self) -> int:
         return int(self.node.get_clock().now().nanoseconds)
 
-    def _deadline(self) -> int | None:
-        # Simulated time does not pass while we sleep: its ticks call expire instead.
-        if self._sim_time or not self._limited:
-            return None
-        deadlines = (group.engine.next_deadline() for group in self._limited)
-        return min((deadline for deadline in deadlines if deadline is not None), default=None)
-
     def _expire(self, now: int) -> None:
         for group in self._wirings.groups:
             group.expire(now)
@@ -354,6 +339,11 @@ def _tellers(config: Config, node: Any, groups: Sequence[GroupRelay]) -> list[Di
     return [Diagnostics(node), Scalars(node, [group.config.name for group in groups])]
 
 
+def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:
+    deadlines = (group.engine.next_deadline() for group in groups)
+    return min((deadline for deadline in deadlines if deadline is not None), default=None)
+
+
 def _describe(wiring: Wiring) -> GroupSnapshot:
     group = wiring.group
     inputs = zip(group.config.topics, wiring.inputs, group.engine.counts(), strict=True)
@@ -370,7 +360,7 @@ def _describe(wiring: Wiring) -> GroupSnapshot:
             for topic, topic_input, counts in inputs
         ),
         sets=group.engine.sets,
-        recent=tuple(group.recent),
+        recent=recent(group.last),
         waiting_for=wiring.waiting_for,
     )
 

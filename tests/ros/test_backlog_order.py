@@ -3,7 +3,6 @@
 from collections import deque
 
 from syncrelay.ros.backlog import Backlog
-from syncrelay.ros.path import Look
 
 
 class _Source:
@@ -26,7 +25,7 @@ class _Source:
 def test_messages_of_all_sources_leave_by_their_time_of_receipt():
     delivered: list[str] = []
     sources = [_Source(delivered, (1, "a"), (4, "b")), _Source(delivered, (2, "A"), (3, "B"), (5, "C"))]
-    Backlog().deliver(Look(sources, seen_until=10))
+    Backlog().deliver((sources, 10))
     assert delivered == ["a", "A", "B", "b", "C"]
 
 
@@ -34,23 +33,23 @@ def test_what_came_after_the_look_waits_for_the_next_one():
     delivered: list[str] = []
     backlog = Backlog()
     slow, fast = _Source(delivered), _Source(delivered, (1, "a"), (6, "b"))
-    backlog.deliver(Look([fast], seen_until=5))
+    backlog.deliver(([fast], 5))
     assert delivered == ["a"]
-    assert backlog
+    assert backlog.held == {fast}
     slow.messages.append((5, "A"))
-    backlog.deliver(Look([slow], seen_until=10))
+    backlog.deliver(([slow], 10))
     assert delivered == ["a", "A", "b"]
-    assert not backlog
+    assert not backlog.held
 
 
 def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
     delivered: list[str] = []
     backlog = Backlog()
     flood = _Source(delivered, *((n, f"{n}") for n in range(1000)))
-    backlog.deliver(Look([flood], seen_until=1000))
+    backlog.deliver(([flood], 1000))
     assert 0 < len(delivered) < 1000
-    while backlog:
-        backlog.deliver(Look([], seen_until=1000))
+    while backlog.held:
+        backlog.deliver(([], 1000))
     assert delivered == [f"{n}" for n in range(1000)]
 
 
@@ -58,7 +57,7 @@ def test_a_slow_topic_gets_its_turn_in_a_flood():
     delivered: list[str] = []
     imu = _Source(delivered, *((2 * n, "imu") for n in range(10_000)))
     camera = _Source(delivered, (99, "camera"))
-    Backlog().deliver(Look([imu, camera], seen_until=20_000))
+    Backlog().deliver(([imu, camera], 20_000))
     assert delivered.index("camera") == 50
 
 
@@ -66,10 +65,10 @@ def test_a_source_that_ends_gives_what_is_held_of_it():
     delivered: list[str] = []
     backlog = Backlog()
     ending, staying = _Source(delivered, (6, "a")), _Source(delivered, (7, "A"))
-    backlog.deliver(Look([ending, staying], seen_until=5))
+    backlog.deliver(([ending, staying], 5))
     backlog.forget(ending)
     assert delivered == ["a"]
-    backlog.deliver(Look([], seen_until=10))
+    backlog.deliver(([], 10))
     assert delivered == ["a", "A"]
 
 
@@ -81,4 +80,4 @@ def test_messages_up_to_a_time_leave_however_many_they_are():
     assert len(delivered) == 901
     backlog.deliver_held()
     assert delivered == [f"{n}" for n in range(902)]
-    assert not backlog
+    assert not backlog.held

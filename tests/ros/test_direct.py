@@ -33,7 +33,9 @@ taker = pytest.importorskip("syncrelay.ros.inputs").taker
 
 pytestmark = pytest.mark.ros
 
+_KEEP_ALL = qos.QoSProfile(history=qos.HistoryPolicy.KEEP_ALL)
 _IMAGE_BYTES = 1_000_000
+_LONG_NS = 60_000_000_000
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 
 
@@ -55,9 +57,8 @@ def here(ros_domain: int) -> Iterator[SimpleNamespace]:
 def topic(here) -> Iterator[SimpleNamespace]:
     """A topic with a subscription and a publisher that keep all."""
 
-    profile = qos.QoSProfile(history=qos.HistoryPolicy.KEEP_ALL)
-    subscription = here.node.create_subscription(Vector3Stamped, "/t", print, profile, raw=True)
-    publisher = here.node.create_publisher(Vector3Stamped, "/t", profile)
+    subscription = here.node.create_subscription(Vector3Stamped, "/t", print, _KEEP_ALL, raw=True)
+    publisher = here.node.create_publisher(Vector3Stamped, "/t", _KEEP_ALL)
     yield SimpleNamespace(subscription=subscription, publisher=publisher)
     here.node.destroy_subscription(subscription)
     here.node.destroy_publisher(publisher)
@@ -79,14 +80,14 @@ class _CountingPool(buffers.Pool):
 
     def lend(self):
         memory = super().lend()
-        assert memory.address not in self.out
-        self.out.add(memory.address)
+        assert memory not in self.out
+        self.out.add(memory)
         self.lendings += 1
         self.most = max(self.most, len(self.out))
         return memory
 
     def give_back(self, memory):
-        self.out.remove(memory.address)
+        self.out.remove(memory)
         super().give_back(memory)
 
 
@@ -152,7 +153,7 @@ def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, topic):
     _, unchanged, unchanged_content = _take(source)
     assert bytes(stamped_content) == with_stamp(original, BEGIN + 5)
     assert bytes(unchanged_content) == original
-    assert len({payload.memory.address, stamped.memory.address, unchanged.memory.address}) == 3
+    assert len({payload.memory, stamped.memory, unchanged.memory}) == 3
 
 
 def test_a_burst_takes_no_more_memory_than_the_queues_and_gives_it_back(here, topic, tmp_path):
@@ -204,37 +205,64 @@ def test_a_watch_sees_what_came_before_it_what_comes_later_and_a_wake(here, topi
     source, watch = here.path.source(topic.subscription, print), here.path.watch()
     topic.publisher.publish(vector(BEGIN))
     watch.add(source)
-    assert watch.wait(-1).sources == [source]
+    assert watch.wait(_LONG_NS)[0] == [source]
     source.take()
     topic.publisher.publish(vector(BEGIN + MS))
-    look = watch.wait(-1)
-    assert look.sources == [source]
-    assert source.take()[0] <= look.seen_until
-    while watch.wait(0).sources:
+    ready, seen_until = watch.wait(_LONG_NS)
+    assert ready == [source]
+    assert source.take()[0] <= seen_until
+    while watch.wait(0)[0]:
         assert source.take() is None
     threading.Timer(0, watch.wake).start()
     # Once a second it looks into all, whatever it was told.
-    assert not [each for each in watch.wait(-1).sources if each.take()]
+    assert not [each for each in watch.wait(_LONG_NS)[0] if each.take()]
     watch.remove(source)
     topic.publisher.publish(vector(BEGIN + 2 * MS))
-    assert watch.wait(0).sources == []
+    assert watch.wait(0)[0] == []
     watch.close()
+
+
+def test_a_look_knows_of_all_that_came_before_it(here, topic, monkeypatch):
+    other = here.node.create_subscription(Vector3Stamped, "/u", print, _KEEP_ALL, raw=True)
+    publisher = here.node.create_publisher(Vector3Stamped, "/u", _KEEP_ALL)
+    sources = [_source(here, topic, print), messages.DirectSource(here.rcl, buffers.Pool(here.rcl), other, print)]
+    watch = here.path.watch()
+    for source in sources:
+        watch.add(source)
+    while any(source.take() for source in watch.wait(0)[0]):
+        pass
+    for n in range(2):
+        topic.publisher.publish(vector(BEGIN + n * MS))
+
+    def now() -> int:
+        """What comes between the event and the clock is older than the look."""
+        monkeypatch.undo()
+        publisher.publish(vector(BEGIN))
+        return time.time_ns()
+
+    monkeypatch.setattr(time, "time_ns", now)
+    ready, seen_until = watch.wait(_LONG_NS)
+    assert ready == sources
+    assert all(source.take()[0] <= seen_until for source in ready)
+    watch.close()
+    here.node.destroy_subscription(other)
+    here.node.destroy_publisher(publisher)
 
 
 def test_a_message_that_dds_never_told_of_is_found_within_a_second(here, topic, monkeypatch):
     source, watch = here.path.source(topic.subscription, print), here.path.watch()
     watch.add(source)
-    while watch.wait(0).sources:
+    while watch.wait(0)[0]:
         assert source.take() is None
     here.rcl.set_on_new_message(source.address, None, None)
     topic.publisher.publish(vector(BEGIN))
     assert source.take() is None
     later = time.time_ns() + 1_000_000_000
     monkeypatch.setattr(time, "time_ns", lambda: later)
-    assert watch.wait(0).sources == [source]
+    assert watch.wait(0)[0] == [source]
     assert source.take() is not None
     assert source.take() is None
-    assert watch.wait(0).sources == []
+    assert watch.wait(0)[0] == []
     watch.close()
 
 
@@ -244,13 +272,13 @@ def test_what_it_has_heard_of_is_taken_without_asking_once_more(here, topic, mon
     monkeypatch.setattr(here.rcl, "take", lambda *words: asked.append(words) or take(*words))
     source, watch = _source(here, topic, print), here.path.watch()
     watch.add(source)
-    while watch.wait(0).sources:
+    while watch.wait(0)[0]:
         assert source.take() is None
     asked.clear()
     for n in range(3):
         topic.publisher.publish(vector(BEGIN + n * MS))
     while source.heard_of < 3:
-        watch.wait(-1)
+        watch.wait(_LONG_NS)
     assert [source.take() is None for _ in range(5)] == [False] * 3 + [True] * 2
     assert len(asked) == 3
     watch.close()

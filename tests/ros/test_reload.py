@@ -116,6 +116,19 @@ def test_a_changed_group_is_built_anew_and_a_new_one_begins(stage: Stage):
     assert not collector.endpoints("/front/camera", kind="publisher")
 
 
+def test_what_a_new_group_lets_wait_leaves_in_time(stage: Stage):
+    """Behind the set that concludes there is nothing: only the passing of time can let it go."""
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    aligned = {"/rear/camera": VECTOR, "/rear/lidar": VECTOR}
+    rear = _rear(max_wait="50ms")
+    rear["topics"] += [{"topic": "/radar", "type": VECTOR, "required": False}]
+    file = _File(stage, front=_FRONT)
+    collector, player = stage.collector(aligned), stage.player(_PAIR)
+    file.reload(front=_FRONT, rear=rear)
+    relaying.connect(player, collector, recording, aligned)
+    relaying.conclude(player, collector, recording, aligned)
+
+
 def test_a_topic_that_no_group_uses_any_more_is_not_subscribed_any_more(stage: Stage):
     file = _File(stage, front=_FRONT, rear=_rear(topics=("/camera", "/other")))
     collector = stage.collector()

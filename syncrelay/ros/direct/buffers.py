@@ -1,6 +1,6 @@
 """Memory of messages: lent to one payload at a time, and back in the pool when nobody holds that payload."""
 
-from ctypes import addressof, byref, c_uint8
+from ctypes import byref, c_uint8
 from typing import Final
 
 from syncrelay.ros.direct.rcl import Rcl, SerializedMessage
@@ -13,28 +13,35 @@ _SPARE: Final = 8
 class Memory:
     """A serialized message that librcl fills, grows and publishes from."""
 
-    __slots__ = ("_capacity", "_message", "_rcl", "_whole", "address")
+    __slots__ = ("_capacity", "_content", "_length", "_message", "_rcl", "_whole", "pointer")
 
     def __init__(self, rcl: Rcl) -> None:
         """Make one without room; raises RclCallError where there is no memory."""
         self._rcl = rcl
         self._message = SerializedMessage()
-        self.address = addressof(self._message)
+        self.pointer = byref(self._message)
         allocator = rcl.default_allocator()
-        rcl.require(rcl.array_init(self.address, 0, byref(allocator)), "rcutils_uint8_array_init")
-        self._capacity = 0
-        self._whole = memoryview(b"")
+        rcl.require(rcl.array_init(self.pointer, 0, byref(allocator)), "rcutils_uint8_array_init")
+        self._capacity = self._length = 0
+        self._whole = self._content = memoryview(b"")
 
     def content(self) -> memoryview:
         """The message's bytes where they lie: writable, and valid until the next take."""
+        # A topic's messages are nearly always as long as the one before.
+        if self._message.length != self._length or self._message.capacity != self._capacity:
+            self._look()
+        return self._content
+
+    def _look(self) -> None:
         message = self._message
         if message.capacity != self._capacity:
             self._capacity = message.capacity
             self._whole = memoryview((c_uint8 * self._capacity).from_address(message.buffer)).cast("B")
-        return self._whole[: message.length]
+        self._length = message.length
+        self._content = self._whole[: self._length]
 
     def __del__(self) -> None:
-        self._rcl.array_fini(self.address)
+        self._rcl.array_fini(self.pointer)
 
 
 class Pool:

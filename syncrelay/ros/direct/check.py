@@ -14,7 +14,7 @@ from builtin_interfaces.msg import Time
 
 from syncrelay.ros.direct.buffers import Memory, Payload, Pool
 from syncrelay.ros.direct.path import DirectPath
-from syncrelay.ros.direct.rcl import Allocator, MessageInfo, Rcl, RclCallError, SerializedMessage
+from syncrelay.ros.direct.rcl import Allocator, MessageInfo, Rcl, RclCallError, SerializedMessage, pointer
 
 _MARGIN: Final = 256
 _UNTOUCHED: Final = 0xA5
@@ -86,12 +86,12 @@ def _check_there_and_back(rcl: Rcl, node: Any) -> None:
             watch.add(source)
             watch.wait(0)
             publisher.handle.publish_raw(_PAYLOAD)
-            _require(source in watch.wait(_PATIENCE_NS).sources, "DDS does not tell of messages that arrive")
+            _require(source in watch.wait(_PATIENCE_NS)[0], "DDS does not tell of messages that arrive")
             pool = Pool(rcl)
             memory = pool.lend()
             ours = _take_with_margin(rcl, source.address, memory)
             path.outlet(publisher).send(Payload(memory, pool))
-            _require(source in watch.wait(_PATIENCE_NS).sources, "DDS does not get what is published in librcl")
+            _require(source in watch.wait(_PATIENCE_NS)[0], "DDS does not get what is published in librcl")
             theirs = subscription.handle.take_message(Time, True)  # noqa: FBT003  rclpy's signature
         finally:
             watch.close()
@@ -102,7 +102,7 @@ def _check_there_and_back(rcl: Rcl, node: Any) -> None:
 def _take_with_margin(rcl: Rcl, subscription: int, memory: Memory) -> MessageInfo:
     roomy = _RoomyInfo()
     memset(addressof(roomy), _UNTOUCHED, sizeof(roomy))
-    code = rcl.take(subscription, memory.address, addressof(roomy), None)
+    code = rcl.take(pointer(subscription), memory.pointer, byref(roomy), None)
     rcl.require(code, "rcl_take_serialized_message")
     _require_margin(roomy, "rmw_message_info_t")
     _require(memory.content() == _PAYLOAD, "a message taken in librcl is another than the one published")

@@ -1,11 +1,11 @@
 """Messages taken and published from where they lie."""
 
-from ctypes import addressof
+from ctypes import byref
 from typing import Any, Final
 
 from syncrelay.cdr import STAMP_BYTES, write_stamp
 from syncrelay.ros.direct.buffers import Payload, Pool
-from syncrelay.ros.direct.rcl import NOTHING_TAKEN, MessageInfo, Rcl
+from syncrelay.ros.direct.rcl import NOTHING_TAKEN, MessageInfo, Rcl, pointer
 from syncrelay.ros.path import Deliver, Taken
 
 # More than any history holds.
@@ -23,10 +23,11 @@ class DirectSource:
         self.address: Final[int] = subscription.handle.pointer
         # It owns what the address points to.
         self._subscription = subscription
+        self._pointer = pointer(self.address)
         self._rcl = rcl
         self._call = rcl.take
         self._info = MessageInfo()
-        self._info_address = addressof(self._info)
+        self._info_pointer = byref(self._info)
         self._next = self._pool.lend()
 
     def take(self) -> Taken | None:
@@ -34,7 +35,7 @@ class DirectSource:
         if not self.heard_of:
             return None
         memory = self._next
-        code = self._call(self.address, memory.address, self._info_address, None)
+        code = self._call(self._pointer, memory.pointer, self._info_pointer, None)
         if code:
             if code != NOTHING_TAKEN:
                 self._rcl.require(code, "rcl_take_serialized_message")
@@ -58,11 +59,11 @@ class DirectOutlet:
         self._call = rcl.publish
         # It owns what the address points to.
         self._publisher = publisher
-        self._address: Final[int] = publisher.handle.pointer
+        self._pointer = pointer(publisher.handle.pointer)
 
     def send(self, payload: Payload) -> None:
         """Publish a payload unchanged. Raises RclCallError."""
-        code = self._call(self._address, payload.memory.address, None)
+        code = self._call(self._pointer, payload.memory.pointer, None)
         if code:
             self._rcl.require(code, "rcl_publish_serialized_message")
 

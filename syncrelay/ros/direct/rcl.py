@@ -4,8 +4,8 @@ Structures after rcutils/types/uint8_array.h, rcutils/allocator.h and rmw/types.
 what the libraries do before any of them carries a message.
 """
 
-from ctypes import CDLL, Structure, c_bool, c_char, c_int, c_int64, c_size_t, c_uint8, c_uint64, c_void_p
-from typing import ClassVar, Final
+from ctypes import CDLL, Structure, byref, c_bool, c_char, c_int, c_int64, c_size_t, c_uint8, c_uint64, c_void_p
+from typing import Any, ClassVar, Final
 
 OK: Final = 0
 NOTHING_TAKEN: Final = 401  # RCL_RET_SUBSCRIPTION_TAKE_FAILED
@@ -63,8 +63,13 @@ class _ErrorText(Structure):
     _fields_: ClassVar = [("text", c_char * 1024)]
 
 
+def pointer(address: int) -> Any:
+    """An address as an argument that ctypes passes on as it is."""
+    return byref(c_uint8.from_address(address))
+
+
 class Rcl:
-    """The functions, with pointers as plain addresses.
+    """The functions, with pointers as plain addresses; `take` and `publish` want a `pointer` for each.
 
     The libraries are those that rclpy has loaded: asked for by the same names, the loader gives the same ones.
     Raises OSError or AttributeError where they are not as expected.
@@ -72,10 +77,9 @@ class Rcl:
 
     def __init__(self) -> None:
         rcl, rcutils, libc = CDLL("librcl.so"), CDLL("librcutils.so"), CDLL(None)
+        # Called for each message, with arguments made before: to convert numbers costs as much again as to call.
         self.take = rcl.rcl_take_serialized_message
-        self.take.argtypes = [c_void_p, c_void_p, c_void_p, c_void_p]
         self.publish = rcl.rcl_publish_serialized_message
-        self.publish.argtypes = [c_void_p, c_void_p, c_void_p]
         self.set_on_new_message = rcl.rcl_subscription_set_on_new_message_callback
         self.set_on_new_message.argtypes = [c_void_p, c_void_p, c_void_p]
         self.array_init = rcutils.rcutils_uint8_array_init
