@@ -132,7 +132,7 @@ class ReceiveLoop:
             self._calls.popleft()[0].cancel()
 
     def _expire_due(self, deadline: Callable[[], int | None]) -> int:
-        """Nanoseconds until the next deadline, a beat at most."""
+        """Let go what is due; give the nanoseconds until the next deadline, a beat at most."""
         due, now = deadline(), self._now()
         if due is not None and now >= due:
             self._expire(now)
