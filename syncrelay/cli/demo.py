@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.resources import files
 from logging.handlers import MemoryHandler
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from rich.console import Console
 from rich.live import Live
@@ -21,6 +21,10 @@ from syncrelay.config import GroupConfig, load_text
 from syncrelay.config.policies import ApproximateTimeGroup
 from syncrelay.ros.logs import LOGGER, configure
 from syncrelay.ros.snapshot import RelaySnapshot
+
+if TYPE_CHECKING:
+    from syncrelay.ros.relay import Relay
+    from syncrelay.ros.rig.processes import Rig
 
 _TITLE = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
 _FRAME_S = 0.125
@@ -46,6 +50,7 @@ def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopReque
     configure("warning", "text")
     prepare_ros()
     console = Console(highlight=False)
+    console.print("Starting a simulated camera, lidar and IMU ...")
     with _view(console) as view:
         final = relay_rig(view.show, total_s=seconds, seed=seed, stop=stop)
     console.print(summary(final))
@@ -61,13 +66,35 @@ def prepare_ros() -> None:
 
 
 def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: int, stop: StopRequest) -> Moment:
-    """Start the rig, relay it and show every moment; return how it stood when all was drained."""
-    from syncrelay.ros.relay import Relay
+    """Start the rig, relay it and show every moment; return how it stood when all was drained.
+
+    Time counts from when every sensor publishes: how long their start takes is the machine's affair.
+    """
     from syncrelay.ros.rig.discovery import quick_discovery
     from syncrelay.ros.rig.processes import Rig
 
-    config = load_text(shipped_config())
-    tally = Tally([_plan(group) for group in config.groups])
+    stop.defer()
+    with quick_discovery(), Rig(seed=seed) as rig:
+        # Imported while the sensors start.
+        from syncrelay.ros.relay import Relay
+
+        config = load_text(shipped_config())
+        while not stop.requested and not rig.is_up():
+            time.sleep(_FRAME_S)
+        with Relay(config) as relay:
+            tally = Tally([_plan(group) for group in config.groups])
+            return _relay(relay, rig, tally, show, total_s=total_s, stop=stop)
+
+
+def _relay(
+    relay: "Relay",
+    rig: "Rig",
+    tally: Tally,
+    show: Callable[[Moment], None],
+    *,
+    total_s: float | None,
+    stop: StopRequest,
+) -> Moment:
     began = time.monotonic()
     end = math.inf if total_s is None else began + total_s
 
@@ -76,14 +103,12 @@ def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: in
         tally.add(elapsed_s, snapshot)
         return Moment(_TITLE, tally.figures(), elapsed_s, total_s)
 
-    stop.defer()
-    with quick_discovery(), Rig(seed=seed) as rig, Relay(config) as relay:
-        stop.wake_with(relay.wake)
-        while not stop.requested and (left_s := end - time.monotonic()) > 0:
-            relay.step(min(_FRAME_S, left_s))
-            rig.check()
-            show(moment(relay.snapshot()))
-        return moment(relay.drain())
+    stop.wake_with(relay.wake)
+    while not stop.requested and (left_s := end - time.monotonic()) > 0:
+        relay.step(min(_FRAME_S, left_s))
+        rig.check()
+        show(moment(relay.snapshot()))
+    return moment(relay.drain())
 
 
 def _plan(group: GroupConfig) -> GroupPlan:

@@ -226,7 +226,7 @@ def _demo(words: Sequence[str], stop: StopRequest) -> int:
         "syncrelay demo",
         description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it.",
     )
-    parser.add_argument("--seconds", metavar="N", type=_positive, help="end after N seconds, with a summary")
+    parser.add_argument("--seconds", metavar="N", type=_positive, help="once its sensors are up, end after N seconds")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
     parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays")
     parser.add_argument(

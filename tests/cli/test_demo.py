@@ -97,10 +97,36 @@ def test_it_matches_a_simulated_rig_and_sums_up(stage):
 
 
 @pytest.mark.ros
-def test_it_fails_if_no_set_came(stage):
-    demo = stage.start("demo", [*_DEMO, "--seconds", "0.1"])
+def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
+    # Longer than the demo runs, and than a relay waits for messages before it asks for them.
+    delay_sensors(stage, seconds=8)
+    demo = stage.start("demo", [*_DEMO, "--seconds", "4"])
+    assert demo.wait() == 0, demo.stdout + demo.stderr
+    assert set(summary_rows(demo.stdout)) == {"camera_lidar", "lidar_imu"}
+    assert demo.said == []
+
+
+@pytest.mark.ros
+def test_a_stop_before_the_sensors_publish_ends_it_and_fails_for_want_of_sets(stage):
+    delay_sensors(stage, seconds=600)
+    demo = stage.start("demo", _DEMO)
+    demo.wait_until(lambda: demo.stdout == "Starting a simulated camera, lidar and IMU ...\n", "its first line")
+    demo.wait_until(lambda: len(children(demo.pid)) == 3, "the rig's processes")
+    sensors = children(demo.pid)
+    demo.send(signal.SIGINT)
     assert demo.wait() == 1
     assert re.search(r"^camera_lidar +0 +0 ", demo.stdout, re.MULTILINE)
+    assert not any(map(running, sensors))
+
+
+def delay_sensors(stage, *, seconds):
+    """Have each sensor of the rig sleep before it starts."""
+    folder = stage.folder / "delay"
+    folder.mkdir()
+    (folder / "sitecustomize.py").write_text(
+        f"import sys, time\nif 'syncrelay.ros.rig' in sys.orig_argv: time.sleep({seconds})\n"
+    )
+    stage.environment["PYTHONPATH"] += os.pathsep + str(folder)
 
 
 @pytest.mark.ros

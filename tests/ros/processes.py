@@ -71,6 +71,7 @@ class Process:
         with self._stdout.open("wb") as stdout, self._stderr.open("wb") as stderr:
             self._child = subprocess.Popen(argv, stdin=stdin, stdout=stdout, stderr=stderr, env=environment, cwd=folder)
         self._answered = 0
+        self._left: set[Path] = set()
 
     @property
     def pid(self) -> int:
@@ -129,6 +130,9 @@ class Process:
         return self.stdout.splitlines()[self._answered - 1]
 
     def send(self, number: signal.Signals) -> None:
+        if number == signal.SIGKILL:
+            # It removes nothing then, and of the dead nothing tells what was theirs.
+            self._left = self.shared_memory()
         self._child.send_signal(number)
 
     def wait(self, timeout_s: float = DEADLINE_S) -> int:
@@ -158,8 +162,8 @@ class Process:
         return bool(int(mask, 16) >> (number - 1) & 1)
 
     def shared_memory(self) -> set[Path]:
-        """The segments of Fast DDS that it and its children have mapped."""
-        return set().union(*map(segments_of, [self.pid, *children_of(self.pid)]))
+        """The segments of Fast DDS that it and its children have mapped, or had when it was killed."""
+        return self._left.union(*map(segments_of, [self.pid, *children_of(self.pid)]))
 
     def _said(self) -> str:
         tail = self.stderr.splitlines()[-30:]

@@ -194,6 +194,22 @@ def test_a_sensor_that_dies_is_named(holder):
     assert "RuntimeError: the rig's camera ended with exit code -9" in holder.stderr
 
 
+_AWAIT_RIG = """
+from syncrelay.ros.rig import processes
+processes._UP_WITHIN_S = 0
+with processes.Rig(seed=1) as rig:
+    while not rig.is_up():
+        pass
+"""
+
+
+@pytest.mark.ros
+def test_sensors_that_never_publish_are_named(stage):
+    impatient = stage.start("impatient", [sys.executable, "-c", _AWAIT_RIG])
+    assert impatient.wait() == 1
+    assert "RuntimeError: the rig's camera, lidar, imu did not publish within 0 s" in impatient.stderr
+
+
 def test_quick_discovery_is_a_profile_for_as_long_as_it_lasts(monkeypatch):
     monkeypatch.delenv("FASTRTPS_DEFAULT_PROFILES_FILE", raising=False)
     monkeypatch.delenv("FASTDDS_DEFAULT_PROFILES_FILE", raising=False)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from syncrelay.cdr import patch_stamp
 from syncrelay.ros.environment import log_arguments
+from syncrelay.ros.rig.processes import UP
 from syncrelay.ros.rig.schedule import SENSORS, Shot, schedule
 
 
@@ -60,6 +61,7 @@ def _publish(name: str, shots: Iterator[Shot], stop: threading.Event) -> None:
     publisher = node.create_publisher(
         import_type(type_name), sensor.topic, QoSProfile(depth=5, reliability=reliability)
     )
+    os.write(1, UP)
     up = time.time_ns()
     for shot in shots:
         if shot.sent < up:

@@ -1,5 +1,6 @@
 """The rig's sensors as child processes of this one."""
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -9,7 +10,12 @@ from typing import IO, Self
 
 from syncrelay.ros.rig.schedule import SENSORS
 
-# A sensor leaves DDS in 0.2 s; one that is only starting, on a busy machine, needs longer to hear of it.
+UP = b"publishes\n"
+"""What a sensor says as soon as its publisher is there."""
+
+_FIRST_TALK = 1 << 16
+# A sensor is up in 3 s and leaves DDS in 0.2 s; on a busy machine both take long.
+_UP_WITHIN_S = 60.0
 _END_WITHIN_S = 10.0
 
 
@@ -23,13 +29,23 @@ class Rig:
     def __init__(self, *, seed: int) -> None:
         self._seed = seed
         self._sensors: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+        self._up_by = 0.0
 
     def __enter__(self) -> Self:
         start = time.time_ns()
+        self._up_by = time.monotonic() + _UP_WITHIN_S
         for name in SENSORS:
             talk = tempfile.TemporaryFile()
             self._sensors[name] = (_start(name, seed=self._seed, start=start, talk=talk), talk)
         return self
+
+    def is_up(self) -> bool:
+        """Whether every sensor publishes; raises RuntimeError when one never will, as `check` does."""
+        self.check()
+        late = [name for name, (_, talk) in self._sensors.items() if UP not in os.pread(talk.fileno(), _FIRST_TALK, 0)]
+        if late and time.monotonic() > self._up_by:
+            raise RuntimeError(f"the rig's {', '.join(late)} did not publish within {_UP_WITHIN_S:.0f} s")
+        return not late
 
     def check(self) -> None:
         """Raise RuntimeError when a sensor has ended by itself, with the end of what it said."""
