@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 HERE = Path(__file__).parent
 TICK_US = 1_000_000 / os.sysconf("SC_CLK_TCK")
-WARM_UP_S = 1.0
+# By then each of fifty groups has been looked at since the last publisher or subscriber came.
+WARM_UP_S = 5.0
 # Behind the last message; the C relay is asked for nothing more than the others.
 SETTLE_S = 0.5
 PATIENCE_S = 20.0

@@ -41,6 +41,8 @@ def run(
     from syncrelay.ros.logs import LOGGER, configure
 
     configure(log_level, log_format)
+    # Before it is read: what changes while the relay starts is seen too.
+    changes = FileChanges(config_path) if watch else None
     config = load(config_path, package_missing=Severity.NOTE)
     for note in config.notes:
         if note.code == "unit":
@@ -69,7 +71,6 @@ def run(
             LOGGER.info("status and metrics: http://%s/, `syncrelay top` shows them", server.address)
         if explain_s is not None:
             return explain(relay, explain_s, stop=stop)
-        changes = FileChanges(config_path) if watch else None
         while not stop.requested:
             relay.step()
             if stop.take_reload() or (changes and changes.seen()):

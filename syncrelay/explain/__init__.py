@@ -6,11 +6,11 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Mismatch, Tolerance
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.find import explanation, find
+from syncrelay.explain.find import explanation, find, remarkable
 from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.histogram import BOUNDS_NS, Histogram
 from syncrelay.explain.observation import Observation, SentSets
-from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet
+from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
 from syncrelay.explain.silence import Silence, in_words
 from syncrelay.explain.watch import GroupWatch, InputGraph
 
@@ -39,4 +39,6 @@ __all__ = [
     "explanation",
     "find",
     "in_words",
+    "recent",
+    "remarkable",
 ]

@@ -1,6 +1,6 @@
 """What is known of a group at one moment: the file's values, what was observed, what the graph shows."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -84,6 +84,16 @@ class GroupFacts:
     least_period: int | None = None
     clock_stopped: int | None = None
     waited: int = 0
+
+    @property
+    def required_first(self) -> Sequence[int]:
+        """The indices of the inputs, those of the required ones first."""
+        needed = [index for index, each in enumerate(self.inputs) if each.required]
+        return (
+            needed
+            if len(needed) == len(self.inputs)
+            else needed + [index for index, each in enumerate(self.inputs) if not each.required]
+        )
 
     @property
     def possible_hz(self) -> float:

@@ -1,5 +1,6 @@
 """All findings of a group, in the order in which they explain a silence."""
 
+from collections.abc import Iterable
 from typing import Final
 
 from syncrelay.explain import rules_flow, rules_graph, rules_stamps, words
@@ -34,18 +35,32 @@ _RULES: Final[tuple[Rule, ...]] = (
 
 def find(facts: GroupFacts) -> tuple[Finding, ...]:
     """Return all findings, one at least; see `explanation` for the one that matters most."""
+    return with_wellbeing(facts, remarkable(facts))
+
+
+def remarkable(facts: GroupFacts) -> tuple[Finding, ...]:
+    """Return what is not as ever: none where a group is well, and as it starts."""
     found = [finding for rule in _RULES for finding in rule(facts)]
     if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
         found.append(_unexplained(facts))
-    elif any(finding.severity is not Severity.OK for finding in found):
-        pass
-    elif facts.figures.last_set is None:
-        since = words.seconds(facts.figures.now - facts.figures.began)
-        found.append(Finding(Code.STARTING, Severity.OK, f"no set yet, {since} after the start"))
-    else:
+    elif _is_well(found) and facts.figures.last_set is not None:
         # Few sets are what other findings come to: it is said where none of them is there.
-        found += [*rules_flow.few_sets(facts)] or [_healthy(facts)]
+        found += rules_flow.few_sets(facts)
     return tuple(found)
+
+
+def with_wellbeing(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Add to what is remarkable that a group is well, or starts; in figures that cost more than all rules."""
+    if not _is_well(found):
+        return found
+    if facts.figures.last_set is None:
+        since = words.seconds(facts.figures.now - facts.figures.began)
+        return (*found, Finding(Code.STARTING, Severity.OK, f"no set yet, {since} after the start"))
+    return (*found, _healthy(facts))
+
+
+def _is_well(found: Iterable[Finding]) -> bool:
+    return all(finding.severity is Severity.OK for finding in found)
 
 
 def explanation(findings: tuple[Finding, ...]) -> Finding:

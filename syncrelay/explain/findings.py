@@ -71,8 +71,7 @@ def of_each_input(rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:
     """Make a rule about an input one about a group, the required inputs first."""
 
     def of_all(facts: GroupFacts) -> Found:
-        order = sorted(range(len(facts.inputs)), key=lambda index: not facts.inputs[index].required)
-        for index in order:
+        for index in facts.required_first:
             yield from rule(facts, index, facts.inputs[index])
 
     return of_all

@@ -3,6 +3,7 @@
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import Final
 
 BOUNDS_NS: Final = tuple(step * 10**power for power in range(5, 10) for step in (1, 2, 5))
@@ -30,8 +31,8 @@ class Tallied:
     def add(self, values: Sequence[int]) -> None:
         """Count values, in nanoseconds."""
         counts = self._counts
-        for value in values:
-            counts[bisect_left(BOUNDS_NS, value)] += 1
+        for place in map(bisect_left, repeat(BOUNDS_NS), values):
+            counts[place] += 1
         self._sum += sum(values)
 
     def histogram(self) -> Histogram:

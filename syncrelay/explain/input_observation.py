@@ -1,15 +1,15 @@
 """What is seen of one input over its last messages: rate, delay, jitter, drift, faults of its stamps."""
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
-from operator import sub
-from statistics import median_low
+from collections.abc import Mapping, Sequence
+from operator import lt, sub
 from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.explain.bursts import LEAST_HELD_NS, Burst, bursts
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.drift import Drift, drift
 from syncrelay.explain.figures import InputFigures
+from syncrelay.explain.last import keep_last, no_values
 from syncrelay.explain.pace import Pace
 from syncrelay.sync.messages import DropReason
 
@@ -43,15 +43,12 @@ class InputObservation:
     """Gathers the messages of one input."""
 
     def __init__(self) -> None:
-        self._stamps: deque[int] = deque(maxlen=_LAST_MESSAGES)
-        self._received: deque[int] = deque(maxlen=_LAST_MESSAGES)
-        self._longest_pause = 0
+        self._stamps = no_values()
+        self._received = no_values()
         self._first: int | None = None
         self._pace = Pace()
-        self._nearest: deque[int] = deque(maxlen=_LAST_MESSAGES)
-        self._delays: deque[int] = deque(maxlen=_LAST_MESSAGES)
-        self._delay: int | None = None
-        self._jitter: int | None = None
+        self._nearest = no_values()
+        self._delays = no_values()
         self._faults: deque[_Faults] = deque()
         self._bursts: deque[Burst] = deque()
         self._last: tuple[int, int] | None = None
@@ -65,51 +62,54 @@ class InputObservation:
         """Take what came; whether its stamps have fallen back by more than a second."""
         if not arrivals:
             return False
-        last = arrivals[-1][1]
+        stamps, received = zip(*arrivals, strict=True)
+        last = received[-1]
         if self._received and last < self._received[-1]:
             self._forget()
         if self._first is None or last < self._first:
-            self._first = arrivals[0][1]
-        duplicates, out_of_order, fallen = self._judge(arrivals)
+            self._first = received[0]
+        duplicates, out_of_order, fallen = self._judge(stamps, received)
         if fallen:
             self._forget()
         while self._faults and self._faults[0].at <= last - WINDOW_NS:
             self._faults.popleft()
         self._faults.append(_Faults(last, duplicates, out_of_order))
-        self._received.extend(received for _, received in arrivals)
-        self._longest_pause = _greatest_step(self._received)
+        keep_last(self._received, received, _LAST_MESSAGES)
         self._pace.look(self._received)
         # A stamp of 0 was never set: it tells nothing of a clock.
-        stamped = [arrival for arrival in arrivals if arrival[0]]
+        stamped = [arrival for arrival in arrivals if arrival[0]] if 0 in stamps else arrivals
         if stamped:
             self._measure(stamped)
         return fallen
 
-    def add_nearest(self, spans: Iterable[int]) -> None:
+    def add_nearest(self, spans: Sequence[int]) -> None:
         """Take the spans of the tightest sets with this input."""
-        self._nearest.extend(spans)
+        keep_last(self._nearest, spans, _LAST_MESSAGES)
 
     def figures(self, *, fed: int, dropped: Mapping[DropReason, int], seconds: float, now: int) -> InputFigures:
         """Give the figures; counts are those of the window, which is so many seconds long."""
         fell_by, fell_at = self._fell or (None, None)
         rate_hz, usual_hz = self._rates(fed, seconds, now)
-        faults = [each for each in self._faults if each.at > now - WINDOW_NS]
+        duplicates = out_of_order = 0
+        for at, repeated, late in self._faults:
+            if at > now - WINDOW_NS:
+                duplicates += repeated
+                out_of_order += late
         held = [each.held for each in self._bursts if each.at > now - WINDOW_NS]
         return InputFigures(
             rate_hz=rate_hz,
             usual_hz=usual_hz,
             pace_hz=self._pace.now_hz,
             slowed_from_hz=self._pace.slowed_from if rate_hz else None,
-            longest_pause=self._longest_pause,
             fed=fed,
             dropped=dropped,
-            last_received=self._received[-1] if self._received else None,
-            delay=self._delay,
-            jitter=self._jitter,
+            received=self._received[:],
+            stamps=self._stamps[:],
+            delays=self._delays[:],
             drift=self._drift,
-            duplicates=sum(each.duplicates for each in faults),
-            out_of_order=sum(each.out_of_order for each in faults),
-            nearest=Distribution(self._nearest),
+            duplicates=duplicates,
+            out_of_order=out_of_order,
+            nearest=Distribution(self._nearest[:]),
             bursts=len(held),
             held=max(held, default=0),
             fell_by=fell_by,
@@ -118,22 +118,24 @@ class InputObservation:
 
     def _forget(self) -> None:
         """Start afresh: a clock jumped, that of the stamps or this machine's."""
-        self._stamps.clear()
-        self._delays.clear()
-        self._received.clear()
+        for kept in (self._stamps, self._delays, self._received, self._nearest):
+            del kept[:]
         self._faults.clear()
         self._bursts.clear()
         self._last = None
-        self._nearest.clear()
         self._points.clear()
         self._drift = None
 
-    def _judge(self, arrivals: Arrivals) -> tuple[int, int, bool]:
+    def _judge(self, stamps: Sequence[int], received: Sequence[int]) -> tuple[int, int, bool]:
         """Count what repeats the newest stamp and what is older; whether one fell by more than a second."""
         duplicates = out_of_order = 0
         fallen = False
         newest = self._newest
-        for stamp, received in arrivals:
+        if newest is not None and newest < stamps[0] and all(map(lt, stamps, stamps[1:])):
+            # Each newer than the one before it, as nearly always: seen at a fifth of the cost.
+            self._newest = stamps[-1]
+            return 0, 0, False
+        for stamp, at in zip(stamps, received, strict=True):
             if newest is None or stamp > newest:
                 newest = stamp
             elif not stamp:
@@ -141,7 +143,7 @@ class InputObservation:
             elif stamp == newest:
                 duplicates += 1
             elif stamp < newest - _JUMP_NS:
-                self._fell = (newest - stamp, received)
+                self._fell = (newest - stamp, at)
                 newest, fallen = stamp, True
             else:
                 out_of_order += 1
@@ -149,13 +151,12 @@ class InputObservation:
         return duplicates, out_of_order, fallen
 
     def _measure(self, stamped: Arrivals) -> None:
-        """Measure delay, jitter, drift and bursts anew, from messages that have stamps."""
-        self._stamps.extend(stamp for stamp, _ in stamped)
-        delays = [received - stamp for stamp, received in stamped]
-        self._delays.extend(delays)
+        """Measure delays, drift and bursts, from messages that have stamps."""
+        stamps, received = zip(*stamped, strict=True)
+        keep_last(self._stamps, stamps, _LAST_MESSAGES)
+        delays = list(map(sub, received, stamps))
+        keep_last(self._delays, delays, _LAST_MESSAGES)
         self._find_bursts(stamped, delays)
-        self._delay = median_low(self._delays)
-        self._jitter = _jitter(self._stamps)
         # What came fastest was held up least: the least delay tells more of the clock than of the load.
         self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, min(delays)))
         self._points_seen += 1
@@ -184,17 +185,3 @@ class InputObservation:
             # It began within the window and has not had all of it.
             return (fed - 1) * _SECOND / (times[-1] - self._first), usual
         return fed / seconds, usual
-
-
-def _greatest_step(times: Sequence[int]) -> int:
-    ordered = list(times)
-    return max(map(sub, ordered[1:], ordered), default=0)
-
-
-def _jitter(stamps: Sequence[int]) -> int | None:
-    ordered = list(stamps)
-    periods = list(map(sub, ordered[1:], ordered))
-    if not periods:
-        return None
-    usual = median_low(periods)
-    return Distribution([abs(period - usual) for period in periods]).quantile(0.95)

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Sequence
-from itertools import pairwise
+from operator import sub
 from statistics import median
 from typing import Final
 
@@ -22,23 +22,25 @@ class Pace:
     def __init__(self) -> None:
         self.now_hz = 0.0
         """The pace of the last messages, 0 of too few to tell."""
+        self.slowed_from: float | None = None
+        """The steady pace that it had before it fell to less than half of it, None if it has not."""
         self._looks: deque[float] = deque(maxlen=_LOOKS)
 
     def look(self, received: Sequence[int]) -> None:
         """Take the times of receipt of the last messages, in nanoseconds."""
-        last = list(received)[-_PERIODS - 1 :]
+        last = received[-_PERIODS - 1 :]
         if len(last) <= _PERIODS:
             self.now_hz = 0.0
+            self.slowed_from = None
             return
-        period = median(after - before for before, after in pairwise(last))
+        period = median(map(sub, last[1:], last))
         self.now_hz = _SECOND / period if period > 0 else 0.0
+        self.slowed_from = self._fell_from()
         if self.now_hz and self.slowed_from is None:
             self._looks.append(self.now_hz)
 
-    @property
-    def slowed_from(self) -> float | None:
-        """The steady pace that it had before it fell to less than half of it, None if it has not."""
-        if not self.now_hz or len(self._looks) < _FEWEST_LOOKS:
+    def _fell_from(self) -> float | None:
+        if not self.now_hz or len(self._looks) < _FEWEST_LOOKS or self.now_hz >= _SLOWED * max(self._looks):
             return None
         usual = median(self._looks)
         if max(self._looks) - min(self._looks) > 2 * _STEADY * usual:

@@ -1,10 +1,12 @@
 """A group at one moment: what is known, what follows from it, what happened last."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Self
 
 from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.find import with_wellbeing
 from syncrelay.explain.findings import Finding
 from syncrelay.sync.messages import DropReason
 
@@ -32,10 +34,25 @@ class RecentDrop(NamedTuple):
         return self._replace(stamp=self.stamp + offsets[self.input])
 
 
-@dataclass(frozen=True, slots=True)
+def recent(last: Iterable[tuple[int | None, ...] | RecentDrop]) -> tuple[RecentSet | RecentDrop, ...]:
+    """Return what left last, sets by their stamps alone, for those who are told of it."""
+    return tuple(each if isinstance(each, RecentDrop) else RecentSet(each) for each in last)
+
+
+@dataclass(frozen=True)
 class GroupReport:
-    """What there is to say of a group; what happened last, oldest first."""
+    """What there is to say of a group, in words only for those who ask; what left `last`, oldest first."""
 
     facts: GroupFacts
-    findings: tuple[Finding, ...]
-    recent: tuple[RecentSet | RecentDrop, ...] = ()
+    remarkable: tuple[Finding, ...]
+    last: Sequence[tuple[int | None, ...] | RecentDrop] = ()
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings, one at least."""
+        return with_wellbeing(self.facts, self.remarkable)
+
+    @cached_property
+    def recent(self) -> tuple[RecentSet | RecentDrop, ...]:
+        """What left last, oldest first."""
+        return recent(self.last)

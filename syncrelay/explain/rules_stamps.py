@@ -59,16 +59,16 @@ def _blocks_if_most(facts: GroupFacts, an_input: InputFacts, count: int) -> Seve
 
 def other_clock(facts: GroupFacts) -> Found:
     """Find an input whose stamps, against the time of their receipt, are far off those of the others."""
-    known = {
-        index: each.figures.delay - each.offset
-        for index, each in enumerate(facts.inputs)
-        if each.required and each.figures.delay is not None and each.figures.rate_hz
-    }
-    if not facts.by_stamp or not facts.is_silent or len(known) < 2:  # noqa: PLR2004  one alone has no other clock
+    if not facts.by_stamp or not facts.is_silent:
         return
-    delays = known.values()
+    delays = {
+        index: each.figures.delay for index, each in enumerate(facts.inputs) if each.required and each.figures.rate_hz
+    }
+    known = {index: delay - facts.inputs[index].offset for index, delay in delays.items() if delay is not None}
+    if len(known) < 2:  # noqa: PLR2004  one alone has no other clock
+        return
     # Of two, the one that is farther from this machine's time is odd.
-    usual = median_low(delays) if len(delays) > 2 else min(delays, key=abs)  # noqa: PLR2004
+    usual = median_low(known.values()) if len(known) > 2 else min(known.values(), key=abs)  # noqa: PLR2004
     odd = max(known, key=lambda index: abs(known[index] - usual))
     behind = known[odd] - usual
     if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0):

@@ -37,7 +37,7 @@ class Silence:
         self._warned: dict[tuple[Code, int | None], _Warning] = {}
 
     def look(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
-        """Yield what is to be said now."""
+        """Yield what is to be said now; of findings, what is remarkable is enough."""
         now = facts.figures.now
         if facts.is_silent:
             yield from self._silent(facts, explanation(findings), now)

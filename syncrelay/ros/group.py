@@ -2,11 +2,11 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, NamedTuple
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.explain import RecentDrop
 from syncrelay.ros.path import Outlet
 from syncrelay.sync import Drop, DropReason, Match, Message
 
@@ -117,8 +117,3 @@ class GroupRelay:
             else:
                 outlet.send(payload)
         return newest
-
-
-def recent(last: Iterable[tuple[int | None, ...] | RecentDrop]) -> tuple[RecentSet | RecentDrop, ...]:
-    """What left last, for those who are told of it."""
-    return tuple(each if isinstance(each, RecentDrop) else RecentSet(each) for each in last)

@@ -16,10 +16,10 @@ from syncrelay.explain import (
     RecentDrop,
     Severity,
     Silence,
-    find,
+    remarkable,
 )
 from syncrelay.ros.graph import topics_alike
-from syncrelay.ros.group import Batch, GroupRelay, recent
+from syncrelay.ros.group import Batch, GroupRelay
 from syncrelay.ros.inputs import TopicInput, Wiring
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.sync.counts import InputCounts
@@ -131,9 +131,9 @@ class Monitor:
             watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
             shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
             facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=max(self._waits))
-            findings = find(facts)
-            self._reports[wiring.group] = GroupReport(facts, findings, recent(gathered.last))
-            for remark in silence.look(facts, findings):
+            found = remarkable(facts)
+            self._reports[wiring.group] = GroupReport(facts, found, gathered.last)
+            for remark in silence.look(facts, found):
                 about = {"group": facts.name, "finding": remark.code and remark.code.value}
                 _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 

@@ -5,7 +5,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
@@ -20,10 +20,10 @@ from rclpy.signals import SignalHandlerOptions
 
 from syncrelay.config import Config
 from syncrelay.errors import ReloadError, RosUnavailableError, UsageError
-from syncrelay.explain import GroupReport
+from syncrelay.explain import GroupReport, recent
 from syncrelay.ros.diagnostics import Diagnostics, Scalars
 from syncrelay.ros.environment import keep_stdout, log_arguments
-from syncrelay.ros.group import GroupRelay, recent
+from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.inputs import Wiring, Wirings
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
@@ -97,7 +97,8 @@ class Relay:
         self._phase = Phase.STARTING
         self._asked = -_ASKED_S
         self._next_look = time.monotonic() + LOOK_S
-        self._announced: dict[str, str] = {}
+        # What each group was last said to wait for; None of one that runs.
+        self._announced: dict[str, str | None] = {}
         self._started = time.monotonic()
         self._wake = threading.Event()
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
@@ -135,22 +136,19 @@ class Relay:
         for teller in self._tellers:
             teller.close()
         self._tellers = _tellers(config, self.node, self._wirings.groups)
-        self._announced = {group.config.name: text for group, text in self._announcements(before)}
+        kept = {group.config.name for group in self._wirings.groups if group in before}
+        self._announced = {name: said for name, said in self._announced.items() if name in kept}
         self._reloads += 1
         self._reload_error = None
         # What is new is to be told of at once.
         self._next_look = time.monotonic()
-        kept = sum(group in before for group in self._wirings.groups)
-        _LOG.info("the file was read again: %d groups go on, %d begin", kept, len(self._wirings.groups) - kept)
+        begin = len(self._wirings.groups) - len(kept)
+        _LOG.info("the file was read again: %d groups go on, %d begin", len(kept), begin)
 
     def refuse_reload(self, reason: str) -> None:
         """Tell in `state` that the file was read again and is left aside."""
         self._reload_error = reason
         self._refused_reloads += 1
-
-    def _announcements(self, before: Sequence[GroupRelay]) -> Iterator[tuple[GroupRelay, str]]:
-        kept = (group for group in self._wirings.groups if group in before)
-        return ((group, self._announced[group.config.name]) for group in kept if group.config.name in self._announced)
 
     def _run_groups(self, config: Config) -> None:
         running = self._wirings.groups
@@ -314,10 +312,11 @@ class Relay:
             name, waiting_for = wiring.group.config.name, wiring.waiting_for
             if waiting_for and time.monotonic() - self._started < _GRACE_S:
                 continue
+            if name in self._announced and self._announced[name] == waiting_for:
+                continue
+            self._announced[name] = waiting_for
             text = f"waiting for {waiting_for}" if waiting_for else f"running: {self._flow(wiring)}"
-            if self._announced.get(name) != text:
-                self._announced[name] = text
-                _LOG.info("%s: %s", name, text, extra={"group": name})
+            _LOG.info("%s: %s", name, text, extra={"group": name})
 
 
 def _require_same_node(running: Config, asked: Config) -> None:

@@ -281,15 +281,24 @@ def test_a_clock_that_is_set_back_is_borne():
     assert stage.group.now - stage.group.last_set == 20 * S
 
 
+def test_spans_count_offsets_in_looks_with_and_without_incomplete_sets():
+    whole, incomplete = (BEGAN, BEGAN + 12 * MS, BEGAN + 3 * MS), (BEGAN, BEGAN + 12 * MS, None)
+    stage = Stage(3, offsets=[0, -10 * MS, 0], required=[True, True, False])
+    stage.second(sets=[(whole, MS), (whole, MS)])
+    stage.second(sets=[(whole, MS), (incomplete, MS)])
+    assert stage.group.last_sets == ((2 * MS, MS), (3 * MS, MS), (3 * MS, MS), (3 * MS, MS))
+    assert stage.group.missing == (0, 0, 0.25)
+
+
 def test_memory_does_not_grow_with_time():
     stage = Stage()
 
     def held():
         observation = stage.observation
-        deques = [observation._looks, observation._sets, observation._nearest]  # noqa: SLF001  memory is the promise
+        kept = [observation._looks, observation._spans, observation._latencies, observation._nearest]  # noqa: SLF001  memory is the promise
         for each in observation._inputs:  # noqa: SLF001
-            deques += [each._stamps, each._received, each._delays, each._faults, each._points]  # noqa: SLF001
-        return sum(map(len, deques))
+            kept += [each._stamps, each._received, each._delays, each._faults, each._points]  # noqa: SLF001
+        return sum(map(len, kept))
 
     for _ in range(330):
         stage.second(stage.stream(10), stage.stream(20), sets=[a_set(stage)] * 10)

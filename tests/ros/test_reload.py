@@ -167,6 +167,31 @@ def test_a_watched_file_is_read_when_it_changes(stage: Stage):
     wait_until(lambda: file.count("refused_reloads") == 1, "the file to be refused")
 
 
+_CHANGED_AS_IT_STARTS = """
+import sys
+from pathlib import Path
+import syncrelay.ros.environment as environment
+from syncrelay.cli import main
+
+path, changed, require_rclpy = sys.argv[1], sys.argv[2], environment.require_rclpy
+
+def require():
+    Path(path).write_text(changed)
+    require_rclpy()
+
+environment.require_rclpy = require
+sys.exit(main(["--config", path, "--watch"]))
+"""
+
+
+def test_a_watched_file_that_changes_while_the_relay_starts_is_read_again(stage: Stage):
+    path = stage.folder / "fusion.yaml"
+    path.write_text(config({"front": _FRONT}))
+    changed = config({"front": _FRONT, "rear": _rear()})
+    relay = stage.start("relay", [sys.executable, "-c", _CHANGED_AS_IT_STARTS, str(path), changed])
+    relay.wait_for_log("the file was read again: 1 groups go on, 1 begin")
+
+
 def _command(stage: Stage, relay: Process) -> subprocess.CompletedProcess[str]:
     address = relay.stderr.split("http://")[1].split("/")[0]
     words = [sys.executable, "-m", "syncrelay", "reload", "--url", address]

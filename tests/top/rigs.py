@@ -12,8 +12,7 @@ from syncrelay.explain import (
     InputGraph,
     Mismatch,
     RecentDrop,
-    RecentSet,
-    find,
+    remarkable,
 )
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import Match, Message
@@ -71,7 +70,7 @@ def _report(config: GroupConfig, sensors: Mapping[str, Sensor], seconds: int, rn
         if sensor
         for received, stamp in _messages(sensor, seconds, rng)
     )
-    recent: list[RecentSet | RecentDrop] = []
+    recent: list[tuple[int | None, ...] | RecentDrop] = []
     for second in range(1, seconds + 1):
         now = _BEGAN + second * S
         arrivals: list[list[tuple[int, int]]] = [[] for _ in chosen]
@@ -87,14 +86,14 @@ def _report(config: GroupConfig, sensors: Mapping[str, Sensor], seconds: int, rn
                     stamps = tuple(m and m.stamp for m in outcome.messages)
                     newest = max(m.payload for m in outcome.messages if m)
                     sets.append((stamps, received - newest + rng.randrange(100_000, 400_000)))
-                    recent.append(RecentSet(stamps))
+                    recent.append(stamps)
                 else:
                     recent.append(RecentDrop(outcome.message.input, outcome.message.stamp, outcome.reason))
         watch.add(arrivals, sets, engine.counts(), engine.sets, now=now)
     facts = watch.facts(
         [_graph(config, index, sensor) for index, sensor in enumerate(chosen)], now=_BEGAN + seconds * S
     )
-    return GroupReport(facts, find(facts), tuple(recent[-_RECENT:]))
+    return GroupReport(facts, remarkable(facts), tuple(recent[-_RECENT:]))
 
 
 def _messages(sensor: Sensor, seconds: int, rng: random.Random) -> Iterator[tuple[int, int]]:

@@ -8,7 +8,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from syncrelay.ros.direct.rcl import Rcl
 
 # A change that was never told must not hide a publisher for ever.
-_DOUBT_S: Final = 10.0
+_DOUBT_S: Final = 60.0
 
 
 class GraphChanges:

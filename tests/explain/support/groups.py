@@ -14,10 +14,7 @@ IMAGE = "sensor_msgs/msg/Image"
 
 
 def an_input(name="/camera", *, node="/driver", counts=None, figures=None, **facts):
-    """An input at 10 Hz, all of whose messages go into sets; `figures` changes some."""
-    usual = InputFigures(
-        rate_hz=10.0, usual_hz=10.0, longest_pause=101 * MS, fed=100, last_received=NOW - 50 * MS, delay=5 * MS
-    )
+    """An input at 10 Hz, all of whose messages go into sets; `figures` changes some, of the last messages too."""
     return InputFacts(
         **{
             "name": name,
@@ -25,11 +22,22 @@ def an_input(name="/camera", *, node="/driver", counts=None, figures=None, **fac
             "output": f"/front{name}",
             "required": True,
             "counts": counts or InputCounts(600, 600, {}, 0),
-            "figures": replace(usual, **(figures or {})),
+            "figures": _input_figures(**(figures or {})),
             "publishers": (Endpoint(node, IMAGE),),
             **facts,
         }
     )
+
+
+def _input_figures(*, last_received=NOW - 50 * MS, longest_pause=101 * MS, delay=5 * MS, **others):
+    usual = InputFigures(
+        rate_hz=10.0,
+        usual_hz=10.0,
+        fed=100,
+        received=() if last_received is None else (last_received - longest_pause, last_received),
+        delays=() if delay is None else (delay,),
+    )
+    return replace(usual, **others)
 
 
 def a_group(*inputs, figures=None, **facts):
@@ -42,7 +50,6 @@ def a_group(*inputs, figures=None, **facts):
         rate_hz=10.0,
         best_hz=10.0,
         last_set=NOW - 50 * MS,
-        last_sets=((5 * MS, 2 * MS),),
         spans=Distribution([5 * MS] * 100),
         latencies=Distribution([2 * MS] * 100),
         nearest=Distribution([5 * MS] * 100),

@@ -3,7 +3,7 @@
 from typing import Any
 
 from syncrelay.config import load_text
-from syncrelay.explain import Endpoint, GroupReport, GroupWatch, InputGraph, RecentDrop, RecentSet, find
+from syncrelay.explain import Endpoint, GroupReport, GroupWatch, InputGraph, RecentDrop, remarkable
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
@@ -71,5 +71,5 @@ def _report(watch: GroupWatch, *, now: int, **publishers: Any) -> GroupReport:
         for name in ("camera", "lidar")
     ]
     facts = watch.facts(graph, now=now)
-    recent = (RecentSet((BEGAN, None)), RecentDrop(0, BEGAN, DropReason.LATE))
-    return GroupReport(facts, find(facts), recent)
+    last = ((BEGAN, None), RecentDrop(0, BEGAN, DropReason.LATE))
+    return GroupReport(facts, remarkable(facts), last)
