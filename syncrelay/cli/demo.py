@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from rich.console import Console
 from rich.live import Live
+from rich.text import Text
 
 from syncrelay.cli.digest import plain_line, summary
 from syncrelay.cli.live import Moment, frame
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from syncrelay.ros.rig.processes import Rig
 
 _TITLE = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
+_STARTING = "Starting a simulated camera, lidar and IMU ..."
 _FRAME_S = 0.125
 _LINE_S = 1.0
 # Lines of log; more than that, and something else is wrong.
@@ -50,9 +52,11 @@ def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopReque
     configure("warning", "text")
     prepare_ros()
     console = Console(highlight=False)
-    console.print("Starting a simulated camera, lidar and IMU ...")
     with _view(console) as view:
         final = relay_rig(view.show, total_s=seconds, seed=seed, stop=stop)
+    if final is None:
+        sys.stderr.write("syncrelay: stopped before it started\n")
+        return 0
     console.print(summary(final))
     return 0 if all(figures.state.sets for figures in final.groups) else 1
 
@@ -65,10 +69,11 @@ def prepare_ros() -> None:
     require_rclpy()
 
 
-def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: int, stop: StopRequest) -> Moment:
+def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: int, stop: StopRequest) -> Moment | None:
     """Start the rig, relay it and show every moment; return how it stood when all was drained.
 
-    Time counts from when every sensor publishes: how long their start takes is the machine's affair.
+    Time counts from when every sensor publishes: how long their start takes is the machine's affair. None if it was
+    stopped before.
     """
     from syncrelay.ros.rig.discovery import quick_discovery
     from syncrelay.ros.rig.processes import Rig
@@ -81,6 +86,8 @@ def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: in
         config = load_text(shipped_config())
         while not stop.requested and not rig.is_up():
             time.sleep(_FRAME_S)
+        if stop.requested:
+            return None
         with Relay(config) as relay:
             tally = Tally([_plan(group) for group in config.groups])
             return _relay(relay, rig, tally, show, total_s=total_s, stop=stop)
@@ -154,12 +161,16 @@ class _Lines:
 
     def __init__(self) -> None:
         self._next_s = _LINE_S
+        self._say(_STARTING)
 
     def show(self, moment: Moment) -> None:
         if moment.elapsed_s >= self._next_s:
-            sys.stdout.write(f"{plain_line(moment)}\n")
-            sys.stdout.flush()
+            self._say(plain_line(moment))
             self._next_s = math.floor(moment.elapsed_s) + _LINE_S
+
+    def _say(self, line: str) -> None:
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
 
 
 def _can_draw(console: Console) -> bool:
@@ -172,7 +183,7 @@ def _view(console: Console) -> Iterator[_View]:
     if not _can_draw(console):
         yield _Lines()
         return
-    with _log_held_back(), Live(console=console, screen=True, auto_refresh=False) as live:
+    with _log_held_back(), Live(Text(_STARTING), console=console, screen=True, auto_refresh=False) as live:
         yield _Screen(live)
 
 

@@ -39,7 +39,7 @@ def find(facts: GroupFacts) -> tuple[Finding, ...]:
 
 
 def remarkable(facts: GroupFacts) -> tuple[Finding, ...]:
-    """Return what is not as ever: none where a group is well, and as it starts."""
+    """Return what is not as ever, an error at least of a silent group; nothing to mend where a group is well."""
     found = [finding for rule in _RULES for finding in rule(facts)]
     if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
         found.append(_unexplained(facts))

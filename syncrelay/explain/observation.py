@@ -67,7 +67,8 @@ class Observation:
         fallen = [each.add(new) for each, new in zip(self._inputs, arrivals, strict=True)]
         self._measure_nearest(arrivals, has_jumped=any(fallen))
         if sets:
-            self._take_sets(stamps, [latency for _, latency in sets], now, is_whole=not any(missing))
+            spans = [self._span(stamps) for stamps, _ in sets] if any(missing) else self._spans_of_whole(stamps)
+            self._take_sets(spans, [latency for _, latency in sets], now)
 
     def figures(self, *, now: int) -> tuple[GroupFigures, tuple[InputFigures, ...]]:
         """Give what is known now, of the group and of its inputs in order."""
@@ -125,14 +126,11 @@ class Observation:
         before = [each.fed for each in self._looks[0].counts] if len(self._looks) > 1 else [0] * len(last)
         return min(among, key=lambda index: last[index].fed - before[index])
 
-    def _take_sets(
-        self, stamps: Sequence[Sequence[int | None]], latencies: Sequence[int], now: int, *, is_whole: bool
-    ) -> None:
+    def _take_sets(self, spans: Sequence[int], latencies: Sequence[int], now: int) -> None:
         if self._last_set is None or (now - self._last_set >= _SILENCE and self._saw_none_before()):
             self._resumed = now
         self._last_set = now
         del self._nearest_since[:]
-        spans = self._spans_of_whole(stamps) if is_whole else list(map(self._span, zip(*stamps, strict=True)))
         keep_last(self._spans, spans, _LAST_SETS)
         keep_last(self._latencies, latencies, _LAST_SETS)
         self._span_histogram.add(spans)
@@ -148,7 +146,7 @@ class Observation:
             list(map(add, each, repeat(offset))) if offset else each
             for each, offset in zip(stamps, self._offsets, strict=True)
         ]
-        return list(map(sub, map(max, *shifted), map(min, *shifted)))
+        return list(map(sub, map(max, zip(*shifted, strict=True)), map(min, zip(*shifted, strict=True))))
 
     def _span(self, stamps: Sequence[int | None]) -> int:
         there = [stamp + offset for stamp, offset in zip(stamps, self._offsets, strict=True) if stamp is not None]

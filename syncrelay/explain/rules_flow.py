@@ -108,9 +108,8 @@ def _why_without(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str]:
 
 def _behind(facts: GroupFacts, an_input: InputFacts) -> int:
     """Return how much later after its stamp a message comes than those of the required inputs, in nanoseconds."""
-    delays = [
-        each.figures.delay - each.offset for each in facts.inputs if each.required and each.figures.delay is not None
-    ]
+    required = ((each.figures.delay, each.offset) for each in facts.inputs if each.required)
+    delays = [delay - offset for delay, offset in required if delay is not None]
     own = an_input.figures.delay
     return own - an_input.offset - median_low(delays) if own is not None and delays else 0
 

@@ -32,7 +32,7 @@ LOOK_S: Final = 1.0
 _LAST_LOOKS: Final = 10
 # So long after a publisher was found its first messages are here.
 _SETTLING_LOOKS: Final = 2
-# Of many groups, so many are looked at at a time: a look at one takes about half a millisecond from the data ...
+# Of many groups, so many are looked at at a time: a look at one takes some tenths of a millisecond from the data ...
 _IN_TURN: Final = 10
 # ... and none waits for more than so many looks: a silence is one of 5 s.
 _LONGEST_TURN: Final = 4

@@ -99,7 +99,7 @@ def test_it_matches_a_simulated_rig_and_sums_up(stage):
 @pytest.mark.ros
 def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
     # Longer than the demo runs, and than a relay waits for messages before it asks for them.
-    delay_sensors(stage, seconds=8)
+    before_each_sensor(stage, "import time; time.sleep(8)")
     demo = stage.start("demo", [*_DEMO, "--seconds", "4"])
     assert demo.wait() == 0, demo.stdout + demo.stderr
     assert set(summary_rows(demo.stdout)) == {"camera_lidar", "lidar_imu"}
@@ -107,25 +107,34 @@ def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
 
 
 @pytest.mark.ros
-def test_a_stop_before_the_sensors_publish_ends_it_and_fails_for_want_of_sets(stage):
-    delay_sensors(stage, seconds=600)
+def test_it_can_be_stopped_before_the_sensors_publish(stage):
+    before_each_sensor(stage, "import time; time.sleep(600)")
     demo = stage.start("demo", _DEMO)
-    demo.wait_until(lambda: demo.stdout == "Starting a simulated camera, lidar and IMU ...\n", "its first line")
     demo.wait_until(lambda: len(children(demo.pid)) == 3, "the rig's processes")
     sensors = children(demo.pid)
     demo.send(signal.SIGINT)
-    assert demo.wait() == 1
-    assert re.search(r"^camera_lidar +0 +0 ", demo.stdout, re.MULTILINE)
+    assert demo.wait() == 0
+    assert demo.stdout == "Starting a simulated camera, lidar and IMU ...\n"
+    assert demo.said == ["syncrelay: stopped before it started"]
     assert not any(map(running, sensors))
 
 
-def delay_sensors(stage, *, seconds):
-    """Have each sensor of the rig sleep before it starts."""
-    folder = stage.folder / "delay"
-    folder.mkdir()
-    (folder / "sitecustomize.py").write_text(
-        f"import sys, time\nif 'syncrelay.ros.rig' in sys.orig_argv: time.sleep({seconds})\n"
+@pytest.mark.ros
+def test_it_fails_if_no_set_came(stage):
+    never = "itertools.repeat(schedule.Shot(0, 0, 1 << 62))"
+    before_each_sensor(
+        stage, f"import itertools; from syncrelay.ros.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
     )
+    demo = stage.start("demo", [*_DEMO, "--seconds", "1"])
+    assert demo.wait() == 1
+    assert re.search(r"^camera_lidar +0 +0 ", demo.stdout, re.MULTILINE)
+
+
+def before_each_sensor(stage, statements):
+    """Have each sensor of the rig run these statements before all else."""
+    folder = stage.folder / "before"
+    folder.mkdir()
+    (folder / "sitecustomize.py").write_text(f"import sys\nif 'syncrelay.ros.rig' in sys.orig_argv: {statements}\n")
     stage.environment["PYTHONPATH"] += os.pathsep + str(folder)
 
 
@@ -158,7 +167,7 @@ def test_the_rig_does_not_outlive_it(stage):
 def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
     screen = on_terminal(stage, [*_DEMO, "--seconds", "10"], columns=80, lines=24)
     drawn, _, after = screen.partition("\x1b[?1049l")
-    assert "\x1b[?1049h" in drawn
+    assert "Starting a simulated camera" in drawn.partition("\x1b[?1049h")[2]
     assert re.search(r"camera -12 ms.*A", drawn)
     assert "each letter is a set" in drawn
     assert "38;5" not in screen  # the stage sets NO_COLOR

@@ -29,6 +29,12 @@ def test_a_share_over_a_limit_leaves_out_what_is_at_it(limit, share):
     assert Distribution([2, 1, 3, 2]).share_over(limit) == share
 
 
+@given(st.lists(st.integers(-3, 3)), st.integers(-4, 4))
+def test_a_share_over_a_limit_is_what_counting_gives(values, limit):
+    over = sum(value > limit for value in values)
+    assert Distribution(values).share_over(limit) == (over / len(values) if values else 0)
+
+
 def test_one_in_twenty_is_a_twentieth():
     assert Distribution([0] * 95 + [9] * 5).share_over(1) == 0.05
 

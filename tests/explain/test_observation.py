@@ -1,8 +1,13 @@
 """What is seen of streams: rates, delays, faults, windows; and that memory stays bounded."""
 
+from operator import add
+
 import pytest
 from groups import BEGAN, MS, S
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.observation import Observation
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
@@ -288,6 +293,46 @@ def test_spans_count_offsets_in_looks_with_and_without_incomplete_sets():
     stage.second(sets=[(whole, MS), (incomplete, MS)])
     assert stage.group.last_sets == ((2 * MS, MS), (3 * MS, MS), (3 * MS, MS), (3 * MS, MS))
     assert stage.group.missing == (0, 0, 0.25)
+
+
+_STAMPS = st.lists(st.integers(BEGAN, BEGAN + 20), min_size=1, max_size=12)
+
+
+@settings(deadline=None)
+@given(_STAMPS, _STAMPS)
+def test_what_comes_at_once_is_judged_as_what_comes_one_by_one(first, second):
+    def seen(*looks):
+        one = InputObservation()
+        for look in looks:
+            one.add(look)
+        return one.figures(fed=0, dropped={}, seconds=1, now=BEGAN + S)
+
+    came = [(stamp, BEGAN + 100 + place) for place, stamp in enumerate(first + second)]
+    at_once = seen(came[: len(first)], came[len(first) :])
+    one_by_one = seen(*[[each] for each in came])
+    for figure in ("duplicates", "out_of_order", "delay", "jitter", "longest_pause", "last_received", "fell_at"):
+        assert getattr(at_once, figure) == getattr(one_by_one, figure)
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.tuples(*[st.integers(BEGAN, BEGAN + 20)] * 3), min_size=1, max_size=8),
+    st.tuples(*[st.integers(-9, 9)] * 3),
+)
+def test_spans_of_whole_sets_are_those_of_sets_one_by_one(sets, offsets):
+    observation = Observation(offsets_ns=offsets, required=[True, True, False], began=BEGAN)
+    nothing = [InputCounts(0, 0, {}, 0)] * 3
+    observation.add([[]] * 3, [(stamps, 0) for stamps in sets], nothing, len(sets), now=BEGAN + S)
+    spans = [max(shifted) - min(shifted) for shifted in (list(map(add, stamps, offsets)) for stamps in sets)]
+    assert list(observation.figures(now=BEGAN + S)[0].spans.newest(99)) == spans[::-1]
+
+
+def test_nothing_is_left_of_delays_when_this_machines_clock_is_set_back_and_no_stamps_are_set():
+    stage = Stage()
+    stage.second(stage.stream(10))
+    assert stage.inputs[0].delay == 2 * MS
+    stage.second([(0, stage.now - 20 * S)], length=-20 * S)
+    assert (stage.inputs[0].delay, stage.inputs[0].jitter) == (None, None)
 
 
 def test_memory_does_not_grow_with_time():

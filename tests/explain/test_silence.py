@@ -3,7 +3,7 @@
 import pytest
 from groups import BEGAN, NOW, S, a_group, an_input
 
-from syncrelay.explain import Code, Finding, GroupFacts, Severity, Silence, find, in_words
+from syncrelay.explain import Code, Finding, GroupFacts, Severity, Silence, in_words, remarkable
 from syncrelay.explain.silence import Remark
 
 DEAD = {"publishers": (), "figures": {"last_received": None, "rate_hz": 0.0}}
@@ -18,7 +18,7 @@ def at(second: float, *, last_set: float | None, **facts) -> GroupFacts:
 
 
 def looked(silence, facts):
-    return list(silence.look(facts, find(facts)))
+    return list(silence.look(facts, remarkable(facts)))
 
 
 def told(silence, seconds, *, last_set):

@@ -10,10 +10,9 @@ from typing import IO, Self
 
 from syncrelay.ros.rig.schedule import SENSORS
 
-UP = b"publishes\n"
+UP = "publishes"
 """What a sensor says as soon as its publisher is there."""
 
-_FIRST_TALK = 1 << 16
 # A sensor is up in 3 s and leaves DDS in 0.2 s; on a busy machine both take long.
 _UP_WITHIN_S = 60.0
 _END_WITHIN_S = 10.0
@@ -40,11 +39,12 @@ class Rig:
         return self
 
     def is_up(self) -> bool:
-        """Whether every sensor publishes; raises RuntimeError when one never will, as `check` does."""
+        """Whether every sensor publishes; raises RuntimeError when one has ended, or has not come up in a minute."""
         self.check()
-        late = [name for name, (_, talk) in self._sensors.items() if UP not in os.pread(talk.fileno(), _FIRST_TALK, 0)]
+        late = {name: said for name, (_, talk) in self._sensors.items() if UP not in (said := _all_of(talk))}
         if late and time.monotonic() > self._up_by:
-            raise RuntimeError(f"the rig's {', '.join(late)} did not publish within {_UP_WITHIN_S:.0f} s")
+            words = "".join(f"\n{name}: {said[-2000:]}" for name, said in late.items() if said)
+            raise RuntimeError(f"the rig's {', '.join(late)} did not publish within {_UP_WITHIN_S:.0f} s{words}")
         return not late
 
     def check(self) -> None:
@@ -52,9 +52,7 @@ class Rig:
         for name, (process, talk) in self._sensors.items():
             code = process.poll()
             if code is not None:
-                talk.seek(0)
-                said = talk.read().decode(errors="replace").strip()
-                raise RuntimeError(f"the rig's {name} ended with exit code {code}: {said[-2000:]}")
+                raise RuntimeError(f"the rig's {name} ended with exit code {code}: {_all_of(talk)[-2000:]}")
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -76,6 +74,11 @@ def _start(name: str, *, seed: int, start: int, talk: IO[bytes]) -> subprocess.P
         stderr=talk,
         process_group=0,  # Control-C is for the demo, which ends the rig in its own order
     )
+
+
+def _all_of(talk: IO[bytes]) -> str:
+    # Not by its position, which the sensor writes at too.
+    return os.pread(talk.fileno(), os.fstat(talk.fileno()).st_size, 0).decode(errors="replace").strip()
 
 
 def _await_end(process: subprocess.Popen[bytes], deadline: float) -> None:
