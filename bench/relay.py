@@ -14,6 +14,7 @@ from pathlib import Path
 from relay_runs import (
     Load,
     floor,
+    in_turns,
     interleaved,
     ours,
     ours_telling_all,
@@ -79,14 +80,11 @@ def telling(runs):
 
 def scale(runs):
     print("\n| scale | CPU a message | to the first | p50 latency | lost |\n|---|---|---|---|---|")
-    first = None
-    for name, load in SCALES.items():
-        each = interleaved({"ours": ours}, load, runs)["ours"]
-        first = first or each.cpu_us
-        ratio = each.cpu_us / first
-        print(
-            f"| {name} | {each.cpu_us:.0f} us | {ratio:.2f} | {each.latency_ms:.2f} ms | {each.lost:.1%} |", flush=True
-        )
+    figures = in_turns({name: (ours, load) for name, load in SCALES.items()}, runs)
+    first = next(iter(figures.values()))
+    for name, each in figures.items():
+        ratio = each.cpu_us / first.cpu_us
+        print(f"| {name} | {each.cpu_us:.0f} us | {ratio:.2f} | {each.latency_ms:.2f} ms | {each.lost:.1%} |")
 
 
 def rest():

@@ -257,9 +257,14 @@ def start_and_idle(load, seconds):
 
 def interleaved(relays, load, runs):
     """Median figures of each relay, of runs in turns, so that what disturbs one disturbs all."""
-    figures = {name: [] for name in relays}
+    return in_turns({name: (relay, load) for name, relay in relays.items()}, runs)
+
+
+def in_turns(measured, runs):
+    """Median figures of each relay under its load, of runs in turns."""
+    figures = {name: [] for name in measured}
     for _ in range(runs):
-        for name, relay in relays.items():
+        for name, (relay, load) in measured.items():
             figures[name].append(measure(relay, load))
     return {
         name: Figures(*(statistics.median(column) for column in zip(*rows, strict=True)))
