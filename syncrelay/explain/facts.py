@@ -88,12 +88,10 @@ class GroupFacts:
     @property
     def required_first(self) -> Sequence[int]:
         """The indices of the inputs, those of the required ones first."""
-        needed = [index for index, each in enumerate(self.inputs) if each.required]
-        return (
-            needed
-            if len(needed) == len(self.inputs)
-            else needed + [index for index, each in enumerate(self.inputs) if not each.required]
-        )
+        indices = range(len(self.inputs))
+        if all(each.required for each in self.inputs):
+            return indices
+        return sorted(indices, key=lambda index: not self.inputs[index].required)
 
     @property
     def possible_hz(self) -> float:
