@@ -5,7 +5,7 @@ import os
 import sys
 import traceback
 from collections.abc import Callable
-from typing import Final
+from typing import Final, TextIO
 
 from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
 
@@ -20,6 +20,17 @@ INTERRUPTED: Final = 130
 
 def guarded(command: Callable[[], int]) -> int:
     """Run a command and return its exit code, or that of the error it raised."""
+    try:
+        return _guarded(command)
+    finally:
+        try:
+            sys.stderr.flush()
+        except OSError:
+            # The terminal is gone, which is how the relay was ended: no failure of its own.
+            _abandon(sys.stderr)
+
+
+def _guarded(command: Callable[[], int]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # A file's name or line may hold what the terminal's encoding lacks.
         sys.stdout.reconfigure(errors="backslashreplace")
@@ -33,7 +44,7 @@ def guarded(command: Callable[[], int]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         # Who read us has seen enough.
-        _abandon_stdout()
+        _abandon(sys.stdout)
         return AT_FAULT
     except Exception:  # noqa: BLE001  the boundary: everything else is our bug
         say(traceback.format_exc())
@@ -62,15 +73,15 @@ def _to_stdout(write: Callable[[], object]) -> None:
     try:
         write()
     except OSError as error:
-        _abandon_stdout()
+        _abandon(sys.stdout)
         if isinstance(error, BrokenPipeError):
             raise
         raise SyncRelayError(f"standard output cannot be written: {error.strerror}") from error
 
 
-def _abandon_stdout() -> None:
+def _abandon(stream: TextIO) -> None:
     """Keep the interpreter from flushing once more, as it ends, what nobody takes."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _text(error: SyncRelayError) -> str:
