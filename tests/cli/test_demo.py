@@ -99,7 +99,7 @@ def test_it_matches_a_simulated_rig_and_sums_up(stage):
 @pytest.mark.ros
 def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
     # Longer than the demo runs, and than a relay waits for messages before it asks for them.
-    before_each_sensor(stage, "import time; time.sleep(8)")
+    stage.before_each_sensor("import time; time.sleep(8)")
     demo = stage.start("demo", [*_DEMO, "--seconds", "4"])
     assert demo.wait() == 0, demo.stdout + demo.stderr
     assert set(summary_rows(demo.stdout)) == {"camera_lidar", "lidar_imu"}
@@ -108,7 +108,7 @@ def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
 
 @pytest.mark.ros
 def test_it_can_be_stopped_before_the_sensors_publish(stage):
-    before_each_sensor(stage, "import time; time.sleep(600)")
+    stage.before_each_sensor("import time; time.sleep(600)")
     demo = stage.start("demo", _DEMO)
     demo.wait_until(lambda: len(children(demo.pid)) == 3, "the rig's processes")
     sensors = children(demo.pid)
@@ -122,20 +122,12 @@ def test_it_can_be_stopped_before_the_sensors_publish(stage):
 @pytest.mark.ros
 def test_it_fails_if_no_set_came(stage):
     never = "itertools.repeat(schedule.Shot(0, 0, 1 << 62))"
-    before_each_sensor(
-        stage, f"import itertools; from syncrelay.ros.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
+    stage.before_each_sensor(
+        f"import itertools; from syncrelay.ros.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
     )
     demo = stage.start("demo", [*_DEMO, "--seconds", "1"])
     assert demo.wait() == 1
     assert re.search(r"^camera_lidar +0 +0 ", demo.stdout, re.MULTILINE)
-
-
-def before_each_sensor(stage, statements):
-    """Have each sensor of the rig run these statements before all else."""
-    folder = stage.folder / "before"
-    folder.mkdir()
-    (folder / "sitecustomize.py").write_text(f"import sys\nif 'syncrelay.ros.rig' in sys.orig_argv: {statements}\n")
-    stage.environment["PYTHONPATH"] += os.pathsep + str(folder)
 
 
 @pytest.mark.ros

@@ -151,6 +151,14 @@ class Stage:
         argv = _module("tests.ros.collector", topics or {}, node=node, reliability=reliability, durability=durability)
         return Collector(self.start("collector", [*argv, "--output", str(output)], stdin=subprocess.PIPE), output)
 
+    def before_each_sensor(self, statements: str) -> None:
+        """Have each sensor of a rig that is started from now on run these statements before all else."""
+        folder = self.folder / "before"
+        folder.mkdir()
+        text = f"import sys\nif 'syncrelay.ros.rig' in sys.orig_argv: {statements}\n"
+        (folder / "sitecustomize.py").write_text(text)
+        self.environment["PYTHONPATH"] += f":{folder}"
+
     def note_shared_memory(self) -> None:
         """Remember the segments that our processes have mapped: of the dead, nothing tells it."""
         for process in self._processes:

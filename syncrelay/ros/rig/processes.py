@@ -8,6 +8,7 @@ import time
 from types import TracebackType
 from typing import IO, Self
 
+from syncrelay.errors import SyncRelayError
 from syncrelay.ros.rig.schedule import SENSORS
 
 UP = "publishes"
@@ -39,12 +40,12 @@ class Rig:
         return self
 
     def is_up(self) -> bool:
-        """Whether every sensor publishes; raises RuntimeError when one has ended, or has not come up in a minute."""
+        """Whether every sensor publishes. Raises SyncRelayError for one that does not in a minute, else as `check`."""
         self.check()
         late = {name: said for name, (_, talk) in self._sensors.items() if UP not in (said := _all_of(talk))}
         if late and time.monotonic() > self._up_by:
             words = "".join(f"\n{name}: {said[-2000:]}" for name, said in late.items() if said)
-            raise RuntimeError(f"the rig's {', '.join(late)} did not publish within {_UP_WITHIN_S:.0f} s{words}")
+            raise SyncRelayError(f"the rig's {', '.join(late)} did not publish within {_UP_WITHIN_S:.0f} s{words}")
         return not late
 
     def check(self) -> None:
