@@ -12,21 +12,12 @@ from tests.ros.stage import Stage, running_stage
 
 _REAL_DATA = "SYNCRELAY_REAL_DATA"
 _FIGURES = "figures"
-_OVER_DDS = ("ros", "faults", "container")
 
 
 def pytest_configure() -> None:
     named = os.environ.get(_REAL_DATA)
     if named and not Path(named).is_dir():
         raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Where CI runs, give a test over DDS two more tries, which are told as RERUN: what others do there is not ours."""
-    if os.environ.get("CI"):
-        for item in items:
-            if any(item.get_closest_marker(name) for name in _OVER_DDS):
-                item.add_marker(pytest.mark.flaky(reruns=2))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

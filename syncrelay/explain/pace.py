@@ -11,8 +11,10 @@ _SECOND: Final = 1_000_000_000
 _PERIODS: Final = 20
 _LOOKS: Final = 120
 _FEWEST_LOOKS: Final = 10
-# What varies by more than this share of its median has no pace to fall from.
+# What varies by more than this share of its median has no pace to fall from ...
 _STEADY: Final = 0.25
+# ... but for one look in so many at either end, in which a busy machine held messages up.
+_ODD: Final = 10
 _SLOWED: Final = 0.5
 
 
@@ -43,6 +45,8 @@ class Pace:
         if not self.now_hz or len(self._looks) < _FEWEST_LOOKS or self.now_hz >= _SLOWED * max(self._looks):
             return None
         usual = median(self._looks)
-        if max(self._looks) - min(self._looks) > 2 * _STEADY * usual:
+        odd = len(self._looks) // _ODD
+        steady = sorted(self._looks)[odd : len(self._looks) - odd]
+        if steady[-1] - steady[0] > 2 * _STEADY * usual:
             return None
         return usual if self.now_hz < _SLOWED * usual else None

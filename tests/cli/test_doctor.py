@@ -263,7 +263,8 @@ def test_too_few_processes_allowed_are_counted(base, tasks_allowed):
 
 SHM = "mount -t tmpfs -o mode=1777 shm /dev/shm; cd /dev/shm"
 STALE = "touch fastrtps_0123456789abcdef fastrtps_0123456789abcdef_el fastrtps_port7999 fastrtps_port7999_el"
-LIVE = "touch fastrtps_port7411 fastrtps_port7411_el; exec 9<fastrtps_port7411_el; flock 9"
+# Of a port that no process here takes: Fast DDS would wait for whoever holds it.
+LIVE = "touch fastrtps_port7499 fastrtps_port7499_el; exec 9<fastrtps_port7499_el; flock 9"
 VETH = "ip link add {0} type veth peer name {0}b; ip link set {0} up; ip link set {0}b up"
 FAULTS = {
     "loopback_down": (["net"], "true"),
@@ -299,7 +300,7 @@ def test_what_it_says_to_do_about_stale_files_removes_them_and_no_others(base):
     clean = found["shm_stale"]["do"].splitlines()[-1]
     command = unshared(["mount"], f"{made}; set +e\n{clean}\nls /dev/shm >&2", "--version")
     done = subprocess.run(command, env=base, capture_output=True, text=True, timeout=60, check=False)
-    assert done.stderr.split() == ["fastrtps_port7411", "fastrtps_port7411_el", "kept"]
+    assert done.stderr.split() == ["fastrtps_port7499", "fastrtps_port7499_el", "kept"]
 
 
 @pytest.mark.ros

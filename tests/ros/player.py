@@ -4,13 +4,16 @@ It takes commands on stdin, one a line, and answers each with a line on stdout w
 
     match N             every publisher has at least N matched subscriptions
     play SPEED FILE     the frames of FILE were published, paced by their times
+    stop                what it plays was ended
     acknowledge         all that was published is acknowledged by all subscriptions, which may take 3 s: only
                         Fast DDS's periodic heartbeat asks for it
 
-It ends when stdin does.
+It ends when stdin does, also in the midst of what it plays.
 """
 
 import argparse
+import os
+import select
 import sys
 import time
 from pathlib import Path
@@ -26,6 +29,7 @@ from tests.ros import frames
 from tests.ros.message_types import import_type
 
 _POLL_S = 0.01
+_LONGEST_SLEEP_S = 0.1
 _ACKNOWLEDGE = Duration(seconds=60)
 
 
@@ -43,13 +47,15 @@ def main() -> None:
     publishers = {
         topic: node.create_publisher(import_type(type_name), topic, profile) for topic, type_name in arguments.topic
     }
-    for line in sys.stdin:
-        command, *words = line.split(maxsplit=2)
+    # Without a buffer, which would hold the next command where nothing tells of it.
+    stdin = os.fdopen(sys.stdin.fileno(), "rb", buffering=0, closefd=False)
+    for line in iter(stdin.readline, b""):
+        command, *words = line.decode().split(maxsplit=2)
         if command == "match":
             _match(publishers, int(words[0]))
         elif command == "play":
             _play(publishers, float(words[0]), Path(words[1].rstrip("\n")))
-        else:
+        elif command == "acknowledge":
             _acknowledge(publishers)
         print(command, flush=True)  # noqa: T201  the answer
     node.destroy_node()
@@ -66,8 +72,15 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _is_interrupted() -> bool:
+    """Whether there is another command, or nobody any more to give one."""
+    return bool(select.select([sys.stdin], [], [], 0)[0])
+
+
 def _match(publishers: dict[str, Publisher], subscriptions: int) -> None:
     while any(publisher.get_subscription_count() < subscriptions for publisher in publishers.values()):
+        if _is_interrupted():
+            return
         time.sleep(_POLL_S)
 
 
@@ -76,7 +89,10 @@ def _play(publishers: dict[str, Publisher], speed: float, path: Path) -> None:
     began = time.monotonic()
     for frame in recording:
         due = began + (frame.time - recording[0].time) / 1e9 / speed
-        time.sleep(max(0.0, due - time.monotonic()))
+        while (left := due - time.monotonic()) > 0:
+            time.sleep(min(left, _LONGEST_SLEEP_S))
+            if _is_interrupted():
+                return
         publishers[frame.topic].publish(frame.payload)
 
 

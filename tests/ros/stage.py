@@ -50,6 +50,12 @@ class Player:
         self.process.wait_until(self.finished, "the end of the recording", deadline_s=self._span_s + DEADLINE_S)
         self.process.answer()
 
+    def stop(self) -> None:
+        """Have it play no more."""
+        self.process.tell("stop")
+        self.finish()
+        self.process.answer()
+
     def play(self, recording: Sequence[Frame], *, speed: float = 10) -> None:
         self.start(recording, speed=speed)
         self.finish()

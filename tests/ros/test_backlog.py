@@ -20,9 +20,10 @@ _OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)
 def test_a_backlog_of_a_fast_and_a_slow_topic_is_matched_in_the_order_of_arrival(stage: Stage):
     # A queue that holds the fast topic for little more than a period of the slow one: drained topic by topic, it
     # would overflow before the slow topic's turn comes.
+    # Few enough that Fast DDS's shared memory holds them all: what it has to send again comes in another order.
     recording = merged(
-        jittery("/imu", period_ms=5, jitter_ms=1, count=400, seed=1),
-        jittery("/lidar", period_ms=100, jitter_ms=5, count=20, seed=2),
+        jittery("/imu", period_ms=5, jitter_ms=1, count=200, seed=1),
+        jittery("/lidar", period_ms=100, jitter_ms=5, count=10, seed=2),
     )
     group = {"policy": "approximate_time", "slop": "10ms", "queue_size": 30, "topics": inputs(_PAIR, qos=LOSSLESS)}
     collector = stage.collector(_OUT)
@@ -36,5 +37,5 @@ def test_a_backlog_of_a_fast_and_a_slow_topic_is_matched_in_the_order_of_arrival
     expected = relaying.expected_sets(
         ApproximateTime(n_inputs=2, queue_size=30, slop_ns=10 * MS), recording, list(_PAIR)
     )
-    assert len(expected) >= 18
+    assert len(expected) >= 8
     assert relaying.sets_within(recording, collector, _OUT) == expected

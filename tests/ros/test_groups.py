@@ -8,7 +8,7 @@ import pytest
 from syncrelay.sync import ApproximateTime, ExactTime
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR, stamps_of
-from tests.ros.configs import LOSSLESS, config, inputs, outputs
+from tests.ros.configs import LOSSLESS, ROOMY, config, inputs, outputs
 from tests.ros.frames import Frame
 from tests.ros.processes import wait_until
 from tests.ros.stage import Stage, both_paths
@@ -28,12 +28,16 @@ def _pair_recording() -> list[Frame]:
     )
 
 
+def _keys(topics: dict[str, str]) -> dict:
+    return {"queue_size": ROOMY, "topics": inputs(topics, qos=LOSSLESS)}
+
+
 def _approximate(topics: dict[str, str], *, slop_ms: int) -> dict:
-    return {"policy": "approximate_time", "slop": f"{slop_ms}ms", "topics": inputs(topics, qos=LOSSLESS)}
+    return {"policy": "approximate_time", "slop": f"{slop_ms}ms", **_keys(topics)}
 
 
 def _exact(topics: dict[str, str]) -> dict:
-    return {"policy": "exact_time", "topics": inputs(topics, qos=LOSSLESS)}
+    return {"policy": "exact_time", **_keys(topics)}
 
 
 def test_a_topic_of_two_groups_is_subscribed_once_and_serves_both(stage: Stage):
@@ -49,7 +53,7 @@ def test_a_topic_of_two_groups_is_subscribed_once_and_serves_both(stage: Stage):
     aligned = dict.fromkeys(["/seeing/camera", "/seeing/lidar", "/moving/lidar", "/moving/imu"], VECTOR)
     _, collector = relaying.relay(stage, config(groups), recording, aligned)
     for group, topics in (("seeing", ["/camera", "/lidar"]), ("moving", ["/lidar", "/imu"])):
-        expected = relaying.expected_sets(ExactTime(n_inputs=2, queue_size=10), recording, topics)
+        expected = relaying.expected_sets(ExactTime(n_inputs=2, queue_size=ROOMY), recording, topics)
         assert len(expected) == 20
         assert relaying.sets_within(recording, collector, outputs(group, topics)) == expected
     assert len(collector.endpoints("/lidar", kind="subscription", node="/syncrelay")) == 1
@@ -63,7 +67,7 @@ def test_eight_topics_leave_in_sets_of_eight(stage: Stage):
     aligned = dict.fromkeys(outputs("all", topics), VECTOR)
     text = config({"all": _approximate(topics, slop_ms=30)})
     _, collector = relaying.relay(stage, text, recording, aligned, speed=1)
-    policy = ApproximateTime(n_inputs=8, queue_size=10, slop_ns=30 * MS)
+    policy = ApproximateTime(n_inputs=8, queue_size=ROOMY, slop_ns=30 * MS)
     expected = relaying.expected_sets(policy, recording, list(topics))
     assert len(expected) > 40
     assert relaying.sets_within(recording, collector, aligned) == expected
@@ -94,7 +98,7 @@ def test_a_relay_that_waits_for_its_publishers_matches_all_they_send(stage: Stag
 
 
 def _assert_sets_of_the_pair(collector, recording: list[Frame]) -> None:
-    policy = ApproximateTime(n_inputs=2, queue_size=10, slop_ns=40 * MS)
+    policy = ApproximateTime(n_inputs=2, queue_size=ROOMY, slop_ns=40 * MS)
     expected = relaying.expected_sets(policy, recording, list(_PAIR))
     assert len(expected) > 30
     assert relaying.sets_within(recording, collector, _PAIR_OUT) == expected
@@ -139,7 +143,7 @@ def test_a_relay_that_is_held_up_makes_the_sets_of_one_that_is_not(stage: Stage)
         )
     player.finish()
     relaying.conclude(player, collector, recording, _PAIR_OUT)
-    policy = ApproximateTime(n_inputs=2, queue_size=10, slop_ns=2 * MS)
+    policy = ApproximateTime(n_inputs=2, queue_size=ROOMY, slop_ns=2 * MS)
     expected = relaying.expected_sets(policy, recording, list(_PAIR))
     assert len(expected) > 900
     assert relaying.sets_within(recording, collector, _PAIR_OUT) == expected

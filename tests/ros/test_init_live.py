@@ -34,13 +34,6 @@ def _init(stage: Stage, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
 
 
-def _end(stage: Stage, *players) -> None:
-    """End players in the midst of what they play, whose end nobody waits for."""
-    stage.note_shared_memory()
-    for player in players:
-        player.process.send(signal.SIGTERM)
-
-
 @pytest.mark.parametrize("receive_path", ["direct", "rclpy"])
 def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     reliable = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
@@ -71,7 +64,6 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     assert f"left out, as outputs of a relay that runs: {outputs}\n" in again.stderr
     (group,) = load(str(stage.folder / "again.yaml")).groups
     assert {topic.topic for topic in group.topics} == {"/camera", "/lidar", "/imu"}
-    _end(stage, reliable, lossy)
 
 
 def test_an_empty_graph_is_named(stage: Stage):
@@ -86,7 +78,6 @@ def test_topics_without_stamps_are_named_with_the_reason(stage: Stage):
     words = [Frame("/text", STRING, time.time_ns() + n * 50 * _MS, serialize(STRING, "x")) for n in range(1000)]
     player.start(merged(words, _now("/unset", period_ms=50, is_stamped=False)), speed=1)
     done = _init(stage, *_LISTEN)
-    _end(stage, player)
     assert (done.returncode, done.stdout) == (1, "")
     assert f"/text ({STRING}): its type has no header, and so no stamp to match by" in done.stderr
     (unset,) = (line for line in done.stderr.splitlines() if "/unset" in line)
@@ -100,7 +91,6 @@ def test_a_file_that_is_there_is_left_alone(stage: Stage):
     taken = stage.folder / "taken.yaml"
     taken.write_text("mine")
     done = _init(stage, *_LISTEN, "-o", str(taken))
-    _end(stage, player)
     assert (done.returncode, taken.read_text()) == (1, "mine")
     assert done.stderr == f"syncrelay: {taken}: exists already, and is not overwritten\n"
 
