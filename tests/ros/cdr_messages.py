@@ -34,8 +34,8 @@ def header(stamp: int, frame_id: str = "base") -> Any:
 def vector(stamp: int, *, frame_id: str = "base", little_endian: bool = True) -> bytes:
     """A Vector3Stamped whose numbers tell its stamp, so that no two are equal.
 
-    Packed by hand, as tests make many thousands of them: encapsulation, seconds, nanoseconds, length of the text with its
-    closing zero, the text, padding to eight bytes behind the encapsulation, x, y, z.
+    Packed by hand, as tests make many thousands of them: encapsulation, seconds, nanoseconds, the text's length with
+    its closing zero, the text, padding to eight bytes behind the encapsulation, x, y, z.
     """
     order = "<" if little_endian else ">"
     text = frame_id.encode() + b"\0"
