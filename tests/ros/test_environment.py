@@ -50,7 +50,7 @@ def relay_with(tmp_path):
             env={"PYTHONPATH": f"{_ROOT}:{site}", "PATH": os.environ["PATH"], **environ},
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=120,
             check=False,
         )
 
@@ -90,7 +90,7 @@ def test_a_middleware_that_is_not_installed_is_named_beside_those_that_are(tmp_p
         env={**os.environ, "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=120,
         check=False,
     )
     assert run.returncode == 69

@@ -226,7 +226,7 @@ def test_a_relay_ends_with_its_terminal(stage: Stage, tmp_path: Path):
     while b"waiting for" not in said:
         said += os.read(ours, 4096)
     os.close(ours)
-    assert relay.wait(timeout=60) == 0
+    assert relay.wait(timeout=120) == 0
 
 
 def _own_terminal() -> None:
