@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from tests.ros.domain import claimed_domain
 from tests.ros.stage import Stage, running_stage
@@ -14,7 +15,14 @@ _REAL_DATA = "SYNCRELAY_REAL_DATA"
 _FIGURES = "figures"
 
 
+# The same examples in every run, and no verdict that a slow machine could change.
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow]
+)
+
+
 def pytest_configure() -> None:
+    settings.load_profile("repeatable")
     named = os.environ.get(_REAL_DATA)
     if named and not Path(named).is_dir():
         raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")

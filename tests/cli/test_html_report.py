@@ -5,7 +5,7 @@ from html import escape
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.cli.analysis_html import as_html
@@ -39,7 +39,6 @@ def _counts(lanes: Lanes) -> list[dict[str, int]]:
     ]
 
 
-@settings(deadline=None)
 @given(st.lists(st.integers(min_value=-(2**62), max_value=2**62)), st.integers(min_value=0, max_value=10**9))
 def test_what_is_packed_comes_out_again(values, step):
     rising = np.cumsum(np.full(50, step, dtype=np.int64))

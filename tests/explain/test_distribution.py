@@ -1,7 +1,7 @@
 """Quantiles are values that occurred."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.explain import Distribution
@@ -15,7 +15,6 @@ def test_a_quantile_is_the_least_value_that_so_many_do_not_exceed(share, value):
     assert Distribution([50, 30, 10, 40, 20]).quantile(share) == value
 
 
-@settings(deadline=None)
 @given(st.lists(st.integers(), min_size=1), st.floats(0, 1))
 def test_a_quantile_occurred_and_is_not_exceeded_by_more_than_the_rest(values, share):
     sample = Distribution(values)

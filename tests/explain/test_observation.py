@@ -4,7 +4,7 @@ from operator import add
 
 import pytest
 from groups import BEGAN, MS, S
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.explain.input_observation import InputObservation
@@ -298,7 +298,6 @@ def test_spans_count_offsets_in_looks_with_and_without_incomplete_sets():
 _STAMPS = st.lists(st.integers(BEGAN, BEGAN + 20), min_size=1, max_size=12)
 
 
-@settings(deadline=None)
 @given(_STAMPS, _STAMPS)
 def test_what_comes_at_once_is_judged_as_what_comes_one_by_one(first, second):
     def seen(*looks):
@@ -314,7 +313,6 @@ def test_what_comes_at_once_is_judged_as_what_comes_one_by_one(first, second):
         assert getattr(at_once, figure) == getattr(one_by_one, figure)
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.tuples(*[st.integers(BEGAN, BEGAN + 20)] * 3), min_size=1, max_size=8),
     st.tuples(*[st.integers(-9, 9)] * 3),

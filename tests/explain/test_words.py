@@ -2,7 +2,7 @@
 
 import pytest
 from groups import MS, S
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
@@ -81,7 +81,6 @@ def test_a_duration_for_the_file_is_round_and_not_shorter(nanoseconds, text):
     assert words.at_least(nanoseconds) == text
 
 
-@settings(deadline=None)
 @given(st.integers(1, 10**12))
 def test_what_is_written_into_the_file_is_enough_and_no_more_than_a_fifth_too_much(nanoseconds):
     written = parse_duration(words.at_least(nanoseconds))
