@@ -52,6 +52,11 @@ def test_every_key_arrives_where_it_is_used(environ):
     assert back.topics[0].qos == QosOverrides() == back.topics[1].qos
 
 
+def test_a_file_that_says_nothing_of_it_listens_on_this_machine_alone(environ):
+    config = load(str(EXAMPLES / "camera_lidar.yaml"), environ=environ)
+    assert config.listen == Listen("127.0.0.1", range(9464, 9474), is_asked_for=False)
+
+
 def test_outputs_are_named_by_prefix_and_input_unless_they_have_a_name(environ):
     config = load(str(FOLDER / "all_keys.yaml"), environ=environ)
     assert [topic.output for group in config.groups for topic in group.topics] == [
