@@ -22,6 +22,7 @@ from syncrelay.config import Listen
 from syncrelay.errors import ListenError
 from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
+from syncrelay.status.hosts import Hosts
 from syncrelay.status.metrics import registry
 from syncrelay.status.state import RelayState, is_ready
 
@@ -32,6 +33,9 @@ _CLIENT_TIMEOUT_S: Final = 5
 # Beyond them a client waits until one that idles has timed out. Each takes a file descriptor, of a usual 1024.
 _CONNECTIONS: Final = 256
 _HEADER_BYTES: Final = 16_384
+
+# Probes ask by whatever name they have for the relay, and a refusal would have it restarted. They tell nothing more.
+_PROBES: Final = ("/livez", "/readyz")
 
 _Start = Callable[[str, list[tuple[str, str]]], Any]
 _Answer = Callable[[dict[str, Any], _Start], Iterable[bytes]]
@@ -47,6 +51,7 @@ class Server:
         self._socket = _bound(listen)
         host, port = self._socket.getsockname()[:2]
         self.place = Place(port, host)
+        self._hosts = Hosts.of(listen, host)
         self._announcement: AbstractContextManager[object] = nullcontext()
         self._server: Any = None
         self._thread: Thread | None = None
@@ -67,7 +72,7 @@ class Server:
     def serve(self, state: Callable[[], RelayState]) -> None:
         """Answer from now on; `state` is called on other threads."""
         self._server = create_server(
-            _application(state),
+            _application(state, self._hosts),
             sockets=[self._socket],
             threads=2,
             connection_limit=_CONNECTIONS,
@@ -107,7 +112,7 @@ def _bound(listen: Listen) -> socket.socket:
     )
 
 
-def _application(state: Callable[[], RelayState]) -> _Answer:
+def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
     metrics: Any = make_wsgi_app(registry(state))
 
     def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
@@ -125,7 +130,11 @@ def _application(state: Callable[[], RelayState]) -> _Answer:
     def application(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
         if environ["REQUEST_METHOD"] not in ("GET", "HEAD"):
             return _text(start, "405 Method Not Allowed", "only GET")
-        answer = answers.get(environ["PATH_INFO"])
+        path = environ["PATH_INFO"]
+        refusal = None if path in _PROBES else hosts.refusal(environ)
+        if refusal is not None:
+            return _text(start, *refusal)
+        answer = answers.get(path)
         if answer is None:
             return _text(start, "404 Not Found", "there are /status, /metrics, /livez and /readyz")
         body = answer(environ, start)

@@ -15,6 +15,7 @@ from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS
 from syncrelay.config.wording import printable
 from syncrelay.errors import SyncRelayError, UsageError
 from syncrelay.status.announcement import Place, announced
+from syncrelay.status.hosts import REFUSAL
 from syncrelay.top.state import NotAStateError, State, read_state
 
 _TIMEOUT_S: Final = 2.0
@@ -69,7 +70,7 @@ def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -
     except HTTPException as error:
         raise OtherServerError("what listens there is no relay: it does not answer as HTTP says") from error
     if status != HTTPStatus.OK:
-        raise OtherServerError(f"what listens there is no relay: it answers {status} {printable(reason)}")
+        raise OtherServerError(_refused(f"{status} {reason}", body))
     try:
         return Answer(url, body, read_state(body))
     except NotAStateError as error:
@@ -118,6 +119,13 @@ def _ended_after(connected: socket.socket, whole_s: float) -> Iterator[None]:
         timer.cancel()
         if is_over.is_set():
             raise NoAnswerError(f"no whole answer within {whole_s:g} s")
+
+
+def _refused(answer: str, body: bytes) -> str:
+    words = printable(body.decode(errors="replace").strip())
+    if words.startswith(REFUSAL):
+        return words
+    return f"what listens there is no relay: it answers {printable(answer)}"
 
 
 def search(urls: Sequence[str], *, timeout_s: float = _SEARCH_TIMEOUT_S, whole_s: float = _WHOLE_S) -> Search:

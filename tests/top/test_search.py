@@ -169,3 +169,16 @@ def test_relays_are_found_among_fifty_that_hang_or_never_end():
         found = search([*urls[:25], *relays, *urls[25:]], timeout_s=3, whole_s=3)
     assert [answer.url for answer in found.relays] == relays
     assert len(found.others) == 50
+
+
+def test_a_relay_that_is_asked_by_a_name_that_it_does_not_go_by_says_what_to_write():
+    state = states.healthy()
+    with Server(Listen("127.0.0.1", range(1))) as server:
+        server.serve(lambda: state)
+        # To the kernel it is this machine; to the relay it is not one of its own.
+        with pytest.raises(OtherServerError) as caught:
+            ask(f"http://0.0.0.0:{server.place.port}")
+    assert str(caught.value) == (
+        "this relay does not answer to 0.0.0.0: if that is its name, write `metrics: {hosts: [0.0.0.0]}` in its file"
+        " and restart it"
+    )
