@@ -1,19 +1,21 @@
 """`syncrelay reload`: have a running relay of this machine read its file again."""
 
-import json
 import os
 import signal
 import time
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.relays import find_one
 from syncrelay.errors import SyncRelayError
-from syncrelay.top.client import NoAnswerError, ask, base_urls, search
+from syncrelay.top.client import NoAnswerError, OtherServerError, ask
+from syncrelay.top.state import Relay
 
 # Reading a file takes milliseconds; a relay that is busy turns to it within a second or two.
 _PATIENCE_S: Final = 10.0
 _POLL_S: Final = 0.1
+_OTHERWISE: Final = "  Where the relay's file says `metrics: null`, send SIGHUP to its process"
 
 
 def reload(named: str | None) -> int:
@@ -21,37 +23,26 @@ def reload(named: str | None) -> int:
 
     Raises SyncRelayError where no relay, or more than one, or one of another machine is found.
     """
-    url = _the_one(named)
+    url = find_one(named, otherwise=_OTHERWISE).url
     before = _relay(url)
-    _signal(int(before["pid"]))
+    _signal(before.pid)
     end = time.monotonic() + _PATIENCE_S
     while time.monotonic() < end:
         time.sleep(_POLL_S)
         now = _relay(url)
-        if now["reloads"] != before["reloads"]:
-            put(f"{now['node']} has read {now['config']} again")
+        if now.reloads != before.reloads:
+            put(f"{now.node} has read {now.config} again")
             return DONE
-        if now["refused_reloads"] != before["refused_reloads"]:
-            say(f"{now['node']} goes on as before, its file is left aside:\n{now['reload_error']}")
+        if now.refused_reloads != before.refused_reloads:
+            say(f"{now.node} goes on as before, its file is left aside:\n{now.reload_error}")
             return AT_FAULT
-    raise SyncRelayError(f"{before['node']} has not read its file within {_PATIENCE_S:.0f} s")
+    raise SyncRelayError(f"{before.node} has not read its file within {_PATIENCE_S:.0f} s")
 
 
-def _the_one(named: str | None) -> str:
-    found = search(base_urls(named)).relays
-    if not found:
-        raise SyncRelayError("no relay answers here: send SIGHUP to its process where it has `metrics: null`")
-    if len(found) > 1:
-        raise SyncRelayError(
-            f"several relays run here, name one: --url {' or --url '.join(each.url for each in found)}"
-        )
-    return found[0].url
-
-
-def _relay(url: str) -> dict[str, Any]:
+def _relay(url: str) -> Relay:
     try:
-        return dict(json.loads(ask(url).document)["relay"])
-    except NoAnswerError as error:
+        return ask(url).state.relay
+    except (NoAnswerError, OtherServerError) as error:
         raise SyncRelayError(f"the relay at {url} is gone: {error}") from error
 
 

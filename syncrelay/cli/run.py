@@ -68,7 +68,9 @@ def run(
         stop.wake_with(relay.wake)
         if server is not None:
             server.serve(relay.state)
-            LOGGER.info("status and metrics: http://%s/, `syncrelay top` shows them", server.address)
+            LOGGER.info(
+                "status and metrics: http://%s/, `syncrelay top --url %s` shows them", server.place, server.place.url
+            )
         if explain_s is not None:
             return explain(relay, explain_s, stop=stop)
         while not stop.requested:

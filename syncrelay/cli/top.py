@@ -2,11 +2,13 @@
 
 import os
 import sys
+from collections.abc import Sequence
 from enum import Enum
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.relays import find, find_one
 from syncrelay.errors import SyncRelayError
-from syncrelay.top.client import FIRST_PORT, LAST_PORT, Answer, Search, base_urls, search
+from syncrelay.top.client import Answer, base_urls
 
 
 class Output(Enum):
@@ -20,21 +22,14 @@ class Output(Enum):
 def top(named: str | None, output: Output) -> int:
     """Show the state of a relay on this machine, or of one that is named by host, host:port or URL.
 
-    1 if there is no relay, or several where one can't be chosen. Raises UsageError for a name that is none.
+    Raises SyncRelayError where there is none, or several of which none can be chosen, and UsageError for a wrong name.
     """
-    urls = base_urls(named)
     if output is Output.SCREEN:
+        # What is no name of a relay is said with or without a terminal.
+        base_urls(named)
         _require_terminal()
-    found = search(urls)
-    if not found.relays:
-        say(_nothing_there(named, found))
-        return AT_FAULT
-    if output is Output.SCREEN:
-        return _screen(found)
-    if len(found.relays) > 1:
-        say(_several(found))
-        return AT_FAULT
-    (answer,) = found.relays
+        return _screen(find(named, otherwise=_otherwise(named)))
+    answer = find_one(named, otherwise=_otherwise(named))
     put(answer.document.decode().rstrip("\n") if output is Output.JSON else _as_text(answer))
     return DONE
 
@@ -45,10 +40,10 @@ def _as_text(answer: Answer) -> str:
     return plain_text(answer)
 
 
-def _screen(found: Search) -> int:
+def _screen(relays: Sequence[Answer]) -> int:
     from syncrelay.top.app import TopApp
 
-    app = TopApp(found.relays)
+    app = TopApp(relays)
     app.run()
     if app.failure is not None:
         raise app.failure
@@ -66,26 +61,13 @@ def _require_terminal() -> None:
         )
 
 
-def _nothing_there(named: str | None, found: Search) -> str:
-    # Of a machine whose name is not known, or that is off, all ports say the same.
-    reasons = {text.partition(": ")[2]: text for text in reversed(found.others)}
-    others = "".join(f"\n  {text}" for text in reversed(reasons.values()))
+def _otherwise(named: str | None) -> str:
     if named is None:
         return (
-            f"syncrelay: no relay answers on this machine, at 127.0.0.1:{FIRST_PORT} to {LAST_PORT}{others}\n"
             "  Start one with `syncrelay --config FILE`, whose file must not say\n"
             "  `metrics: null`, or say where it is: `syncrelay top --url robot:9464`."
         )
     return (
-        f"syncrelay: no relay answers at {named}{others}\n"
         "  From other machines a relay can be asked if its file says\n"
         "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between."
     )
-
-
-def _several(found: Search) -> str:
-    lines = "".join(
-        f"\n  --url {answer.url}   {answer.state.relay.node}: {', '.join(group.name for group in answer.state.groups)}"
-        for answer in found.relays
-    )
-    return f"syncrelay: {len(found.relays)} relays answer; choose one{lines}"

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
-from syncrelay.config.listen import check_listen
+from syncrelay.config.listen import check_listen, parse_host
 from syncrelay.config.names import (
     LONGEST_TOPIC,
     check_namespace,
@@ -45,6 +45,9 @@ NOT_NULL: Final = BeforeValidator(_refuse_null)
 """For a field that is None where its key is absent: `key:` without a value is no way to say so."""
 
 ListenAddress = Annotated[str, AfterValidator(check_listen)]
+Host = Annotated[str, AfterValidator(parse_host)]
+"""A host name or an address without a port, as parse_host returns it."""
+
 _NUMBER: Final = r"([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"
 _UNIT: Final = "(ns|us|µs|μs|ms|s|min)"
 _TOKENS: Final = "[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"

@@ -8,6 +8,7 @@ from syncrelay.config.keys import (
     NOT_NULL,
     Duration,
     FieldPath,
+    Host,
     Keys,
     ListenAddress,
     Namespace,
@@ -61,6 +62,15 @@ class MetricsConfig(Keys):
             " Default: the first free port of 127.0.0.1:9464 to 9473."
         ),
         examples=["127.0.0.1:9464"],
+    )
+    hosts: tuple[Host, ...] = Field(
+        default=(),
+        description=(
+            "Other names by which the relay is asked, such as that of a Kubernetes service: a page in a browser cannot"
+            " read the state under a name that is not here. Names of this machine and, where `listen` is open to"
+            " other machines, every address need not be listed. Default: none."
+        ),
+        examples=[["robot.lab.example"]],
     )
 
 

@@ -1,6 +1,6 @@
 """What the relay is told: a file with every default filled in."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from syncrelay.config.file import FileKeys
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
@@ -85,11 +85,9 @@ def resolve(file: FileKeys, *, notes: tuple[Problem, ...]) -> Config:
 def _listen(metrics: MetricsConfig | None) -> Listen | None:
     if metrics is None:
         return None
-    return (
-        Listen(DEFAULT_HOST, DEFAULT_PORTS, is_asked_for=False)
-        if metrics.listen is None
-        else parse_listen(metrics.listen)
-    )
+    if metrics.listen is None:
+        return Listen(DEFAULT_HOST, DEFAULT_PORTS, is_asked_for=False, hosts=metrics.hosts)
+    return replace(parse_listen(metrics.listen), hosts=metrics.hosts)
 
 
 def _group(name: str, group: AnyGroup, node: NodeConfig) -> GroupConfig:

@@ -9,6 +9,7 @@ import json
 import logging
 import socket
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from threading import Thread
 from types import TracebackType
 from typing import Any, Final, Self
@@ -19,7 +20,9 @@ from waitress.wasyncore import close_all
 
 from syncrelay.config import Listen
 from syncrelay.errors import ListenError
+from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
+from syncrelay.status.hosts import Hosts
 from syncrelay.status.metrics import registry
 from syncrelay.status.state import RelayState, is_ready
 
@@ -31,18 +34,25 @@ _CLIENT_TIMEOUT_S: Final = 5
 _CONNECTIONS: Final = 256
 _HEADER_BYTES: Final = 16_384
 
+# Probes ask by whatever name they have for the relay, and a refusal would have it restarted. They tell nothing more.
+_PROBES: Final = ("/livez", "/readyz")
+
 _Start = Callable[[str, list[tuple[str, str]]], Any]
+_Answer = Callable[[dict[str, Any], _Start], Iterable[bytes]]
 
 
 class Server:
-    """Holds a port from its making on and answers once it serves; a context manager that ends both."""
+    """Holds a port from its making on, answers and is announced once it serves; a context manager that ends it all."""
 
     def __init__(self, listen: Listen) -> None:
         """Take the port, or the first free one of those that the file leaves open. Raises ListenError."""
         # waitress warns of clients that go away, which is no concern of the robot's operator.
         logging.getLogger("waitress").setLevel(logging.CRITICAL)
         self._socket = _bound(listen)
-        self.address = _in_words(self._socket)
+        host, port = self._socket.getsockname()[:2]
+        self.place = Place(port, host)
+        self._hosts = Hosts.of(listen, host)
+        self._announcement: AbstractContextManager[object] = nullcontext()
         self._server: Any = None
         self._thread: Thread | None = None
 
@@ -52,6 +62,7 @@ class Server:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._announcement.__exit__(kind, error, trace)
         if self._thread is not None:
             self._server.trigger.pull_trigger(lambda: close_all(self._server._map))  # noqa: SLF001  it has no stop of its own
             self._thread.join()
@@ -61,7 +72,7 @@ class Server:
     def serve(self, state: Callable[[], RelayState]) -> None:
         """Answer from now on; `state` is called on other threads."""
         self._server = create_server(
-            _application(state),
+            _application(state, self._hosts),
             sockets=[self._socket],
             threads=2,
             connection_limit=_CONNECTIONS,
@@ -75,14 +86,10 @@ class Server:
         )
         self._thread = Thread(target=self._server.asyncore.loop, kwargs=self._loop_settings(), name="syncrelay-http")
         self._thread.start()
+        self._announcement = announce(self.place)
 
     def _loop_settings(self) -> dict[str, Any]:
         return {"timeout": 1, "map": self._server._map, "use_poll": True}  # noqa: SLF001
-
-
-def _in_words(bound: socket.socket) -> str:
-    host, port = bound.getsockname()[:2]
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 def _bound(listen: Listen) -> socket.socket:
@@ -105,14 +112,14 @@ def _bound(listen: Listen) -> socket.socket:
     )
 
 
-def _application(state: Callable[[], RelayState]) -> Callable[[dict[str, Any], _Start], Iterable[bytes]]:
+def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
     metrics: Any = make_wsgi_app(registry(state))
 
     def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
         answer: Iterable[bytes] = metrics(environ, start)
         return answer
 
-    answers: dict[str, Callable[[dict[str, Any], _Start], Iterable[bytes]]] = {
+    answers: dict[str, _Answer] = {
         "/": lambda _, start: _text(start, "200 OK", "syncrelay: /status /metrics /livez /readyz"),
         "/metrics": answer_metrics,
         "/status": lambda _, start: _json(start, document(state())),
@@ -123,7 +130,11 @@ def _application(state: Callable[[], RelayState]) -> Callable[[dict[str, Any], _
     def application(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
         if environ["REQUEST_METHOD"] not in ("GET", "HEAD"):
             return _text(start, "405 Method Not Allowed", "only GET")
-        answer = answers.get(environ["PATH_INFO"])
+        path = environ["PATH_INFO"]
+        refusal = None if path in _PROBES else hosts.refusal(environ)
+        if refusal is not None:
+            return _text(start, *refusal)
+        answer = answers.get(path)
         if answer is None:
             return _text(start, "404 Not Found", "there are /status, /metrics, /livez and /readyz")
         body = answer(environ, start)

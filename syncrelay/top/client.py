@@ -1,27 +1,31 @@
 """Asks relays for their state over HTTP, and finds out where relays are."""
 
 import socket
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
-from http.client import HTTPException
+from http import HTTPStatus
+from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnection, IncompleteRead
+from threading import Event, Timer
 from typing import Final
-from urllib.error import HTTPError, URLError
 from urllib.parse import urlsplit
-from urllib.request import ProxyHandler, build_opener
 
+from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS
+from syncrelay.config.wording import printable
 from syncrelay.errors import SyncRelayError, UsageError
+from syncrelay.status.announcement import Place, announced
+from syncrelay.status.hosts import REFUSAL
 from syncrelay.top.state import NotAStateError, State, read_state
 
-FIRST_PORT: Final = 9464
-LAST_PORT: Final = 9473
-"""Where a relay listens unless its file says otherwise: at the first of these that is free."""
 _TIMEOUT_S: Final = 2.0
 # A relay that is just starting, or a machine under load, takes longer to be found than to be asked again.
 _SEARCH_TIMEOUT_S: Final = 5.0
+# A large state takes its time on a slow network. What comes byte by byte, or never ends, is no state.
+_WHOLE_S: Final = 10.0
 _MOST_BYTES: Final = 64_000_000
-# A robot is asked directly: a proxy that the environment names is for the world outside.
-_OPENER: Final = build_opener(ProxyHandler({}))
+_MOST_WORDS: Final = 500
+_AT_ONCE: Final = 64
 
 
 class NoAnswerError(SyncRelayError):
@@ -53,29 +57,88 @@ class Search:
     others: tuple[str, ...]
 
 
-def ask(url: str, *, timeout_s: float = _TIMEOUT_S) -> Answer:
+def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -> Answer:
     """Get the state of the relay at a base URL such as http://robot:9464.
 
-    Raises NoAnswerError where nothing answers in time, OtherServerError where something else does.
+    Raises NoAnswerError where nothing more comes for `timeout_s`, or not all of it in `whole_s`, and OtherServerError
+    where something else answers.
     """
     try:
-        with _OPENER.open(f"{url}/status", timeout=timeout_s) as response:
-            document = response.read(_MOST_BYTES)
-    except HTTPError as error:
-        error.close()
-        raise OtherServerError(f"what listens there is no relay: it answers {error.code} {error.reason}") from error
-    except (OSError, HTTPException, UnicodeError) as error:
+        status, reason, body = _get(url, timeout_s, whole_s)
+    except (OSError, IncompleteRead, UnicodeError) as error:
         raise _no_answer(error, timeout_s) from error
+    except HTTPException as error:
+        raise OtherServerError("what listens there is no relay: it does not answer as HTTP says") from error
+    if status != HTTPStatus.OK:
+        raise OtherServerError(_refused(f"{status} {reason}", body))
     try:
-        return Answer(url, document, read_state(document))
+        return Answer(url, body, read_state(body))
     except NotAStateError as error:
-        raise OtherServerError(f"what listens there is no relay, or one of another version ({error})") from error
+        raise OtherServerError(
+            f"what listens there is no relay, or one of another version ({printable(str(error))})"
+        ) from error
 
 
-def search(urls: Sequence[str]) -> Search:
+def _get(url: str, timeout_s: float, whole_s: float) -> tuple[int, str, bytes]:
+    """Return code, reason and body. No proxy that the environment names is asked: a robot is near."""
+    parts = urlsplit(url)
+    connection = (HTTPSConnection if parts.scheme == "https" else HTTPConnection)(parts.netloc, timeout=timeout_s)
+    with closing(connection):
+        connection.connect()
+        with _ended_after(connection.sock, whole_s):
+            connection.request("GET", f"{parts.path}/status")
+            with connection.getresponse() as response:
+                return response.status, response.reason, _body(response)
+
+
+def _body(response: HTTPResponse) -> bytes:
+    most = _MOST_BYTES if response.status == HTTPStatus.OK else _MOST_WORDS
+    body = response.read(most)
+    # Of a given number of bytes http.client says nothing where fewer come.
+    if response.length and len(body) < most:
+        raise IncompleteRead(body, response.length)
+    return body
+
+
+@contextmanager
+def _ended_after(connected: socket.socket, whole_s: float) -> Iterator[None]:
+    """Cut off what is said over a connection for too long, however steadily. Raises NoAnswerError then."""
+    is_over = Event()
+
+    def end() -> None:
+        is_over.set()
+        with suppress(OSError):
+            connected.shutdown(socket.SHUT_RDWR)
+
+    timer = Timer(whole_s, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        if is_over.is_set():
+            raise NoAnswerError(f"no whole answer within {whole_s:g} s")
+
+
+def _refused(answer: str, body: bytes) -> str:
+    words = printable(body.decode(errors="replace").strip())
+    if words.startswith(REFUSAL):
+        return words
+    return f"what listens there is no relay: it answers {printable(answer)}"
+
+
+def search(urls: Sequence[str], *, timeout_s: float = _SEARCH_TIMEOUT_S, whole_s: float = _WHOLE_S) -> Search:
     """Ask all at once. Of several, those where nobody listens are not worth a word."""
-    with ThreadPoolExecutor(len(urls)) as pool:
-        answers = list(pool.map(_ask_or_error, urls))
+
+    def answer_or_error(url: str) -> Answer | SyncRelayError:
+        try:
+            return ask(url, timeout_s=timeout_s, whole_s=whole_s)
+        except (NoAnswerError, OtherServerError) as error:
+            return error
+
+    with ThreadPoolExecutor(min(len(urls), _AT_ONCE)) as pool:
+        answers = list(pool.map(answer_or_error, urls))
     told = [
         f"{url}: {answer}"
         for url, answer in zip(urls, answers, strict=True)
@@ -84,26 +147,19 @@ def search(urls: Sequence[str]) -> Search:
     return Search(tuple(answer for answer in answers if isinstance(answer, Answer)), tuple(told))
 
 
-def _ask_or_error(url: str) -> Answer | SyncRelayError:
-    try:
-        return ask(url, timeout_s=_SEARCH_TIMEOUT_S)
-    except (NoAnswerError, OtherServerError) as error:
-        return error
-
-
 def base_urls(named: str | None) -> list[str]:
-    """Return where to look: at the ports that relays take by themselves, on this machine or the one named.
+    """Return where to look: on this machine wherever relays listen, on one that is named at the ports they take alone.
 
     `named` is a host, host:port or URL; with a port it is the only place. Raises UsageError where it is none of them.
     """
     if named is None:
-        return _at_usual_ports("127.0.0.1")
+        return _on_this_machine()
     try:
         parts = urlsplit(named if "://" in named else f"http://{named}")
         host, port = parts.hostname, parts.port
     except ValueError as error:
         raise UsageError(f"--url {named}: {error}") from error
-    if parts.scheme not in {"http", "https"} or not host:
+    if parts.scheme not in {"http", "https"} or not host or not named.isprintable() or " " in named:
         raise UsageError(f"--url {named}: expected a host, host:port or http://host:port")
     path = parts.path.rstrip("/").removesuffix("/status")
     if port is None and parts.scheme == "http" and not path:
@@ -111,20 +167,29 @@ def base_urls(named: str | None) -> list[str]:
     return [f"{parts.scheme}://{parts.netloc}{path}"]
 
 
+def _on_this_machine() -> list[str]:
+    """Return where relays announce that they answer, and where one does that cannot be heard: in a container, say."""
+    places = set(announced())
+    everywhere = {place.port for place in places if place.is_everywhere}
+    unheard = {Place(port, DEFAULT_HOST) for port in DEFAULT_PORTS if port not in everywhere}
+    return list(dict.fromkeys(place.url for place in sorted(places | unheard)))
+
+
 def _at_usual_ports(host: str) -> list[str]:
-    return [f"http://{host}:{port}" for port in range(FIRST_PORT, LAST_PORT + 1)]
+    return [f"http://{host}:{port}" for port in DEFAULT_PORTS]
 
 
 def _no_answer(error: Exception, timeout_s: float) -> NoAnswerError:
-    reason = error.reason if isinstance(error, URLError) and isinstance(error.reason, Exception) else error
-    match reason:
+    match error:
         case ConnectionRefusedError():
             return NobodyListensError("nothing listens there")
         case TimeoutError():
             return NoAnswerError(f"no answer within {timeout_s:g} s")
         case socket.gaierror():
             return NoAnswerError("no machine of that name is known")
+        case IncompleteRead() | ConnectionError():
+            return NoAnswerError("the connection ended before the answer did")
         case OSError(strerror=str() as words):
             return NoAnswerError(words)
         case _:
-            return NoAnswerError(str(reason) or type(reason).__name__)
+            return NoAnswerError(str(error) or type(error).__name__)

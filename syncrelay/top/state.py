@@ -17,7 +17,7 @@ class NotAStateError(SyncRelayError):
 
 @dataclass(frozen=True, slots=True)
 class Relay:
-    """The relay as a whole."""
+    """The relay as a whole, its reloads as RelayState has them. `pid` is its number where it runs, 0 if not told."""
 
     node: str
     version: str
@@ -25,6 +25,10 @@ class Relay:
     phase: Phase
     ready: bool
     uptime_s: float
+    pid: int = 0
+    reloads: int = 0
+    refused_reloads: int = 0
+    reload_error: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

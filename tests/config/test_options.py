@@ -128,6 +128,7 @@ OPTIONS = {
     "node": (file(), file(node={"name": "z"}), lambda config: config.node),
     "metrics": (file(), file(metrics=None), lambda config: config.listen),
     "listen": (file(), file(metrics={"listen": "0.0.0.0:80"}), lambda config: config.listen),
+    "hosts": (file(), file(metrics={"hosts": ["robot"]}), lambda config: config.listen),
     "diagnostics": (file(), file(diagnostics=None), lambda config: config.diagnostics),
     "scalars": (file(), file(diagnostics={"scalars": True}), lambda config: config.diagnostics),
     "defaults": (file(), file(defaults={"output_prefix": "/z"}), outputs),

@@ -24,7 +24,8 @@ def test_every_example_is_in_order(file):
 def test_every_key_arrives_where_it_is_used(environ):
     config = load(str(FOLDER / "all_keys.yaml"), environ=environ)
     assert (config.node.name, config.node.namespace, config.node.use_sim_time) == ("fusion", "/robot1", True)
-    assert config.listen == Listen("127.0.0.1", range(9500, 9501))
+    hosts = ("robot.lab.example", "10.0.0.5", "fd00::1", "10.0.0.6")
+    assert config.listen == Listen("127.0.0.1", range(9500, 9501), hosts=hosts)
     assert config.diagnostics == DiagnosticsConfig(scalars=True)
     front, back = config.groups
     assert (front.name, back.name) == ("front", "back")
@@ -50,6 +51,11 @@ def test_every_key_arrives_where_it_is_used(environ):
     assert dock.stamp.field == "trigger.time"
     assert chatter.stamp == "receive"
     assert back.topics[0].qos == QosOverrides() == back.topics[1].qos
+
+
+def test_a_file_that_says_nothing_of_it_listens_on_this_machine_alone(environ):
+    config = load(str(EXAMPLES / "camera_lidar.yaml"), environ=environ)
+    assert config.listen == Listen("127.0.0.1", range(9464, 9474), is_asked_for=False)
 
 
 def test_outputs_are_named_by_prefix_and_input_unless_they_have_a_name(environ):

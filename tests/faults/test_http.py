@@ -17,7 +17,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import Process, wait_until
 from tests.ros.stage import Stage
-from tests.ros.status import address
+from tests.ros.status import ANY_PORT, address
 
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
 
@@ -44,7 +44,7 @@ def _answer(place: tuple[str, int], request: bytes) -> bytes:
 def _requests() -> Iterator[bytes]:
     """Requests of which hardly one is right."""
     chance = random.Random(3)
-    whole = b"GET /status HTTP/1.1\r\nHost: robot\r\nConnection: close\r\n\r\n"
+    whole = b"GET /status HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
     yield from (b"", b"\r\n" * 100, b"\0" * 1000, b"GET / HTTP/1.1\r\nHost: " + b"x" * 100_000)
     yield from (b"GET /" + b"../" * 50 + b"etc/passwd HTTP/1.1\r\n\r\n", b"GET /status?" + b"a=b&" * 2000)
     for lie in (b"Content-Length: 99999999999", b"Content-Length: -1", b"Transfer-Encoding: chunked"):
@@ -75,7 +75,7 @@ def test_a_thousand_clients_that_stall_and_requests_that_are_none_disturb_no_set
         witness.wait_for_set_after(began)
         most = descriptors(relay.pid)
         # Those that stall are sent away in turn, until all have been.
-        assert b" 200 OK" in _answer(place, b"GET /livez HTTP/1.1\r\nHost: robot\r\nConnection: close\r\n\r\n")
+        assert b" 200 OK" in _answer(place, b"GET /livez HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
     for _ in range(_GARBAGE):
         _answer(place, next(requests))
     witness.wait_for_set_after(time.time_ns())
@@ -98,7 +98,7 @@ def test_no_page_shows_the_environment(stage: Stage):
     witness.wait_for_sets(50)
     place = _place(relay)
     pages = [
-        f"{method} {path} HTTP/1.1\r\nHost: robot\r\nConnection: close\r\n\r\n"
+        f"{method} {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
         for method in ("GET", "HEAD", "POST", "OPTIONS", "TRACE")
         for path in ("/", "/status", "/metrics", "/livez", "/readyz", "/nowhere", "/${ROBOT_PASSWORD}", "/env", "*")
     ]
@@ -111,13 +111,13 @@ def test_no_page_shows_the_environment(stage: Stage):
     assert value not in relay.stderr + relay.stdout
 
 
-def test_the_port_is_this_machines_alone_unless_the_file_says_otherwise(stage: Stage):
+def test_a_relay_listens_at_the_address_that_the_file_says_and_nowhere_else(stage: Stage):
     group = {"policy": "exact_time", "topics": inputs(dict.fromkeys(["/camera", "/lidar"], VECTOR))}
-    usual = stage.relay(config({"front": group}))
+    alone = stage.relay(config({"front": group}, metrics=ANY_PORT))
     open_to_all = stage.relay(config({"front": group}, metrics={"listen": "0.0.0.0:0"}))
-    for relay in (usual, open_to_all):
+    for relay in (alone, open_to_all):
         relay.wait_for_log("status and metrics: ")
-    assert _listening(usual) == {"127.0.0.1"}
+    assert _listening(alone) == {"127.0.0.1"}
     assert _listening(open_to_all) == {"0.0.0.0"}  # noqa: S104  it is what the file says
 
 

@@ -114,7 +114,6 @@ def test_a_search_finds_relays_and_tells_what_else_answers(closed_port):
 @pytest.mark.parametrize(
     ("named", "urls"),
     [
-        (None, [f"http://127.0.0.1{port}" for port in _USUAL]),
         ("robot", [f"http://robot{port}" for port in _USUAL]),
         ("http://robot/", [f"http://robot{port}" for port in _USUAL]),
         ("robot:9464", ["http://robot:9464"]),

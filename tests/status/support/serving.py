@@ -12,12 +12,11 @@ _PATIENCE_S = 20
 
 
 @contextmanager
-def serving(state: RelayState) -> Iterator[tuple[str, int]]:
+def serving(state: RelayState, listen: Listen = ANY) -> Iterator[tuple[str, int]]:
     """The address of a server that answers with one state."""
-    with Server(ANY) as server:
+    with Server(listen) as server:
         server.serve(lambda: state)
-        host, port = server.address.rsplit(":", 1)
-        yield host, int(port)
+        yield server.place.host, server.place.port
 
 
 def connected(address: tuple[str, int]) -> socket.socket:
@@ -31,8 +30,8 @@ def sent(address: tuple[str, int], request: bytes) -> bytes:
         return b"".join(iter(lambda: client.recv(65_536), b""))
 
 
-def asked(address: tuple[str, int], path: str, *, method: str = "GET") -> tuple[int, str]:
+def asked(address: tuple[str, int], path: str, *, method: str = "GET", host: str = "localhost") -> tuple[int, str]:
     """The status code and the body of one answer."""
-    answer = sent(address, f"{method} {path} HTTP/1.1\r\nHost: robot\r\nConnection: close\r\n\r\n".encode())
+    answer = sent(address, f"{method} {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode())
     head, _, body = answer.partition(b"\r\n\r\n")
     return int(head.split()[1]), body.decode()

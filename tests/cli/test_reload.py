@@ -1,0 +1,64 @@
+"""`syncrelay reload` as a user starts it, where there is nobody, more than one, or somebody else."""
+
+import json
+from contextlib import ExitStack
+
+import pytest
+
+from syncrelay.config import Listen
+from syncrelay.status import Server, document
+from tests.cli.command import run
+from tests.top import states
+from tests.top.relay_server import serving
+from tests.top.speaker import speaking
+
+
+def test_where_nobody_answers_it_names_whom_it_asked(tmp_path):
+    with serving(states.healthy()) as server:
+        url = server.url
+    asked = run("reload", "--url", url, folder=tmp_path)
+    assert (asked.returncode, asked.stdout) == (1, "")
+    assert asked.stderr.splitlines() == [
+        f"syncrelay: no relay answers at {url}",
+        f"  {url}: nothing listens there",
+        "  Where the relay's file says `metrics: null`, send SIGHUP to its process",
+    ]
+
+
+@pytest.mark.parametrize("words", [["reload"], ["top", "--once"]])
+def test_of_several_relays_none_is_taken_for_the_one_that_is_meant(tmp_path, words):
+    state = states.rig()
+    with ExitStack() as stack:
+        servers = [stack.enter_context(Server(Listen("127.0.0.1", range(1)))) for _ in range(2)]
+        for server in servers:
+            server.serve(lambda: state)
+        asked = run(*words, folder=tmp_path)
+    assert (asked.returncode, asked.stdout) == (1, "")
+    first, *lines = asked.stderr.splitlines()
+    assert first.endswith(" relays answer; choose one")
+    # Others may run on this machine.
+    groups = ", ".join(group.facts.name for group in state.groups)
+    assert {f"  --url {server.place.url}   /syncrelay: {groups}" for server in servers} <= set(lines)
+
+
+def test_a_relay_that_ends_once_it_is_found_is_gone(tmp_path):
+    whole = b"HTTP/1.1 200 OK\r\n\r\n" + json.dumps(document(states.healthy())).encode()
+    speeches = iter([[whole]])
+    with speaking(lambda: iter(next(speeches, []))) as url:
+        asked = run("reload", "--url", url, folder=tmp_path)
+    assert (asked.returncode, asked.stdout) == (1, "")
+    assert asked.stderr == f"syncrelay: the relay at {url} is gone: the connection ended before the answer did\n"
+
+
+@pytest.mark.parametrize("told", [{}, {"pid": 0}, {"pid": -1}, {"pid": 1}, {"pid": 2**70}])
+def test_what_is_no_relay_here_gets_no_signal(tmp_path, told):
+    state = document(states.healthy())
+    del state["relay"]["pid"]
+    state["relay"] |= told
+    with serving(states.healthy()) as server:
+        server.body = json.dumps(state).encode()
+        asked = run("reload", "--url", server.url, folder=tmp_path)
+    assert (asked.returncode, asked.stdout) == (1, "")
+    assert asked.stderr.startswith(
+        f"syncrelay: process {told.get('pid', 0)} is not the relay here; it runs in a container"
+    )

@@ -1,0 +1,49 @@
+"""Servers that speak as they please: what may listen where a relay is looked for."""
+
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from threading import Event, Thread
+
+Speech = Callable[[], Iterator[bytes]]
+
+
+@contextmanager
+def speaking(speech: Speech) -> Iterator[str]:
+    """The base URL of a server that says this to everyone who connects, and hangs up at its end."""
+    with closing(socket.create_server(("127.0.0.1", 0), backlog=128)) as listener:
+        Thread(target=_accept, args=(listener, speech), daemon=True).start()
+        try:
+            yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+        finally:
+            # Closing it alone would not wake who waits in accept.
+            listener.shutdown(socket.SHUT_RDWR)
+
+
+def slowly(chunk: bytes) -> Iterator[bytes]:
+    """The same without end, well within anyone's patience for the next of it."""
+    pause = Event()
+    while not pause.wait(0.02):
+        yield chunk
+
+
+def without_end(chunk: bytes) -> Iterator[bytes]:
+    while True:
+        yield chunk
+
+
+def _accept(listener: socket.socket, speech: Speech) -> None:
+    with suppress(OSError):
+        while True:
+            client, _ = listener.accept()
+            Thread(target=_speak, args=(client, speech), daemon=True).start()
+
+
+def _speak(client: socket.socket, speech: Speech) -> None:
+    with closing(client), suppress(OSError):
+        for chunk in speech():
+            client.sendall(chunk)
+        # Else the end would be a reset, where the request has not been read.
+        client.shutdown(socket.SHUT_WR)
+        while client.recv(65_536):
+            pass
