@@ -10,13 +10,14 @@ from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, wi
 from syncrelay.bag.wiring import wire
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.new_file import write_again, write_new
 from syncrelay.cli.reading import reading
 from syncrelay.config import Severity, load_text
 from syncrelay.config.source import read_source
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, UsageError
+from syncrelay.printable import printable
 
 _GROUP = "matched"
 
@@ -44,13 +45,13 @@ def analyze_bag(bag: str, asked: Asked) -> int:
         text = read_source(asked.config).text if asked.config else _proposed(recording, asked.topics)
         wirings = wire(load_text(text, name=asked.config or "<topics>", package_missing=Severity.NOTE), recording)
         for problem in (problem for wiring in wirings for problem in wiring.problems):
-            say(f"syncrelay: {problem}")
+            remark(printable(problem))
         with reading(recording):
             analysis = analyze(recording, text, wirings)
         if asked.config is None:
             analysis = settled(analysis)
         for fault in recording.faults:
-            say(f"syncrelay: {fault}")
+            remark(printable(fault))
     _print(bag, analysis, asked)
     return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
 

@@ -9,10 +9,11 @@ from syncrelay.bag import Channel, Encoding, open_recording
 from syncrelay.bag.analysis import propose, propose_for
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.qos import Profile
-from syncrelay.cli.boundary import DONE, put, say
+from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
 from syncrelay.cli.reading import reading
 from syncrelay.errors import NothingToMatchError
+from syncrelay.printable import printable
 
 if TYPE_CHECKING:
     from syncrelay.ros.listening import Heard
@@ -27,7 +28,7 @@ def init_from_bag(bag: str, output: str | None) -> int:
         with reading(recording):
             text = propose(recording)
         for fault in recording.faults:
-            say(f"syncrelay: {fault}")
+            remark(printable(fault))
     return _give(text, output)
 
 
@@ -45,9 +46,9 @@ def init_from_graph(seconds: float, output: str | None) -> int:
         say(f"listening to the graph for {seconds:g} s ...")
     heard = listen(seconds=seconds)
     if heard.relayed:
-        say(f"syncrelay: left out, as outputs of a relay that runs: {', '.join(heard.relayed)}")
+        remark(f"left out, as outputs of a relay that runs: {', '.join(heard.relayed)}")
     for why in heard.unusable:
-        say(f"syncrelay: {why}")
+        remark(printable(why))
     try:
         text = propose_for(list(_streams(heard)), source=f"{seconds:g} s of the graph")
     except NothingToMatchError as error:

@@ -12,10 +12,11 @@ from syncrelay.bag.replay import Listener
 from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.wiring import Wiring, wire
 from syncrelay.bag.writing import SetWriter
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.reading import reading
 from syncrelay.cli.summary import summarize
 from syncrelay.config import Severity, load
+from syncrelay.printable import printable
 from syncrelay.sync import Match, Outcome
 
 
@@ -53,7 +54,7 @@ def replay(bags: Sequence[str], config_path: str, wanted: Wanted) -> int:
 
 def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:
     for sentence in sentences:
-        say(f"syncrelay: {sentence}")
+        remark(printable(sentence))
 
 
 def _printing(wanted: Wanted) -> Iterator[Listener]:
@@ -79,5 +80,5 @@ def _writing(wanted: Wanted, wirings: Sequence[Wiring], opened: ExitStack) -> It
         writer.begin(wiring)
     channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)
     if any(channel.encoding is Encoding.ROS1 for channel in channels):
-        say("syncrelay: the recording is of ROS 1, what is written is CDR as ROS 2 has it, without header.seq")
+        remark("the recording is of ROS 1, what is written is CDR as ROS 2 has it, without header.seq")
     yield writer.take

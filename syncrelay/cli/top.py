@@ -1,10 +1,11 @@
 """`syncrelay top`: a running relay on the terminal, or once as text."""
 
+import json
 import os
 import sys
 from enum import Enum
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.errors import SyncRelayError
 from syncrelay.top.client import FIRST_PORT, LAST_PORT, Answer, Search, base_urls, search
 
@@ -27,15 +28,16 @@ def top(named: str | None, output: Output) -> int:
         _require_terminal()
     found = search(urls)
     if not found.relays:
-        say(_nothing_there(named, found))
+        remark(_nothing_there(named, found))
         return AT_FAULT
     if output is Output.SCREEN:
         return _screen(found)
     if len(found.relays) > 1:
-        say(_several(found))
+        remark(_several(found))
         return AT_FAULT
     (answer,) = found.relays
-    put(answer.document.decode().rstrip("\n") if output is Output.JSON else _as_text(answer))
+    # Made anew: JSON may hold as they are what a terminal must not see.
+    put(json.dumps(json.loads(answer.document)) if output is Output.JSON else _as_text(answer))
     return DONE
 
 
@@ -72,12 +74,12 @@ def _nothing_there(named: str | None, found: Search) -> str:
     others = "".join(f"\n  {text}" for text in reversed(reasons.values()))
     if named is None:
         return (
-            f"syncrelay: no relay answers on this machine, at 127.0.0.1:{FIRST_PORT} to {LAST_PORT}{others}\n"
+            f"no relay answers on this machine, at 127.0.0.1:{FIRST_PORT} to {LAST_PORT}{others}\n"
             "  Start one with `syncrelay --config FILE`, whose file must not say\n"
             "  `metrics: null`, or say where it is: `syncrelay top --url robot:9464`."
         )
     return (
-        f"syncrelay: no relay answers at {named}{others}\n"
+        f"no relay answers at {named}{others}\n"
         "  From other machines a relay can be asked if its file says\n"
         "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between."
     )
@@ -88,4 +90,4 @@ def _several(found: Search) -> str:
         f"\n  --url {answer.url}   {answer.state.relay.node}: {', '.join(group.name for group in answer.state.groups)}"
         for answer in found.relays
     )
-    return f"syncrelay: {len(found.relays)} relays answer; choose one{lines}"
+    return f"{len(found.relays)} relays answer; choose one{lines}"

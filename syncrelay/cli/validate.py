@@ -9,6 +9,7 @@ from typing import Any, Final
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 from syncrelay.config.source import STDIN
+from syncrelay.printable import printable, printable_lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ def _print_text(findings: Sequence[Finding]) -> None:
 
 
 def _print_json(findings: Sequence[Finding]) -> None:
-    put(json.dumps([_as_json(finding) for finding in findings], indent=2, ensure_ascii=False))
+    put(json.dumps([_as_json(finding) for finding in findings], indent=2))
 
 
 def _print_github(findings: Sequence[Finding]) -> None:
@@ -55,7 +56,7 @@ def _print_github(findings: Sequence[Finding]) -> None:
         for problem in finding.problems:
             put(_workflow_command(problem))
         if finding.config is not None:
-            put(_ok(finding.file, finding.config))
+            put(_inert(_ok(finding.file, finding.config)))
 
 
 _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
@@ -67,7 +68,7 @@ _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
 
 def _ok(file: str, config: Config) -> str:
     n_topics = len({topic.topic for group in config.groups for topic in group.topics})
-    return f"{file}: ok, {_count(len(config.groups), 'group')}, {_count(n_topics, 'topic')}"
+    return f"{printable(file)}: ok, {_count(len(config.groups), 'group')}, {_count(n_topics, 'topic')}"
 
 
 def _count(number: int, word: str) -> str:
@@ -110,8 +111,13 @@ def _workflow_command(problem: Problem) -> str:
     return f"::{command} {written}::{_escaped(text)}"
 
 
+def _inert(line: str) -> str:
+    """Return a line that GitHub takes for no command, whatever the file is called."""
+    return line.replace("::", "%3A%3A").replace("##[", "##%5B")
+
+
 def _escaped(text: str) -> str:
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return printable_lines(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _escaped_property(text: str) -> str:

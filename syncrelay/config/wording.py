@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from syncrelay.printable import printable
+
 _LONGEST_QUOTE = 60
 
 
@@ -27,11 +29,6 @@ def quoted(text: str) -> str:
     if len(line) > _LONGEST_QUOTE:
         line = line[: _LONGEST_QUOTE - 1] + "…"
     return f"'{line}'" if "`" in line else f"`{line}`"
-
-
-def printable(text: str) -> str:
-    """Return the text on one line, with escapes for what would move a cursor or hide in a terminal."""
-    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
 
 
 def describe(value: object) -> str:

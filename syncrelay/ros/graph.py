@@ -6,7 +6,9 @@ from typing import Any, Final
 
 from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 
+from syncrelay.config.names import is_topic_name
 from syncrelay.explain import Endpoint, Mismatch
+from syncrelay.printable import printable
 
 _RELIABILITY: Final = {QoSReliabilityPolicy.BEST_EFFORT: "best_effort", QoSReliabilityPolicy.RELIABLE: "reliable"}
 _DURABILITY: Final = {QoSDurabilityPolicy.VOLATILE: "volatile", QoSDurabilityPolicy.TRANSIENT_LOCAL: "transient_local"}
@@ -53,7 +55,7 @@ def subscribers(infos: Iterable[Any], offered: QoSProfile) -> tuple[Endpoint, ..
 
 
 def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None]) -> tuple[Endpoint, ...]:
-    return tuple(Endpoint(_node(info), info.topic_type, why(info.qos_profile)) for info in infos)
+    return tuple(Endpoint(node_of(info), printable(info.topic_type), why(info.qos_profile)) for info in infos)
 
 
 def is_nameless(info: Any) -> bool:
@@ -61,10 +63,20 @@ def is_nameless(info: Any) -> bool:
     return bool(info.node_name == _NAMELESS)
 
 
-def _node(info: Any) -> str:
+def node_of(info: Any) -> str:
+    """Return the full name of an endpoint's node."""
     if is_nameless(info):
         return "a node of unknown name"
-    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+    return printable(f"{info.node_namespace.rstrip('/')}/{info.node_name}")
+
+
+def topics_in(node: Any) -> dict[str, tuple[str, ...]]:
+    """Return the topics of the graph and their types; but for names against ROS's rules, on which rclpy raises.
+
+    DDS allows any, and who publishes there need not use ROS.
+    """
+    named = dict(node.get_topic_names_and_types())
+    return {name: tuple(map(printable, types)) for name, types in named.items() if is_topic_name(name)}
 
 
 def topics_alike(name: str, type_name: str, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:

@@ -15,7 +15,8 @@ from rclpy.qos import QoSReliabilityPolicy
 from syncrelay.cdr import read_stamp
 from syncrelay.config import QosOverrides
 from syncrelay.errors import RosUnavailableError, TypeImportError
-from syncrelay.ros.graph import is_nameless
+from syncrelay.printable import printable
+from syncrelay.ros.graph import is_nameless, topics_in
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.path import Content, Path, Source
 from syncrelay.ros.path_choice import VARIABLE, choose_path
@@ -112,7 +113,7 @@ class _Listener:
             self._loop.stop()
             return
         self._due = now + _LOOK_NS
-        for name, types in self._node.get_topic_names_and_types():
+        for name, types in topics_in(self._node).items():
             is_known = name in self._topics or name in self._headerless or name in self._relayed
             if not is_known and name not in _OF_EVERY_NODE and not _is_hidden(name):
                 self._find(name, types)
@@ -123,7 +124,7 @@ class _Listener:
         if is_unknown or any(type_name in self._unusable for type_name in types):
             return
         # Of a topic with publishers of several types, no group could take more than one.
-        type_name = publishers[0].topic_type
+        type_name = printable(publishers[0].topic_type)
         try:
             message_type = import_type(type_name)
         except TypeImportError as error:

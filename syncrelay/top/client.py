@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from urllib.request import ProxyHandler, build_opener
 
 from syncrelay.errors import SyncRelayError, UsageError
+from syncrelay.printable import printable
 from syncrelay.top.state import NotAStateError, State, read_state
 
 FIRST_PORT: Final = 9464
@@ -63,7 +64,8 @@ def ask(url: str, *, timeout_s: float = _TIMEOUT_S) -> Answer:
             document = response.read(_MOST_BYTES)
     except HTTPError as error:
         error.close()
-        raise OtherServerError(f"what listens there is no relay: it answers {error.code} {error.reason}") from error
+        answer = printable(f"{error.code} {error.reason}")
+        raise OtherServerError(f"what listens there is no relay: it answers {answer}") from error
     except (OSError, HTTPException, UnicodeError) as error:
         raise _no_answer(error, timeout_s) from error
     try:
@@ -127,4 +129,4 @@ def _no_answer(error: Exception, timeout_s: float) -> NoAnswerError:
         case OSError(strerror=str() as words):
             return NoAnswerError(words)
         case _:
-            return NoAnswerError(str(reason) or type(reason).__name__)
+            return NoAnswerError(printable(str(reason)) or type(reason).__name__)
