@@ -9,6 +9,7 @@ from typing import Any, Final
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 from syncrelay.config.source import STDIN
+from syncrelay.config.wording import counted
 from syncrelay.printable import printable, printable_lines
 
 
@@ -31,7 +32,8 @@ def validate(files: Sequence[str], output_format: str) -> int:
 def _check(file: str) -> Finding:
     name = "<stdin>" if file == STDIN else file
     try:
-        config = load(file)
+        # A package may be installed where the relay runs, and replay needs none.
+        config = load(file, package_missing=Severity.NOTE)
     except ConfigError as error:
         return Finding(name, None, error.problems)
     return Finding(name, config, config.notes)
@@ -68,11 +70,7 @@ _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
 
 def _ok(file: str, config: Config) -> str:
     n_topics = len({topic.topic for group in config.groups for topic in group.topics})
-    return f"{printable(file)}: ok, {_count(len(config.groups), 'group')}, {_count(n_topics, 'topic')}"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+    return f"{printable(file)}: ok, {counted(len(config.groups), 'group')}, {counted(n_topics, 'topic')}"
 
 
 def _as_json(finding: Finding) -> dict[str, Any]:

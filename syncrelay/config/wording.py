@@ -48,6 +48,11 @@ def describe(value: object) -> str:
             return "a mapping"
 
 
+def counted(number: int, word: str) -> str:
+    """Return `1 node` or `3 nodes`."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
 def one_of(words: Iterable[str]) -> str:
     """Return `a`, `a or b`, `a, b or c`."""
     return _listed(words, "or")

@@ -36,7 +36,11 @@ def _labelled(label: str, text: str, dim: str, reset: str) -> Iterator[str]:
 def sighting_lines(sighting: Sighting) -> Iterator[str]:
     """Yield what was seen of the graph: a line of counts, then a line for each topic of the file."""
     yield f"seen in {sighting.seconds:.0f} s: {summary(sighting)}"
-    rows = [_row(topic) for topic in sighting.topics]
+    yield from aligned([_row(topic) for topic in sighting.topics])
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows as lines, each column as wide as its widest cell."""
     widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         padded = [cell + " " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)]

@@ -18,7 +18,9 @@ import pytest
 import yaml
 from mcap.writer import Writer
 
-from syncrelay.cli import main
+from syncrelay.cli.boundary import guarded
+from syncrelay.cli.dispatch import dispatch
+from syncrelay.cli.stop import StopRequest
 from syncrelay.status import document
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
@@ -53,7 +55,7 @@ def shown(capfd):
     """Runs a command in this process; gives its exit code and what it printed, which must be safe."""
 
     def run(*words):
-        code = main([str(word) for word in words])
+        code = guarded(lambda: dispatch([str(word) for word in words], stop=StopRequest()))
         printed = capfd.readouterr()
         assert_shown_safely(printed.out)
         assert_shown_safely(printed.err)
