@@ -1,9 +1,11 @@
 """What the graph shows of a topic's endpoints: nodes, types, and why they do not connect to us."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from typing import Any, Final
 
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 
 from syncrelay.config.names import is_topic_name
@@ -75,8 +77,18 @@ def topics_in(node: Any) -> dict[str, tuple[str, ...]]:
 
     DDS allows any, and who publishes there need not use ROS.
     """
-    named = dict(node.get_topic_names_and_types())
+    try:
+        named = dict(node.get_topic_names_and_types())
+    except UnicodeDecodeError:
+        # One name that is no UTF-8 hides all from rclpy; node by node, it hides those of its node.
+        named = dict(_topics_by_node(node))
     return {name: tuple(map(printable, types)) for name, types in named.items() if is_topic_name(name)}
+
+
+def _topics_by_node(node: Any) -> Iterator[tuple[str, Sequence[str]]]:
+    for name, namespace in node.get_node_names_and_namespaces():
+        with suppress(NodeNameNonExistentError, UnicodeDecodeError):
+            yield from node.get_publisher_names_and_types_by_node(name, namespace)
 
 
 def topics_alike(name: str, type_name: str, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
