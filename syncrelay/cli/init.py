@@ -49,14 +49,13 @@ def init_from_graph(seconds: float, output: str | None) -> int:
     heard = listen(seconds=seconds)
     if heard.relayed:
         remark(f"left out, as outputs of a relay that runs: {', '.join(heard.relayed)}")
-    for why in heard.unusable:
-        remark(printable(why))
     headerless = [f"{name} ({type_name}): {NO_HEADER}" for name, type_name in heard.headerless.items()]
+    without = (*heard.unusable, *headerless)
     try:
         proposal = propose_for(inventory_of(list(_streams(heard))), source=f"{seconds:g} s of the graph")
     except NothingToMatchError as error:
-        raise NothingToMatchError("\n  ".join([str(error), *headerless, _what_helps(heard)])) from error
-    return _give(replace(proposal, left_out=(*proposal.left_out, *headerless)), output)
+        raise NothingToMatchError("\n  ".join([str(error), *without, _what_helps(heard)])) from error
+    return _give(replace(proposal, left_out=(*proposal.left_out, *without)), output)
 
 
 def _give(proposal: Proposal, output: str | None) -> int:
@@ -78,6 +77,6 @@ def _streams(heard: "Heard") -> Iterator[tuple[Channel, Stream]]:
 
 
 def _what_helps(heard: "Heard") -> str:
-    if not heard.topics and not heard.headerless:
+    if not (heard.topics or heard.headerless or heard.unusable):
         return "nobody publishes anything that can be used here: start the nodes; `syncrelay doctor --live` tells more"
     return "with --seconds N it listens longer; a topic of a group may go by `stamp: receive`"

@@ -1,6 +1,7 @@
-"""Publishes over DDS under names that ROS refuses, as whoever uses no ROS may; they are given in hexadecimal digits.
+"""Publishes over DDS under names and a type that ROS refuses, as whoever uses no ROS may.
 
-rclpy and rcl take no such names, rmw does where it is told to avoid the conventions of ROS: through ctypes.
+rclpy and rcl take no such names, rmw does where it is told to avoid the conventions of ROS: through ctypes. Words are
+the type's namespace and name as DDS has them, then the topics, in hexadecimal digits.
 """
 
 import sys
@@ -56,6 +57,27 @@ class _Options(Structure):
 _PROFILE = _Profile(history=1, depth=1, reliability=1, durability=2, liveliness=1, avoid_ros_namespace_conventions=True)
 
 
+class _Support(Structure):
+    """The begin of rosidl_message_type_support_t."""
+
+    _fields_: ClassVar = [("identifier", c_char_p), ("data", c_void_p)]
+
+
+class _Callbacks(Structure):
+    """The begin of message_type_support_callbacks_t (rosidl_typesupport_fastrtps_cpp)."""
+
+    _fields_: ClassVar = [("namespace", c_char_p), ("name", c_char_p)]
+
+
+def _rename(support: c_void_p, namespace: bytes, name: bytes) -> None:
+    """Have a type go by another name, in this process and wherever it publishes."""
+    find = CDLL("librosidl_runtime_c.so").get_message_typesupport_handle
+    find.restype, find.argtypes = POINTER(_Support), [c_void_p, c_char_p]
+    found = find(support, b"rosidl_typesupport_fastrtps_c")
+    callbacks = _Callbacks.from_address(found.contents.data)
+    callbacks.namespace, callbacks.name = namespace, name
+
+
 def _type_support(message_type: Any) -> c_void_p:
     message_type.__class__.__import_type_support__()
     capsule = py_object(message_type.__class__._TYPE_SUPPORT)  # noqa: SLF001
@@ -65,7 +87,7 @@ def _type_support(message_type: Any) -> c_void_p:
     return c_void_p(pointer(capsule, name(capsule)))
 
 
-def main(names: list[str]) -> None:
+def main(namespace: bytes, name: bytes, *topics: bytes) -> None:
     rclpy.init()
     node = rclpy.create_node("odd_publisher")
     rcl, rmw = CDLL("librcl.so"), CDLL("librmw_fastrtps_cpp.so")
@@ -73,12 +95,12 @@ def main(names: list[str]) -> None:
     rmw.rmw_create_publisher.argtypes = [c_void_p, c_void_p, c_char_p, POINTER(_Profile), POINTER(_Options)]
     handle = rcl.rcl_node_get_rmw_handle(c_void_p(node.handle.pointer))
     support = _type_support(Vector3Stamped)
-    for name in names:
-        wire = b"rt/" + bytes.fromhex(name)
-        assert rmw.rmw_create_publisher(handle, support, wire, byref(_PROFILE), byref(_Options()))
+    _rename(support, namespace, name)
+    for topic in topics:
+        assert rmw.rmw_create_publisher(handle, support, b"rt/" + topic, byref(_PROFILE), byref(_Options()))
     print("up", flush=True)  # noqa: T201  whoever started it waits for this
     sys.stdin.read()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main(*map(bytes.fromhex, sys.argv[1:]))
