@@ -64,6 +64,11 @@ class McapOutput:
             text = yaml.safe_dump(self._metadata(), sort_keys=False)
             (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
 
+    @property
+    def count(self) -> int:
+        """How many messages have been written."""
+        return sum(output.count for output in self._outputs)
+
     def add(self, topic: str, type_name: str, definition: Definition | None, type_hash: str, qos: Profile) -> Output:
         """Begin a topic."""
         if type_name not in self._schemas:
@@ -86,11 +91,10 @@ class McapOutput:
 
     def _metadata(self) -> dict[str, Any]:
         begin = self._begin or 0
-        count = sum(output.count for output in self._outputs)
         span = {
             "starting_time": {"nanoseconds_since_epoch": begin},
-            "duration": {"nanoseconds": self._end - begin if count else 0},
-            "message_count": count,
+            "duration": {"nanoseconds": self._end - begin if self.count else 0},
+            "message_count": self.count,
         }
         about = {
             "version": _METADATA_VERSION,

@@ -105,7 +105,7 @@ def _name(key: str, value: Any) -> str:
     names = _NAMES[key]
     if isinstance(value, int):
         return names[value] if 0 <= value < len(names) else "unknown"
-    return str(value)
+    return value if value in names else "unknown"
 
 
 def _nanoseconds(value: Any) -> int:

@@ -6,6 +6,7 @@ from enum import Enum
 from typing import Protocol, TypeAlias
 
 from syncrelay.bag.qos import Profile
+from syncrelay.printable import printable
 
 
 class Encoding(Enum):
@@ -32,7 +33,8 @@ class Channel:
 
     `type` is a full type name (`pkg/msg/Name`), also in a ROS 1 bag. `qos` is what the publishers offered,
     empty where that was not recorded. `type_hash` is the RIHS01 hash of REP 2016, empty if it was not recorded.
-    An encoding that is not known here stands as it was recorded.
+    An encoding that is not known here stands as it was recorded. Names are printable, whatever was recorded: those
+    that are not by themselves are none that a file can have.
     """
 
     id: int
@@ -42,6 +44,12 @@ class Channel:
     definition: Definition | None = None
     qos: tuple[Profile, ...] = ()
     type_hash: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "topic", printable(self.topic))
+        object.__setattr__(self, "type", printable(self.type))
+        if not isinstance(self.encoding, Encoding):
+            object.__setattr__(self, "encoding", printable(self.encoding))
 
 
 RawMessage: TypeAlias = tuple[Channel, int, bytes]

@@ -9,6 +9,7 @@ from syncrelay.bag.analysis.topics import TopicFigures
 from syncrelay.bag.replay import GroupResult, InputResult
 from syncrelay.cli.summary import summarize
 from syncrelay.explain import in_words, words
+from syncrelay.printable import printable
 
 _SECOND = 1_000_000_000
 
@@ -16,7 +17,7 @@ _SECOND = 1_000_000_000
 def report(name: str, analysis: Analysis) -> Iterator[str]:
     """Yield the lines."""
     messages = sum(topic.messages for topic in analysis.topics)
-    yield f"{name}: {words.seconds(analysis.end - analysis.begin)}, {messages} messages of the topics named"
+    yield f"{printable(name)}: {words.seconds(analysis.end - analysis.begin)}, {messages} messages of the topics named"
     for topic in analysis.topics:
         yield ""
         yield from _topic(topic)

@@ -10,13 +10,15 @@ from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, wi
 from syncrelay.bag.wiring import wire
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
+from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new
 from syncrelay.cli.reading import reading
 from syncrelay.config import Severity, load_text
 from syncrelay.config.source import read_source
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, UsageError
+from syncrelay.printable import printable
 
 _GROUP = "matched"
 
@@ -33,26 +35,41 @@ class Asked:
 
 
 def analyze_bag(bag: str, asked: Asked) -> int:
-    """Print what a recording tells; 1 if a required topic is not in it.
+    """Print what a recording tells, with neither file nor topics what is in it; 1 if a required topic is not.
 
-    Raises ConfigError for a faulty file, BagError for a recording that cannot be read, UsageError where neither a
-    file nor topics are named.
+    Raises ConfigError for a faulty file, BagError for a recording that cannot be read, UsageError where both a file
+    and topics are named, or something is to be written of neither.
     """
-    if (asked.config is None) == (not asked.topics):
-        raise UsageError("name a file with --config FILE, or the topics to match\n  syncrelay analyze --help says more")
+    _require_sense(asked)
     with closing(open_recording([bag])) as recording:
+        if asked.config is None and not asked.topics:
+            put_inventory(bag, recording, is_json=asked.json)
+            _tell_faults(recording)
+            return DONE
         text = read_source(asked.config).text if asked.config else _proposed(recording, asked.topics)
         wirings = wire(load_text(text, name=asked.config or "<topics>", package_missing=Severity.NOTE), recording)
         for problem in (problem for wiring in wirings for problem in wiring.problems):
-            say(f"syncrelay: {problem}")
+            remark(printable(problem))
         with reading(recording):
             analysis = analyze(recording, text, wirings)
         if asked.config is None:
             analysis = settled(analysis)
-        for fault in recording.faults:
-            say(f"syncrelay: {fault}")
+        _tell_faults(recording)
     _print(bag, analysis, asked)
     return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
+
+
+def _require_sense(asked: Asked) -> None:
+    more = "\n  syncrelay analyze --help says more"
+    if asked.config is not None and asked.topics:
+        raise UsageError(f"name a file with --config FILE, or the topics to match, not both{more}")
+    if asked.config is None and not asked.topics and (asked.write or asked.html):
+        raise UsageError(f"name a file with --config FILE, or the topics to match: there is nothing to write yet{more}")
+
+
+def _tell_faults(recording: Recording) -> None:
+    for fault in recording.faults:
+        remark(printable(fault))
 
 
 def _proposed(recording: Recording, topics: Sequence[str]) -> str:

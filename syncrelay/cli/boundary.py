@@ -2,12 +2,14 @@
 
 import io
 import os
+import re
 import sys
 import traceback
 from collections.abc import Callable
 from typing import Final, TextIO
 
 from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
+from syncrelay.printable import one_entry, printable_lines
 
 DONE: Final = 0
 AT_FAULT: Final = 1
@@ -16,6 +18,9 @@ USAGE: Final = 2
 ROS_UNAVAILABLE: Final = 69
 OUR_BUG: Final = 70
 INTERRUPTED: Final = 130
+
+# All that our own texts are coloured with (syncrelay.config.render, syncrelay.doctor.text), and nothing else.
+_COLOURS: Final = re.compile("(\033\\[(?:[0-2]|3[134])m)")
 
 
 def guarded(command: Callable[[], int]) -> int:
@@ -38,7 +43,7 @@ def _guarded(command: Callable[[], int]) -> int:
         code = command()
         _to_stdout(sys.stdout.flush)
     except SyncRelayError as error:
-        say(_text(error))
+        _tell(error)
         return _code(error)
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -48,25 +53,38 @@ def _guarded(command: Callable[[], int]) -> int:
         return AT_FAULT
     except Exception:  # noqa: BLE001  the boundary: everything else is our bug
         say(traceback.format_exc())
-        say("syncrelay: this is a bug in syncrelay, please report it with the lines above and your file")
+        remark("this is a bug in syncrelay, please report it with the lines above and your file")
         return OUR_BUG
     return code
 
 
 def say(text: str) -> None:
-    """Print talk on stderr."""
-    sys.stderr.write(f"{text}\n")
+    """Print talk on stderr, as `put` does."""
+    sys.stderr.write(f"{_safe(text, sys.stderr)}\n")
     sys.stderr.flush()
 
 
+def remark(sentence: str) -> None:
+    """Print a sentence of talk on stderr; whatever it quotes, no line of it passes for another sentence."""
+    say(f"syncrelay: {one_entry(sentence)}")
+
+
 def put(text: str) -> None:
-    """Print what was asked for on stdout."""
-    _to_stdout(lambda: sys.stdout.write(f"{text}\n"))
+    """Print what was asked for on stdout: no control character but newlines and, where colour is wanted, colours."""
+    _to_stdout(lambda: sys.stdout.write(f"{_safe(text, sys.stdout)}\n"))
 
 
 def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isatty
     """Tell whether output may be coloured (https://no-color.org)."""
     return is_terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def _safe(text: str, stream: TextIO) -> str:
+    if text.isprintable() or not wants_colour(stream.isatty()):
+        return printable_lines(text)
+    # What the pattern splits off stands at the odd places.
+    parts = enumerate(_COLOURS.split(text))
+    return "".join(part if at % 2 else printable_lines(part) for at, part in parts)
 
 
 def _to_stdout(write: Callable[[], object]) -> None:
@@ -84,13 +102,14 @@ def _abandon(stream: TextIO) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _text(error: SyncRelayError) -> str:
+def _tell(error: SyncRelayError) -> None:
     from syncrelay.config.errors import ConfigError
     from syncrelay.config.render import render
 
     if isinstance(error, ConfigError):
-        return render(error.problems, colour=wants_colour(sys.stderr.isatty()))
-    return f"syncrelay: {error}"
+        say(render(error.problems, colour=wants_colour(sys.stderr.isatty())))
+    else:
+        remark(str(error))
 
 
 def _code(error: SyncRelayError) -> int:

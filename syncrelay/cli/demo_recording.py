@@ -11,6 +11,7 @@ from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.qos import Profile
 from syncrelay.cdr import patch_stamp
 from syncrelay.cli.boundary import DONE, put
+from syncrelay.printable import printable
 from syncrelay.ros.rig.scene import SCENES
 from syncrelay.ros.rig.schedule import SENSORS, schedule
 
@@ -35,7 +36,7 @@ def record(output: str, seconds: float | None, seed: int) -> int:
         for received, name, payload in heapq.merge(*(_sent(name, seed, end) for name in SENSORS)):
             recording.write(outputs[name], payload, received)
             counts[name] += 1
-    put(f"{output}: {', '.join(f'{count} of {SENSORS[name].topic}' for name, count in counts.items())}")
+    put(f"{printable(output)}: {', '.join(f'{count} of {SENSORS[name].topic}' for name, count in counts.items())}")
     return DONE
 
 

@@ -113,7 +113,8 @@ def _validate(words: Sequence[str], _stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay validate",
         description="Checks files without ROS: every error at once, each at its line, with the nearest valid word.\n"
-        "Message types are checked where ROS is installed. Exit code 1 if a file has an error.",
+        "Message types are checked where ROS is installed; that a package of theirs is not is a note. Exit code 1 if\n"
+        "a file has an error.",
     )
     parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, - for standard input")
     parser.add_argument(
@@ -177,7 +178,8 @@ def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay analyze",
         description="Measures a recording without ROS: rates, gaps, faults of stamps, offsets; what the groups of a\n"
-        "file make of it, and why; and the values that would fit. Exit code 1 if a required topic is not in it.",
+        "file make of it, and why; and the values that would fit. BAG alone: what is in it, and what to type next.\n"
+        "Exit code 1 if a required topic is not in it.",
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
     parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics to match, where there is no file yet")

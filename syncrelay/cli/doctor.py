@@ -13,6 +13,7 @@ from syncrelay.doctor.diagnosis import Diagnosis, Severity
 from syncrelay.doctor.examine import Examination, Request, examine
 from syncrelay.doctor.stamps import delay_of
 from syncrelay.doctor.text import diagnosis_lines, sighting_lines, verdict
+from syncrelay.printable import printable
 
 _LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
 
@@ -29,7 +30,7 @@ def doctor(
         say(f"looking at the graph for {live_s:g} s ...")
     examination = examine(request)
     if output_format == "json":
-        put(json.dumps(_as_json(examination), indent=2, ensure_ascii=False))
+        put(json.dumps(_as_json(examination), indent=2))
     else:
         _print_text(examination)
     return AT_FAULT if _to_mend(examination.diagnoses) else DONE
@@ -41,7 +42,7 @@ def _to_mend(diagnoses: Sequence[Diagnosis]) -> bool:
 
 def _print_text(examination: Examination) -> None:
     colour = wants_colour(sys.stdout.isatty())
-    put(_heading(examination))
+    put(printable(_heading(examination)))
     if examination.sighting is not None:
         put("\n".join(sighting_lines(examination.sighting)))
     for diagnosis in examination.diagnoses:

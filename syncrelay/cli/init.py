@@ -3,16 +3,19 @@
 import sys
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncrelay.bag import Channel, Encoding, open_recording
-from syncrelay.bag.analysis import propose, propose_for
+from syncrelay.bag.analysis import Proposal, inventory_of, propose, propose_for
+from syncrelay.bag.analysis.inventory import NO_HEADER
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.qos import Profile
-from syncrelay.cli.boundary import DONE, put, say
+from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
 from syncrelay.cli.reading import reading
 from syncrelay.errors import NothingToMatchError
+from syncrelay.printable import printable
 
 if TYPE_CHECKING:
     from syncrelay.ros.listening import Heard
@@ -25,10 +28,10 @@ def init_from_bag(bag: str, output: str | None) -> int:
     """
     with closing(open_recording([bag])) as recording:
         with reading(recording):
-            text = propose(recording)
+            proposal = propose(recording)
         for fault in recording.faults:
-            say(f"syncrelay: {fault}")
-    return _give(text, output)
+            remark(printable(fault))
+    return _give(proposal, output)
 
 
 def init_from_graph(seconds: float, output: str | None) -> int:
@@ -45,21 +48,23 @@ def init_from_graph(seconds: float, output: str | None) -> int:
         say(f"listening to the graph for {seconds:g} s ...")
     heard = listen(seconds=seconds)
     if heard.relayed:
-        say(f"syncrelay: left out, as outputs of a relay that runs: {', '.join(heard.relayed)}")
-    for why in heard.unusable:
-        say(f"syncrelay: {why}")
+        remark(f"left out, as outputs of a relay that runs: {', '.join(heard.relayed)}")
+    headerless = [f"{name} ({type_name}): {NO_HEADER}" for name, type_name in heard.headerless.items()]
+    without = (*heard.unusable, *headerless)
     try:
-        text = propose_for(list(_streams(heard)), source=f"{seconds:g} s of the graph")
+        proposal = propose_for(inventory_of(list(_streams(heard))), source=f"{seconds:g} s of the graph")
     except NothingToMatchError as error:
-        raise NothingToMatchError("\n  ".join([str(error), *_what_was_heard(heard)])) from error
-    return _give(text, output)
+        raise NothingToMatchError("\n  ".join([str(error), *without, _what_helps(heard)])) from error
+    return _give(replace(proposal, left_out=(*proposal.left_out, *without)), output)
 
 
-def _give(text: str, output: str | None) -> int:
+def _give(proposal: Proposal, output: str | None) -> int:
+    for sentence in proposal.left_out:
+        remark(printable(f"left out: {sentence}"))
     if output is None:
-        put(text.rstrip())
+        put(proposal.text.rstrip())
     else:
-        write_new(output, text)
+        write_new(output, proposal.text)
     return DONE
 
 
@@ -71,14 +76,7 @@ def _streams(heard: "Heard") -> Iterator[tuple[Channel, Stream]]:
         yield Channel(number, topic.name, topic.type, Encoding.CDR, qos=(profile,)), stream
 
 
-def _what_was_heard(heard: "Heard") -> Iterator[str]:
-    """Yield what there is, and what may help."""
-    for topic in heard.topics:
-        unset = topic.stamps.count(0)
-        yield f"{topic.name} ({topic.type}): {len(topic.stamps)} messages{f', {unset} with stamp 0' if unset else ''}"
-    for name, type_name in heard.headerless.items():
-        yield f"{name} ({type_name}): its type has no header, and so no stamp to match by"
-    if not heard.topics and not heard.headerless:
-        yield "nobody publishes anything that can be used here: start the nodes; `syncrelay doctor --live` tells more"
-    else:
-        yield "with --seconds N it listens longer; a topic of a group may go by `stamp: receive`"
+def _what_helps(heard: "Heard") -> str:
+    if not (heard.topics or heard.headerless or heard.unusable):
+        return "nobody publishes anything that can be used here: start the nodes; `syncrelay doctor --live` tells more"
+    return "with --seconds N it listens longer; a topic of a group may go by `stamp: receive`"

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Final
 
-from syncrelay.cli.boundary import say
+from syncrelay.cli.boundary import remark
 from syncrelay.errors import BagError
 
 _HEAD: Final = 500
@@ -19,7 +19,7 @@ def write_new(name: str, text: str) -> None:
         raise BagError(f"{path}: exists already, and is not overwritten") from error
     except OSError as error:
         raise BagError(f"{path}: cannot be written: {error.strerror}") from error
-    say(f"syncrelay: {path} is written")
+    remark(f"{path} is written")
 
 
 def write_again(name: str, text: str, *, mark: str) -> None:

@@ -9,6 +9,7 @@ from typing import Final
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
 from syncrelay.cli.relays import find_one
 from syncrelay.errors import SyncRelayError
+from syncrelay.printable import one_entry, printable
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask
 from syncrelay.top.state import Relay
 
@@ -31,10 +32,10 @@ def reload(named: str | None) -> int:
         time.sleep(_POLL_S)
         now = _relay(url)
         if now.reloads != before.reloads:
-            put(f"{now.node} has read {now.config} again")
+            put(printable(f"{now.node} has read {now.config} again"))
             return DONE
         if now.refused_reloads != before.refused_reloads:
-            say(f"{now.node} goes on as before, its file is left aside:\n{now.reload_error}")
+            say(one_entry(f"{now.node} goes on as before, its file is left aside:\n{now.reload_error}"))
             return AT_FAULT
     raise SyncRelayError(f"{before.node} has not read its file within {_PATIENCE_S:.0f} s")
 

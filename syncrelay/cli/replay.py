@@ -12,10 +12,12 @@ from syncrelay.bag.replay import Listener
 from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.wiring import Wiring, wire
 from syncrelay.bag.writing import SetWriter
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.reading import reading
 from syncrelay.cli.summary import summarize
 from syncrelay.config import Severity, load
+from syncrelay.config.wording import counted
+from syncrelay.printable import printable
 from syncrelay.sync import Match, Outcome
 
 
@@ -40,10 +42,14 @@ def replay(bags: Sequence[str], config_path: str, wanted: Wanted) -> int:
         opened.callback(recording.close)
         wirings = wire(config, recording)
         _say_all(problem for wiring in wirings for problem in wiring.problems)
-        listeners = [*_printing(wanted), *_writing(wanted, wirings, opened)]
+        written = _written(wanted.output, wirings, opened)
+        listeners = [*_printing(wanted), *([] if written is None else [_writing(written, wirings)])]
         with reading(recording):
             results = replay_groups(recording, wirings, listeners=listeners)
         _say_all(recording.faults)
+    if written is not None:
+        sets = sum(result.sets for result in results)
+        remark(f"{wanted.output} is written: {counted(written.count, 'message')} of {counted(sets, 'set')}")
     tell = say if wanted.sets or wanted.drops else put
     for result in results:
         for line in summarize(result):
@@ -53,7 +59,7 @@ def replay(bags: Sequence[str], config_path: str, wanted: Wanted) -> int:
 
 def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:
     for sentence in sentences:
-        say(f"syncrelay: {sentence}")
+        remark(printable(sentence))
 
 
 def _printing(wanted: Wanted) -> Iterator[Listener]:
@@ -71,13 +77,19 @@ def _printing(wanted: Wanted) -> Iterator[Listener]:
         yield print_drop
 
 
-def _writing(wanted: Wanted, wirings: Sequence[Wiring], opened: ExitStack) -> Iterator[Listener]:
-    if wanted.output is None:
-        return
-    writer = SetWriter(opened.enter_context(McapOutput(Path(wanted.output))))
+def _written(output: str | None, wirings: Sequence[Wiring], opened: ExitStack) -> McapOutput | None:
+    """Return the recording to be written, if one is, with what there is to say of it."""
+    if output is None:
+        return None
+    channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)
+    recording = opened.enter_context(McapOutput(Path(output)))
+    if any(channel.encoding is Encoding.ROS1 for channel in channels):
+        remark("the recording is of ROS 1, what is written is CDR as ROS 2 has it, without header.seq")
+    return recording
+
+
+def _writing(recording: McapOutput, wirings: Sequence[Wiring]) -> Listener:
+    writer = SetWriter(recording)
     for wiring in wirings:
         writer.begin(wiring)
-    channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)
-    if any(channel.encoding is Encoding.ROS1 for channel in channels):
-        say("syncrelay: the recording is of ROS 1, what is written is CDR as ROS 2 has it, without header.seq")
-    yield writer.take
+    return writer.take

@@ -1,5 +1,6 @@
 """`syncrelay top`: a running relay on the terminal, or once as text."""
 
+import json
 import os
 import sys
 from collections.abc import Sequence
@@ -30,7 +31,8 @@ def top(named: str | None, output: Output) -> int:
         _require_terminal()
         return _screen(find(named, otherwise=_otherwise(named)))
     answer = find_one(named, otherwise=_otherwise(named))
-    put(answer.document.decode().rstrip("\n") if output is Output.JSON else _as_text(answer))
+    # Made anew: JSON may hold as they are what a terminal must not see.
+    put(json.dumps(json.loads(answer.document)) if output is Output.JSON else _as_text(answer))
     return DONE
 
 

@@ -9,6 +9,8 @@ from typing import Any, Final
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 from syncrelay.config.source import STDIN
+from syncrelay.config.wording import counted
+from syncrelay.printable import printable, printable_lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,8 @@ def validate(files: Sequence[str], output_format: str) -> int:
 def _check(file: str) -> Finding:
     name = "<stdin>" if file == STDIN else file
     try:
-        config = load(file)
+        # A package may be installed where the relay runs, and replay needs none.
+        config = load(file, package_missing=Severity.NOTE)
     except ConfigError as error:
         return Finding(name, None, error.problems)
     return Finding(name, config, config.notes)
@@ -47,7 +50,7 @@ def _print_text(findings: Sequence[Finding]) -> None:
 
 
 def _print_json(findings: Sequence[Finding]) -> None:
-    put(json.dumps([_as_json(finding) for finding in findings], indent=2, ensure_ascii=False))
+    put(json.dumps([_as_json(finding) for finding in findings], indent=2))
 
 
 def _print_github(findings: Sequence[Finding]) -> None:
@@ -55,7 +58,7 @@ def _print_github(findings: Sequence[Finding]) -> None:
         for problem in finding.problems:
             put(_workflow_command(problem))
         if finding.config is not None:
-            put(_ok(finding.file, finding.config))
+            put(_inert(_ok(finding.file, finding.config)))
 
 
 _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
@@ -67,11 +70,7 @@ _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
 
 def _ok(file: str, config: Config) -> str:
     n_topics = len({topic.topic for group in config.groups for topic in group.topics})
-    return f"{file}: ok, {_count(len(config.groups), 'group')}, {_count(n_topics, 'topic')}"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+    return f"{printable(file)}: ok, {counted(len(config.groups), 'group')}, {counted(n_topics, 'topic')}"
 
 
 def _as_json(finding: Finding) -> dict[str, Any]:
@@ -110,8 +109,13 @@ def _workflow_command(problem: Problem) -> str:
     return f"::{command} {written}::{_escaped(text)}"
 
 
+def _inert(line: str) -> str:
+    """Return a line that GitHub takes for no command, whatever the file is called."""
+    return line.replace("::", "%3A%3A").replace("##[", "##%5B")
+
+
 def _escaped(text: str) -> str:
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return printable_lines(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _escaped_property(text: str) -> str:

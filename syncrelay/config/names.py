@@ -22,6 +22,15 @@ def check_topic_name(name: object) -> str:
     return name
 
 
+def is_topic_name(name: str) -> bool:
+    """Tell whether ROS takes a topic name: not all who write recordings, or publish over DDS, keep to its rules."""
+    try:
+        check_topic_name(name)
+    except ValueError:
+        return False
+    return True
+
+
 def check_namespace(name: str) -> str:
     """Return a node's namespace, empty or `/` for the root; raises ValueError saying what is wrong."""
     if name not in ("", "/"):

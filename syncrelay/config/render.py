@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from syncrelay.config.problems import Problem, Severity, Span
-from syncrelay.config.wording import printable
+from syncrelay.printable import printable
 
 _MOST_SHOWN: Final = 100
 _TAB_WIDTH: Final = 4
@@ -36,7 +36,7 @@ def _block(problem: Problem, *, colour: bool) -> str:
     bold, reset = (_BOLD, _RESET) if colour else ("", "")
     prefix = "note: " if problem.severity is Severity.NOTE else ""
     path = f"{problem.path}: " if problem.path else ""
-    head = f"{bold}{where(problem)}:{reset} {prefix}{bold}{path}{reset}{problem.text}"
+    head = f"{bold}{where(problem)}:{reset} {prefix}{bold}{path}{reset}{printable(problem.text)}"
     if problem.span is None or not problem.source.strip():
         return head
     return f"{head}\n{_excerpt(problem.source, problem.span, colour=colour)}"

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from syncrelay.printable import printable
+
 _LONGEST_QUOTE = 60
 
 
@@ -29,11 +31,6 @@ def quoted(text: str) -> str:
     return f"'{line}'" if "`" in line else f"`{line}`"
 
 
-def printable(text: str) -> str:
-    """Return the text on one line, with escapes for what would move a cursor or hide in a terminal."""
-    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
-
-
 def describe(value: object) -> str:
     """Say what a value of the file is: the number `5`, the text `abc`, a list."""
     match value:
@@ -49,6 +46,11 @@ def describe(value: object) -> str:
             return "a list"
         case _:
             return "a mapping"
+
+
+def counted(number: int, word: str) -> str:
+    """Return `1 node` or `3 nodes`."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
 def one_of(words: Iterable[str]) -> str:

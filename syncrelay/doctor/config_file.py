@@ -4,9 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from syncrelay.config import Config, Problem, Severity, TopicConfig, render
-from syncrelay.config.wording import all_of
+from syncrelay.config.wording import all_of, counted
 from syncrelay.doctor.diagnosis import Diagnosis, know, mend
-from syncrelay.doctor.words import counted
 
 
 def check_file(file: str, problems: Sequence[Problem]) -> Iterator[Diagnosis]:

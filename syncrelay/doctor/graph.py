@@ -3,10 +3,9 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from syncrelay.config.wording import all_of, one_of
+from syncrelay.config.wording import all_of, counted, one_of
 from syncrelay.doctor.diagnosis import Diagnosis, Severity, know, mend
 from syncrelay.doctor.discovery import ports_of
-from syncrelay.doctor.words import counted
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 
 # Of Fast DDS's shared memory by default, in bytes: a message has to fit into it as a whole.

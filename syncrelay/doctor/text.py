@@ -5,11 +5,11 @@ from typing import Final
 
 from rich.cells import cell_len
 
-from syncrelay.config.wording import printable
 from syncrelay.doctor.diagnosis import Diagnosis, Severity
 from syncrelay.doctor.graph import summary
 from syncrelay.doctor.stamps import delay_of
 from syncrelay.doctor.words import duration
+from syncrelay.printable import printable
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 
 _BOLD, _RED, _YELLOW, _DIM, _RESET = "\033[1m", "\033[31m", "\033[33m", "\033[2m", "\033[0m"
@@ -21,22 +21,26 @@ def diagnosis_lines(found: Diagnosis, *, colour: bool) -> Iterator[str]:
     """Yield a block: what is so, marked with its severity, then what follows and what to do."""
     mark, bold, dim, reset = (_MARK[found.severity], _BOLD, _DIM, _RESET) if colour else ("", "", "", "")
     first, *rest = found.what.splitlines()
-    yield f"{mark}{found.severity.value:<6}{reset}{bold}{_shown(first)}{reset}"
-    yield from (f"{_INDENT}{_shown(line)}" for line in rest)
+    yield f"{mark}{found.severity.value:<6}{reset}{bold}{printable(first)}{reset}"
+    yield from (f"{_INDENT}{printable(line)}" for line in rest)
     yield from _labelled("so", found.so, dim, reset)
     yield from _labelled("do", found.do, dim, reset)
 
 
 def _labelled(label: str, text: str, dim: str, reset: str) -> Iterator[str]:
     first, *rest = text.splitlines()
-    yield f"{_INDENT}{dim}{label}{reset}  {_shown(first)}"
-    yield from (f"{_INDENT}    {_shown(line)}" for line in rest)
+    yield f"{_INDENT}{dim}{label}{reset}  {printable(first)}"
+    yield from (f"{_INDENT}    {printable(line)}" for line in rest)
 
 
 def sighting_lines(sighting: Sighting) -> Iterator[str]:
     """Yield what was seen of the graph: a line of counts, then a line for each topic of the file."""
     yield f"seen in {sighting.seconds:.0f} s: {summary(sighting)}"
-    rows = [_row(topic) for topic in sighting.topics]
+    yield from aligned([_row(topic) for topic in sighting.topics])
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows as lines, each column as wide as its widest cell."""
     widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         padded = [cell + " " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)]
@@ -68,7 +72,3 @@ def verdict(diagnoses: Sequence[Diagnosis]) -> str:
     if not to_mend:
         things.insert(0, "nothing to mend")
     return ", ".join(things)
-
-
-def _shown(text: str) -> str:
-    return printable(text)

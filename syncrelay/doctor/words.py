@@ -13,8 +13,3 @@ def duration(ns: float) -> str:
             count = ns / length
             return f"{count:.{0 if size >= 100 * length else 1}f} {unit}".replace(".0 ", " ")
     return "0 ms" if size < 1e5 else f"{ns / 1e6:.1f} ms"  # noqa: PLR2004  a tenth of a millisecond
-
-
-def counted(number: int, word: str) -> str:
-    """Return `1 node` or `3 nodes`."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"

@@ -1,12 +1,16 @@
 """What the graph shows of a topic's endpoints: nodes, types, and why they do not connect to us."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from typing import Any, Final
 
+from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 
+from syncrelay.config.names import is_topic_name
 from syncrelay.explain import Endpoint, Mismatch
+from syncrelay.printable import printable
 
 _RELIABILITY: Final = {QoSReliabilityPolicy.BEST_EFFORT: "best_effort", QoSReliabilityPolicy.RELIABLE: "reliable"}
 _DURABILITY: Final = {QoSDurabilityPolicy.VOLATILE: "volatile", QoSDurabilityPolicy.TRANSIENT_LOCAL: "transient_local"}
@@ -53,7 +57,7 @@ def subscribers(infos: Iterable[Any], offered: QoSProfile) -> tuple[Endpoint, ..
 
 
 def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None]) -> tuple[Endpoint, ...]:
-    return tuple(Endpoint(_node(info), info.topic_type, why(info.qos_profile)) for info in infos)
+    return tuple(Endpoint(node_of(info), printable(info.topic_type), why(info.qos_profile)) for info in infos)
 
 
 def is_nameless(info: Any) -> bool:
@@ -61,10 +65,30 @@ def is_nameless(info: Any) -> bool:
     return bool(info.node_name == _NAMELESS)
 
 
-def _node(info: Any) -> str:
+def node_of(info: Any) -> str:
+    """Return the full name of an endpoint's node."""
     if is_nameless(info):
         return "a node of unknown name"
-    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+    return printable(f"{info.node_namespace.rstrip('/')}/{info.node_name}")
+
+
+def topics_in(node: Any) -> dict[str, tuple[str, ...]]:
+    """Return the topics of the graph and their types; but for names against ROS's rules, on which rclpy raises.
+
+    DDS allows any, and who publishes there need not use ROS.
+    """
+    try:
+        named = dict(node.get_topic_names_and_types())
+    except UnicodeDecodeError:
+        # One name that is no UTF-8 hides all from rclpy; node by node, it hides those of its node.
+        named = dict(_topics_by_node(node))
+    return {name: tuple(map(printable, types)) for name, types in named.items() if is_topic_name(name)}
+
+
+def _topics_by_node(node: Any) -> Iterator[tuple[str, Sequence[str]]]:
+    for name, namespace in node.get_node_names_and_namespaces():
+        with suppress(NodeNameNonExistentError, UnicodeDecodeError):
+            yield from node.get_publisher_names_and_types_by_node(name, namespace)
 
 
 def topics_alike(name: str, type_name: str, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:

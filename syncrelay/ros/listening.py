@@ -3,7 +3,7 @@
 import os
 import time
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -14,8 +14,10 @@ from rclpy.qos import QoSReliabilityPolicy
 
 from syncrelay.cdr import read_stamp
 from syncrelay.config import QosOverrides
+from syncrelay.config.interfaces import Interfaces
 from syncrelay.errors import RosUnavailableError, TypeImportError
-from syncrelay.ros.graph import is_nameless
+from syncrelay.printable import printable
+from syncrelay.ros.graph import is_nameless, topics_in
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.path import Content, Path, Source
 from syncrelay.ros.path_choice import VARIABLE, choose_path
@@ -50,7 +52,7 @@ class Heard:
     """What was heard.
 
     `relayed` are outputs of relays that run already; `headerless` are topics without stamps, with their types;
-    `unusable` says why a type cannot be had.
+    `unusable` says of each topic whose type cannot be had why.
     """
 
     topics: tuple[HeardTopic, ...]
@@ -92,6 +94,7 @@ class _Listener:
         self._relayed: set[str] = set()
         self._headerless: dict[str, str] = {}
         self._unusable: dict[str, str] = {}
+        self._interfaces = Interfaces.find(os.environ)
         self._subscribed: list[tuple[Any, Source]] = []
         self._count = 0
 
@@ -112,22 +115,21 @@ class _Listener:
             self._loop.stop()
             return
         self._due = now + _LOOK_NS
-        for name, types in self._node.get_topic_names_and_types():
-            is_known = name in self._topics or name in self._headerless or name in self._relayed
+        for name in topics_in(self._node):
+            is_known = any(name in known for known in (self._topics, self._headerless, self._relayed, self._unusable))
             if not is_known and name not in _OF_EVERY_NODE and not _is_hidden(name):
-                self._find(name, types)
+                self._find(name)
 
-    def _find(self, name: str, types: Sequence[str]) -> None:
+    def _find(self, name: str) -> None:
         publishers = self._node.get_publishers_info_by_topic(name)
-        is_unknown = not publishers or any(map(is_nameless, publishers))
-        if is_unknown or any(type_name in self._unusable for type_name in types):
+        if not publishers or any(map(is_nameless, publishers)):
             return
         # Of a topic with publishers of several types, no group could take more than one.
-        type_name = publishers[0].topic_type
+        type_name = printable(publishers[0].topic_type)
         try:
-            message_type = import_type(type_name)
+            message_type = self._imported(type_name)
         except TypeImportError as error:
-            self._unusable[type_name] = str(error)
+            self._unusable[name] = f"{name} ({type_name}): {str(error).splitlines()[0]}"
             return
         if not begins_with_header(message_type):
             self._headerless[name] = type_name
@@ -138,6 +140,13 @@ class _Listener:
         offered = [each.qos_profile for each in publishers if each.topic_type == type_name]
         self._topics[name] = HeardTopic(name, type_name, all(map(_is_reliable, offered)))
         self._subscribe(self._topics[name], message_type, input_profile(QosOverrides(), offered))
+
+    def _imported(self, type_name: str) -> Any:
+        """Import a type that others name: that runs its package, so none but what is installed as a message."""
+        installed, package = self._interfaces, type_name.partition("/")[0]
+        if installed is None or package not in installed.packages or type_name not in installed.types(package):
+            raise TypeImportError("its type is not installed here, or not sourced")
+        return import_type(type_name)
 
     def _subscribe(self, topic: HeardTopic, message_type: Any, profile: Any) -> None:
         def take(_payload: Any, content: Content, received: int) -> None:

@@ -6,6 +6,8 @@ import sys
 from datetime import UTC, datetime
 from typing import Any
 
+from syncrelay.printable import one_entry
+
 LOGGER = logging.getLogger("syncrelay")
 
 
@@ -13,13 +15,13 @@ _ROS_LEVELS = {"WARNING": "WARN", "CRITICAL": "FATAL"}
 
 
 class _TextFormatter(logging.Formatter):
-    """As ROS prints it, so that it reads on in a launch's output."""
+    """As ROS prints it, so that it reads on in a launch's output; no line but the first of a record looks like that."""
 
     def format(self, record: logging.LogRecord) -> str:
         level = _ROS_LEVELS.get(record.levelname, record.levelname)
         source = getattr(record, "node", record.name)
         text = f"[{level}] [{record.created:.3f}] [{source}]: {record.getMessage()}"
-        return f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text
+        return one_entry(f"{text}\n{self.formatException(record.exc_info)}" if record.exc_info else text)
 
 
 class _JsonFormatter(logging.Formatter):
@@ -55,7 +57,7 @@ class RosoutHandler(logging.Handler):
         }
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(record.getMessage())
+        self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(one_entry(record.getMessage()))
 
 
 def name_after(node_name: str) -> None:

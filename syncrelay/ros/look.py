@@ -13,7 +13,8 @@ from syncrelay.cdr import read_stamp
 from syncrelay.config import TopicConfig
 from syncrelay.config.wording import nearest
 from syncrelay.errors import RosUnavailableError, TypeImportError
-from syncrelay.ros.graph import is_nameless
+from syncrelay.printable import printable
+from syncrelay.ros.graph import is_nameless, node_of, topics_in
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
@@ -113,7 +114,7 @@ def _watch(
             for payload, received in _drained(topic.subscription) if topic.subscription else ():
                 topic.take(payload, received, clock.time_of(received))
         time.sleep(_POLL_S)
-    listed = dict(node.get_topic_names_and_types())
+    listed = topics_in(node)
     published = [name for name in listed if name not in _OF_EVERY_NODE and _is_published(node, name)]
     return Sighting(
         seconds=time.monotonic() - began,
@@ -187,8 +188,8 @@ def _seen_publisher(endpoint: Any, topic: _Watched) -> SeenPublisher:
         compatibility, reason = qos_check_compatible(offered, topic.profile)
         mismatch = _in_words(reason) if compatibility == QoSCompatibility.ERROR else None
     return SeenPublisher(
-        node="" if is_nameless(endpoint) else f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}",
-        type=endpoint.topic_type,
+        node="" if is_nameless(endpoint) else node_of(endpoint),
+        type=printable(endpoint.topic_type),
         offers=f"{_word(offered.reliability)}, {_word(offered.durability)}",
         mismatch=mismatch,
     )
@@ -227,5 +228,5 @@ def _is_hidden(name: str) -> bool:
 
 
 def _others(node: Any) -> Sequence[str]:
-    found = [f"{namespace.rstrip('/')}/{name}" for name, namespace in node.get_node_names_and_namespaces()]
+    found = [printable(f"{namespace.rstrip('/')}/{name}") for name, namespace in node.get_node_names_and_namespaces()]
     return sorted(name for name in found if not name.endswith(f"/{_NODE}"))

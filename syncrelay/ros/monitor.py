@@ -18,7 +18,7 @@ from syncrelay.explain import (
     Silence,
     remarkable,
 )
-from syncrelay.ros.graph import topics_alike
+from syncrelay.ros.graph import topics_alike, topics_in
 from syncrelay.ros.group import Batch, GroupRelay
 from syncrelay.ros.inputs import TopicInput, Wiring
 from syncrelay.ros.receive import ReceiveLoop
@@ -165,9 +165,10 @@ class Monitor:
     def _alike(self, topic_input: TopicInput) -> tuple[str, ...]:
         """Find what may have been meant: our own outputs are not it."""
         outputs = {topic.output for wiring in self._wirings for topic in wiring.group.config.topics}
-        topics = self._node.get_topic_names_and_types()
         published = [
-            (name, types) for name, types in topics if name not in outputs and self._node.count_publishers(name)
+            (name, types)
+            for name, types in topics_in(self._node).items()
+            if name not in outputs and self._node.count_publishers(name)
         ]
         return topics_alike(topic_input.name, topic_input.type, published)
 

@@ -12,8 +12,8 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS
-from syncrelay.config.wording import printable
 from syncrelay.errors import SyncRelayError, UsageError
+from syncrelay.printable import printable
 from syncrelay.status.announcement import Place, announced
 from syncrelay.status.hosts import REFUSAL
 from syncrelay.top.state import NotAStateError, State, read_state

@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, TypeAlias
 
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BeforeValidator, TypeAdapter, ValidationError
 
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.printable import printable
 from syncrelay.status import Level, Phase
+
+Text: TypeAlias = Annotated[str, AfterValidator(printable)]
+"""A text as it may be shown: who answers at a port may be anyone."""
 
 
 class NotAStateError(SyncRelayError):
@@ -19,9 +23,9 @@ class NotAStateError(SyncRelayError):
 class Relay:
     """The relay as a whole, its reloads as RelayState has them. `pid` is its number where it runs, 0 if not told."""
 
-    node: str
-    version: str
-    config: str
+    node: Text
+    version: Text
+    config: Text
     phase: Phase
     ready: bool
     uptime_s: float
@@ -52,7 +56,7 @@ class SetFigures:
 class Tolerance:
     """The key of the file that says how far apart the stamps of a set may be."""
 
-    key: str
+    key: Text
     ms: float
 
 
@@ -60,17 +64,17 @@ class Tolerance:
 class Mismatch:
     """A QoS policy by which two do not connect."""
 
-    policy: str
-    offered: str
-    requested: str
+    policy: Text
+    offered: Text
+    requested: Text
 
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
     """A publisher of an input or a subscriber of an output."""
 
-    node: str
-    type: str
+    node: Text
+    type: Text
     mismatch: Mismatch | None
 
 
@@ -78,9 +82,9 @@ class Endpoint:
 class Input:
     """An input and its output. `dropped_lately` counts the last ten seconds, `missing` is a share of the sets."""
 
-    topic: str
-    type: str
-    output: str
+    topic: Text
+    type: Text
+    output: Text
     required: bool
     rate_hz: float
     age_ms: float | None
@@ -89,8 +93,8 @@ class Input:
     received: int
     matched: int
     buffered: int
-    dropped: Mapping[str, int]
-    dropped_lately: Mapping[str, int]
+    dropped: Mapping[Text, int]
+    dropped_lately: Mapping[Text, int]
     lost: int
     missing: float
     publishers: tuple[Endpoint, ...]
@@ -102,10 +106,10 @@ class Input:
 class Finding:
     """One thing that is so; `severity` is never STALE."""
 
-    code: str
+    code: Text
     severity: Level
-    text: str
-    suggestion: str | None
+    text: Text
+    suggestion: Text | None
 
 
 def _outcome(told: Any) -> Any:
@@ -122,8 +126,8 @@ def _outcome(told: Any) -> Any:
 class Group:
     """A group; `last_sets` and `recent` oldest first."""
 
-    name: str
-    policy: str
+    name: Text
+    policy: Text
     level: Level
     queue_size: int
     tolerance: Tolerance | None
@@ -165,4 +169,4 @@ def read_state(document: bytes) -> State:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"])) or "the document"
-        raise NotAStateError(f"{where}: {first['msg']}") from error
+        raise NotAStateError(printable(f"{where}: {first['msg']}")) from error

@@ -13,17 +13,24 @@ from syncrelay.config import Severity, load_text
 from syncrelay.errors import NothingToMatchError
 from tests.bag.making import BEST_EFFORT, write_mcap, write_rosbag2
 from tests.ros import recordings
-from tests.ros.cdr_messages import STRING, VECTOR, header, serialize, vector
+from tests.ros.cdr_messages import STORE, STRING, VECTOR, header, serialize, vector
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS, at, jittery, merged
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+POINT = "geometry_msgs/msg/PointStamped"
+
+
+def _left_out(bag: Path) -> dict[str, str]:
+    """Why each topic is left out, by its name and type."""
+    with closing(open_recording([str(bag)])) as recording:
+        return dict(sentence.split(": ", 1) for sentence in propose(recording).left_out)
 
 
 def _proposed(bag: Path) -> tuple[str, dict[str, int]]:
     """The text for a recording, and the sets of each group when it is replayed."""
     with closing(open_recording([str(bag)])) as recording:
-        text = propose(recording)
+        text = propose(recording).text
     with closing(open_recording([str(bag)])) as recording:
         results = replay(recording, wire(load_text(text, package_missing=Severity.NOTE), recording))
     return text, {result.name: result.sets for result in results}
@@ -60,32 +67,82 @@ def test_a_constant_distance_is_told(tmp_path):
     assert "if one trigger starts both, write `offset: " in _proposed(write_mcap(tmp_path / "rig.mcap", frames))[0]
 
 
-def test_topics_without_stamps_or_with_few_messages_are_left_out(tmp_path):
-    text = [Frame("/text", STRING, BEGIN + n * MS, serialize(STRING, "x")) for n in range(50)]
-    unset = [Frame("/unset", VECTOR, BEGIN + n * 100 * MS, vector(0)) for n in range(50)]
-    frames = merged(text, unset, at("/rare", 1, 2, 3), _stereo_and_lidar())
-    proposed, _ = _proposed(write_mcap(tmp_path / "rig.mcap", frames))
-    for topic in ("/text", "/unset", "/rare"):
-        assert topic not in proposed
+def _no_groups_topics() -> list[Frame]:
+    """Topics that no group can take, each for another reason."""
+    at_100_ms = [BEGIN + n * 100 * MS for n in range(50)]
+    return merged(
+        [Frame("/text", STRING, time, serialize(STRING, "x")) for time in at_100_ms],
+        [Frame("/unset", VECTOR, time, vector(0)) for time in at_100_ms],
+        [Frame("/unset_once", VECTOR, time, vector(0 if n == 3 else time)) for n, time in enumerate(at_100_ms[:10])],
+        [Frame("/stuck", VECTOR, time, vector(BEGIN)) for time in at_100_ms],
+        [Frame("/diagnostics", DIAGNOSTICS, time, serialize(DIAGNOSTICS, header(time), [])) for time in at_100_ms],
+        at("/rare", 1, 2, 3),
+        jittery("/a<script>", period_ms=100, jitter_ms=3, count=50, seed=3),
+    )
 
 
-def test_topics_that_ros_could_not_have_are_left_out(tmp_path):
-    strange = jittery("/a<script>", period_ms=100, jitter_ms=3, count=50, seed=3)
-    proposed, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(strange, _stereo_and_lidar())))
-    assert "script" not in proposed
+def test_every_topic_that_is_left_out_is_named_with_the_reason(tmp_path):
+    bag = write_mcap(tmp_path / "rig.mcap", merged(_no_groups_topics(), _stereo_and_lidar()))
+    text, sets = _proposed(bag)
+    assert {topic.topic for group in load_text(text).groups for topic in group.topics} == {"/left", "/right", "/lidar"}
     assert sets["fused"] >= 49
+    assert _left_out(bag) == {
+        f"/a<script> ({VECTOR})": "a topic name has letters, digits, `_` and `/` only, found `<` in `/a<script>`",
+        f"/diagnostics ({DIAGNOSTICS})": "nodes tell of themselves in it, no sensor of the world",
+        f"/rare ({VECTOR})": "3 messages, and 10 are the fewest that tell a rhythm",
+        f"/stuck ({VECTOR})": "50 messages, all of one stamp",
+        f"/text ({STRING})": "its type has no header, and so no stamp to match by",
+        f"/unset ({VECTOR})": "50 messages, 50 with stamp 0",
+        f"/unset_once ({VECTOR})": "10 messages, 1 with stamp 0",
+    }
 
 
-def test_what_nodes_say_of_themselves_is_no_sensor(tmp_path):
-    said = [
-        Frame(
-            "/diagnostics", DIAGNOSTICS, BEGIN + n * 100 * MS, serialize(DIAGNOSTICS, header(BEGIN + n * 100 * MS), [])
-        )
-        for n in range(50)
-    ]
-    proposed, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(said, _stereo_and_lidar())))
-    assert "/diagnostics" not in proposed
-    assert sets["fused"] >= 49
+def test_where_all_can_be_matched_none_is_left_out(tmp_path):
+    assert _left_out(write_mcap(tmp_path / "rig.mcap", _stereo_and_lidar())) == {}
+
+
+def test_what_gives_no_set_with_the_others_is_named_too(tmp_path):
+    early = jittery("/early", period_ms=100, jitter_ms=3, count=50, seed=3)
+    late = [frame._replace(topic="/late", time=frame.time + 3_600_000 * MS) for frame in early]
+    late = [frame._replace(payload=vector(frame.time)) for frame in late]
+    with (
+        closing(open_recording([str(write_mcap(tmp_path / "rig.mcap", [*early, *late]))])) as recording,
+        pytest.raises(NothingToMatchError) as raised,
+    ):
+        propose(recording)
+    said = [f"/early ({VECTOR}): 50 messages, and no set with the others"]
+    said += [f"/late ({VECTOR}): 50 messages, and no set with the others"]
+    assert str(raised.value).split("\n  ") == ["no two topics of the recording give a set", *said]
+
+
+def test_of_a_topic_of_two_types_the_one_with_more_messages_is_taken(tmp_path):
+    few = [frame._replace(type_name=POINT, payload=_point(frame.time)) for frame in at("/left", *range(0, 3000, 100))]
+    first, second = tmp_path / "0.mcap", tmp_path / "1.mcap"
+    write_mcap(first, few)
+    write_mcap(second, _stereo_and_lidar())
+    text, _ = _proposed(tmp_path)
+    assert {topic.type for group in load_text(text).groups for topic in group.topics} == {VECTOR}
+    why = f"a group takes one type of a topic, and more messages of it are {VECTOR}"
+    assert _left_out(tmp_path) == {f"/left ({POINT})": why}
+
+
+def _point(stamp: int) -> bytes:
+    return serialize(POINT, header(stamp), STORE.types["geometry_msgs/msg/Point"](0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("fast_ms", "latency_ms", "size"), [(5, 50, 60), (20, 50, 16), (50, 0, None)], ids=["readme", "less", "default"]
+)
+def test_queues_are_as_long_as_the_rule_of_the_readme_asks(fast_ms, latency_ms, size, tmp_path):
+    lidar = [each._replace(time=each.time + latency_ms * MS) for each in at("/lidar", *range(0, 9000, 100))]
+    text, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(at("/imu", *range(0, 9000, fast_ms)), lidar)))
+    (group,) = load_text(text).groups
+    assert group.keys.queue_size == (size or 10)
+    assert ("queue_size" in text) == (size is not None)
+    if size is not None:
+        (line,) = (line for line in text.splitlines() if "queue_size" in line)
+        assert f"twice the {size // 2} messages of /imu that may come before one of /lidar does" in line
+    assert sets["fused"] == 90
 
 
 @pytest.mark.parametrize("frames", [[], at("/one", *range(0, 5000, 100))], ids=["few", "one"])

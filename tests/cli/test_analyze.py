@@ -1,12 +1,15 @@
 import json
+import shlex
 
 import pytest
 
 from syncrelay.cli.demo import shipped_config
 from tests.bag.making import rig, write_mcap
 from tests.cli.command import run
-from tests.ros.cdr_messages import VECTOR
+from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
 from tests.ros.configs import config, inputs
+from tests.ros.frames import Frame
+from tests.ros.streams import BEGIN, MS, at, merged
 from tests.ros.summary import read_summary
 
 _TOPICS = ("/camera", "/lidar")
@@ -91,11 +94,86 @@ def test_topics_without_a_file_get_one(folder, tmp_path):
     assert read_summary(replayed.stdout)["matched"].sets == 100
 
 
+_INVENTORY = f"""\
+other rig.mcap: 9.9 s, 300 messages of 4 topics
+  topic    type                              messages  rate   stamps
+  /camera  {VECTOR}  100       10 Hz  5 ms before receipt
+  /lidar   {VECTOR}  100       10 Hz  5 ms before receipt
+  /text    {STRING}               50        20 Hz  none: its type has no header, and so no stamp to match by
+  /unset   {VECTOR}  50        20 Hz  50 with stamp 0
+
+Next, to match two topics or more:
+  syncrelay analyze 'other rig.mcap' /camera /lidar
+or to have a file proposed for all, and see what it makes of the recording:
+  syncrelay init --from-bag 'other rig.mcap' -o fusion.yaml
+  syncrelay analyze 'other rig.mcap' --config fusion.yaml
+"""
+
+
+@pytest.fixture
+def other_rig(folder):
+    """A recording of the rig, and of topics that no group can take."""
+    text = [Frame("/text", STRING, BEGIN + n * 50 * MS, serialize(STRING, "x")) for n in range(50)]
+    unset = [Frame("/unset", VECTOR, BEGIN + n * 50 * MS, vector(0)) for n in range(50)]
+    return write_mcap(folder / "other rig.mcap", merged(rig(100), text, unset))
+
+
+def test_a_recording_alone_gets_its_topics_listed_and_what_to_type_next(folder, other_rig):
+    done = run("analyze", other_rig.name, folder=folder)
+    assert (done.returncode, done.stdout, done.stderr) == (0, _INVENTORY, "")
+    commands = [shlex.split(line) for line in done.stdout.splitlines() if line.startswith("  syncrelay ")]
+    for _, *words in commands:
+        assert run(*words, folder=folder).returncode == 0
+
+
+def test_the_list_is_there_for_programs_too(folder, other_rig):
+    found = json.loads(run("analyze", other_rig.name, "--json", folder=folder).stdout)
+    assert found["groups"] == []
+    assert {topic["topic"]: (topic["messages"], topic["unfit"]) for topic in found["topics"]} == {
+        "/camera": (100, None),
+        "/lidar": (100, None),
+        "/text": (50, "its type has no header, and so no stamp to match by"),
+        "/unset": (50, "50 messages, 50 with stamp 0"),
+    }
+
+
+def test_of_a_recording_with_nothing_to_match_no_command_is_shown(folder):
+    write_mcap(folder / "one.mcap", at("/lidar", *range(0, 2000, 100)))
+    done = run("analyze", "one.mcap", folder=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "equal to receipt" in done.stdout
+    assert done.stdout.splitlines()[-1].startswith("No two topics have stamps and enough messages")
+
+
+def test_keys_that_no_two_inputs_have_in_common_are_found(folder):
+    frames = [
+        Frame(f"/{name}", VECTOR, BEGIN + n * 100 * MS, vector(BEGIN + n * 100 * MS, frame_id=f"{name}_{n}"))
+        for n in range(100)
+        for name in ("left", "right")
+    ]
+    write_mcap(folder / "keys.mcap", frames)
+    topics = inputs(dict.fromkeys(("/left", "/right"), VECTOR))
+    (folder / "keys.yaml").write_text(
+        config({"seen": {"policy": "equal_key", "key": "header.frame_id", "topics": topics}})
+    )
+    done = run("analyze", "keys.mcap", "--config", "keys.yaml", "--json", folder=folder)
+    (group,) = json.loads(done.stdout)["groups"]
+    (found,) = (finding for finding in group["findings"] if finding["code"] == "no_common_key")
+    assert "the newest are 'left_" in found["text"]
+    # It explains the silence, which the others only describe.
+    assert group["findings"][0] == found
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (["rig.mcap"], 2, "name a file with --config FILE, or the topics to match"),
-        (["rig.mcap", "/camera", "--config", "f.yaml"], 2, "name a file with --config FILE, or the topics to match"),
+        (["rig.mcap", "--html", "r.html"], 2, "name a file with --config FILE, or the topics to match: there is"),
+        (["rig.mcap", "--write", "n.yaml"], 2, "name a file with --config FILE, or the topics to match: there is"),
+        (
+            ["rig.mcap", "/camera", "--config", "f.yaml"],
+            2,
+            "name a file with --config FILE, or the topics to match, not both",
+        ),
         (["rig.mcap", "/camera"], 2, "name 2 topics or more"),
         (["rig.mcap", "/camera", "/lidr"], 1, "/lidr is not in the recording, did you mean `/lidar`?"),
         (["none.mcap", "/camera", "/lidar"], 1, "none.mcap: no such file or folder"),

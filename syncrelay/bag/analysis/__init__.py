@@ -2,13 +2,18 @@
 
 from syncrelay.bag.analysis.analysis import Analysis, GroupAnalysis, analyze, proposed_text, settled
 from syncrelay.bag.analysis.changes import Change, patch, with_changes
-from syncrelay.bag.analysis.proposal import propose, propose_for
+from syncrelay.bag.analysis.inventory import Topic, inventory, inventory_of
+from syncrelay.bag.analysis.proposal import Proposal, propose, propose_for
 
 __all__ = [
     "Analysis",
     "Change",
     "GroupAnalysis",
+    "Proposal",
+    "Topic",
     "analyze",
+    "inventory",
+    "inventory_of",
     "patch",
     "propose",
     "propose_for",

@@ -1,15 +1,16 @@
 """The stamps of a recording, read once: all that the analysis asks for comes from these arrays."""
 
 from array import array
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.payloads import stamp_reader, value_reader
-from syncrelay.bag.recording import Channel, Recording
+from syncrelay.bag.recording import Channel, Encoding, Recording
 from syncrelay.bag.wiring import Wiring
 from syncrelay.config import StampSource
 
@@ -40,6 +41,7 @@ class Stream:
 
 
 _Wanted: TypeAlias = tuple[str, StampSource, str | None]
+_Take: TypeAlias = Callable[[int, int, bytes], None]
 
 
 def read_streams(recording: Recording, wirings: Sequence[Wiring]) -> tuple[tuple[Stream, ...], ...]:
@@ -48,7 +50,7 @@ def read_streams(recording: Recording, wirings: Sequence[Wiring]) -> tuple[tuple
     Raises BagError for a stamp or key that a recorded type does not have.
     """
     streams: dict[_Wanted, Stream] = {}
-    takers: dict[Channel, list[Callable[[int, int, bytes], None]]] = {}
+    takers: dict[Channel, list[_Take]] = {}
     chosen: list[tuple[Stream, ...]] = []
     for wiring in wirings:
         of_group = []
@@ -61,13 +63,36 @@ def read_streams(recording: Recording, wirings: Sequence[Wiring]) -> tuple[tuple
                     takers.setdefault(channel, []).append(taker)
             of_group.append(streams[wanted])
         chosen.append(tuple(of_group))
-    for place, (channel, received, payload) in enumerate(recording.messages(takers.keys())):
-        for take in takers[channel]:
-            take(place, received, payload)
+    _pour(recording, takers)
     return tuple(chosen)
 
 
-def _taker(stream: Stream, channel: Channel, source: StampSource, key: str | None) -> Callable[[int, int, bytes], None]:
+def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
+    """Read a recording to its end; give a channel and a stream for each topic and type that it has.
+
+    Stamps are those of the headers; of a topic without, or whose type is not known, the times of receipt.
+    """
+    found: dict[tuple[str, str, Encoding | str], tuple[Channel, Stream]] = {}
+    takers: dict[Channel, list[_Take]] = {}
+    for channel in recording.channels:
+        first = (channel, Stream(channel.topic, channel.type))
+        _, stream = found.setdefault((channel.topic, channel.type, channel.encoding), first)
+        takers[channel] = [_taker(stream, channel, "header" if _has_stamps(channel) else "receive", None)]
+    _pour(recording, takers)
+    return tuple(found.values())
+
+
+def _has_stamps(channel: Channel) -> bool:
+    return isinstance(channel.encoding, Encoding) and bool(begins_with_header(channel))
+
+
+def _pour(recording: Recording, takers: Mapping[Channel, Sequence[_Take]]) -> None:
+    for place, (channel, received, payload) in enumerate(recording.messages(takers.keys())):
+        for take in takers[channel]:
+            take(place, received, payload)
+
+
+def _taker(stream: Stream, channel: Channel, source: StampSource, key: str | None) -> _Take:
     read_stamp = stamp_reader(source, channel)
     read_key: Callable[[bytes], Any] | None = None if key is None else value_reader(channel, key)
 

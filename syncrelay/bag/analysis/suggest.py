@@ -29,7 +29,8 @@ _PERIODS: Final = 1.5
 _FAR_OFF: Final = 4
 # A slop so many times what is needed lets wrong messages in where the right ones are missing.
 _TOO_WIDE: Final = 4
-_LARGEST_QUEUE: Final = 1000
+LARGEST_QUEUE: Final = 1000
+"""More messages than that are not suggested to be kept, whatever would come of it."""
 _SAME_SPAN: Final = 1.02
 _UNSET: Final = 0.5
 _MEASURED: Final = ("exact_time", "approximate_time", "approximate_time_eager", "approximate_epsilon_time")
@@ -202,7 +203,7 @@ def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list
     queues = found.queues[found.spans <= slop]
     need = int(np.quantile(queues, 0.995, method="inverted_cdf")) if len(queues) else 1
     size = need + ceil(need / 4) + 1
-    while size <= 4 * max(need, group.keys.queue_size) and size <= _LARGEST_QUEUE:
+    while size <= 4 * max(need, group.keys.queue_size) and size <= LARGEST_QUEUE:
         if size > group.keys.queue_size:
             reason = f"up to {need} messages of one input come before a set that it is in can leave"
             yield [Change(group.name, None, "queue_size", size, reason)]

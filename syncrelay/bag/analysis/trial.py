@@ -75,11 +75,16 @@ class _Run:
         stream = self._streams[index]
         now, stamp = stream.received[at], stream.stamps[at]
         self.let_go(now)
-        key: Hashable = stream.keys[at] if stream.keys is not None else None
+        key = self.key(index, at)
         if stamp == UNREADABLE or (stream.keys is not None and key is None):
             self._settle([self.engine.reject(Message(index, 0, now), DropReason.MALFORMED)], now)
         else:
             self._settle(self.engine.add(Message(index, stamp, now, key), now=now), now)
+
+    def key(self, index: int, at: int) -> Hashable:
+        """Give the key of one message, None where it has none."""
+        keys = self._streams[index].keys
+        return None if keys is None else keys[at]
 
     def let_go(self, now: int) -> None:
         """Let what has waited long enough leave, each at its own time."""
@@ -128,6 +133,7 @@ def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingF
     watch = GroupWatch(group, began=begin)
     found: dict[tuple[Code, int | None], tuple[Finding, int]] = {}
     arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]
+    keys: list[Hashable] = [None] * len(streams)
     seen = 0
     due = begin + _SECOND
 
@@ -135,11 +141,11 @@ def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingF
         nonlocal arrivals, seen
         new = [(each.stamps, each.latency) for each in run.sets[seen:]]
         seen = len(run.sets)
-        watch.add(arrivals, new, run.engine.counts(), run.engine.sets, now=now)
+        watch.add(arrivals, new, run.engine.counts(), run.engine.sets, keys=tuple(keys), now=now)
         arrivals = [[] for _ in streams]
         for finding in find(watch.facts(graph, now=now)):
-            key = (finding.code, finding.input)
-            found[key] = (finding, found.get(key, (finding, 0))[1] + 1)
+            which = (finding.code, finding.input)
+            found[which] = (finding, found.get(which, (finding, 0))[1] + 1)
 
     for index, at in run.order:
         received = streams[index].received[at]
@@ -149,6 +155,8 @@ def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingF
         run.feed(index, at)
         if streams[index].stamps[at] != UNREADABLE:
             arrivals[index].append((streams[index].stamps[at], received))
+        if (key := run.key(index, at)) is not None:
+            keys[index] = key
     look(due)
     lasting = [LastingFinding(finding, seconds) for finding, seconds in found.values()]
     bad = [each for each in lasting if each.finding.severity is not Severity.OK and each.seconds >= _PASSING]

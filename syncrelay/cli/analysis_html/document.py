@@ -14,6 +14,7 @@ from syncrelay.cli.analysis_html.drawings import drawings_of
 from syncrelay.cli.analysis_html.fates import FATES, Fate
 from syncrelay.cli.analysis_html.words import TopicRow, group_words, topic_row
 from syncrelay.explain import words
+from syncrelay.printable import printable, printable_lines
 
 MARK: Final = '<meta name="generator" content="syncrelay">'
 """Stands near the begin of every page, and in no other file."""
@@ -34,7 +35,7 @@ def as_html(name: str, analysis: Analysis) -> str:
     script, style = _joined(_SCRIPTS), _joined(_STYLES)
     page: str = _template().render(
         mark=MARK,
-        name=name,
+        name=printable(name),
         began=_when(analysis.begin),
         lasts=words.seconds(analysis.end - analysis.begin),
         messages=sum(topic.messages for topic in analysis.topics),
@@ -43,7 +44,7 @@ def as_html(name: str, analysis: Analysis) -> str:
         groups=told,
         fates={fate.name: fate for fate in FATES},
         drawings={"fates": [_fate(fate) for fate in FATES], "groups": [each.for_script for each in drawings]},
-        file=with_changes(analysis.text, analysis.changes).rstrip(),
+        file=printable_lines(with_changes(analysis.text, analysis.changes)).rstrip(),
         script=script,
         style=style,
         script_hash=_hash(script),
