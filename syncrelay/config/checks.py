@@ -1,6 +1,5 @@
 """What single keys can't tell: names that meet, topics that groups share, a restamp that names no input."""
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
@@ -8,8 +7,11 @@ from syncrelay.config.document import Document, MappingNode, ScalarNode, Sequenc
 from syncrelay.config.drafts import GroupDraft, TopicDraft
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem, Severity
+from syncrelay.config.units import MAX_NS, NS_PER_UNIT
 from syncrelay.config.wording import did_you_mean, quoted
 
+# What is longer is refused as out of range.
+_LONGEST_S = MAX_NS // NS_PER_UNIT["s"]
 _RESTAMP_WORDS = ("none", "earliest", "latest")
 
 
@@ -96,8 +98,9 @@ def _unit(group: GroupDraft, document: Document) -> Iterator[Problem]:
     path = (*group.path, "slop")
     node = document.find(path)
     slop = plain(node) if isinstance(node, ScalarNode) else None
-    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop < math.inf:
-        text = f"{slop:g} without a unit is {slop:g} s; write {slop:g}ms if milliseconds are meant, else {slop:g}s"
+    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop <= _LONGEST_S:
+        number = f"{slop:.15g}"
+        text = f"{number} without a unit is {number} s; write {number}ms if milliseconds are meant, else {number}s"
         problem = _at(document, path, text, code="unit")
         yield replace(problem, severity=Severity.NOTE)
 
