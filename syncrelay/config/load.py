@@ -14,6 +14,7 @@ from syncrelay.config.errors import ConfigError
 from syncrelay.config.file import File, FileKeys
 from syncrelay.config.filling import with_defaults
 from syncrelay.config.interfaces import Interfaces
+from syncrelay.config.own_topics import check_own_topics
 from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import Config, resolve
 from syncrelay.config.source import Source, check_text, read_source
@@ -55,6 +56,7 @@ def _config(source: Source, environ: Mapping[str, str], package_missing: Severit
     problems += faults
     groups = drafts(document)
     problems += check_between(groups, document)
+    problems += check_own_topics(groups, document)
     problems += _types(groups, document, environ, package_missing)
     found = _in_order(problems)
     if file is None or any(problem.severity is Severity.ERROR for problem in found):
