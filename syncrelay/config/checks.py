@@ -114,9 +114,10 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
         if other is topic:
             continue
         if topic.type and other.type and topic.type != other.type:
-            line = document.value_span((*other.path, "type")).line
-            text = f"{quoted(topic.topic)} is {quoted(other.type)} in line {line}, and one topic has one type"
-            yield _at(document, (*topic.path, "type"), text, code="conflict")
+            path = (*topic.path, "type")
+            line = document.line((*other.path, "type"), beside=path)
+            text = f"{quoted(topic.topic)} is {quoted(other.type)} in {line}, and one topic has one type"
+            yield _at(document, path, text, code="conflict")
         if topic.qos != other.qos:
             yield _qos_conflict(topic, other, document)
 
@@ -124,10 +125,9 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
 def _qos_conflict(topic: TopicDraft, other: TopicDraft, document: Document) -> Problem:
     own = (*topic.path, "qos")
     path = own if document.find(own) else (*topic.path, "topic")
-    line = document.value_span(
-        (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
-    ).line
-    text = f"{quoted(str(topic.topic))} has another `qos` in line {line}: it is subscribed once, write the same in both"
+    others = (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
+    line = document.line(others, beside=path)
+    text = f"{quoted(str(topic.topic))} has another `qos` in {line}: it is subscribed once, write the same in both"
     return _at(document, path, text, code="conflict")
 
 
@@ -140,12 +140,12 @@ def _outputs(groups: Sequence[GroupDraft], document: Document) -> Iterator[Probl
         name = quoted(topic.output)
         what = f"the output {name}" if topic.has_own_output else f"the default output {name}"
         if topic.output in inputs:
-            line = document.value_span((*inputs[topic.output].path, "topic")).line
-            text = f"{what} is an input too (line {line}): its messages would come back, give it another `output`"
+            line = document.line((*inputs[topic.output].path, "topic"), beside=topic.output_path)
+            text = f"{what} is an input too ({line}): its messages would come back, give it another `output`"
             yield _at(document, topic.output_path, text, code="loop")
         elif topic.output in outputs:
-            line = document.value_span(outputs[topic.output].output_path).line
-            text = f"{what} is taken by line {line}, give it another `output`"
+            line = document.line(outputs[topic.output].output_path, beside=topic.output_path)
+            text = f"{what} is taken by {line}, give it another `output`"
             yield _at(document, topic.output_path, text, code="repeated_output")
         outputs.setdefault(topic.output, topic)
 
