@@ -86,8 +86,8 @@ def _content(path: str, patience_s: float) -> bytes:
     if kind is not None:
         # Not even opened: to open a device may do something.
         raise _unreadable(path, f"is a {kind}, expected a YAML file")
-    # Not to wait for whoever writes to a pipe: that has an end below.
-    with FileIO(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)) as file:
+    # Not to wait until somebody writes to a pipe: the wait has an end below.
+    with FileIO(path, opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
         return _read(file, deadline=time.monotonic() + patience_s)
 
 
