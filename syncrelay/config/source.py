@@ -71,7 +71,7 @@ def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) ->
     try:
         content = _content(path, patience_s)
     except TimeoutError as error:
-        text = f"its end did not come within {patience_s:g} s: is it a pipe that nobody writes to, or closes?"
+        text = f"could not be read to its end within {patience_s:g} s: is it a pipe that nobody writes to, or closes?"
         raise _unreadable(path, text) from error
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
