@@ -1,6 +1,5 @@
 """What single keys can't tell: names that meet, topics that groups share, a restamp that names no input."""
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
@@ -8,8 +7,11 @@ from syncrelay.config.document import Document, MappingNode, ScalarNode, Sequenc
 from syncrelay.config.drafts import GroupDraft, TopicDraft
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem, Severity
-from syncrelay.config.wording import did_you_mean, quoted
+from syncrelay.config.units import MAX_NS, NS_PER_UNIT
+from syncrelay.config.wording import quoted
 
+# What is longer is refused as out of range.
+_LONGEST_S = MAX_NS // NS_PER_UNIT["s"]
 _RESTAMP_WORDS = ("none", "earliest", "latest")
 
 
@@ -56,7 +58,7 @@ def _restamp(group: GroupDraft, document: Document) -> Iterator[Problem]:
     inputs = [topic.topic for topic in group.topics if topic.topic]
     if group.restamp in _RESTAMP_WORDS or group.restamp_topic in inputs:
         return
-    hint = did_you_mean(group.restamp, (*_RESTAMP_WORDS, *inputs))
+    hint = document.did_you_mean(group.restamp, (*_RESTAMP_WORDS, *inputs))
     text = f"{quoted(group.restamp)} is not an input of this group, nor none, earliest or latest{hint}"
     yield _at(document, (*group.path, "restamp"), text, code="bad_value")
 
@@ -67,7 +69,7 @@ def _trigger(group: GroupDraft, document: Document) -> Iterator[Problem]:
     inputs = {topic.topic: topic for topic in group.topics if topic.topic}
     path = (*group.path, "trigger")
     if group.trigger_topic not in inputs:
-        hint = did_you_mean(group.trigger, inputs)
+        hint = document.did_you_mean(group.trigger, inputs)
         yield _at(document, path, f"{quoted(group.trigger)} is not an input of this group{hint}", code="bad_value")
     elif not inputs[group.trigger_topic].is_required:
         text = f"{quoted(group.trigger)} triggers every set, so it cannot be optional (`required: false`)"
@@ -96,8 +98,9 @@ def _unit(group: GroupDraft, document: Document) -> Iterator[Problem]:
     path = (*group.path, "slop")
     node = document.find(path)
     slop = plain(node) if isinstance(node, ScalarNode) else None
-    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop < math.inf:
-        text = f"{slop:g} without a unit is {slop:g} s; write {slop:g}ms if milliseconds are meant, else {slop:g}s"
+    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop <= _LONGEST_S:
+        number = f"{slop:.15g}"
+        text = f"{number} without a unit is {number} s; write {number}ms if milliseconds are meant, else {number}s"
         problem = _at(document, path, text, code="unit")
         yield replace(problem, severity=Severity.NOTE)
 
@@ -111,9 +114,10 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
         if other is topic:
             continue
         if topic.type and other.type and topic.type != other.type:
-            line = document.value_span((*other.path, "type")).line
-            text = f"{quoted(topic.topic)} is {quoted(other.type)} in line {line}, and one topic has one type"
-            yield _at(document, (*topic.path, "type"), text, code="conflict")
+            path = (*topic.path, "type")
+            line = document.line((*other.path, "type"), beside=path)
+            text = f"{quoted(topic.topic)} is {quoted(other.type)} in {line}, and one topic has one type"
+            yield _at(document, path, text, code="conflict")
         if topic.qos != other.qos:
             yield _qos_conflict(topic, other, document)
 
@@ -121,10 +125,9 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
 def _qos_conflict(topic: TopicDraft, other: TopicDraft, document: Document) -> Problem:
     own = (*topic.path, "qos")
     path = own if document.find(own) else (*topic.path, "topic")
-    line = document.value_span(
-        (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
-    ).line
-    text = f"{quoted(str(topic.topic))} has another `qos` in line {line}: it is subscribed once, write the same in both"
+    others = (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
+    line = document.line(others, beside=path)
+    text = f"{quoted(str(topic.topic))} has another `qos` in {line}: it is subscribed once, write the same in both"
     return _at(document, path, text, code="conflict")
 
 
@@ -137,12 +140,12 @@ def _outputs(groups: Sequence[GroupDraft], document: Document) -> Iterator[Probl
         name = quoted(topic.output)
         what = f"the output {name}" if topic.has_own_output else f"the default output {name}"
         if topic.output in inputs:
-            line = document.value_span((*inputs[topic.output].path, "topic")).line
-            text = f"{what} is an input too (line {line}): its messages would come back, give it another `output`"
+            line = document.line((*inputs[topic.output].path, "topic"), beside=topic.output_path)
+            text = f"{what} is an input too ({line}): its messages would come back, give it another `output`"
             yield _at(document, topic.output_path, text, code="loop")
         elif topic.output in outputs:
-            line = document.value_span(outputs[topic.output].output_path).line
-            text = f"{what} is taken by line {line}, give it another `output`"
+            line = document.line(outputs[topic.output].output_path, beside=topic.output_path)
+            text = f"{what} is taken by {line}, give it another `output`"
             yield _at(document, topic.output_path, text, code="repeated_output")
         outputs.setdefault(topic.output, topic)
 

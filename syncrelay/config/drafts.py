@@ -64,7 +64,7 @@ class GroupDraft:
 
 def drafts(document: Document) -> tuple[GroupDraft, ...]:
     """Return what can be read of a file's groups."""
-    absolute = _absolute_names(document)
+    absolute = absolute_names(document)
     groups = document.find(("groups",))
     if groups is None:
         return ()
@@ -119,7 +119,8 @@ def _topic(
     )
 
 
-def _absolute_names(document: Document) -> Callable[[str], str]:
+def absolute_names(document: Document) -> Callable[[str], str]:
+    """Return what makes a name of the file absolute, as its node does."""
     node = document.find(("node",))
     own = node if isinstance(node, MappingNode) else MappingNode(document.root.span)
     name = _checked(check_node_name, _value(own, "name")) or "syncrelay"

@@ -6,6 +6,7 @@ from typing import Any, Final
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Float64
 
+from syncrelay.config.own_topics import DIAGNOSTICS, SCALARS
 from syncrelay.explain import Distribution, GroupReport, InputFacts, explanation
 from syncrelay.status import Level, level
 
@@ -25,7 +26,7 @@ class Diagnostics:
     def __init__(self, node: Any) -> None:
         self._node = node
         self._name = node.get_fully_qualified_name()
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = node.create_publisher(DiagnosticArray, DIAGNOSTICS, 10)
 
     def publish(self, reports: Sequence[GroupReport]) -> None:
         """Publish the state of all groups, if anyone listens."""
@@ -56,7 +57,7 @@ class Scalars:
         self._publishers = {
             (group, figure): node.create_publisher(Float64, f"~/{group}/{figure}", 10)
             for group in groups
-            for figure in ("sets_hz", "span_ms", "latency_ms")
+            for figure in SCALARS
         }
 
     def publish(self, reports: Sequence[GroupReport]) -> None:

@@ -38,16 +38,16 @@ class _File:
 
     def __init__(self, stage: Stage, *arguments: str, **groups: Any) -> None:
         self.relay = stage.relay(config(groups, metrics=ANY_PORT), *arguments)
-        self._path = stage.folder / "config-0.yaml"
-        if not self._path.exists():
-            self._path = max(stage.folder.glob("config-*.yaml"))
+        self.path = stage.folder / "config-0.yaml"
+        if not self.path.exists():
+            self.path = max(stage.folder.glob("config-*.yaml"))
         self.relay.wait_for_log("status and metrics: ")
 
     def write(self, text: str) -> None:
         # In one go: a file that is half written is no file of the user's.
-        new = self._path.with_suffix(".new")
+        new = self.path.with_suffix(".new")
         new.write_text(text)
-        new.replace(self._path)
+        new.replace(self.path)
 
     def reload(self, **groups: Any) -> None:
         """Write the file, have it read, and wait until it is taken."""
@@ -158,6 +158,39 @@ def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
     aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
     collector, player = stage.collector(aligned), stage.player(_PAIR)
     relaying.connect(player, collector, recording, aligned)
+
+
+def test_a_pipe_moved_over_a_watched_file_holds_nothing_up(stage: Stage):
+    file = _File(stage, "--watch", front=_FRONT)
+    relay, path = file.relay, file.path
+    os.mkfifo(path.with_suffix(".pipe"))
+    path.with_suffix(".pipe").replace(path)
+    # Somebody opens the pipe to write to it only once the relay reads it.
+    held = os.open(path, os.O_WRONLY)
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+    collector, player = stage.collector(aligned), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, aligned)
+    wait_until(lambda: file.count("refused_reloads") == 1, "the pipe to be given up")
+    os.close(held)
+    file.write(config({"front": _FRONT, "rear": _rear()}, metrics=ANY_PORT))
+    wait_until(lambda: file.count("reloads") == 1, "the file that replaced it to be read")
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+
+
+def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
+    second = stage.folder / "second.yaml"
+    second.write_text(config({"rear": _rear()}))
+    file = _File(stage, "--config", str(second), "--watch", front=_FRONT)
+    file.relay.wait_for_log("rear: waiting for")
+    state = status(file.relay)
+    assert [group["name"] for group in state["groups"]] == ["front", "rear"]
+    assert state["relay"]["config"] == f"{file.path}, {second}"
+    second.write_text(config({"rear": _rear(), "left": _rear(output_prefix="/left")}))
+    file.relay.wait_for_log("the file was read again: 2 groups go on, 1 begin")
+    file.write(config({"left": _FRONT}, metrics=ANY_PORT))
+    file.relay.wait_for_log(f"of {file.path} too: give one of them another name")
 
 
 def test_a_watched_file_is_read_when_it_changes(stage: Stage):
