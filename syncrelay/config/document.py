@@ -7,7 +7,8 @@ from typing import Any, Final, NamedTuple, TypeAlias
 from syncrelay.config.problems import Path, Problem, Severity, Span, dotted
 from syncrelay.config.scalars import Scalar
 from syncrelay.config.source import Source
-from syncrelay.config.wording import LIKENESS, nearest, or_nearest, printable
+from syncrelay.config.wording import LIKENESS, nearest, or_nearest
+from syncrelay.printable import printable
 
 MOST_VALUES: Final = 200_000
 """In a file, after following every alias and filling in defaults: a thousand groups are a tenth of it."""

@@ -6,7 +6,8 @@ from typing import Any
 from syncrelay.config.document import Document, Entry, MappingNode
 from syncrelay.config.file import FileKeys
 from syncrelay.config.problems import Path, Problem
-from syncrelay.config.wording import printable, quoted
+from syncrelay.config.wording import quoted
+from syncrelay.printable import printable
 
 _ONE_FOR_ALL = ("node", "metrics", "diagnostics")
 
