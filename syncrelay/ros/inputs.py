@@ -271,14 +271,18 @@ class TopicInput:
             except RefusedError as error:
                 user.refusal = None if user.publisher else error.refusal
                 self._put_off(error)
+        lost = None
         try:
+            lost = _losses(subscription)
             source = self._path.source(subscription, self._deliver)
             old = self._loop.call(lambda: self._swap(source, publishers)).result()
-        except (RclCallError, OSError) as error:
+        except (_rclpy.RCLError, RclCallError, OSError) as error:
+            # It would hold on to the subscription.
+            lost = None
             for entity in (*publishers.values(), subscription):
                 self._entities.end(entity)
             raise RefusedError(Refusal("receive", self.name, self.type, why=str(error))) from error
-        self._profile, self._lost = profile, _losses(subscription)
+        self._profile, self._lost = profile, lost
         old.append(self._subscription)
         self._subscription = subscription
         for entity in old:
