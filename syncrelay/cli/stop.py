@@ -66,6 +66,8 @@ class StopRequest:
 
     def _request(self, _signal: int, _frame: FrameType | None) -> None:
         self.requested = True
+        # There is nothing to read again; and as it ends, Python would let the signal kill the process.
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
         if self._wake is not None:
             self._wake()
         elif not self._deferred:

@@ -88,11 +88,11 @@ def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stag
     told = {name: wait_for_finding(file.relay, "refused_by_dds", name) for name in ("outputs", "subscriptions")}
     events, log = "rcl_interfaces/msg/ParameterEvent", "rcl_interfaces/msg/Log"
     assert {name: (finding["severity"], finding["topic"], finding["text"]) for name, finding in told.items()} == {
-        "outputs": ("error", "/x", f"DDS refuses to publish /o1 as {_IMU}: this process has it as {events} already"),
+        "outputs": ("error", "/x", f"the relay cannot publish /o1 as {_IMU}: this process has it as {events} already"),
         "subscriptions": (
             "error",
             "/z",
-            f"DDS refuses to subscribe to /z as {_FIELD}: this process has it as {log} already",
+            f"the relay cannot subscribe to /z as {_FIELD}: this process has it as {log} already",
         ),
     }
     assert "refused_by_dds" not in findings(file.relay)
@@ -109,7 +109,7 @@ def test_a_file_with_an_output_that_dds_refuses_is_left_aside_and_all_goes_on(st
     # The first output would have to end for the other group's, which could be made.
     third = _group(("/x", _IMU, "/o3"), ("/mag", _FIELD, "/o1"))
     why = file.refuse(config({"front": _FRONT, "swap": third}, metrics=ANY_PORT))
-    assert why.startswith(f"DDS refuses to publish /o3 as {_IMU}: ")
+    assert why.startswith(f"the relay cannot publish /o3 as {_IMU}: ")
     _wait_for_outputs(collector, {"/o1": _IMU, "/o2": _FIELD})
     player.play(recording)
     relaying.conclude(player, collector, recording, _ALIGNED)

@@ -113,7 +113,7 @@ def test_what_cannot_be_made_after_the_old_ended_leaves_all_as_it_was(here):
     before, groups = _published(here), here.wirings.groups
     answers = iter([False, False, False, True, False, False])
     here.entities.refuses = lambda: next(answers)
-    with pytest.raises(ReloadError, match="DDS refuses to publish /a as any: no more memory"):
+    with pytest.raises(ReloadError, match="the relay cannot publish /a as any: no more memory"):
         here.wirings.wire([groups[1], *_groups(**_OTHER)])
     assert _published(here) == before
     assert here.wirings.groups == groups
