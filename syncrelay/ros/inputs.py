@@ -261,8 +261,6 @@ class TopicInput:
 
         An output that DDS does not make anew goes on as it was.
         """
-        if self._profile is not None:
-            _LOG.info("%s: its publishers' QoS changed, subscribing anew", self.name)
         subscription = self._entities.subscription(self._message_type, self._topic, profile)
         publishers: dict[User, Any] = {}
         for user in self._users:
@@ -282,6 +280,8 @@ class TopicInput:
             for entity in (*publishers.values(), subscription):
                 self._entities.end(entity)
             raise RefusedError(Refusal("receive", self.name, self.type, why=str(error))) from error
+        if self._profile is not None:
+            _LOG.info("%s: its publishers' QoS changed, subscribed anew", self.name)
         self._profile, self._lost = profile, lost
         old.append(self._subscription)
         self._subscription = subscription
