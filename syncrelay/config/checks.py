@@ -17,12 +17,18 @@ def check_between(groups: Sequence[GroupDraft], document: Document) -> Iterator[
     """Yield what is wrong between the keys of a file, types aside."""
     yield from _too_few(groups, document)
     for group in groups:
-        yield from _repeated_inputs(group, document)
         yield from _restamp(group, document)
         yield from _trigger(group, document)
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
         yield from _unit(group, document)
+    yield from check_names(groups, document)
+
+
+def check_names(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
+    """Yield what is wrong between the names of topics, be they the file's own or what remaps make of them."""
+    for group in groups:
+        yield from _repeated_inputs(group, document)
     yield from _shared_topics(groups, document)
     yield from _outputs(groups, document)
     yield from _too_long(groups, document)
@@ -46,8 +52,8 @@ def _repeated_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]
         if topic.topic is None:
             continue
         if topic.topic in first:
-            line = document.value_span((*first[topic.topic].path, "topic")).line
-            text = f"{quoted(topic.topic)} is in this group twice, first in line {line}"
+            line = _line_of_topic(first[topic.topic], document)
+            text = f"{_name_of_topic(topic)} is in this group twice, first in {line}"
             yield _at(document, (*topic.path, "topic"), text, code="repeated_topic")
         first.setdefault(topic.topic, topic)
 
@@ -112,7 +118,7 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
             continue
         if topic.type and other.type and topic.type != other.type:
             line = document.value_span((*other.path, "type")).line
-            text = f"{quoted(topic.topic)} is {quoted(other.type)} in line {line}, and one topic has one type"
+            text = f"{_name_of_topic(topic)} is {quoted(other.type)} in line {line}, and one topic has one type"
             yield _at(document, (*topic.path, "type"), text, code="conflict")
         if topic.qos != other.qos:
             yield _qos_conflict(topic, other, document)
@@ -124,7 +130,7 @@ def _qos_conflict(topic: TopicDraft, other: TopicDraft, document: Document) -> P
     line = document.value_span(
         (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
     ).line
-    text = f"{quoted(str(topic.topic))} has another `qos` in line {line}: it is subscribed once, write the same in both"
+    text = f"{_name_of_topic(topic)} has another `qos` in line {line}: it is subscribed once, write the same in both"
     return _at(document, path, text, code="conflict")
 
 
@@ -134,17 +140,34 @@ def _outputs(groups: Sequence[GroupDraft], document: Document) -> Iterator[Probl
     for topic in _topics(groups):
         if topic.output is None:
             continue
-        name = quoted(topic.output)
+        name = _named(topic.output, topic.output_before)
         what = f"the output {name}" if topic.has_own_output else f"the default output {name}"
         if topic.output in inputs:
-            line = document.value_span((*inputs[topic.output].path, "topic")).line
-            text = f"{what} is an input too (line {line}): its messages would come back, give it another `output`"
+            line = _line_of_topic(inputs[topic.output], document)
+            text = f"{what} is an input too ({line}): its messages would come back, give it another `output`"
             yield _at(document, topic.output_path, text, code="loop")
         elif topic.output in outputs:
-            line = document.value_span(outputs[topic.output].output_path).line
-            text = f"{what} is taken by line {line}, give it another `output`"
+            other = outputs[topic.output]
+            line = _line(document.value_span(other.output_path).line, other.output_before)
+            text = f"{what} is taken by {line}, give it another `output`"
             yield _at(document, topic.output_path, text, code="repeated_output")
         outputs.setdefault(topic.output, topic)
+
+
+def _name_of_topic(topic: TopicDraft) -> str:
+    return _named(str(topic.topic), topic.topic_before)
+
+
+def _named(name: str, before: str | None) -> str:
+    return quoted(name) if before is None else f"{quoted(name)}, remapped from {quoted(before)},"
+
+
+def _line_of_topic(topic: TopicDraft, document: Document) -> str:
+    return _line(document.value_span((*topic.path, "topic")).line, topic.topic_before)
+
+
+def _line(number: int, before: str | None) -> str:
+    return f"line {number}" if before is None else f"line {number}, remapped from {quoted(before)}"
 
 
 def _too_long(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:

@@ -1,7 +1,7 @@
 """A file's groups and topics as far as they can be read: checks between them don't wait for every key to be right."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from syncrelay.config.document import Document, MappingNode, SequenceNode, mappings, plain
@@ -19,7 +19,10 @@ from syncrelay.config.typenames import check_field_path, check_type_name
 
 @dataclass(frozen=True, slots=True)
 class TopicDraft:
-    """A topic. Names are absolute; what is missing or wrong is None. `key_path` is where its key is written."""
+    """A topic. Names are absolute; what is missing or wrong is None. `key_path` is where its key is written.
+
+    Where remaps make others of the names, `topic_before` and `output_before` are those that the file gives.
+    """
 
     path: Path
     topic: str | None
@@ -32,6 +35,8 @@ class TopicDraft:
     is_required: bool
     key: str | None
     key_path: Path
+    topic_before: str | None = None
+    output_before: str | None = None
 
     @property
     def output_path(self) -> Path:
@@ -64,7 +69,26 @@ class GroupDraft:
 
 def drafts(document: Document) -> tuple[GroupDraft, ...]:
     """Return what can be read of a file's groups."""
-    absolute = _absolute_names(document)
+    return _drafts(document, _absolute_names(document))
+
+
+def remapped_drafts(document: Document, resolve: Callable[[str], str]) -> tuple[GroupDraft, ...]:
+    """Return the groups of a file under the names that a node makes of the file's own: `resolve` gives them."""
+    return tuple(
+        replace(group, topics=tuple(map(_remapped, group.topics, before.topics)))
+        for group, before in zip(_drafts(document, resolve), drafts(document), strict=True)
+    )
+
+
+def _remapped(topic: TopicDraft, before: TopicDraft) -> TopicDraft:
+    return replace(
+        topic,
+        topic_before=before.topic if before.topic != topic.topic else None,
+        output_before=before.output if before.output != topic.output else None,
+    )
+
+
+def _drafts(document: Document, absolute: Callable[[str], str]) -> tuple[GroupDraft, ...]:
     groups = document.find(("groups",))
     if groups is None:
         return ()

@@ -14,6 +14,7 @@ from syncrelay.config.errors import ConfigError
 from syncrelay.config.file import File, FileKeys
 from syncrelay.config.filling import with_defaults
 from syncrelay.config.interfaces import Interfaces
+from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import Config, resolve
 from syncrelay.config.source import Source, check_text, read_source
@@ -59,7 +60,7 @@ def _config(source: Source, environ: Mapping[str, str], package_missing: Severit
     found = _in_order(problems)
     if file is None or any(problem.severity is Severity.ERROR for problem in found):
         raise ConfigError(found)
-    return resolve(file, notes=found)
+    return resolve(file, names=NamesInFile(document), notes=found)
 
 
 def _validate(document: Document) -> tuple[FileKeys | None, list[Problem]]:
