@@ -5,17 +5,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode, SequenceNode, plain
-from syncrelay.config.drafts import GroupDraft, TopicDraft
+from syncrelay.config.drafts import GroupDraft, TopicDraft, node_name
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem, Severity
 from syncrelay.config.wording import did_you_mean, quoted
 
+# The longest of what every node offers below its name.
+_LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
 _RESTAMP_WORDS = ("none", "earliest", "latest")
 
 
 def check_between(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
     """Yield what is wrong between the keys of a file, types aside."""
     yield from _too_few(groups, document)
+    yield from _node(document)
     for group in groups:
         yield from _restamp(group, document)
         yield from _trigger(group, document)
@@ -56,6 +59,18 @@ def _repeated_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]
             text = f"{_name_of_topic(topic)} is in this group twice, first in {line}"
             yield _at(document, (*topic.path, "topic"), text, code="repeated_topic")
         first.setdefault(topic.topic, topic)
+
+
+def _node(document: Document) -> Iterator[Problem]:
+    """Yield a name and namespace that are too long together."""
+    name = node_name(document)
+    if len(name) > _LONGEST_NODE:
+        path = ("node", "namespace") if document.find(("node", "namespace")) else ("node", "name")
+        text = (
+            f"the node's full name has {len(name)} characters, at most {_LONGEST_NODE} are allowed: it becomes part of"
+            " the names of its services"
+        )
+        yield _at(document, path, text, code="bad_value")
 
 
 def _restamp(group: GroupDraft, document: Document) -> Iterator[Problem]:

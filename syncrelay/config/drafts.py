@@ -143,6 +143,11 @@ def _topic(
     )
 
 
+def node_name(document: Document) -> str:
+    """Return the full name that a file gives to its node."""
+    return _absolute_names(document)("~")
+
+
 def _absolute_names(document: Document) -> Callable[[str], str]:
     node = document.find(("node",))
     own = node if isinstance(node, MappingNode) else MappingNode(document.root.span)

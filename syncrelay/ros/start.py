@@ -12,13 +12,17 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from syncrelay.config.wording import printable, quoted
-from syncrelay.errors import RosUnavailableError, UsageError
+from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
 from syncrelay.ros.domain import require_domain
 from syncrelay.ros.environment import keep_stdout, log_arguments
 
 # Where in rcl's sources it gave up: that tells its authors something, not whoever wrote the arguments.
 _PLACE_IN_RCL: Final = re.compile(r", at [^ ,]+:\d+")
-_PARSING: Final = "Couldn't parse"
+# What rcl says of arguments, and of nothing else.
+_OF_ARGUMENTS: Final = re.compile(
+    r"(Couldn't parse|Enclave name is not valid|invalid node name|invalid namespace|[^:]*external configuration).*",
+    re.DOTALL,
+)
 
 
 def start(ros_args: Sequence[str], *, simulated: bool) -> Context:
@@ -40,9 +44,7 @@ def start(ros_args: Sequence[str], *, simulated: bool) -> Context:
     except _rclpy.UnknownROSArgsError as error:
         raise _not_taken(ros_args, f"{error} is unknown") from error
     except _rclpy.RCLError as error:
-        if _PARSING in str(error):
-            raise _not_taken(ros_args, str(error)[str(error).index(_PARSING) :]) from error
-        raise RosUnavailableError(f"rclpy does not start: {error}") from error
+        raise _refused(f"rclpy does not start: {error}", ros_args) from error
     return context
 
 
@@ -56,7 +58,7 @@ def make_node(name: str, *, namespace: str, context: Context, ros_args: Sequence
     except ParameterException as error:
         raise _not_taken(ros_args, str(error)) from error
     except _rclpy.RCLError as error:
-        raise RosUnavailableError(f"no node starts: {error}") from error
+        raise _refused(f"no node starts: {error}", ros_args) from error
 
 
 def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:
@@ -72,6 +74,11 @@ def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:
             raise _not_taken(ros_args, f"of the topic {quoted(name)} they make none: {error}") from error
 
     return resolve
+
+
+def _refused(words: str, ros_args: Sequence[str]) -> SyncRelayError:
+    of_arguments = _OF_ARGUMENTS.search(words)
+    return _not_taken(ros_args, of_arguments.group()) if of_arguments else RosUnavailableError(words)
 
 
 def _not_taken(ros_args: Sequence[str], reason: str) -> UsageError:
