@@ -1,4 +1,4 @@
-"""What ROS refuses when the relay starts, and what remaps make impossible: a sentence and an exit code, no traceback."""
+"""What ROS refuses as the relay starts, and what remaps make impossible: a sentence, an exit code, no traceback."""
 
 import random
 from collections.abc import Iterator

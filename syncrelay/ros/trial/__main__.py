@@ -56,7 +56,7 @@ def _start(plan: dict[str, Any]) -> None:
         _say(Step.ARGUMENTS, fault=str(error))
         return
     except RosUnavailableError as error:
-        _say(step, fault=str(error))
+        _say(step, fault=str(error.__cause__ or error))
         return
     _say(
         Step.NAMES,
