@@ -1,10 +1,11 @@
 """`syncrelay --config FILE`: run the relay until SIGINT or SIGTERM."""
 
 import os
+import traceback
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.file_changes import FileChanges
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
@@ -15,6 +16,11 @@ if TYPE_CHECKING:
     from syncrelay.config import Listen
     from syncrelay.ros.relay import Relay
     from syncrelay.status import Server
+
+_BUG: Final = (
+    "a bug in syncrelay kept it from taking on the file, all goes on as before;"
+    " please report it with these lines and the file:"
+)
 
 
 def run(
@@ -93,6 +99,9 @@ def _reload(relay: "Relay", config_path: str, groups: Sequence[str]) -> None:
     except SyncRelayError as error:
         LOGGER.error("the file was read again and is left aside, all goes on as before:\n%s", error)
         relay.refuse_reload(str(error))
+    except Exception as error:  # noqa: BLE001  a file that finds a bug of ours is no reason to end what runs
+        LOGGER.exception("%s", _BUG)
+        relay.refuse_reload(f"{_BUG}\n{''.join(traceback.format_exception(error)).rstrip()}")
 
 
 def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:

@@ -30,6 +30,27 @@ class Endpoint:
 
 
 @dataclass(frozen=True, slots=True)
+class Refusal:
+    """A publisher or subscription that DDS does not make.
+
+    `verb` is what cannot be done with the topic. `held_as` is the type that this process has the topic as already,
+    where that is the reason; else `why` is what DDS says.
+    """
+
+    verb: str
+    topic: str
+    type: str
+    held_as: str | None = None
+    why: str = ""
+
+    @property
+    def text(self) -> str:
+        """The whole in words."""
+        reason = f"this process has it as {self.held_as} already" if self.held_as else self.why
+        return f"DDS does not {self.verb} {self.topic} as {self.type}: {reason}"
+
+
+@dataclass(frozen=True, slots=True)
 class Tolerance:
     """The key of the file that says how far apart the stamps of a set may be, and its value in nanoseconds."""
 
@@ -41,9 +62,9 @@ class Tolerance:
 class InputFacts:
     """An input and its output.
 
-    `name` is the topic's in the graph, `not_importable` says why its type cannot be used here, `alike` are topics of
-    the graph that may have been meant, `lost` counts what DDS lost on the way of late. `key` is the newest message's.
-    `offset` is added to stamps for matching, in nanoseconds.
+    `name` is the topic's in the graph, `not_importable` says why its type cannot be used here, `refusal` what DDS does
+    not make for it, `alike` are topics of the graph that may have been meant, `lost` counts what DDS lost on the way of
+    late. `key` is the newest message's. `offset` is added to stamps for matching, in nanoseconds.
     """
 
     name: str
@@ -56,6 +77,7 @@ class InputFacts:
     subscribers: tuple[Endpoint, ...] = ()
     alike: tuple[str, ...] = ()
     not_importable: str | None = None
+    refusal: Refusal | None = None
     lost: int = 0
     key: Hashable = None
     offset: int = 0
@@ -68,7 +90,7 @@ class GroupFacts:
     `tolerance` is None where stamps may be any distance apart, as with `equal_key`. `by_stamp` says whether stamps are
     what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
     others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it does
-    not; `waited` how long messages at most lay before the relay took them.
+    not; `waited` how long messages at most lay before the relay took them; `failure` what stopped the group for good.
     """
 
     name: str
@@ -84,6 +106,7 @@ class GroupFacts:
     least_period: int | None = None
     clock_stopped: int | None = None
     waited: int = 0
+    failure: str | None = None
 
     @property
     def required_first(self) -> Sequence[int]:

@@ -8,6 +8,8 @@ from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Code, Finding, Rule, Severity, of_each_input
 
 _RULES: Final[tuple[Rule, ...]] = (
+    rules_graph.internal_error,
+    of_each_input(rules_graph.refused_by_dds),
     of_each_input(rules_graph.type_not_importable),
     of_each_input(rules_graph.other_type),
     of_each_input(rules_graph.no_publisher),

@@ -1,4 +1,4 @@
-"""Findings about the graph: who publishes and subscribes, as what type and with which QoS, and who has gone silent."""
+"""Findings about the graph and what we have there: publishers, subscribers, types, QoS, and who has gone silent."""
 
 from typing import Final
 
@@ -13,6 +13,31 @@ _NO_MESSAGE: Final = 5 * SECOND
 _LEASE: Final = 20 * SECOND
 # A pause that is so many times the longest before it is news.
 _PAUSES: Final = 3
+
+
+def internal_error(facts: GroupFacts) -> Found:
+    """Find that an exception has stopped the group."""
+    if facts.failure is not None:
+        yield Finding(
+            Code.INTERNAL_ERROR,
+            Severity.ERROR,
+            f"a bug in syncrelay stopped this group: {facts.failure}",
+            "report it with the traceback in the log; `syncrelay reload` starts the group again",
+        )
+
+
+def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find a topic that DDS lets the group not subscribe to or publish."""
+    if (refusal := an_input.refusal) is not None:
+        yield Finding(
+            Code.REFUSED_BY_DDS,
+            Severity.ERROR if an_input.required else Severity.WARN,
+            refusal.text,
+            "give one of the two another name: a process has one type for each topic"
+            if refusal.held_as
+            else "the relay tries again every few seconds; if it stays, look at limits of memory and open files",
+            index,
+        )
 
 
 def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Tolerance
+from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Refusal, Tolerance
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.sync.counts import InputCounts
@@ -20,6 +20,7 @@ class InputGraph:
     subscribers: tuple[Endpoint, ...] = ()
     alike: tuple[str, ...] = ()
     not_importable: str | None = None
+    refusal: Refusal | None = None
     lost: int = 0
 
 
@@ -55,7 +56,13 @@ class GroupWatch:
         self._observation.add(arrivals, sets, counts, total_sets, now=now)
 
     def facts(
-        self, graph: Sequence[InputGraph], *, now: int, clock_stopped: int | None = None, waited: int = 0
+        self,
+        graph: Sequence[InputGraph],
+        *,
+        now: int,
+        clock_stopped: int | None = None,
+        waited: int = 0,
+        failure: str | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
         keys = self.config.keys
@@ -77,6 +84,7 @@ class GroupWatch:
                     subscribers=shown.subscribers,
                     alike=shown.alike,
                     not_importable=shown.not_importable,
+                    refusal=shown.refusal,
                     lost=shown.lost,
                     key=key,
                     offset=topic.offset_ns,
@@ -92,6 +100,7 @@ class GroupWatch:
             least_period=keys.max_rate,
             clock_stopped=clock_stopped,
             waited=waited,
+            failure=failure,
         )
 
 

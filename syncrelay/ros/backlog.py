@@ -26,6 +26,8 @@ class Backlog:
         self._heads: list[_Head] = []
         self.held: set[Source] = set()
         """The sources that a held message is of."""
+        self.failed: dict[Source, Exception] = {}
+        """The sources that could not be drained, and why; the reader empties it."""
         self._ties = count()
 
     def deliver(self, look: Look) -> None:
@@ -72,28 +74,39 @@ class Backlog:
 
     def _deliver_alone(self, source: Source, until: int) -> None:
         """Deliver as the only one what one source has, a batch at most: nearly always, and without any sorting."""
-        taken = source.take()
-        if taken is None:
-            return
-        self.longest_wait = max(self.longest_wait, until - taken[0])
-        for _ in range(_BATCH):
-            received, payload, content = taken
-            if received > until:
-                break
-            source.deliver(payload, content, received)
+        try:
             taken = source.take()
             if taken is None:
                 return
+            self.longest_wait = max(self.longest_wait, until - taken[0])
+            for _ in range(_BATCH):
+                received, payload, content = taken
+                if received > until:
+                    break
+                source.deliver(payload, content, received)
+                taken = source.take()
+                if taken is None:
+                    return
+        except Exception as error:  # noqa: BLE001  it is told to who added the source
+            self.failed[source] = error
+            return
         self._hold(source, taken)
 
     def _hand_on(self, head: _Head) -> Source:
         received, _, payload, content, source = head
         self.held.discard(source)
-        source.deliver(payload, content, received)
+        try:
+            source.deliver(payload, content, received)
+        except Exception as error:  # noqa: BLE001
+            self.failed[source] = error
         return source
 
     def _take(self, source: Source) -> None:
-        taken = source.take()
+        try:
+            taken = source.take()
+        except Exception as error:  # noqa: BLE001
+            self.failed[source] = error
+            return
         if taken is not None:
             self._hold(source, taken)
 

@@ -1,12 +1,15 @@
 """What the relay publishes about itself: /diagnostics, and figures for plotting."""
 
+import logging
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Float64
 
+from syncrelay.config import Config
 from syncrelay.explain import Distribution, GroupReport, InputFacts, explanation
+from syncrelay.ros.entities import Entities, RefusedError
 from syncrelay.status import Level, level
 
 _LEVELS: Final = {
@@ -15,17 +18,66 @@ _LEVELS: Final = {
     Level.ERROR: DiagnosticStatus.ERROR,
     Level.STALE: DiagnosticStatus.STALE,
 }
+# In the place of a group's name, which is never empty.
+_ALL: Final = ""
+_LOG = logging.getLogger("syncrelay")
 _NS_PER_MS: Final = 1e6
 _NS_PER_SECOND: Final = 1e9
+
+
+class Telling:
+    """Publishes what the file asks for, as far as DDS lets it; what it refuses is tried again at each report."""
+
+    def __init__(self, node: Any, entities: Entities) -> None:
+        self._node = node
+        self._entities = entities
+        self._wanted: tuple[str, ...] = ()
+        self._tellers: dict[str, Diagnostics | Scalars] = {}
+        self._said: set[str] = set()
+
+    def adopt(self, config: Config, groups: Sequence[str]) -> None:
+        """Publish what this file asks for of these groups from now on; what was published before goes on."""
+        asked = config.diagnostics
+        self._wanted = () if asked is None else (_ALL, *groups) if asked.scalars else (_ALL,)
+        for key in [key for key in self._tellers if key not in self._wanted]:
+            self._tellers.pop(key).close()
+        self._make()
+
+    def publish(self, reports: Sequence[GroupReport]) -> None:
+        """Publish the state of all groups."""
+        self._make()
+        if (diagnostics := self._tellers.get(_ALL)) is not None:
+            diagnostics.publish(reports)
+        for report in reports:
+            if (scalars := self._tellers.get(report.facts.name)) is not None:
+                scalars.publish([report])
+
+    def _make(self) -> None:
+        for key in self._wanted:
+            if key not in self._tellers:
+                try:
+                    self._tellers[key] = self._made(key)
+                except RefusedError as error:
+                    self._say_once(str(error))
+
+    def _made(self, key: str) -> "Diagnostics | Scalars":
+        return Diagnostics(self._node, self._entities) if key == _ALL else Scalars(self._entities, key)
+
+    def _say_once(self, text: str) -> None:
+        if text not in self._said:
+            self._said.add(text)
+            _LOG.warning("%s", text)
 
 
 class Diagnostics:
     """Publishes one DiagnosticStatus a group, `<node>: <group>`; the suggestion is among its values."""
 
-    def __init__(self, node: Any) -> None:
+    def __init__(self, node: Any, entities: Entities) -> None:
+        """Raise RefusedError where DDS does not make the publisher."""
         self._node = node
+        self._entities = entities
         self._name = node.get_fully_qualified_name()
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = entities.publisher(DiagnosticArray, "/diagnostics", 10)
 
     def publish(self, reports: Sequence[GroupReport]) -> None:
         """Publish the state of all groups, if anyone listens."""
@@ -36,7 +88,7 @@ class Diagnostics:
 
     def close(self) -> None:
         """Publish no more."""
-        self._node.destroy_publisher(self._publisher)
+        self._entities.end(self._publisher)
 
     def _status(self, report: GroupReport) -> DiagnosticStatus:
         return DiagnosticStatus(
@@ -49,33 +101,36 @@ class Diagnostics:
 
 
 class Scalars:
-    """Publishes the figures of each group as Float64 on `~/GROUP/sets_hz`, `.../span_ms` and `.../latency_ms`."""
+    """Publishes the figures of a group as Float64 on `~/GROUP/sets_hz`, `.../span_ms` and `.../latency_ms`."""
 
-    def __init__(self, node: Any, groups: Sequence[str]) -> None:
-        self._node = node
-        self._publishers = {
-            (group, figure): node.create_publisher(Float64, f"~/{group}/{figure}", 10)
-            for group in groups
-            for figure in ("sets_hz", "span_ms", "latency_ms")
-        }
+    def __init__(self, entities: Entities, group: str) -> None:
+        """Raise RefusedError where DDS does not make one of the publishers."""
+        self._entities = entities
+        self._publishers: dict[str, Any] = {}
+        try:
+            for figure in ("sets_hz", "span_ms", "latency_ms"):
+                self._publishers[figure] = entities.publisher(Float64, f"~/{group}/{figure}", 10)
+        except RefusedError:
+            self.close()
+            raise
 
     def publish(self, reports: Sequence[GroupReport]) -> None:
-        """Publish what there is; spans and latencies only where sets left."""
+        """Publish what there is; span and latency only where sets left."""
         for report in reports:
             figures = report.facts.figures
-            self._publish(report, "sets_hz", figures.rate_hz)
+            self._publish("sets_hz", figures.rate_hz)
             if figures.last_sets:
                 span, latency = figures.last_sets[0]
-                self._publish(report, "span_ms", span / _NS_PER_MS)
-                self._publish(report, "latency_ms", latency / _NS_PER_MS)
+                self._publish("span_ms", span / _NS_PER_MS)
+                self._publish("latency_ms", latency / _NS_PER_MS)
 
     def close(self) -> None:
         """Publish no more."""
         for publisher in self._publishers.values():
-            self._node.destroy_publisher(publisher)
+            self._entities.end(publisher)
 
-    def _publish(self, report: GroupReport, figure: str, value: float) -> None:
-        self._publishers[report.facts.name, figure].publish(Float64(data=value))
+    def _publish(self, figure: str, value: float) -> None:
+        self._publishers[figure].publish(Float64(data=value))
 
 
 def _values(report: GroupReport) -> Iterator[tuple[str, str]]:

@@ -1,14 +1,19 @@
 """One group at work: payloads in, matched sets out on the group's publishers. Lives on the receive thread."""
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain import RecentDrop
+from syncrelay.explain import Code, RecentDrop
 from syncrelay.ros.path import Outlet
-from syncrelay.sync import Drop, DropReason, Match, Message
+from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
+from syncrelay.sync.counts import InputCounts
+
+_LOG = logging.getLogger("syncrelay")
 
 # Enough for the widest terminal's strip of recent sets.
 _RECENT = 256
@@ -28,12 +33,44 @@ class Batch(NamedTuple):
     keys: tuple[Hashable, ...]
 
 
+class _Stopped:
+    """In the place of an engine that failed: takes messages and gives nothing. The counts stay as they were."""
+
+    def __init__(self, sets: int, counts: tuple[InputCounts, ...]) -> None:
+        self.sets = sets
+        self._counts = counts
+
+    def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002  an engine's signature
+        return ()
+
+    def reject(self, message: Message, reason: DropReason) -> Drop:
+        return Drop(message, reason)
+
+    def expire(self, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002
+        return ()
+
+    def flush(self, reason: DropReason) -> Sequence[Drop]:  # noqa: ARG002
+        return ()
+
+    def next_deadline(self) -> int | None:
+        return None
+
+    def counts(self) -> tuple[InputCounts, ...]:
+        return self._counts
+
+
 class GroupRelay:
-    """Feeds a group's engine and publishes the sets that it gives."""
+    """Feeds a group's engine and publishes the sets that it gives.
+
+    An exception on the way stops the group and no other: `receive` and `receive_keyed` leave it to whoever feeds them
+    to call `fail`, the rest do so themselves.
+    """
 
     def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
         self.config = config
-        self.engine = config.engine()
+        self.engine: SyncGroup | _Stopped = config.engine()
+        self.failure: str | None = None
+        """What stopped it; None of one that works."""
         self.last: deque[tuple[int | None, ...] | RecentDrop] = deque(maxlen=_RECENT)
         """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
         self._now = now
@@ -83,11 +120,54 @@ class GroupRelay:
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""
-        self._settle(self.engine.expire(now=now))
+        try:
+            self._settle(self.engine.expire(now=now))
+        except Exception as error:  # noqa: BLE001  it is this group's alone
+            self.fail(error)
 
     def flush(self, reason: DropReason) -> None:
         """Drop all that is buffered."""
-        self._settle(self.engine.flush(reason))
+        try:
+            self._settle(self.engine.flush(reason))
+        except Exception as error:  # noqa: BLE001
+            self.fail(error)
+
+    def next_deadline(self) -> int | None:
+        """When `expire` wants to be called next."""
+        try:
+            return self.engine.next_deadline()
+        except Exception as error:  # noqa: BLE001
+            self.fail(error)
+            return None
+
+    def counts(self) -> tuple[InputCounts, ...]:
+        """Where the messages of each input went."""
+        try:
+            return self.engine.counts()
+        except Exception as error:  # noqa: BLE001
+            self.fail(error)
+            return self.engine.counts()
+
+    def fail(self, error: Exception) -> None:
+        """Stop for good, and say so once, with the traceback."""
+        if self.failure is not None:
+            return
+        self.failure = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        _LOG.error(
+            "%s: a bug in syncrelay stopped this group, others go on; please report it with these lines and your file",
+            self.config.name,
+            exc_info=error,
+            extra={"group": self.config.name, "finding": Code.INTERNAL_ERROR.value},
+        )
+        self.engine = _Stopped(self.engine.sets, self._last_counts())
+
+    def _last_counts(self) -> tuple[InputCounts, ...]:
+        """Count once more, as far as what failed still can."""
+        with suppress(Exception):
+            self.engine.flush(DropReason.SHUTDOWN)
+        with suppress(Exception):
+            return self.engine.counts()
+        return self.config.engine().counts()
 
     def _settle(self, outcomes: Sequence[Match | Drop]) -> None:
         for outcome in outcomes:

@@ -1,54 +1,50 @@
-"""Topics that come in: found in the graph, subscribed once however many groups use them, as their publishers offer."""
+"""A topic that comes in: found in the graph, subscribed once however many groups use it, as its publishers offer."""
 
 import importlib
 import logging
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from syncrelay.cdr import has_place_for_stamp
 from syncrelay.config import TopicConfig
 from syncrelay.errors import TypeImportError
-from syncrelay.explain import Endpoint
+from syncrelay.explain import Endpoint, Refusal
 from syncrelay.ros import graph
+from syncrelay.ros.direct.rcl import RclCallError
+from syncrelay.ros.entities import Entities, RefusedError
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.path import Content, Deliver, Path, Source
 from syncrelay.ros.qos import input_profile, output_profile
 from syncrelay.ros.receive import ReceiveLoop
-from syncrelay.ros.types import begins_with_header, import_type, stamp_reader, value_reader
-from syncrelay.sync import DropReason
+from syncrelay.ros.takers import taker
+from syncrelay.ros.types import begins_with_header, import_type
 
 _LOG = logging.getLogger("syncrelay")
 
-
-class _LeftToTheReceiveLoop(CallbackGroup):  # type: ignore[misc]  # CallbackGroup is untyped
-    """Keeps the node's executor, which serves parameters and the clock, away from the data."""
-
-    def can_execute(self, entity: Any) -> bool:  # noqa: ARG002  rclpy's signature
-        return False
-
-    def beginning_execution(self, entity: Any) -> bool:  # noqa: ARG002
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        """Nothing ever begins."""
+# What DDS refused is tried again this often, and at once after a reload, which may have freed a topic.
+_TRY_AGAIN_S: Final = 5.0
 
 
 class User:
     """An input of a group that is fed from a topic, with what feeds it and where its messages leave."""
 
-    __slots__ = ("group", "index", "publisher", "take")
+    __slots__ = ("group", "index", "publisher", "refusal", "take")
 
     def __init__(self, group: GroupRelay, index: int) -> None:
         self.group = group
         self.index = index
         self.take: Deliver | None = None
         self.publisher: Any = None
+        self.refusal: Refusal | None = None
+        """Why DDS does not make its publisher. Until it does nothing is fed, as sets would lack the message."""
+
+    @property
+    def output(self) -> str:
+        """Where its messages leave, as the file has it."""
+        return self.group.config.topics[self.index].output
 
 
 class TopicInput:
@@ -57,24 +53,30 @@ class TopicInput:
     Looked at on the main thread; its entities are swapped on the receive thread.
     """
 
-    def __init__(self, config: TopicConfig, *, name: str, node: Any, path: Path, loop: ReceiveLoop) -> None:
+    def __init__(
+        self, config: TopicConfig, *, name: str, entities: Entities, node: Any, path: Path, loop: ReceiveLoop
+    ) -> None:
         self._topic = config.topic
         self.type = config.type
         self.publishers: tuple[Endpoint, ...] = ()
         self.not_importable: str | None = None
         self._qos = config.qos
+        self._entities = entities
         self._node = node
         self._path = path
         self._loop = loop
         self.name = name
         self.missing: str | None = f"a publisher of {self.name} ({self.type})"
-        self._callback_group = _LeftToTheReceiveLoop()
+        self._refusal: Refusal | None = None
+        self._try_again = 0.0
+        self._wants_look = True
         self._users: list[User] = []
         self._takers: list[Deliver] = []
         self._message_type: Any = None
         self._profile: Any = None
         self._subscription: Any = None
         self._source: Source | None = None
+        self._failure: Exception | None = None
         self._lost: Any = None
         self._said: set[str] = set()
 
@@ -84,23 +86,59 @@ class TopicInput:
         return self._profile is not None
 
     @property
-    def has_type(self) -> bool:
-        """Whether its type is imported; until then it is to be looked at though the graph be as before."""
-        return self._message_type is not None
+    def is_due(self) -> bool:
+        """Whether it is to be looked at though the graph be as before: for its type, or for what DDS did not make."""
+        return self._wants_look or self._message_type is None or (self._lacks and self._may_try)
+
+    @property
+    def _lacks(self) -> bool:
+        return self._refusal is not None or any(user.refusal for user in self._users)
+
+    @property
+    def _may_try(self) -> bool:
+        return time.monotonic() >= self._try_again
 
     @property
     def publisher_count(self) -> int:
         """How many publish it as the file's type."""
         return sum(publisher.type == self.type for publisher in self.publishers)
 
+    @property
+    def users(self) -> Sequence[User]:
+        """Those that are fed."""
+        return self._users
+
+    @property
+    def entity(self) -> Any:
+        """Its subscription; None as long as there is none."""
+        return self._subscription
+
+    def refusal(self, group: GroupRelay, index: int) -> Refusal | None:
+        """What DDS refuses that an input of a group needs."""
+        return self._refusal or next(
+            (user.refusal for user in self._users if user.group is group and user.index == index), None
+        )
+
     def user(self, group: GroupRelay, index: int) -> User:
         """Make ready to feed an input of a group; raises TypeImportError for a field that the type does not have."""
         user = User(group, index)
         if self._message_type is not None:
             user.take = taker(group, index, self._message_type)
-        if self._profile is not None:
-            user.publisher = self._publisher(user, self._profile)
         return user
+
+    def equip(self, user: User) -> None:
+        """Make the publisher of one who will be attached, if its QoS is known. Raises RefusedError."""
+        if self._profile is not None and user.publisher is None:
+            user.publisher = self._publisher(user, self._profile)
+            user.refusal = None
+
+    def equip_or_tell(self, user: User) -> None:
+        """Make its publisher, or have it told and tried again that DDS refuses."""
+        try:
+            self.equip(user)
+        except RefusedError as error:
+            user.refusal = error.refusal
+            self._put_off(error)
 
     def attach(self, user: User) -> None:
         """Feed it from now on. On the loop's thread, or before that runs."""
@@ -110,28 +148,38 @@ class TopicInput:
         self._feed_users()
 
     def detach(self, group: GroupRelay) -> list[User]:
-        """Feed a group no longer; its users, whose publishers are to be destroyed. On the loop's thread."""
+        """Feed a group no longer; its users, whose publishers are to be ended. On the loop's thread."""
         gone = [user for user in self._users if user.group is group]
         self._users = [user for user in self._users if user.group is not group]
         self._feed_users()
         return gone
 
-    @property
-    def is_used(self) -> bool:
-        """Whether a group is fed."""
-        return bool(self._users)
-
     def close(self) -> None:
-        """Receive no longer. On the main thread."""
-        source = self._source
+        """Receive no longer; if it is looked at again, it begins anew. On the main thread."""
+        self._wants_look = True
+        source, self._source = self._source, None
         if source is not None:
             self._loop.call(lambda: self._loop.remove(source)).result()
-            self._node.destroy_subscription(self._subscription)
-            self._source = self._subscription = self._lost = None
+        self._profile = self._lost = None
+        if self._subscription is not None:
+            self._entities.end(self._subscription)
+            self._subscription = None
+
+    def try_again(self) -> None:
+        """Let the next look ask DDS again for what it refused."""
+        self._try_again, self._wants_look = 0.0, True
 
     def look(self) -> None:
         """Look at the graph; subscribe, anew where the publishers' QoS changed; `missing` says what is not there."""
+        self._wants_look = False
+        if self._failure is not None:
+            self._end_failed(self._failure)
         self.missing = self._find_type() or self._find_publishers()
+
+    def _end_failed(self, error: Exception) -> None:
+        self._failure = None
+        self.close()
+        self._refused(RefusedError(Refusal("receive", self.name, self.type, why=str(error))))
 
     def _find_type(self) -> str | None:
         if self._message_type is not None:
@@ -153,8 +201,8 @@ class TopicInput:
         endpoints = self._node.get_publishers_info_by_topic(self.name)
         fitting = [endpoint for endpoint in endpoints if endpoint.topic_type == self.type]
         profile = input_profile(self._qos, [endpoint.qos_profile for endpoint in fitting])
-        if profile is not None and profile != self._profile:
-            self._adopt(profile)
+        if profile is not None and (self._may_try or not self._lacks):
+            self._follow(profile)
         self.publishers = graph.publishers(endpoints, self._profile)
         for stranger in self.publishers:
             if stranger.type != self.type:
@@ -185,50 +233,91 @@ class TopicInput:
             self._said.add(text)
             _LOG.log(level, "%s", text)
 
+    def _follow(self, profile: Any) -> None:
+        """Have a subscription of this QoS, and all publishers, as far as DDS makes them."""
+        try:
+            if profile != self._profile:
+                self._adopt(profile)
+        except RefusedError as error:
+            self._refused(error)
+            return
+        self._refusal = None
+        lacking = [user for user in self._users if user.publisher is None]
+        for user in lacking:
+            self.equip_or_tell(user)
+        if any(user.publisher is not None for user in lacking):
+            self._loop.call(lambda: self._connect_all(lacking)).result()
+
+    def _refused(self, error: RefusedError) -> None:
+        self._refusal = error.refusal
+        self._put_off(error)
+
+    def _put_off(self, error: RefusedError) -> None:
+        self._try_again = time.monotonic() + _TRY_AGAIN_S
+        self._say_once(logging.ERROR, str(error))
+
     def _adopt(self, profile: Any) -> None:
-        """Replace the subscription and its outputs by ones of another QoS."""
+        """Replace the subscription and its outputs by ones of another QoS; raises RefusedError, with nothing changed.
+
+        An output that DDS does not make anew goes on as it was.
+        """
         if self._profile is not None:
             _LOG.info("%s: its publishers' QoS changed, subscribing anew", self.name)
-        subscription = self._node.create_subscription(
-            self._message_type,
-            self._topic,
-            _never_called,
-            profile,
-            raw=True,
-            callback_group=self._callback_group,
-        )
-        publishers = [self._publisher(user, profile) for user in self._users]
-        self._profile = profile
-        self._lost = _rclpy.EventHandle(
-            subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST
-        )
-        self._loop.call(lambda: self._swap(subscription, publishers)).result()
+        subscription = self._entities.subscription(self._message_type, self._topic, profile)
+        publishers: dict[User, Any] = {}
+        for user in self._users:
+            try:
+                publishers[user] = self._publisher(user, profile)
+            except RefusedError as error:
+                user.refusal = None if user.publisher else error.refusal
+                self._put_off(error)
+        try:
+            source = self._path.source(subscription, self._deliver)
+            old = self._loop.call(lambda: self._swap(source, publishers)).result()
+        except (RclCallError, OSError) as error:
+            for entity in (*publishers.values(), subscription):
+                self._entities.end(entity)
+            raise RefusedError(Refusal("receive", self.name, self.type, why=str(error))) from error
+        self._profile, self._lost = profile, _losses(subscription)
+        old.append(self._subscription)
+        self._subscription = subscription
+        for entity in old:
+            if entity is not None:
+                self._entities.end(entity)
 
     def _publisher(self, user: User, profile: Any) -> Any:
-        output = user.group.config.topics[user.index].output
-        return self._node.create_publisher(self._message_type, output, output_profile(profile))
+        return self._entities.publisher(self._message_type, user.output, output_profile(profile))
 
-    def _swap(self, subscription: Any, publishers: list[Any]) -> None:
-        old = [user.publisher for user in self._users if user.publisher is not None]
-        for user, publisher in zip(self._users, publishers, strict=True):
-            user.publisher = publisher
+    def _swap(self, source: Source, publishers: Mapping[User, Any]) -> list[Any]:
+        """Receive from another source, and publish by others; the publishers that are over. On the loop's thread."""
+        # First what may fail.
+        self._loop.add(source, self._fail)
+        old = [user.publisher for user in publishers]
+        for user, publisher in publishers.items():
+            user.publisher, user.refusal = publisher, None
             self._connect(user)
         if self._source is not None:
             self._loop.remove(self._source)
-            self._node.destroy_subscription(self._subscription)
-        for publisher in old:
-            self._node.destroy_publisher(publisher)
-        self._subscription = subscription
-        self._source = self._path.source(subscription, self._deliver)
+        self._source = source
         self._feed_users()
-        self._loop.add(self._source)
+        return old
+
+    def _fail(self, error: Exception) -> None:
+        """Hear that the source gives no more messages. On the loop's thread."""
+        self._source, self._failure, self._wants_look = None, error, True
+
+    def _connect_all(self, users: Sequence[User]) -> None:
+        for user in users:
+            if user.publisher is not None:
+                self._connect(user)
+        self._feed_users()
 
     def _connect(self, user: User) -> None:
         outlet = self._path.outlet(user.publisher)
         user.group.connect(user.index, outlet, restamped=begins_with_header(self._message_type))
 
     def _feed_users(self) -> None:
-        self._takers = [user.take for user in self._users if user.take is not None]
+        self._takers = [user.take for user in self._users if user.take is not None and user.refusal is None]
         if self._source is not None:
             self._source.deliver = self._takers[0] if len(self._takers) == 1 else self._deliver
 
@@ -244,117 +333,5 @@ class TopicInput:
                 user.publisher.wait_for_all_acked(Duration(nanoseconds=left))
 
 
-def taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
-    """What feeds one input of a group from messages of a type; raises TypeImportError where a field is not there."""
-    take = _taker(group, index, message_type)
-    topic = group.config.topics[index]
-    if group.config.restamp is None or topic.stamp == "header" or not begins_with_header(message_type):
-        return take
-
-    def take_if_it_can_be_restamped(payload: Any, content: Content, received: int) -> None:
-        if has_place_for_stamp(content):
-            take(payload, content, received)
-        else:
-            group.receive(index, payload, received, None)
-
-    return take_if_it_can_be_restamped
-
-
-def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
-    topic = group.config.topics[index]
-    read_stamp = stamp_reader(topic.stamp, message_type)
-    if topic.key is not None:
-        read_key = value_reader(message_type, topic.key)
-        return lambda payload, content, received: group.receive_keyed(
-            index, payload, received, read_stamp(content) if read_stamp else received, read_key(content)
-        )
-    if read_stamp is None:
-        return lambda payload, _, received: group.receive(index, payload, received, received)
-    return lambda payload, content, received: group.receive(index, payload, received, read_stamp(content))
-
-
-def _never_called(_: bytes) -> None:
-    """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""
-
-
-@dataclass(frozen=True, slots=True)
-class Wiring:
-    """A group and the topics that feed it, in the order of its inputs."""
-
-    group: GroupRelay
-    inputs: tuple[TopicInput, ...]
-
-    @property
-    def waiting_for(self) -> str | None:
-        """What keeps the group from giving sets, in words."""
-        inputs = zip(self.group.config.topics, self.inputs, strict=True)
-        return ", ".join(each.missing for topic, each in inputs if each.missing and topic.required) or None
-
-
-class Wirings:
-    """All groups that run, in the file's order; one input per topic, however many use it and whatever they call it."""
-
-    def __init__(self, *, node: Any, path: Path, loop: ReceiveLoop) -> None:
-        self.all: tuple[Wiring, ...] = ()
-        self._node = node
-        self._path = path
-        self._loop = loop
-        self._inputs: dict[tuple[str, str, str], TopicInput] = {}
-
-    @property
-    def groups(self) -> list[GroupRelay]:
-        """The groups alone."""
-        return [wiring.group for wiring in self.all]
-
-    @property
-    def inputs(self) -> list[TopicInput]:
-        """Each topic once."""
-        return list(self._inputs.values())
-
-    def wire(self, groups: Sequence[GroupRelay]) -> None:
-        """Let these groups run, and no other; those that did go on as they are. On the main thread.
-
-        What is new begins, and what is gone ends, between two messages. Raises TypeImportError, with nothing
-        changed, for a field that a type does not have.
-        """
-        running = {wiring.group: wiring for wiring in self.all}
-        inputs = dict(self._inputs)
-        wirings = tuple(running.get(group) or self._wiring(group, inputs) for group in groups)
-        users = [
-            (topic_input, topic_input.user(wiring.group, index))
-            for wiring in wirings
-            if wiring.group not in running
-            for index, topic_input in enumerate(wiring.inputs)
-        ]
-        ended = [wiring for group, wiring in running.items() if group not in groups]
-        gone = self._loop.call(lambda: _switch(ended, users)).result() if running else _switch(ended, users)
-        for user in gone:
-            if user.publisher is not None:
-                self._node.destroy_publisher(user.publisher)
-        for topic_input in inputs.values():
-            if not topic_input.is_used:
-                topic_input.close()
-        self._inputs = {key: topic_input for key, topic_input in inputs.items() if topic_input.is_used}
-        self.all = wirings
-
-    def _wiring(self, group: GroupRelay, inputs: dict[tuple[str, str, str], TopicInput]) -> Wiring:
-        return Wiring(group, tuple(self._input(topic, inputs) for topic in group.config.topics))
-
-    def _input(self, topic: TopicConfig, inputs: dict[tuple[str, str, str], TopicInput]) -> TopicInput:
-        name = self._node.resolve_topic_name(topic.topic)
-        key = (name, topic.type, repr(topic.qos))
-        if key not in inputs:
-            inputs[key] = TopicInput(topic, name=name, node=self._node, path=self._path, loop=self._loop)
-        return inputs[key]
-
-
-def _switch(ended: Sequence[Wiring], users: Sequence[tuple[TopicInput, User]]) -> list[User]:
-    """End some groups and begin others; the users that are gone. On the loop's thread, or before that runs."""
-    gone = []
-    for wiring in ended:
-        wiring.group.flush(DropReason.SHUTDOWN)
-        for topic_input in wiring.inputs:
-            gone += topic_input.detach(wiring.group)
-    for topic_input, user in users:
-        topic_input.attach(user)
-    return gone
+def _losses(subscription: Any) -> Any:
+    return _rclpy.EventHandle(subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST)

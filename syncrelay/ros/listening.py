@@ -149,7 +149,7 @@ class _Listener:
         subscription = self._node.create_subscription(message_type, topic.name, _never_called, profile, raw=True)
         source = self._path.source(subscription, take)
         self._subscribed.append((subscription, source))
-        self._loop.add(source)
+        self._loop.add(source, _give_up)
 
 
 def _subscribes_original(node: Any, publisher: Any, name: str) -> bool:
@@ -169,6 +169,10 @@ def _is_reliable(profile: Any) -> bool:
 
 def _is_hidden(name: str) -> bool:
     return any(part.startswith("_") for part in name.split("/"))
+
+
+def _give_up(error: Exception) -> None:
+    raise error
 
 
 def _never_called(_: bytes) -> None:

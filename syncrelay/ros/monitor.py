@@ -18,10 +18,12 @@ from syncrelay.explain import (
     Silence,
     remarkable,
 )
+from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.graph import topics_alike
 from syncrelay.ros.group import Batch, GroupRelay
-from syncrelay.ros.inputs import TopicInput, Wiring
+from syncrelay.ros.inputs import TopicInput
 from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.ros.wirings import Wiring
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
@@ -64,9 +66,10 @@ class _Ends(NamedTuple):
 class Monitor:
     """Makes a report of each group that it looks at, and logs what is worth a line. On the main thread."""
 
-    def __init__(self, wirings: Sequence[Wiring], *, node: Any, loop: ReceiveLoop, simulated: bool) -> None:
+    def __init__(self, wirings: Sequence[Wiring], *, node: Any, loop: ReceiveLoop, simulated: bool, bugs: Bugs) -> None:
         self._node = node
         self._loop = loop
+        self._bugs = bugs
         self._clock = _ClockWatch(node) if simulated else None
         self._wirings: Sequence[Wiring] = ()
         self._watched: dict[GroupRelay, _Watched] = {}
@@ -126,22 +129,27 @@ class Monitor:
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
         for wiring, gathered in zip(wirings, seen, strict=True):
-            watch, silence = self._watched[wiring.group]
-            batch = gathered.batch
-            watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
-            shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
-            facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=max(self._waits))
-            found = remarkable(facts)
-            self._reports[wiring.group] = GroupReport(facts, found, gathered.last)
-            for remark in silence.look(facts, found):
-                about = {"group": facts.name, "finding": remark.code and remark.code.value}
-                _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
+            with self._bugs.contained(f"looking at {wiring.group.config.name}"):
+                self._look_at(wiring, gathered, now, stopped)
+
+    def _look_at(self, wiring: Wiring, gathered: _Seen, now: int, stopped: int | None) -> None:
+        watch, silence = self._watched[wiring.group]
+        batch = gathered.batch
+        watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
+        shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
+        failure = wiring.group.failure
+        facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=max(self._waits), failure=failure)
+        found = remarkable(facts)
+        self._reports[wiring.group] = GroupReport(facts, found, gathered.last)
+        for remark in silence.look(facts, found):
+            about = {"group": facts.name, "finding": remark.code and remark.code.value}
+            _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 
     def _gather(self, wirings: Sequence[Wiring]) -> tuple[int, list[_Seen]]:
         """Take what came and left, between two messages. On the loop's thread."""
         groups = [wiring.group for wiring in wirings]
         return self._loop.longest_wait(), [
-            _Seen(group.watched(), group.engine.counts(), group.engine.sets, tuple(group.last)) for group in groups
+            _Seen(group.watched(), group.counts(), group.engine.sets, tuple(group.last)) for group in groups
         ]
 
     def _graph(self, group: GroupRelay, index: int, topic_input: TopicInput) -> InputGraph:
@@ -159,6 +167,7 @@ class Monitor:
             subscribers=ends.subscribers,
             alike=ends.alike,
             not_importable=topic_input.not_importable,
+            refusal=topic_input.refusal(group, index),
             lost=self._losses[topic_input].lately,
         )
 

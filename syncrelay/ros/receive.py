@@ -17,13 +17,16 @@ _Result = TypeVar("_Result")
 
 # An idle loop turns as often as this.
 _BEAT_NS = 1_000_000_000
+# A turn that fails and is repeated at once must not take all of a core.
+_AFTER_FAILURE_S = 0.01
 
 
 class ReceiveLoop:
     """Drains sources of one path on the thread that calls `run`.
 
     Only `call`, `wake`, `stop` and the attributes may be used from other threads. `expire` is called with the time of
-    `now`, in nanoseconds, when that is due. `beat` is called at every turn, once a second at least.
+    `now`, in nanoseconds, when that is due. `beat` is called at every turn, once a second at least. `contain` takes an
+    exception that nobody else did, and the loop goes on; without it, the loop ends and `run` raises it.
     """
 
     def __init__(
@@ -34,6 +37,7 @@ class ReceiveLoop:
         expire: Callable[[int], None],
         deadline: Callable[[], int | None] | None = None,
         beat: Callable[[], None] | None = None,
+        contain: Callable[[Exception], None] | None = None,
     ) -> None:
         self._watch = watch
         self._now = now
@@ -46,7 +50,8 @@ class ReceiveLoop:
         """When the loop last turned."""
         self._expire = expire
         self._beat = beat
-        self._sources: list[Source] = []
+        self._contain = contain
+        self._sources: dict[Source, Callable[[Exception], None]] = {}
         self._backlog = Backlog()
         self._calls: deque[tuple[Future[Any], Callable[[], None]]] = deque()
         self._stopping = False
@@ -88,36 +93,69 @@ class ReceiveLoop:
         self._stopping = True
         self.wake()
 
-    def add(self, source: Source) -> None:
-        """Drain one more source. On the loop's thread, or before it runs."""
+    def add(self, source: Source, failed: Callable[[Exception], None]) -> None:
+        """Drain one more source. On the loop's thread, or before it runs.
+
+        `failed` hears on the loop's thread what kept it from giving its messages; by then it is removed.
+        """
         self._watch.add(source)
-        self._sources.append(source)
+        self._sources[source] = failed
 
     def remove(self, source: Source) -> None:
         """Take what a source has, then stop draining it: it may be destroyed. On the loop's thread."""
         self._backlog.deliver_until(time.time_ns(), self._sources)
+        self._leave(source)
+
+    def _leave(self, source: Source) -> None:
         self._backlog.forget(source)
-        self._watch.remove(source)
-        self._sources.remove(source)
+        if self._sources.pop(source, None) is not None:
+            self._watch.remove(source)
 
     def run(self) -> None:
         """Receive until `stop` is called."""
         try:
             while not self._stopping:
-                if self._calls:
-                    self._carry_out_calls()
-                deadline = self.deadline
-                longest = _BEAT_NS if deadline is None else self._expire_due(deadline)
-                self._backlog.deliver(self._watch.wait(0 if self._backlog.held else longest))
-                self.turned = time.monotonic()
-                if self._beat is not None:
-                    self._beat()
-            self._backlog.deliver_until(time.time_ns(), self._sources)
-            self._backlog.deliver_held()
-            self._carry_out_calls()
+                self._guarded(self._receive)
+                if not self._stopping:
+                    time.sleep(_AFTER_FAILURE_S)
+            for last in (self._take_what_came, self._backlog.deliver_held, self._carry_out_calls):
+                self._guarded(last)
         finally:
             self._ended = True
             self._cancel_calls()
+
+    def _guarded(self, function: Callable[[], None]) -> None:
+        try:
+            function()
+        except Exception as error:
+            if self._contain is None:
+                raise
+            self._contain(error)
+
+    def _receive(self) -> None:
+        while not self._stopping:
+            if self._calls:
+                self._carry_out_calls()
+            deadline = self.deadline
+            longest = _BEAT_NS if deadline is None else self._expire_due(deadline)
+            self._backlog.deliver(self._watch.wait(0 if self._backlog.held else longest))
+            if self._backlog.failed:
+                self._end_failed()
+            self.turned = time.monotonic()
+            if self._beat is not None:
+                self._beat()
+
+    def _take_what_came(self) -> None:
+        self._backlog.deliver_until(time.time_ns(), self._sources)
+
+    def _end_failed(self) -> None:
+        """Drain no longer what could not be drained, and tell who added it."""
+        failed, self._backlog.failed = self._backlog.failed, {}
+        for source, error in failed.items():
+            tell = self._sources.get(source)
+            if tell is not None:
+                self._leave(source)
+                tell(error)
 
     def close(self) -> None:
         """Free what the loop holds of rcl. After `run` has returned."""

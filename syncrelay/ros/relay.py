@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -17,9 +18,10 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from syncrelay.config import Config, ConfigError, GroupConfig
 from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, recent
-from syncrelay.ros.diagnostics import Diagnostics, Scalars
+from syncrelay.ros.bugs import Bugs
+from syncrelay.ros.diagnostics import Telling
+from syncrelay.ros.entities import Entities
 from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.inputs import Wiring, Wirings
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
@@ -27,6 +29,7 @@ from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.ros.start import make_node, resolver, start
 from syncrelay.ros.transport import apply_transport
+from syncrelay.ros.wirings import Wiring, Wirings
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
 
@@ -43,6 +46,8 @@ _ASKED_S = 3.0
 _GRACE_S = 2.0
 # What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
 _CLOCK_JUMP = Duration(nanoseconds=-1_000_000_000)
+# What fails again at once must not take all of a core.
+_AFTER_FAILURE_S = 0.1
 # How long an end may take to see that reliable subscribers have what was published on all outputs. They say so
 # at the writer's next heartbeat only, which may be 3 s away.
 _ACKNOWLEDGE_NS = 300_000_000
@@ -90,12 +95,20 @@ class Relay:
         self._now: Callable[[], int] = self._simulated_now if self._sim_time else time.monotonic_ns
         path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
         self.receive_path = path.name
-        self._loop = ReceiveLoop(path.watch(), now=self._now, expire=self._expire, beat=beat)
+        self._bugs = Bugs()
+        self._loop = ReceiveLoop(
+            path.watch(),
+            now=self._now,
+            expire=self._expire,
+            beat=beat,
+            contain=lambda error: self._bugs.tell("receiving", error),
+        )
         self._graph_changes = path.graph_changes(self.node)
-        self._wirings = Wirings(node=self.node, path=path, loop=self._loop)
-        self._run_groups(config)
-        self.monitor = Monitor(self._wirings.all, node=self.node, loop=self._loop, simulated=self._sim_time)
-        self._tellers = _tellers(config, self.node, self._wirings.groups)
+        entities = Entities(self.node)
+        self._wirings = Wirings(entities=entities, node=self.node, path=path, loop=self._loop)
+        self._telling = Telling(self.node, entities)
+        self.monitor = Monitor((), node=self.node, loop=self._loop, simulated=self._sim_time, bugs=self._bugs)
+        self._take_on(config)
         self._reloads = 0
         self._refused_reloads = 0
         self._reload_error: str | None = None
@@ -132,18 +145,19 @@ class Relay:
     def reload(self, config: Config) -> None:
         """Run the groups of a file that was read again: those that are as before go on, with all that they hold.
 
-        On the main thread. Raises ReloadError, with nothing changed, where the file asks for what needs a restart,
-        ConfigError where remaps have made its names meet.
+        A group that failed begins anew. On the main thread. Whatever it raises, the groups of the file before go on:
+        ReloadError where the file asks for what needs a restart, or for a publisher that DDS does not make,
+        ConfigError where remaps make its names meet.
         """
         _require_same_node(self._config, config)
         self._require_distinct_names(config)
         before = self._wirings.groups
-        self._run_groups(config)
+        try:
+            self._take_on(config)
+        except BaseException:
+            self._take_on(self._config)
+            raise
         self._config = config
-        self.monitor.watch(self._wirings.all)
-        for teller in self._tellers:
-            teller.close()
-        self._tellers = _tellers(config, self.node, self._wirings.groups)
         kept = {group.config.name for group in self._wirings.groups if group in before}
         self._announced = {name: said for name, said in self._announced.items() if name in kept}
         self._reloads += 1
@@ -167,8 +181,8 @@ class Relay:
         if problems:
             raise ConfigError(problems)
 
-    def _run_groups(self, config: Config) -> None:
-        running = self._wirings.groups
+    def _take_on(self, config: Config) -> None:
+        running = [group for group in self._wirings.groups if group.failure is None]
         chosen = self._chosen(config)
         as_before = [next((group for group in running if group.config == each), None) for each in chosen]
         self._wirings.wire(
@@ -178,22 +192,23 @@ class Relay:
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         self._loop.deadline = None if self._sim_time or not limited else lambda: _next_deadline(limited)
         self._loop.wake()
+        self.monitor.watch(self._wirings.all)
+        self._telling.adopt(config, [group.config.name for group in self._wirings.groups])
 
     def wake(self) -> None:
         """Have `step` return at once. Safe in a signal handler."""
         self._wake.set()
 
     def step(self, timeout_s: float = _LOOK_S) -> None:
-        """Look at the graph, then rest until the next look is due, `timeout_s` at most, or until `wake`.
-
-        Raises what the receive thread raised, if it did.
-        """
+        """Look at the graph, then rest until the next look is due, `timeout_s` at most, or until `wake`."""
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
-        self._look_at_graph()
-        self._announce()
+        with self._bugs.contained("looking at the graph"):
+            self._look_at_graph()
+            self._announce()
         if (now := time.monotonic()) >= self._next_look:
-            self._look(self.monitor.look if self._is_watched(now) else self.monitor.look_in_turn)
+            with self._bugs.contained("looking at the groups"):
+                self._look(self.monitor.look if self._is_watched(now) else self.monitor.look_in_turn)
         is_waiting = any(wiring.waiting_for for wiring in self._wirings.all)
         until_look = max(0.0, self._next_look - time.monotonic())
         rest_s, began = min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
@@ -204,8 +219,9 @@ class Relay:
     def _look_at_graph(self) -> None:
         has_changed = self._graph_changes.seen()
         for topic_input in self._wirings.inputs:
-            if has_changed or not topic_input.has_type:
-                topic_input.look()
+            if has_changed or topic_input.is_due:
+                with self._bugs.contained(f"looking at {topic_input.name}"):
+                    topic_input.look()
         if has_changed:
             self.monitor.graph_changed()
 
@@ -226,8 +242,7 @@ class Relay:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
         self._phase = Phase.RUNNING
-        for teller in self._tellers:
-            teller.publish(self.monitor.reports)
+        self._telling.publish(self.monitor.reports)
         return self.monitor.reports
 
     def state(self) -> RelayState:
@@ -264,7 +279,8 @@ class Relay:
                 group.flush(DropReason.SHUTDOWN)
             deadline = time.monotonic_ns() + _ACKNOWLEDGE_NS
             for topic_input in self._wirings.inputs:
-                topic_input.wait_until_acknowledged(deadline)
+                with self._bugs.contained(f"ending {topic_input.name}"):
+                    topic_input.wait_until_acknowledged(deadline)
         return self._snapshot()
 
     def close(self) -> None:
@@ -293,10 +309,11 @@ class Relay:
         return ", ".join(f"{each.name} -> {self.node.resolve_topic_name(topic.output)}" for each, topic in topics)
 
     def _serve(self) -> None:
-        try:
-            self._services.spin()
-        except ExternalShutdownException:
-            return
+        while self._context.ok():
+            with self._bugs.contained("serving parameters and the clock"), suppress(ExternalShutdownException):
+                self._services.spin()
+                return
+            time.sleep(_AFTER_FAILURE_S)
 
     def _follow_clock(self) -> None:
         clock = self.node.get_clock()
@@ -306,7 +323,7 @@ class Relay:
         def changed(jump: Any) -> None:
             if jump.delta <= _CLOCK_JUMP:
                 self._loop.call(self._flush_jump)
-            elif any(group.engine.next_deadline() is not None for group in self._wirings.groups):
+            elif any(group.config.keys.max_wait is not None for group in self._wirings.groups):
                 self._loop.call(lambda: self._expire(self._now()))
 
         self._jump_handle = clock.create_jump_callback(threshold, post_callback=changed)
@@ -349,23 +366,17 @@ def _require_same_node(running: Config, asked: Config) -> None:
             raise ReloadError(f"`{name}` cannot change while the relay runs: restart it")
 
 
-def _tellers(config: Config, node: Any, groups: Sequence[GroupRelay]) -> list[Diagnostics | Scalars]:
-    """Make what publishes about the relay, as the file asks for it."""
-    if config.diagnostics is None:
-        return []
-    if not config.diagnostics.scalars:
-        return [Diagnostics(node)]
-    return [Diagnostics(node), Scalars(node, [group.config.name for group in groups])]
-
-
 def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:
-    deadlines = (group.engine.next_deadline() for group in groups)
+    try:
+        deadlines = [group.engine.next_deadline() for group in groups]
+    except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
+        deadlines = [group.next_deadline() for group in groups]
     return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
 
 def _describe(wiring: Wiring) -> GroupSnapshot:
     group = wiring.group
-    inputs = zip(group.config.topics, wiring.inputs, group.engine.counts(), strict=True)
+    inputs = zip(group.config.topics, wiring.inputs, group.counts(), strict=True)
     return GroupSnapshot(
         name=group.config.name,
         inputs=tuple(

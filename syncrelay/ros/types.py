@@ -30,6 +30,11 @@ def import_type(name: str) -> Any:
     return message_type
 
 
+def name_of(message_type: Any) -> str:
+    """Return the full name of a message class, `pkg/msg/Name`."""
+    return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
+
+
 def begins_with_header(message_type: Any) -> bool:
     """Whether payloads of a type begin with a std_msgs/Header, whose stamp is at a fixed place."""
     fields = message_type.get_fields_and_field_types()
@@ -48,11 +53,11 @@ def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:
 
     Raises TypeImportError where the type has no such field.
     """
-    module, name = message_type.__module__.split(".")[0], message_type.__name__
+    name = name_of(message_type)
     try:
-        return field_reader(_fields_of, f"{module}/{name}", path)
+        return field_reader(_fields_of, name.replace("/msg/", "/"), path)
     except UnreadableFieldError as error:
-        raise TypeImportError(f"{module}/msg/{name} has no field {path} to go by: {error}") from error
+        raise TypeImportError(f"{name} has no field {path} to go by: {error}") from error
 
 
 def _fields_of(name: str) -> Mapping[str, str]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from syncrelay.explain import Endpoint, GroupReport
+from syncrelay.explain import Endpoint, GroupReport, InputFacts
 
 
 class Phase(Enum):
@@ -52,10 +52,18 @@ def level(report: GroupReport) -> Level:
 
 
 def is_ready(state: RelayState) -> bool:
-    """Whether every required input of every group has a publisher that serves it, and the relay runs."""
+    """Whether the relay runs, and every required input of every group is served and let through."""
     inputs = [each for report in state.groups for each in report.facts.inputs if each.required]
-    matched = all(any(_serves(publisher, each.type) for publisher in each.publishers) for each in inputs)
-    return state.phase is Phase.RUNNING and bool(state.groups) and matched
+    return (
+        state.phase is Phase.RUNNING
+        and bool(state.groups)
+        and all(report.facts.failure is None for report in state.groups)
+        and all(_is_served(each) for each in inputs)
+    )
+
+
+def _is_served(an_input: InputFacts) -> bool:
+    return an_input.refusal is None and any(_serves(each, an_input.type) for each in an_input.publishers)
 
 
 def _serves(publisher: Endpoint, type_name: str) -> bool:

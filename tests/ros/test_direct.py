@@ -29,7 +29,7 @@ messages = pytest.importorskip("syncrelay.ros.direct.messages")
 rcl = pytest.importorskip("syncrelay.ros.direct.rcl")
 buffers = pytest.importorskip("syncrelay.ros.direct.buffers")
 choose_path = pytest.importorskip("syncrelay.ros.path_choice").choose_path
-taker = pytest.importorskip("syncrelay.ros.inputs").taker
+taker = pytest.importorskip("syncrelay.ros.takers").taker
 
 pytestmark = pytest.mark.ros
 

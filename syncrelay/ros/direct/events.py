@@ -8,11 +8,12 @@ import os
 import select
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from ctypes import c_void_p, cast
 from typing import Final
 
 from syncrelay.ros.direct.messages import DirectSource
-from syncrelay.ros.direct.rcl import Rcl
+from syncrelay.ros.direct.rcl import Rcl, RclCallError
 from syncrelay.ros.path import Look
 
 _NS_PER_SECOND: Final = 1_000_000_000
@@ -38,16 +39,25 @@ class EventWatch:
         self._epoll.register(event, _EDGE)
         self._sources[event] = source
         code = self._rcl.set_on_new_message(source.address, self._notify, event)
-        self._rcl.require(code, "rcl_subscription_set_on_new_message_callback")
+        try:
+            self._rcl.require(code, "rcl_subscription_set_on_new_message_callback")
+        except RclCallError:
+            self._forget(event)
+            raise
         source.doubt()
         os.eventfd_write(event, 1)
 
     def remove(self, source: DirectSource) -> None:
-        """Watch it no longer. Raises RclCallError."""
+        """Watch it no longer; it is to be destroyed next."""
         event = next(event for event, each in self._sources.items() if each is source)
-        # Before the number of the eventfd may stand for another file.
-        code = self._rcl.set_on_new_message(source.address, None, None)
-        self._rcl.require(code, "rcl_subscription_set_on_new_message_callback")
+        # Before the number of the eventfd may stand for another file. Whatever librcl says, the source is left: who
+        # could no longer be rid of it could not go on.
+        with suppress(RclCallError):
+            code = self._rcl.set_on_new_message(source.address, None, None)
+            self._rcl.require(code, "rcl_subscription_set_on_new_message_callback")
+        self._forget(event)
+
+    def _forget(self, event: int) -> None:
         del self._sources[event]
         self._epoll.unregister(event)
         os.close(event)
