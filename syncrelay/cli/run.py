@@ -36,8 +36,8 @@ def run(
 ) -> int:
     """Relay the groups of a file, all of them if `groups` is empty; 0 after an orderly end.
 
-    With `explain_s`, end after so many seconds with the findings, and 1 unless all groups are healthy. The file is
-    read again at SIGHUP, and with `watch` when it changes.
+    With `explain_s`, only look: publish nothing, and end after so many seconds with the findings, and 1 unless all
+    groups are healthy. The file is read again at SIGHUP, and with `watch` when it changes.
 
     Raises ConfigError for a faulty file, UsageError for a group that it lacks, RosUnavailableError where ROS
     cannot be used.
@@ -57,6 +57,7 @@ def run(
     require_rclpy()
     from syncrelay.cli.explain import explain
     from syncrelay.cli.summary import summarize
+    from syncrelay.ros.entities import Purpose
     from syncrelay.ros.relay import Relay
 
     stop.defer()
@@ -69,6 +70,7 @@ def run(
             groups=groups or None,
             ros_args=ros_args,
             beat=heartbeat.beat if heartbeat else None,
+            purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
         ) as relay,
     ):
         stop.wake_with(relay.wake)

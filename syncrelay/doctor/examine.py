@@ -9,7 +9,7 @@ from syncrelay.doctor.container import check_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, know, worst_first
 from syncrelay.doctor.discovery import check_discovery, range_of
 from syncrelay.doctor.folders import check_folders
-from syncrelay.doctor.graph import check_clock, check_company, check_own_name, check_sizes, check_topics
+from syncrelay.doctor.graph import check_clock, check_company, check_outputs, check_own_name, check_sizes, check_topics
 from syncrelay.doctor.installation import Installation, check_installation, middleware_of
 from syncrelay.doctor.listen import check_listen
 from syncrelay.doctor.machine.discovery import look_at_discovery, look_at_transport
@@ -150,7 +150,9 @@ def _look(config: Config | None, trial: Trial, *, seconds: float) -> Sighting:
     require_rclpy()
     from syncrelay.ros.look import look  # noqa: PLC0415
 
-    return look(_topics(config, trial), seconds=seconds, use_sim_time=trial.use_sim_time)
+    topics = [topic for group in (config.groups if config else ()) for topic in group.topics]
+    outputs = [trial.names[topic.output] for topic in topics]
+    return look(_topics(config, trial), outputs=outputs, seconds=seconds, use_sim_time=trial.use_sim_time)
 
 
 def _of_graph(
@@ -161,6 +163,7 @@ def _of_graph(
         return
     yield from check_clock(sighting, use_sim_time=trial.use_sim_time)
     yield from check_own_name(sighting, trial.node)
+    yield from check_outputs(sighting, trial.node)
     yield from check_topics(sighting, optional=_optional(config, trial))
     if config.node.transport == "default" and uses_defaults(environ):
         yield from check_sizes(sighting)

@@ -64,7 +64,8 @@ class InputFacts:
 
     `name` is the topic's in the graph, `not_importable` says why its type cannot be used here, `refusal` what DDS does
     not make for it, `alike` are topics of the graph that may have been meant, `lost` counts what DDS lost on the way of
-    late. `key` is the newest message's. `offset` is added to stamps for matching, in nanoseconds.
+    late. `rivals` are others that publish its output, seen so without a break since `rivals_since`. `key` is the newest
+    message's. `offset` is added to stamps for matching, in nanoseconds.
     """
 
     name: str
@@ -79,6 +80,8 @@ class InputFacts:
     not_importable: str | None = None
     refusal: Refusal | None = None
     lost: int = 0
+    rivals: tuple[Endpoint, ...] = ()
+    rivals_since: int = 0
     key: Hashable = None
     offset: int = 0
 

@@ -22,6 +22,8 @@ class InputGraph:
     not_importable: str | None = None
     refusal: Refusal | None = None
     lost: int = 0
+    rivals: tuple[Endpoint, ...] = ()
+    rivals_since: int = 0
 
 
 class GroupWatch:
@@ -86,6 +88,8 @@ class GroupWatch:
                     not_importable=shown.not_importable,
                     refusal=shown.refusal,
                     lost=shown.lost,
+                    rivals=shown.rivals,
+                    rivals_since=shown.rivals_since,
                     key=key,
                     offset=topic.offset_ns,
                 )

@@ -60,6 +60,7 @@ class _Ends(NamedTuple):
 
     output: str
     subscribers: tuple[Endpoint, ...]
+    rivals: tuple[Endpoint, ...]
     alike: tuple[str, ...]
 
 
@@ -76,6 +77,7 @@ class Monitor:
         self._reports: dict[GroupRelay, GroupReport] = {}
         self._losses: dict[TopicInput, _Losses] = {}
         self._ends: dict[tuple[GroupRelay, int], _Ends] = {}
+        self._rivals_since: dict[tuple[GroupRelay, int], int] = {}
         self._waits: deque[int] = deque(maxlen=_LAST_LOOKS)
         self._overslept = 0
         self.watch(wirings)
@@ -99,6 +101,7 @@ class Monitor:
         self._losses = {each: self._losses.get(each) or _Losses() for each in inputs}
         self._reports = {group: report for group, report in self._reports.items() if group in self._watched}
         self._ends.clear()
+        self._rivals_since = {key: at for key, at in self._rivals_since.items() if key[0] in self._watched}
 
     def graph_changed(self) -> None:
         """Hear that what is known of the graph may no longer be so."""
@@ -155,25 +158,40 @@ class Monitor:
     def _graph(self, group: GroupRelay, index: int, topic_input: TopicInput) -> InputGraph:
         ends = self._ends.get((group, index))
         if ends is None:
-            ends = self._ends[group, index] = _Ends(
-                output=self._node.resolve_topic_name(group.config.topics[index].output),
-                subscribers=topic_input.subscribers(group, index),
-                alike=() if topic_input.publishers else self._alike(topic_input),
-            )
+            ends = self._ends[group, index] = self._ends_of(group, index, topic_input)
         return InputGraph(
             name=topic_input.name,
             output=ends.output,
             publishers=topic_input.publishers,
             subscribers=ends.subscribers,
+            rivals=ends.rivals,
+            rivals_since=self._rivals_since.get((group, index), 0),
             alike=ends.alike,
             not_importable=topic_input.not_importable,
             refusal=topic_input.refusal(group, index),
             lost=self._losses[topic_input].lately,
         )
 
+    def _ends_of(self, group: GroupRelay, index: int, topic_input: TopicInput) -> _Ends:
+        rivals = topic_input.rivals(group, index)
+        if rivals:
+            self._rivals_since.setdefault((group, index), time.time_ns())
+        else:
+            self._rivals_since.pop((group, index), None)
+        return _Ends(
+            output=self._node.resolve_topic_name(group.config.topics[index].output),
+            subscribers=topic_input.subscribers(group, index),
+            rivals=rivals,
+            alike=() if topic_input.publishers else self._alike(topic_input),
+        )
+
     def _alike(self, topic_input: TopicInput) -> tuple[str, ...]:
         """Find what may have been meant: our own outputs are not it."""
-        outputs = {topic.output for wiring in self._wirings for topic in wiring.group.config.topics}
+        outputs = {
+            self._node.resolve_topic_name(topic.output)
+            for wiring in self._wirings
+            for topic in wiring.group.config.topics
+        }
         topics = self._node.get_topic_names_and_types()
         published = [
             (name, types) for name, types in topics if name not in outputs and self._node.count_publishers(name)

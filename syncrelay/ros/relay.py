@@ -20,7 +20,7 @@ from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, recent
 from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.diagnostics import Telling
-from syncrelay.ros.entities import Entities
+from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
@@ -68,8 +68,11 @@ class Relay:
         groups: Collection[str] | None = None,
         ros_args: Sequence[str] = (),
         beat: Callable[[], None] | None = None,
+        purpose: Purpose = Purpose.RELAY,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
+
+        Whose purpose is to look has all but publishers: sets leave to nowhere.
 
         Raises ConfigError where remaps make the file's names meet, UsageError where ROS does not take `ros_args`.
         `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
@@ -104,7 +107,7 @@ class Relay:
             contain=lambda error: self._bugs.tell("receiving", error),
         )
         self._graph_changes = path.graph_changes(self.node)
-        entities = Entities(self.node)
+        entities = Entities(self.node, purpose)
         self._wirings = Wirings(entities=entities, node=self.node, path=path, loop=self._loop)
         self._telling = Telling(self.node, entities)
         self.monitor = Monitor((), node=self.node, loop=self._loop, simulated=self._sim_time, bugs=self._bugs)
