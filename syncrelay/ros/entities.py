@@ -1,6 +1,6 @@
 """What DDS makes for the relay: raw subscriptions and publishers, each made or refused with a reason."""
 
-from collections.abc import Collection
+from collections.abc import Callable
 from enum import Enum
 from typing import Any, Final
 
@@ -56,7 +56,8 @@ class Entities:
         """Where it is to look, nobody asks for publishers."""
         self._left_to_the_loop = _LeftToTheReceiveLoop()
         # An entity of the node itself, which never ends, stands for itself.
-        self._holders: dict[str, dict[Any, str]] = {_ROSOUT[0]: {node: _ROSOUT[1]}}
+        self._holders: dict[str, dict[Any, str]] = {}
+        self._hold(node.resolve_topic_name(_ROSOUT[0]), node, _ROSOUT[1])
         for entity in (*node.publishers, *node.subscriptions):
             self._hold(entity.topic_name, entity, name_of(entity.msg_type))
 
@@ -95,11 +96,12 @@ class Entities:
         if not self._node.destroy_publisher(entity):
             self._node.destroy_subscription(entity)
 
-    def frees(self, topic: str, ending: Collection[Any]) -> bool:
-        """Whether nothing of ours is left on a topic when these end."""
-        return all(entity in ending for entity in self._holders.get(self._node.resolve_topic_name(topic), ()))
+    def frees(self, topic: str, ending: set[Any]) -> bool:
+        """Whether there is something of ours on a topic, and nothing any more when these end."""
+        holders = self._holders.get(self._node.resolve_topic_name(topic), {}).keys()
+        return bool(holders) and holders <= ending
 
-    def _made(self, make: Any, message_type: Any, topic: str, verb: str) -> Any:
+    def _made(self, make: Callable[[], Any], message_type: Any, topic: str, verb: str) -> Any:
         name, type_name = self._node.resolve_topic_name(topic), name_of(message_type)
         held = next(iter(self._holders.get(name, {}).values()), type_name)
         if held != type_name:

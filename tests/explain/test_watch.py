@@ -4,12 +4,13 @@ import pytest
 from groups import BEGAN, IMAGE, MS, S
 
 from syncrelay.config import load_text
-from syncrelay.explain import Endpoint, GroupWatch, InputGraph, Tolerance
+from syncrelay.explain import Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
 from syncrelay.sync.counts import InputCounts
 
+REFUSAL = Refusal("publish", "/front/lidar", IMAGE, held_as="std_msgs/msg/Int64")
 GRAPH = (
     InputGraph("/camera", "/front/camera", publishers=(Endpoint("/usb_cam", IMAGE),), alike=("/cam",), lost=3),
-    InputGraph("/lidar", "/front/lidar", not_importable="no such package"),
+    InputGraph("/lidar", "/front/lidar", not_importable="no such package", refusal=REFUSAL),
 )
 
 
@@ -85,15 +86,15 @@ def test_the_graph_becomes_facts():
         ("/cam",),
         3,
     )
-    assert lidar.not_importable == "no such package"
+    assert (lidar.not_importable, lidar.refusal) == ("no such package", REFUSAL)
 
 
 def test_what_came_becomes_facts_with_the_newest_keys():
     group = watch("policy: equal_key\n    key: header.frame_id")
     counts = (InputCounts(1, 0, {}, 1), InputCounts(0, 0, {}, 0))
     group.add([[(BEGAN, BEGAN + MS)], []], [], counts, 0, keys=("k7", None), now=BEGAN + S)
-    found = group.facts(GRAPH, now=BEGAN + S, clock_stopped=4 * S, waited=5)
+    found = group.facts(GRAPH, now=BEGAN + S, clock_stopped=4 * S, waited=5, failure="KeyError: 7")
     assert [each.counts for each in found.inputs] == list(counts)
     assert [each.key for each in found.inputs] == ["k7", None]
     assert found.inputs[0].figures.delay == MS
-    assert (found.clock_stopped, found.waited) == (4 * S, 5)
+    assert (found.clock_stopped, found.waited, found.failure) == (4 * S, 5, "KeyError: 7")

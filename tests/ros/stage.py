@@ -153,9 +153,18 @@ class Stage:
 
     def before_each_sensor(self, statements: str) -> None:
         """Have each sensor of a rig that is started from now on run these statements before all else."""
+        self._before("syncrelay.ros.rig", statements)
+
+    def before_each_relay(self, statements: str) -> None:
+        """Have each relay that is started from now on run these statements before all else."""
+        self._before("--config", statements)
+
+    def _before(self, word: str, statements: str) -> None:
+        """Have each process with this word in its command run these statements before all else."""
         folder = self.folder / "before"
         folder.mkdir()
-        text = f"import sys\nif 'syncrelay.ros.rig' in sys.orig_argv: {statements}\n"
+        (folder / "statements.py").write_text(statements)
+        text = f"import sys\nif {word!r} in sys.orig_argv: exec(open({str(folder / 'statements.py')!r}).read(), {{}})\n"
         (folder / "sitecustomize.py").write_text(text)
         self.environment["PYTHONPATH"] += f":{folder}"
 

@@ -4,7 +4,6 @@ import fcntl
 import json
 import os
 import pty
-import signal
 import subprocess
 import sys
 import termios
@@ -18,6 +17,7 @@ from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, config, inputs
 from tests.ros.processes import Process, wait_until
+from tests.ros.reloaded import ReloadedFile
 from tests.ros.stage import Stage, both_paths
 from tests.ros.status import ANY_PORT, status
 from tests.ros.streams import at, jittery, merged
@@ -32,47 +32,12 @@ def _rear(*, topics: tuple[str, ...] = ("/camera", "/lidar"), **keys: Any) -> di
     return {"policy": "exact_time", "topics": inputs(dict.fromkeys(topics, VECTOR), qos=LOSSLESS), **keys}
 
 
-class _File:
-    """The file of a relay, which it reads again."""
-
-    def __init__(self, stage: Stage, *arguments: str, **groups: Any) -> None:
-        self.relay = stage.relay(config(groups, metrics=ANY_PORT), *arguments)
-        self._path = stage.folder / "config-0.yaml"
-        if not self._path.exists():
-            self._path = max(stage.folder.glob("config-*.yaml"))
-        self.relay.wait_for_log("status and metrics: ")
-
-    def write(self, text: str) -> None:
-        # In one go: a file that is half written is no file of the user's.
-        new = self._path.with_suffix(".new")
-        new.write_text(text)
-        new.replace(self._path)
-
-    def reload(self, **groups: Any) -> None:
-        """Write the file, have it read, and wait until it is taken."""
-        self.write(config(groups, metrics=ANY_PORT))
-        before = self.count("reloads")
-        self.relay.send(signal.SIGHUP)
-        wait_until(lambda: self.count("reloads") == before + 1, "the file to be read")
-
-    def refuse(self, text: str) -> str:
-        """Write a file that is to be left aside; why it was."""
-        self.write(text)
-        before = self.count("refused_reloads")
-        self.relay.send(signal.SIGHUP)
-        wait_until(lambda: self.count("refused_reloads") == before + 1, "the file to be refused")
-        return str(status(self.relay)["relay"]["reload_error"])
-
-    def count(self, what: str) -> int:
-        return int(status(self.relay)["relay"][what])
-
-
 @both_paths
 def test_an_unchanged_group_loses_and_doubles_nothing_while_others_come_change_and_go(stage: Stage):
     camera = jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1)
     recording = merged(camera, jittery("/lidar", period_ms=10, jitter_ms=2, count=2000, seed=2))
     aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
-    file = _File(stage, front=_FRONT)
+    file = ReloadedFile(stage, front=_FRONT)
     collector = stage.collector(aligned)
     player = stage.player(_PAIR)
     relaying.connect(player, collector, recording, aligned)
@@ -102,7 +67,7 @@ def test_an_unchanged_group_loses_and_doubles_nothing_while_others_come_change_a
 
 def test_a_changed_group_is_built_anew_and_a_new_one_begins(stage: Stage):
     recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
-    file = _File(stage, front=_FRONT)
+    file = ReloadedFile(stage, front=_FRONT)
     relay = file.relay
     file.reload(front=_rear(output_prefix="/new"), rear=_rear())
     aligned = {"/new/camera": VECTOR, "/new/lidar": VECTOR, "/rear/camera": VECTOR, "/rear/lidar": VECTOR}
@@ -122,7 +87,7 @@ def test_what_a_new_group_lets_wait_leaves_in_time(stage: Stage):
     aligned = {"/rear/camera": VECTOR, "/rear/lidar": VECTOR}
     rear = _rear(max_wait="50ms")
     rear["topics"] += [{"topic": "/radar", "type": VECTOR, "required": False}]
-    file = _File(stage, front=_FRONT)
+    file = ReloadedFile(stage, front=_FRONT)
     collector, player = stage.collector(aligned), stage.player(_PAIR)
     file.reload(front=_FRONT, rear=rear)
     relaying.connect(player, collector, recording, aligned)
@@ -130,7 +95,7 @@ def test_what_a_new_group_lets_wait_leaves_in_time(stage: Stage):
 
 
 def test_a_topic_that_no_group_uses_any_more_is_not_subscribed_any_more(stage: Stage):
-    file = _File(stage, front=_FRONT, rear=_rear(topics=("/camera", "/other")))
+    file = ReloadedFile(stage, front=_FRONT, rear=_rear(topics=("/camera", "/other")))
     collector = stage.collector()
     other = stage.player({"/other": VECTOR, **_PAIR})
     other.match()
@@ -146,7 +111,7 @@ def test_a_topic_that_no_group_uses_any_more_is_not_subscribed_any_more(stage: S
 
 
 def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
-    file = _File(stage, front=_FRONT)
+    file = ReloadedFile(stage, front=_FRONT)
     why = file.refuse(config({"front": {**_FRONT, "slopp": "1ms"}}, metrics=ANY_PORT))
     assert "groups.front.slopp: unknown key, did you mean `slop`?" in why
     assert "the file was read again and is left aside, all goes on as before" in file.relay.stderr
@@ -160,7 +125,7 @@ def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
 
 
 def test_a_watched_file_is_read_when_it_changes(stage: Stage):
-    file = _File(stage, "--watch", front=_FRONT)
+    file = ReloadedFile(stage, "--watch", front=_FRONT)
     file.write(config({"front": _FRONT, "rear": _rear()}, metrics=ANY_PORT))
     wait_until(lambda: file.count("reloads") == 1, "the file to be read")
     file.write("version: 1\n")
@@ -199,7 +164,7 @@ def _command(stage: Stage, relay: Process) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_command_has_it_read_and_tells_what_came_of_it(stage: Stage):
-    file = _File(stage, front=_FRONT)
+    file = ReloadedFile(stage, front=_FRONT)
     done = _command(stage, file.relay)
     assert (done.returncode, done.stdout.startswith("/syncrelay has read ")) == (0, True)
     file.write("groups: 5")
@@ -236,5 +201,5 @@ def _own_terminal() -> None:
 
 
 def test_its_state_tells_which_process_it_is(stage: Stage):
-    file = _File(stage, front=_FRONT)
+    file = ReloadedFile(stage, front=_FRONT)
     assert json.loads(json.dumps(status(file.relay)))["relay"]["pid"] == file.relay.pid

@@ -4,6 +4,7 @@ import json
 import socket
 import threading
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 
 import pytest
 from serving import ANY, asked, connected, sent, serving
@@ -11,10 +12,21 @@ from states import CAMERA, relay, started, working
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
-from syncrelay.explain import Endpoint, Mismatch
+from syncrelay.explain import Endpoint, Mismatch, Refusal
 from syncrelay.status import Phase, Server
 
 HEALTHY = relay(working())
+STOPPED = replace(working(), facts=replace(working().facts, failure="KeyError: 'x'"))
+REFUSED = replace(
+    working(),
+    facts=replace(
+        working().facts,
+        inputs=tuple(
+            replace(each, refusal=Refusal("publish", each.output, each.type, why="no memory"))
+            for each in working().facts.inputs
+        ),
+    ),
+)
 UNFIT = Endpoint("/usb_cam", CAMERA.type, Mismatch("reliability", "best_effort", "reliable"))
 
 
@@ -62,8 +74,13 @@ def test_a_relay_lives_while_its_receive_loop_turns(state, answer):
         (relay(started(camera=(UNFIT,))), (503, "not ready: running, see /status\n")),
         (relay(started(camera=(UNFIT, CAMERA))), (200, "ready\n")),
         (relay(started(camera=(Endpoint("/x", "std_msgs/msg/Int64"),))), (503, "not ready: running, see /status\n")),
+        (relay(STOPPED), (503, "not ready: running, see /status\n")),
+        (relay(REFUSED), (503, "not ready: running, see /status\n")),
     ],
-    ids=["ready", "drains", "starts", "no group", "no publisher", "QoS does not fit", "one of two fits", "other type"],
+    ids=[
+        *("ready", "drains", "starts", "no group", "no publisher", "QoS does not fit", "one of two fits", "other type"),
+        *("a bug stopped it", "refused by DDS"),
+    ],
 )
 def test_a_relay_is_ready_while_every_required_input_is_served(state, answer):
     with serving(state) as address:

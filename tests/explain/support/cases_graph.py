@@ -3,11 +3,32 @@
 from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
 from groups import IMAGE, MS, NOW, S, a_group, a_silent_group
 
-from syncrelay.explain import Code, Endpoint, Mismatch, Severity
+from syncrelay.explain import Code, Endpoint, Mismatch, Refusal, Severity
 from syncrelay.sync.counts import InputCounts
 
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
+    "a group that an exception stopped": (
+        Code.INTERNAL_ERROR,
+        Severity.ERROR,
+        a_group(failure="KeyError: 'x'"),
+        "a bug in syncrelay stopped this group: KeyError: 'x'",
+        "report it with the traceback in the log; `syncrelay reload` starts the group again",
+    ),
+    "an output whose topic has another type here": (
+        Code.REFUSED_BY_DDS,
+        Severity.ERROR,
+        a_group(camera(refusal=Refusal("publish", "/out", IMAGE, held_as="std_msgs/msg/Int64")), LIDAR),
+        f"DDS does not publish /out as {IMAGE}: this process has it as std_msgs/msg/Int64 already",
+        "give one of the two another name: a process has one type for each topic",
+    ),
+    "an optional input that DDS does not subscribe to": (
+        Code.REFUSED_BY_DDS,
+        Severity.WARN,
+        a_group(camera(required=False, refusal=Refusal("subscribe to", "/camera", IMAGE, why="out of memory")), LIDAR),
+        f"DDS does not subscribe to /camera as {IMAGE}: out of memory",
+        "the relay tries again every few seconds; if it stays, look at limits of memory and open files",
+    ),
     "a type that is not installed": (
         Code.TYPE_NOT_IMPORTABLE,
         Severity.ERROR,

@@ -1,0 +1,178 @@
+"""An exception in one group stops that group: its neighbours go on, and so does the thread that feeds them all."""
+
+import random
+import time
+from collections import deque
+from threading import Thread
+
+import pytest
+
+from syncrelay.config import load_text
+from syncrelay.ros.group import GroupRelay
+from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.sync import DropReason
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.processes import wait_until
+from tests.ros.streams import BEGIN, MS
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_STEPS = ("add", "reject", "expire", "flush", "counts", "next_deadline")
+
+
+def _group(name: str = "front", **keys) -> GroupRelay:
+    text = config({name: {"policy": "exact_time", "max_wait": "10ms", "topics": inputs(_PAIR), **keys}})
+    return GroupRelay(load_text(text).groups[0], now=lambda: 0)
+
+
+class _Outlet:
+    def __init__(self) -> None:
+        self.sent: list[object] = []
+
+    def send(self, payload: object) -> None:
+        self.sent.append(payload)
+
+
+class _Failing:
+    """An engine that does what another does until one of its steps fails."""
+
+    def __init__(self, engine, step: str) -> None:
+        self._engine, self._step = engine, step
+
+    def __getattr__(self, name: str):
+        if name == self._step:
+            raise ZeroDivisionError(name)
+        return getattr(self._engine, name)
+
+
+def _drive(group: GroupRelay, step: str) -> None:
+    """What the relay does with a group, in which this step of the engine takes part."""
+    match step:
+        case "add" | "reject":
+            stamp = BEGIN if step == "add" else None
+            try:
+                group.receive(0, b"late", 0, stamp)
+            except ZeroDivisionError as error:
+                group.fail(error)
+        case "expire":
+            group.expire(BEGIN)
+        case "flush":
+            group.flush(DropReason.TIME_JUMP)
+        case "counts":
+            group.counts()
+        case "next_deadline":
+            group.next_deadline()
+
+
+@pytest.mark.parametrize("failing", _STEPS)
+def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then_on(failing: str, caplog):
+    group, outlets = _group(), [_Outlet(), _Outlet()]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+        group.receive(index, b"set", 0, BEGIN)
+    assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
+    group.engine = _Failing(group.engine, failing)
+    _drive(group, failing)
+    assert group.failure == f"ZeroDivisionError: {failing}"
+    for step in _STEPS:
+        _drive(group, step)
+    for index in range(2):
+        group.receive(index, b"more", 0, BEGIN + MS)
+    assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
+    assert group.engine.sets == 1
+    if failing != "counts":
+        assert [(each.fed, each.matched, each.buffered) for each in group.counts()] == [(1, 1, 0), (1, 1, 0)]
+    told = [record for record in caplog.records if record.exc_info]
+    assert [(record.levelname, record.group, record.finding) for record in told] == [
+        ("ERROR", "front", "internal_error")
+    ]
+
+
+class _Source:
+    """Gives messages, and fails where an exception stands in the place of one."""
+
+    def __init__(self, *messages: bytes | Exception) -> None:
+        self.messages = deque(messages)
+        self.deliver = lambda *_: None
+
+    def take(self):
+        if not self.messages:
+            return None
+        message = self.messages.popleft()
+        if isinstance(message, Exception):
+            raise message
+        return 0, message, message
+
+    def doubt(self) -> None:
+        pass
+
+
+class _Watch:
+    """Has all sources ready at each turn, and fails now and then."""
+
+    def __init__(self, chance: random.Random) -> None:
+        self._chance = chance
+        self.sources: list[_Source] = []
+
+    def add(self, source: _Source) -> None:
+        self.sources.append(source)
+
+    def remove(self, source: _Source) -> None:
+        self.sources.remove(source)
+
+    def wait(self, _: int):
+        _fail_at_times(self._chance)
+        return list(self.sources), time.time_ns()
+
+    def wake(self) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+def _fail_at_times(chance: random.Random) -> None:
+    if chance.random() < 0.1:
+        raise chance.choice([ZeroDivisionError, OSError, MemoryError, RecursionError])("by chance")
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
+    """Whatever fails around them, all messages of the other sources are delivered in order, and all calls are made."""
+    chance = random.Random(seed)
+    told: list[Exception] = []
+    loop = ReceiveLoop(
+        _Watch(chance),
+        now=lambda: 0,
+        expire=lambda _: _fail_at_times(chance),
+        deadline=lambda: _fail_at_times(chance) or chance.choice([None, 0]),
+        beat=lambda: _fail_at_times(chance),
+        contain=told.append,
+    )
+    sound = [_Source(*(b"%d" % n for n in range(200))) for _ in range(3)]
+    delivered: dict[_Source, list[bytes]] = {source: [] for source in sound}
+    for source in sound:
+        source.deliver = lambda payload, *_, source=source: delivered[source].append(payload)
+        loop.add(source, told.append)
+    ailing, lost = _Source(b"a", OSError("gone"), b"b"), []
+    loop.add(ailing, lost.append)
+    thread = Thread(target=loop.run)
+    thread.start()
+    for n in range(20):
+        assert loop.call(lambda n=n: n).result(timeout=60) == n
+        with pytest.raises(KeyError):
+            loop.call(lambda: {}["no such"]).result(timeout=60)
+    wait_until(lambda: not any(source.messages for source in sound), "all messages")
+    loop.stop()
+    thread.join(timeout=60)
+    assert not thread.is_alive()
+    assert [str(error) for error in lost] == ["gone"]
+    assert all(messages == [b"%d" % n for n in range(200)] for messages in delivered.values())
+    assert told
+
+
+def test_without_somebody_to_tell_the_loop_raises_what_failed():
+    chance = random.Random(1)
+    loop = ReceiveLoop(_Watch(chance), now=lambda: 0, expire=lambda _: None)
+    with pytest.raises((ZeroDivisionError, OSError, MemoryError, RecursionError)):
+        loop.run()

@@ -1,0 +1,176 @@
+"""What DDS does not make is told as its group's, and others go on; a reload takes on all of a file or nothing."""
+
+from typing import Any
+
+import pytest
+
+from syncrelay.sync import ExactTime
+from tests.ros import relaying
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import LOSSLESS, config, inputs
+from tests.ros.processes import wait_until
+from tests.ros.reloaded import ReloadedFile
+from tests.ros.stage import Collector, Stage, both_paths
+from tests.ros.status import ANY_PORT, findings, wait_for_finding
+from tests.ros.streams import at, jittery, merged
+
+pytestmark = pytest.mark.ros
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_ALIGNED = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+_FRONT = {"policy": "exact_time", "queue_size": 50, "topics": inputs(_PAIR, qos=LOSSLESS)}
+_IMU, _FIELD = "sensor_msgs/msg/Imu", "sensor_msgs/msg/MagneticField"
+# All that is needed to subscribe and to publish is here, so that nobody else has to.
+_AT_ONCE = {"reliability": "reliable", "durability": "volatile"}
+
+
+def _group(*topics: tuple[str, str, str]) -> dict[str, Any]:
+    """A group of these topics, with their types and outputs."""
+    named = [
+        {"topic": topic, "type": type_name, "output": output, "qos": _AT_ONCE} for topic, type_name, output in topics
+    ]
+    return {"policy": "exact_time", "topics": named}
+
+
+_SWAP = _group(("/x", _IMU, "/o1"), ("/mag", _FIELD, "/o2"))
+_SWAPPED = _group(("/x", _IMU, "/o2"), ("/mag", _FIELD, "/o1"))
+
+
+def _wait_for_outputs(collector: Collector, outputs: dict[str, str]) -> None:
+    """Until the relay publishes these, as these types and no others."""
+
+    def seen(output: str) -> list[str]:
+        return [each["type"] for each in collector.endpoints(output, kind="publisher", node="/syncrelay")]
+
+    wait_until(lambda: all(seen(output) == [name] for output, name in outputs.items()), f"{outputs}")
+
+
+@both_paths
+def test_a_reload_exchanges_the_outputs_of_two_types_and_other_groups_lose_nothing(stage: Stage):
+    recording = merged(*(jittery(topic, period_ms=10, jitter_ms=0, count=600, seed=1) for topic in _PAIR))
+    file = ReloadedFile(stage, front=_FRONT, swap=_SWAP)
+    collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, _ALIGNED)
+    player.start(recording, speed=2)
+    reloads = 0
+    while not player.finished():
+        file.reload(front=_FRONT, swap=_SWAPPED if reloads % 2 == 0 else _SWAP)
+        reloads += 1
+    player.finish()
+    relaying.conclude(player, collector, recording, _ALIGNED)
+    assert reloads > 2
+    expected = relaying.expected_sets(ExactTime(n_inputs=2, queue_size=50), recording, list(_PAIR))
+    assert relaying.sets_within(recording, collector, _ALIGNED) == expected
+    file.reload(front=_FRONT, swap=_SWAPPED)
+    _wait_for_outputs(collector, {"/o2": _IMU, "/o1": _FIELD})
+
+
+def test_an_input_takes_the_topic_of_an_output_that_ends_and_an_output_that_of_an_input(stage: Stage):
+    file, collector = ReloadedFile(stage, turned=_SWAP), stage.collector()
+    _wait_for_outputs(collector, {"/o1": _IMU, "/o2": _FIELD})
+    file.reload(turned=_group(("/o1", _FIELD, "/x"), ("/o2", _IMU, "/mag")))
+    _wait_for_outputs(collector, {"/x": _FIELD, "/mag": _IMU})
+    assert "refused_by_dds" not in findings(file.relay, "turned")
+
+
+@both_paths
+def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stage):
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    outputs = _group(("/x", _IMU, "/o1"), ("/mag", _FIELD, "/o2"))
+    subscriptions = _group(("/y", _IMU, "/o3"), ("/z", _FIELD, "/o4"))
+    own = ["-r", "/parameter_events:=/o1", "-r", "/rosout:=/z"]
+    file = ReloadedFile(stage, "--ros-args", *own, front=_FRONT, outputs=outputs, subscriptions=subscriptions)
+    collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, _ALIGNED)
+    player.play(recording)
+    relaying.conclude(player, collector, recording, _ALIGNED)
+    assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 3
+    told = {name: wait_for_finding(file.relay, "refused_by_dds", name) for name in ("outputs", "subscriptions")}
+    events, log = "rcl_interfaces/msg/ParameterEvent", "rcl_interfaces/msg/Log"
+    assert {name: (finding["severity"], finding["topic"], finding["text"]) for name, finding in told.items()} == {
+        "outputs": ("error", "/x", f"DDS does not publish /o1 as {_IMU}: this process has it as {events} already"),
+        "subscriptions": (
+            "error",
+            "/z",
+            f"DDS does not subscribe to /z as {_FIELD}: this process has it as {log} already",
+        ),
+    }
+    assert "refused_by_dds" not in findings(file.relay)
+    # rcl's own lines would come at every try.
+    assert ">>> [rcutils" not in file.relay.stderr
+
+
+def test_a_file_with_an_output_that_dds_refuses_is_left_aside_and_all_goes_on(stage: Stage):
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    file = ReloadedFile(stage, "--ros-args", "-r", "/parameter_events:=/o3", front=_FRONT, swap=_SWAP)
+    collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, _ALIGNED)
+    _wait_for_outputs(collector, {"/o1": _IMU, "/o2": _FIELD})
+    # The first output would have to end for the other group's, which could be made.
+    third = _group(("/x", _IMU, "/o3"), ("/mag", _FIELD, "/o1"))
+    why = file.refuse(config({"front": _FRONT, "swap": third}, metrics=ANY_PORT))
+    assert why.startswith(f"DDS does not publish /o3 as {_IMU}: ")
+    _wait_for_outputs(collector, {"/o1": _IMU, "/o2": _FIELD})
+    player.play(recording)
+    relaying.conclude(player, collector, recording, _ALIGNED)
+    assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 3
+
+
+_FAILING = """
+from syncrelay.config import GroupConfig
+from syncrelay.sync.group import SyncGroup
+
+add, engine = SyncGroup.add, GroupConfig.engine
+
+def failing_add(self, message, *, now):
+    if message.stamp % 1000 == 7 and self._is_limited:
+        raise KeyError(message.stamp)
+    return add(self, message, now=now)
+
+def failing_engine(self):
+    if self.name == "impossible":
+        raise OverflowError("too large to be an engine")
+    return engine(self)
+
+SyncGroup.add, GroupConfig.engine = failing_add, failing_engine
+"""
+
+
+@both_paths
+def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_on(stage: Stage):
+    stage.before_each_relay(_FAILING)
+    recording = merged(*(at(topic, 0, 10, 20.000007, 30) for topic in _PAIR))
+    failing = {**_FRONT, "max_wait": "1s"}
+    of_failing = {"/failing/camera": VECTOR, "/failing/lidar": VECTOR}
+    aligned = {**_ALIGNED, **of_failing}
+    file = ReloadedFile(stage, front=_FRONT, failing=failing)
+    collector, player = stage.collector(aligned), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, aligned)
+    player.play(recording)
+    relaying.conclude(player, collector, recording, _ALIGNED)
+    assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 4
+    assert [len(relaying.within(recording, collector.payloads(each))) for each in of_failing] == [2, 2]
+    finding = wait_for_finding(file.relay, "internal_error", "failing")
+    assert finding["text"].startswith("a bug in syncrelay stopped this group: KeyError: ")
+    assert "internal_error" not in findings(file.relay)
+    assert file.relay.stderr.count("Traceback") == 1
+    file.reload(front=_FRONT, failing=failing)
+    assert "the file was read again: 1 groups go on, 1 begin" in file.relay.stderr
+    relaying.conclude(player, collector, recording, of_failing)
+
+
+def test_a_bug_that_a_file_finds_leaves_the_relay_with_its_old_file(stage: Stage):
+    stage.before_each_relay(_FAILING)
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    file = ReloadedFile(stage, front=_FRONT)
+    collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, _ALIGNED)
+    why = file.refuse(config({"front": {**_FRONT, "queue_size": 7}, "impossible": _FRONT}, metrics=ANY_PORT))
+    assert why.startswith("a bug in syncrelay kept it from taking on the file, all goes on as before")
+    assert "Traceback" in why
+    assert why.endswith("OverflowError: too large to be an engine")
+    assert file.relay.stderr.count("OverflowError: too large to be an engine") == 1
+    player.play(recording)
+    relaying.conclude(player, collector, recording, _ALIGNED)
+    assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 3
+    file.reload(front=_FRONT, rear=_SWAP)

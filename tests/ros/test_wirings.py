@@ -1,0 +1,220 @@
+"""Groups exchanged for others while DDS refuses some of what they need: all of the new run, or all of the old."""
+
+import random
+from collections.abc import Iterator
+from threading import Thread
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from syncrelay.config import load_text
+from syncrelay.errors import ReloadError
+from syncrelay.explain import Refusal
+from tests.ros.configs import config
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+entities = pytest.importorskip("syncrelay.ros.entities")
+choose_path = pytest.importorskip("syncrelay.ros.path_choice").choose_path
+Wirings = pytest.importorskip("syncrelay.ros.wirings").Wirings
+GroupRelay = pytest.importorskip("syncrelay.ros.group").GroupRelay
+import_type = pytest.importorskip("syncrelay.ros.types").import_type
+ReceiveLoop = pytest.importorskip("syncrelay.ros.receive").ReceiveLoop
+
+pytestmark = pytest.mark.ros
+
+_TYPES = tuple(f"sensor_msgs/msg/{name}" for name in ("Imu", "MagneticField", "Temperature"))
+_NAMES = ("/a", "/b", "/c", "/d", "/e", "/f")
+_AT_ONCE = {"reliability": "reliable", "durability": "volatile"}
+
+
+class _Refusing(entities.Entities):
+    """Refuses, too, what a test says."""
+
+    def __init__(self, node: Any) -> None:
+        super().__init__(node)
+        self.refuses = lambda: False
+
+    def publisher(self, message_type: Any, topic: str, profile: Any) -> Any:
+        if self.refuses():
+            raise entities.RefusedError(Refusal("publish", topic, "any", why="no more memory"))
+        return super().publisher(message_type, topic, profile)
+
+
+@pytest.fixture(params=["direct", "rclpy"])
+def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
+    """Wirings of a node of this process, with a loop that runs."""
+    context = rclpy.context.Context()
+    rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
+    node = rclpy.create_node("here", context=context)
+    path = choose_path(request.param, node=node, context=context)
+    loop = ReceiveLoop(path.watch(), now=lambda: 0, expire=lambda _: None)
+    refusing = _Refusing(node)
+    thread = Thread(target=loop.run)
+    thread.start()
+    wirings = Wirings(entities=refusing, node=node, path=path, loop=loop)
+    try:
+        yield SimpleNamespace(node=node, entities=refusing, wirings=wirings, context=context)
+    finally:
+        loop.stop()
+        thread.join()
+        loop.close()
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def _groups(**topics: list[tuple[str, str, str]]) -> list[Any]:
+    """Groups of these topics, types and outputs."""
+    named = {
+        name: {
+            "policy": "exact_time",
+            "topics": [{"topic": a, "type": t, "output": b, "qos": _AT_ONCE} for a, t, b in inputs],
+        }
+        for name, inputs in topics.items()
+    }
+    return [GroupRelay(each, now=lambda: 0) for each in load_text(config(named)).groups]
+
+
+def _look(here: SimpleNamespace) -> None:
+    for each in here.wirings.inputs:
+        each.look()
+
+
+def _published(here: SimpleNamespace) -> dict[str, str]:
+    return {
+        each.topic_name: each.msg_type.__name__
+        for each in here.node.publishers
+        if each.topic_name not in ("/rosout", "/parameter_events")
+    }
+
+
+def _subscribed(here: SimpleNamespace) -> dict[str, str]:
+    return {each.topic_name: each.msg_type.__name__ for each in here.node.subscriptions}
+
+
+def _asked(here: SimpleNamespace) -> tuple[dict[str, str], dict[str, str]]:
+    """What the groups that run are to publish and to subscribe to."""
+    topics = [topic for group in here.wirings.groups for topic in group.config.topics]
+    types = [topic.type.split("/")[-1] for topic in topics]
+    return (
+        dict(zip([topic.output for topic in topics], types, strict=True)),
+        dict(zip([topic.topic for topic in topics], types, strict=True)),
+    )
+
+
+_IMU, _FIELD, _ = _TYPES
+_ONE = {"swap": [("/x", _IMU, "/a"), ("/y", _FIELD, "/b")]}
+_OTHER = {"swap": [("/x", _IMU, "/b"), ("/y", _FIELD, "/a")]}
+
+
+def test_what_cannot_be_made_after_the_old_ended_leaves_all_as_it_was(here):
+    here.wirings.wire(_groups(**_ONE, rear=[("/x", _IMU, "/c"), ("/z", _IMU, "/d")]))
+    _look(here)
+    before, groups = _published(here), here.wirings.groups
+    answers = iter([False, False, False, True, False, False])
+    here.entities.refuses = lambda: next(answers)
+    with pytest.raises(ReloadError, match="DDS does not publish /a as any: no more memory"):
+        here.wirings.wire([groups[1], *_groups(**_OTHER)])
+    assert _published(here) == before
+    assert here.wirings.groups == groups
+    here.entities.refuses = lambda: False
+    here.wirings.wire([groups[1], *_groups(**_OTHER)])
+    assert _published(here) == {"/b": "Imu", "/a": "MagneticField", "/c": "Imu", "/d": "Imu"}
+
+
+def test_what_could_be_made_neither_anew_nor_again_is_told_and_made_at_a_later_look(here):
+    here.wirings.wire(_groups(**_ONE))
+    _look(here)
+    wiring = here.wirings.all[0]
+    answers = iter([False, False, True, True, True])
+    here.entities.refuses = lambda: next(answers)
+    with pytest.raises(ReloadError):
+        here.wirings.wire(_groups(**_OTHER))
+    assert here.wirings.all == (wiring,)
+    assert [each.refusal(wiring.group, index) is not None for index, each in enumerate(wiring.inputs)] == [True, True]
+    assert wiring.waiting_for is not None
+    here.entities.refuses = lambda: False
+    for each in here.wirings.inputs:
+        each.try_again()
+        assert each.is_due
+    _look(here)
+    assert _published(here) == {"/a": "Imu", "/b": "MagneticField"}
+    assert not any(each.refusal(wiring.group, index) for index, each in enumerate(wiring.inputs))
+
+
+def test_a_subscription_is_made_when_what_held_its_topic_has_ended(here):
+    imu = here.wirings
+    imu.wire(_groups(**_ONE))
+    _look(here)
+    holder = here.entities.publisher(next(iter(here.node.publishers)).msg_type, "/later", 10)
+    imu.wire([*imu.groups, *_groups(late=[("/later", _IMU, "/c"), ("/z", _IMU, "/d")])])
+    _look(here)
+    late = imu.all[1]
+    assert late.inputs[0].refusal(late.group, 0).held_as == "rcl_interfaces/msg/ParameterEvent"
+    assert "/later" not in _subscribed(here)
+    here.entities.end(holder)
+    late.inputs[0].try_again()
+    _look(here)
+    assert late.inputs[0].refusal(late.group, 0) is None
+    assert _subscribed(here)["/later"] == "Imu"
+
+
+def test_what_others_in_the_process_made_is_refused_in_the_words_of_dds(here):
+    here.node.create_publisher(import_type(_FIELD), "/a", 10)
+    here.wirings.wire(_groups(**_ONE))
+    _look(here)
+    wiring = here.wirings.all[0]
+    refusal = wiring.inputs[0].refusal(wiring.group, 0)
+    assert refusal.held_as is None
+    assert "incompatible type" in refusal.why
+    assert wiring.inputs[1].refusal(wiring.group, 1) is None
+
+
+def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:
+    """Groups that make a right file: no topic of theirs has two types, nor comes in and goes out."""
+    came = {
+        name: _TYPES[place % 3] if chance.random() < 0.8 else chance.choice(_TYPES)
+        for place, name in enumerate(_NAMES)
+        if chance.random() < 0.7 or place < 2
+    }
+    outputs = [*(set(_NAMES) - came.keys()), "/g", "/h", "/i", "/j"]
+    chance.shuffle(outputs)
+    groups: dict[str, list[tuple[str, str, str]]] = {}
+    for name in chance.sample(("one", "two", "three"), k=chance.randrange(1, 4)):
+        inputs = chance.sample(sorted(came), k=2)
+        if len(outputs) >= len(inputs):
+            groups[name] = [(each, came[each], outputs.pop()) for each in inputs]
+    return groups
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here, seed: int):
+    """The entities of the node are those of the groups that run, whatever their topics were before as which types."""
+    chance = random.Random(seed)
+    # It keeps its topics, and so its publishers and subscriptions.
+    staying = _groups(stays=[("/s", _IMU, "/so"), ("/t", _FIELD, "/to")])
+    here.wirings.wire(staying)
+    _look(here)
+    kept = {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
+    refused = 0
+    for _ in range(40):
+        before = here.wirings.groups
+        likelihood = chance.choice([0, 0, 0.1, 0.5])
+        here.entities.refuses = lambda likelihood=likelihood: chance.random() < likelihood
+        asked = [*staying, *_groups(**_any_groups(chance))]
+        try:
+            here.wirings.wire(asked)
+        except ReloadError:
+            refused += 1
+            assert here.wirings.groups == before
+        else:
+            assert here.wirings.groups == asked
+        _look(here)
+        here.entities.refuses = lambda: False
+        for each in here.wirings.inputs:
+            each.try_again()
+        _look(here)
+        assert (_published(here), _subscribed(here)) == _asked(here)
+        assert not any(each.missing and "DDS" in each.missing for each in here.wirings.inputs)
+        assert kept <= {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
+    assert refused
