@@ -52,7 +52,13 @@ def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
 def _relay_parser() -> Parser:
     parser = Parser("syncrelay", description=_ABOUT, usage=_USAGE.removeprefix("usage: "), epilog=_COMMANDS_HELP)
     options = parser.add_argument_group("the relay")
-    options.add_argument("--config", metavar="FILE", help="relay what FILE says until Ctrl-C or SIGTERM")
+    options.add_argument(
+        "--config",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="relay what FILE says until Ctrl-C or SIGTERM; given several times, what all the files say together",
+    )
     options.add_argument(
         "--group", metavar="NAME", action="append", default=[], help="relay this group only; may be repeated"
     )
@@ -93,7 +99,7 @@ def _relay(words: Sequence[str], stop: StopRequest) -> int:
         return _print(parser.format_help())
     if arguments.version:
         return _print(_version())
-    if arguments.config is None:
+    if not arguments.config:
         parser.error("--config FILE is missing")
     from syncrelay.cli.run import run
 
@@ -117,6 +123,9 @@ def _validate(words: Sequence[str], _stop: StopRequest) -> int:
     )
     parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, - for standard input")
     parser.add_argument(
+        "--together", action="store_true", help="check the files as one, as the relay takes them: --config FILE ..."
+    )
+    parser.add_argument(
         "--format",
         choices=("text", "json", "github"),
         default="text",
@@ -129,7 +138,7 @@ def _validate(words: Sequence[str], _stop: StopRequest) -> int:
     arguments = parser.read(words)
     from syncrelay.cli.validate import validate
 
-    return validate(arguments.files, arguments.format)
+    return validate([arguments.files] if arguments.together else [[file] for file in arguments.files], arguments.format)
 
 
 def _schema(words: Sequence[str], _stop: StopRequest) -> int:
@@ -158,7 +167,13 @@ def _replay(words: Sequence[str], _stop: StopRequest) -> int:
         nargs="+",
         help="a rosbag2 folder, an MCAP, sqlite3 or ROS 1 bag file, also compressed; several are read as one",
     )
-    parser.add_argument("--config", metavar="FILE", required=True, help="the file whose groups get the messages")
+    parser.add_argument(
+        "--config",
+        metavar="FILE",
+        action="append",
+        required=True,
+        help="the file whose groups get the messages; may be repeated",
+    )
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
     )
@@ -181,7 +196,7 @@ def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
     parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics to match, where there is no file yet")
-    parser.add_argument("--config", metavar="FILE", help="the file whose groups are looked at")
+    parser.add_argument("--config", metavar="FILE", action="append", help="the file whose groups are looked at")
     parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values, comments kept")
     parser.add_argument(
         "--html", metavar="REPORT", help="write all of it with drawings, as one HTML file to open offline"
@@ -193,7 +208,10 @@ def _analyze(words: Sequence[str], _stop: StopRequest) -> int:
     arguments = parser.read(words)
     from syncrelay.cli.analyze import Asked, analyze_bag
 
-    asked = Asked(arguments.config, tuple(arguments.topics), arguments.write, arguments.html, arguments.json)
+    config, *others = arguments.config or [None]
+    if others:
+        parser.error("--config is here several times: analyze takes one file, of which --write makes a better one")
+    asked = Asked(config, tuple(arguments.topics), arguments.write, arguments.html, arguments.json)
     return analyze_bag(arguments.bag, asked)
 
 
@@ -254,7 +272,13 @@ def _doctor(words: Sequence[str], _stop: StopRequest) -> int:
         description="Tells what can go wrong before a message flows: what is so, what follows, what to do.\n"
         "Exit code 1 if something is to be mended.",
     )
-    parser.add_argument("--config", metavar="FILE", help="check FILE too, and whether its types can be used here")
+    parser.add_argument(
+        "--config",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="check FILE too, and whether its types can be used here; may be repeated",
+    )
     parser.add_argument(
         "--live", action="store_true", help="join the graph: publishers, types, QoS, stamps of the topics of FILE"
     )

@@ -18,13 +18,13 @@ _LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
 
 
 def doctor(
-    config_path: str | None,
+    config_paths: Sequence[str],
     live_s: float | None,
     output_format: str,
     ros_args: Sequence[str],
 ) -> int:
     """Examine, print what was found as `text` or `json`; 1 if something is to be mended, else 0."""
-    request = Request(dict(os.environ), VARIABLE, config_path, tuple(ros_args), live_s)
+    request = Request(dict(os.environ), VARIABLE, tuple(config_paths), tuple(ros_args), live_s)
     if live_s is not None and sys.stderr.isatty():
         say(f"looking at the graph for {live_s:g} s ...")
     examination = examine(request)

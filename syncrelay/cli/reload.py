@@ -62,7 +62,7 @@ def _signal(pid: int) -> None:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
     except OSError:
         words = []
-    if not any(b"syncrelay" in word for word in words) or b"--config" not in words:
+    if not any(b"syncrelay" in word for word in words) or not any(word.startswith(b"--config") for word in words):
         raise SyncRelayError(f"process {pid} is not the relay here; {elsewhere}")
     try:
         os.kill(pid, signal.SIGHUP)

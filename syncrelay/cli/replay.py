@@ -28,13 +28,13 @@ class Wanted:
     output: str | None
 
 
-def replay(bags: Sequence[str], config_path: str, wanted: Wanted) -> int:
-    """Feed recordings to the groups of a file and print what became of them; 1 if a required topic is not there.
+def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> int:
+    """Feed recordings to the groups of files and print what became of them; 1 if a required topic is not there.
 
     Lines go to stdout, and the summary then to stderr. Raises ConfigError for a faulty file, BagError for a
     recording that cannot be read, or has not the stamps that the file names.
     """
-    config = load(config_path, package_missing=Severity.NOTE)
+    config = load(*config_paths, package_missing=Severity.NOTE)
     with ExitStack() as opened:
         recording = open_recording(bags)
         opened.callback(recording.close)

@@ -7,13 +7,15 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from syncrelay.cli.file_changes import FileChanges
+from syncrelay.cli.config_files import ConfigFiles
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import ListenError, SyncRelayError, UsageError
 
 if TYPE_CHECKING:
-    from syncrelay.config import Listen
+    from concurrent.futures import Future
+
+    from syncrelay.config import Config, Listen
     from syncrelay.ros.relay import Relay
     from syncrelay.status import Server
 
@@ -24,7 +26,7 @@ _BUG: Final = (
 
 
 def run(
-    config_path: str,
+    config_paths: Sequence[str],
     groups: Sequence[str],
     log_level: str,
     log_format: str,
@@ -34,12 +36,12 @@ def run(
     watch: bool = False,
     stop: StopRequest,
 ) -> int:
-    """Relay the groups of a file, all of them if `groups` is empty; 0 after an orderly end.
+    """Relay the groups of files, all of them if `groups` is empty; 0 after an orderly end.
 
     With `explain_s`, only look: publish nothing, and end after so many seconds with the findings, and 1 unless all
-    groups are healthy. The file is read again at SIGHUP, and with `watch` when it changes.
+    groups are healthy. The files are read again at SIGHUP, and with `watch` when one changes.
 
-    Raises ConfigError for a faulty file, UsageError for a group that it lacks, RosUnavailableError where ROS
+    Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
     cannot be used.
     """
     from syncrelay.config import Severity, load, where
@@ -47,13 +49,13 @@ def run(
     from syncrelay.ros.logs import LOGGER, configure
 
     configure(log_level, log_format)
-    # Before it is read: what changes while the relay starts is seen too.
-    changes = FileChanges(config_path) if watch else None
-    config = load(config_path, package_missing=Severity.NOTE)
+    # Before they are read: what changes while the relay starts is seen too.
+    files = ConfigFiles(config_paths, watched=watch)
+    config = load(*config_paths, package_missing=Severity.NOTE)
     for note in config.notes:
         if note.code == "unit":
             LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)
-    _require_groups(groups, [group.name for group in config.groups], config_path)
+    _require_groups(groups, config, config_paths)
     require_rclpy()
     from syncrelay.cli.explain import explain
     from syncrelay.cli.summary import summarize
@@ -66,14 +68,16 @@ def run(
         listening(config.listen if explain_s is None else None) as server,
         Relay(
             config,
-            config_path=config_path,
+            config_path=", ".join(config_paths),
             groups=groups or None,
             ros_args=ros_args,
             beat=heartbeat.beat if heartbeat else None,
             purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
         ) as relay,
+        files,
     ):
         stop.wake_with(relay.wake)
+        files.call_when_read(relay.wake)
         if server is not None:
             server.serve(relay.state)
             LOGGER.info("status and metrics: http://%s/, `syncrelay top` shows them", server.address)
@@ -81,22 +85,23 @@ def run(
             return explain(relay, explain_s, stop=stop)
         while not stop.requested:
             relay.step()
-            if stop.take_reload() or (changes and changes.seen()):
-                _reload(relay, config_path, groups)
+            if stop.take_reload():
+                files.read_again()
+            if (read := files.take()) is not None:
+                _reload(relay, read, config_paths, groups)
         for group in relay.drain().groups:
             for line in summarize(group):
                 LOGGER.info(line, extra={"group": group.name})
     return 0
 
 
-def _reload(relay: "Relay", config_path: str, groups: Sequence[str]) -> None:
-    """Take on the file as it is now; whatever is wrong with it, all goes on as before."""
-    from syncrelay.config import Severity, load
+def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str], groups: Sequence[str]) -> None:
+    """Take on the files as they were read again; whatever is wrong with them, all goes on as before."""
     from syncrelay.ros.logs import LOGGER
 
     try:
-        config = load(config_path, package_missing=Severity.NOTE)
-        _require_groups(groups, [group.name for group in config.groups], config_path)
+        config = read.result()
+        _require_groups(groups, config, config_paths)
         relay.reload(config)
     except SyncRelayError as error:
         LOGGER.error("the file was read again and is left aside, all goes on as before:\n%s", error)
@@ -137,10 +142,11 @@ def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]
         return nullcontext()
 
 
-def _require_groups(asked: Sequence[str], there: Sequence[str], config_path: str) -> None:
+def _require_groups(asked: Sequence[str], config: "Config", config_paths: Sequence[str]) -> None:
     from syncrelay.config.wording import did_you_mean
 
+    there = [group.name for group in config.groups]
     for name in asked:
         if name not in there:
-            hint = did_you_mean(name, there)
-            raise UsageError(f"--group {name}: {config_path} has no such group{hint}; it has {', '.join(there)}")
+            hint, files = did_you_mean(name, there), ", ".join(config_paths)
+            raise UsageError(f"--group {name}: {files} has no such group{hint}; there is {', '.join(there)}")

@@ -10,6 +10,12 @@ from collections.abc import Callable
 from types import FrameType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Of `struct sigaction` in Linux's C libraries: its size at most, where its flags stand, and one of them.
+_ACTION_BYTES = 256
+_FLAGS_AT = 8 + 128
+_SA_RESETHAND = 0x80000000
+# What a shell says of a process that a signal ended, added to the signal's number.
+_ENDED_BY = 128
 
 
 def release_signals() -> None:
@@ -23,6 +29,8 @@ def release_signals() -> None:
 class StopRequest:
     """Ends the process at once while there is nothing to lose, and is remembered from `defer` on.
 
+    A second SIGINT or SIGTERM ends the process at once in any case, whatever hangs by then.
+
     A signal that arrives while modules are still being imported would kill the process, or be lost where it is
     PID 1: so this is installed before they are.
     """
@@ -33,12 +41,15 @@ class StopRequest:
         self._had_terminal = os.isatty(sys.stderr.fileno())
         self._wake: Callable[[], None] | None = None
         self._deferred = False
+        self._signalled = False
 
     def install(self) -> None:
         """Take the signals from here on."""
         for number in _SIGNALS:
             signal.signal(number, self._request)
         signal.signal(signal.SIGHUP, self._request_reload)
+        for number in _SIGNALS:
+            _take_once(number)
 
     def defer(self) -> None:
         """From here on there is something to end in order: only remember the request."""
@@ -55,16 +66,26 @@ class StopRequest:
         asked, self._reload = self._reload, False
         return asked
 
-    def _request_reload(self, signal_number: int, frame: FrameType | None) -> None:
+    def _request_reload(self, _signal: int, _frame: FrameType | None) -> None:
         if self._had_terminal and not os.isatty(sys.stderr.fileno()):
             # Not asked for: the terminal is gone, and with it whoever could end us.
-            self._request(signal_number, frame)
+            self._stop()
             return
         self._reload = True
         if self._wake is not None:
             self._wake()
 
-    def _request(self, _signal: int, _frame: FrameType | None) -> None:
+    def _request(self, number: int, _frame: FrameType | None) -> None:
+        if self._signalled:
+            os._exit(_ENDED_BY + number)
+        self._signalled = True
+        if os.getpid() != 1:
+            # The kernel needs no turn of this thread for it. Of PID 1 it takes no signal that has no handler.
+            for each in _SIGNALS:
+                signal.signal(each, signal.SIG_DFL)
+        self._stop()
+
+    def _stop(self) -> None:
         self.requested = True
         if self._wake is not None:
             self._wake()
@@ -72,3 +93,19 @@ class StopRequest:
             os.write(2, b"syncrelay: stopped before it started\n")
             # No exception: raised in the middle of an import, it could be swallowed there.
             os._exit(0)
+
+
+def _take_once(number: int) -> None:
+    """Have the kernel itself end the process at the second signal, should the handler's turn never come.
+
+    It comes when this thread next runs Python: not while a call into DDS hangs, nor a file system.
+    """
+    if os.getpid() == 1:
+        return
+    import ctypes
+
+    sigaction = ctypes.CDLL(None).sigaction
+    action = ctypes.create_string_buffer(_ACTION_BYTES)
+    sigaction(number, None, action)
+    ctypes.c_uint.from_buffer(action, _FLAGS_AT).value |= _SA_RESETHAND
+    sigaction(number, action, None)

@@ -8,32 +8,32 @@ from typing import Any, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
-from syncrelay.config.source import STDIN
+from syncrelay.config.source import shown_name
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a file came to: a config if it is in order, and its problems, notes among them."""
+    """What files that run together came to: a config if they are in order, and their problems, notes among them."""
 
-    file: str
+    files: tuple[str, ...]
     config: Config | None
     problems: tuple[Problem, ...]
 
 
-def validate(files: Sequence[str], output_format: str) -> int:
-    """Check files and print what was found as `text`, `json` or `github`; 1 if any has an error."""
-    findings = [_check(file) for file in files]
+def validate(sets: Sequence[Sequence[str]], output_format: str) -> int:
+    """Check sets of files, each as one, and print what was found as `text`, `json` or `github`; 1 for any error."""
+    findings = [_check(files) for files in sets]
     _PRINT[output_format](findings)
     return DONE if all(finding.config for finding in findings) else AT_FAULT
 
 
-def _check(file: str) -> Finding:
-    name = "<stdin>" if file == STDIN else file
+def _check(files: Sequence[str]) -> Finding:
+    names = tuple(shown_name(file) for file in files)
     try:
-        config = load(file)
+        config = load(*files)
     except ConfigError as error:
-        return Finding(name, None, error.problems)
-    return Finding(name, config, config.notes)
+        return Finding(names, None, error.problems)
+    return Finding(names, config, config.notes)
 
 
 def _print_text(findings: Sequence[Finding]) -> None:
@@ -41,13 +41,14 @@ def _print_text(findings: Sequence[Finding]) -> None:
         if finding.config is None:
             say(render(finding.problems, colour=wants_colour(sys.stderr.isatty())))
             continue
-        put(_ok(finding.file, finding.config))
+        put(_ok(finding.files, finding.config))
         if finding.problems:
             put(render(finding.problems, colour=wants_colour(sys.stdout.isatty())))
 
 
 def _print_json(findings: Sequence[Finding]) -> None:
-    put(json.dumps([_as_json(finding) for finding in findings], indent=2, ensure_ascii=False))
+    listed = [_as_json(file, finding) for finding in findings for file in dict.fromkeys(finding.files)]
+    put(json.dumps(listed, indent=2, ensure_ascii=False))
 
 
 def _print_github(findings: Sequence[Finding]) -> None:
@@ -55,7 +56,7 @@ def _print_github(findings: Sequence[Finding]) -> None:
         for problem in finding.problems:
             put(_workflow_command(problem))
         if finding.config is not None:
-            put(_ok(finding.file, finding.config))
+            put(_ok(finding.files, finding.config))
 
 
 _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
@@ -65,20 +66,22 @@ _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
 }
 
 
-def _ok(file: str, config: Config) -> str:
+def _ok(files: Sequence[str], config: Config) -> str:
     n_topics = len({topic.topic for group in config.groups for topic in group.topics})
-    return f"{file}: ok, {_count(len(config.groups), 'group')}, {_count(n_topics, 'topic')}"
+    together = "ok together" if len(files) > 1 else "ok"
+    return f"{', '.join(files)}: {together}, {_count(len(config.groups), 'group')}, {_count(n_topics, 'topic')}"
 
 
 def _count(number: int, word: str) -> str:
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
-def _as_json(finding: Finding) -> dict[str, Any]:
+def _as_json(file: str, finding: Finding) -> dict[str, Any]:
+    problems = [problem for problem in finding.problems if problem.file == file]
     return {
-        "file": finding.file,
-        "ok": finding.config is not None,
-        "problems": [_problem_as_json(problem) for problem in finding.problems],
+        "file": file,
+        "ok": all(problem.severity is not Severity.ERROR for problem in problems),
+        "problems": [_problem_as_json(problem) for problem in problems],
     }
 
 

@@ -1,17 +1,19 @@
 """What single keys can't tell: names that meet, topics that groups share, a restamp that names no input."""
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode, SequenceNode, plain
-from syncrelay.config.drafts import GroupDraft, TopicDraft, node_name
+from syncrelay.config.drafts import GroupDraft, TopicDraft, node_name, remapped_from
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem, Severity
+from syncrelay.config.units import MAX_NS, NS_PER_UNIT
 from syncrelay.config.wording import did_you_mean, quoted
 
 # The longest of what every node offers below its name.
 _LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
+# What is longer is refused as out of range.
+_LONGEST_S = MAX_NS // NS_PER_UNIT["s"]
 _RESTAMP_WORDS = ("none", "earliest", "latest")
 
 
@@ -55,9 +57,10 @@ def _repeated_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]
         if topic.topic is None:
             continue
         if topic.topic in first:
-            line = _line_of_topic(first[topic.topic], document)
-            text = f"{_name_of_topic(topic)} is in this group twice, first in {line}"
-            yield _at(document, (*topic.path, "topic"), text, code="repeated_topic")
+            path = (*topic.path, "topic")
+            line = _line_of_topic(first[topic.topic], document, beside=path)
+            text = f"{topic.topic_said} is in this group twice, first in {line}"
+            yield _at(document, path, text, code="repeated_topic")
         first.setdefault(topic.topic, topic)
 
 
@@ -117,8 +120,9 @@ def _unit(group: GroupDraft, document: Document) -> Iterator[Problem]:
     path = (*group.path, "slop")
     node = document.find(path)
     slop = plain(node) if isinstance(node, ScalarNode) else None
-    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop < math.inf:
-        text = f"{slop:g} without a unit is {slop:g} s; write {slop:g}ms if milliseconds are meant, else {slop:g}s"
+    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop <= _LONGEST_S:
+        number = f"{slop:.15g}"
+        text = f"{number} without a unit is {number} s; write {number}ms if milliseconds are meant, else {number}s"
         problem = _at(document, path, text, code="unit")
         yield replace(problem, severity=Severity.NOTE)
 
@@ -132,9 +136,10 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
         if other is topic:
             continue
         if topic.type and other.type and topic.type != other.type:
-            line = document.value_span((*other.path, "type")).line
-            text = f"{_name_of_topic(topic)} is {quoted(other.type)} in line {line}, and one topic has one type"
-            yield _at(document, (*topic.path, "type"), text, code="conflict")
+            path = (*topic.path, "type")
+            line = document.line((*other.path, "type"), beside=path)
+            text = f"{topic.topic_said} is {quoted(other.type)} in {line}, and one topic has one type"
+            yield _at(document, path, text, code="conflict")
         if topic.qos != other.qos:
             yield _qos_conflict(topic, other, document)
 
@@ -142,10 +147,9 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
 def _qos_conflict(topic: TopicDraft, other: TopicDraft, document: Document) -> Problem:
     own = (*topic.path, "qos")
     path = own if document.find(own) else (*topic.path, "topic")
-    line = document.value_span(
-        (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
-    ).line
-    text = f"{_name_of_topic(topic)} has another `qos` in line {line}: it is subscribed once, write the same in both"
+    others = (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
+    line = document.line(others, beside=path)
+    text = f"{topic.topic_said} has another `qos` in {line}: it is subscribed once, write the same in both"
     return _at(document, path, text, code="conflict")
 
 
@@ -155,34 +159,22 @@ def _outputs(groups: Sequence[GroupDraft], document: Document) -> Iterator[Probl
     for topic in _topics(groups):
         if topic.output is None:
             continue
-        name = _named(topic.output, topic.output_before)
+        name = topic.output_said
         what = f"the output {name}" if topic.has_own_output else f"the default output {name}"
         if topic.output in inputs:
-            line = _line_of_topic(inputs[topic.output], document)
+            line = _line_of_topic(inputs[topic.output], document, beside=topic.output_path)
             text = f"{what} is an input too ({line}): its messages would come back, give it another `output`"
             yield _at(document, topic.output_path, text, code="loop")
         elif topic.output in outputs:
             other = outputs[topic.output]
-            line = _line(document.value_span(other.output_path).line, other.output_before)
+            line = document.line(other.output_path, beside=topic.output_path) + remapped_from(other.output_before)
             text = f"{what} is taken by {line}, give it another `output`"
             yield _at(document, topic.output_path, text, code="repeated_output")
         outputs.setdefault(topic.output, topic)
 
 
-def _name_of_topic(topic: TopicDraft) -> str:
-    return _named(str(topic.topic), topic.topic_before)
-
-
-def _named(name: str, before: str | None) -> str:
-    return quoted(name) if before is None else f"{quoted(name)}, remapped from {quoted(before)},"
-
-
-def _line_of_topic(topic: TopicDraft, document: Document) -> str:
-    return _line(document.value_span((*topic.path, "topic")).line, topic.topic_before)
-
-
-def _line(number: int, before: str | None) -> str:
-    return f"line {number}" if before is None else f"line {number}, remapped from {quoted(before)}"
+def _line_of_topic(topic: TopicDraft, document: Document, *, beside: Path) -> str:
+    return document.line((*topic.path, "topic"), beside=beside) + remapped_from(topic.topic_before)
 
 
 def _too_long(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:

@@ -40,7 +40,7 @@ def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[
         raise ConfigError([source.problem(text, span=span, code="yaml")]) from error
     if composer.root is None or (isinstance(composer.root, ScalarNode) and composer.root.value is None):
         raise ConfigError([source.problem(_EMPTY, span=None, code="empty")])
-    return Document(source.name, source.lines, composer.root), composer.problems
+    return Document({source.index: source}, composer.root), composer.problems
 
 
 _EMPTY = "the file is empty, expected at least `version: 1` and `groups:`"
@@ -95,7 +95,7 @@ class _Composer:
         closes_bracket = event.end_mark.column > event.start_mark.column
         if closes_bracket and event.end_mark.line == ended.node.span.line - 1:
             start = ended.node.span
-            ended.node.span = Span(start.line, start.column, event.end_mark.column - start.column + 1)
+            ended.node.span = start._replace(width=event.end_mark.column - start.column + 1)
         self._place(ended.node, ended.anchor)
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
@@ -188,4 +188,4 @@ class _Composer:
         width = end.column - start.column if end.line == start.line else 0
         if width < 1 or isinstance(event, yaml.CollectionStartEvent):
             width = len(self._source.line(start.line + 1)) - start.column
-        return Span(start.line + 1, start.column + 1, max(1, width))
+        return Span(start.line + 1, start.column + 1, max(1, width), self._source.index)

@@ -1,11 +1,13 @@
 """A YAML file as a tree in which every key and value knows where it stands."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 from syncrelay.config.problems import Path, Problem, Severity, Span, dotted
 from syncrelay.config.scalars import Scalar
+from syncrelay.config.source import Source
+from syncrelay.config.wording import printable
 
 
 @dataclass(slots=True)
@@ -48,23 +50,20 @@ Node: TypeAlias = ScalarNode | MappingNode | SequenceNode
 
 @dataclass(slots=True)
 class Document:
-    """A file's name, lines and tree."""
+    """The tree of a file, or of several that are read together; `sources` by their index."""
 
-    name: str
-    lines: tuple[str, ...]
+    sources: Mapping[int, Source]
     root: Node
 
     def problem(self, path: Path, text: str, *, code: str, span: Span, severity: Severity = Severity.ERROR) -> Problem:
-        """Return a problem of this file at a span."""
-        return Problem(
-            file=self.name,
-            path=dotted(path),
-            text=text,
-            code=code,
-            span=span,
-            source=self.lines[span.line - 1] if span.line <= len(self.lines) else "",
-            severity=severity,
-        )
+        """Return a problem at a span."""
+        return self.sources[span.source].problem(text, code=code, span=span, path=dotted(path), severity=severity)
+
+    def line(self, path: Path, *, beside: Path) -> str:
+        """Return the line of a value, and its file where that is another than the one of the value beside it."""
+        span = self.value_span(path)
+        is_elsewhere = span.source != self.value_span(beside).source
+        return f"line {span.line}{f' of {printable(self.sources[span.source].name)}' if is_elsewhere else ''}"
 
     def key_span(self, path: Path) -> Span:
         """Return where the last key of a path stands; for a list item, the item."""

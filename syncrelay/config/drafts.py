@@ -15,6 +15,7 @@ from syncrelay.config.names import (
 )
 from syncrelay.config.problems import Path
 from syncrelay.config.typenames import check_field_path, check_type_name
+from syncrelay.config.wording import quoted
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +38,16 @@ class TopicDraft:
     key_path: Path
     topic_before: str | None = None
     output_before: str | None = None
+
+    @property
+    def topic_said(self) -> str:
+        """The topic as a sentence names it, with what remaps made it from."""
+        return _said(self.topic, self.topic_before)
+
+    @property
+    def output_said(self) -> str:
+        """The output, likewise."""
+        return _said(self.output, self.output_before)
 
     @property
     def output_path(self) -> Path:
@@ -67,9 +78,18 @@ class GroupDraft:
         return str(self.path[-1])
 
 
+def remapped_from(before: str | None) -> str:
+    """Return what a sentence adds to a name that remaps made of another; nothing where there is none."""
+    return "" if before is None else f", remapped from {quoted(before)}"
+
+
+def _said(name: str | None, before: str | None) -> str:
+    return f"{quoted(str(name))}{remapped_from(before)}{',' if before else ''}"
+
+
 def drafts(document: Document) -> tuple[GroupDraft, ...]:
     """Return what can be read of a file's groups."""
-    return _drafts(document, _absolute_names(document))
+    return _drafts(document, absolute_names(document))
 
 
 def remapped_drafts(document: Document, resolve: Callable[[str], str]) -> tuple[GroupDraft, ...]:
@@ -145,10 +165,11 @@ def _topic(
 
 def node_name(document: Document) -> str:
     """Return the full name that a file gives to its node."""
-    return _absolute_names(document)("~")
+    return absolute_names(document)("~")
 
 
-def _absolute_names(document: Document) -> Callable[[str], str]:
+def absolute_names(document: Document) -> Callable[[str], str]:
+    """Return what makes a name of the file absolute, as its node does."""
     node = document.find(("node",))
     own = node if isinstance(node, MappingNode) else MappingNode(document.root.span)
     name = _checked(check_node_name, _value(own, "name")) or "syncrelay"

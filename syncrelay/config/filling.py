@@ -1,5 +1,7 @@
 """`defaults`: keys that groups have without writing them."""
 
+from dataclasses import replace
+
 from syncrelay.config.document import Document, Entry, MappingNode, ScalarNode
 from syncrelay.config.file import GROUP_MODEL_OF, GroupOfAnyPolicy
 
@@ -20,7 +22,7 @@ def with_defaults(document: Document) -> Document:
         },
     )
     entries = root.entries | {"groups": Entry(root.entries["groups"].key, filled)}
-    return Document(document.name, document.lines, MappingNode(root.span, entries))
+    return replace(document, root=MappingNode(root.span, entries))
 
 
 def _filled(group: MappingNode, defaults: MappingNode) -> MappingNode:

@@ -41,6 +41,9 @@ def _refuse_null(value: Any) -> Any:
     return value
 
 
+MOST: Final = 1_000_000
+"""The largest number of messages or sets that a key may name: DDS, which counts in 32 bits, refuses more as it runs."""
+
 NOT_NULL: Final = BeforeValidator(_refuse_null)
 """For a field that is None where its key is absent: `key:` without a value is no way to say so."""
 

@@ -1,23 +1,26 @@
 """From a file to a Config, or to everything that is wrong with it at once."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 from pydantic import ValidationError
 
 from syncrelay.config.checks import check_between
 from syncrelay.config.compose import compose
 from syncrelay.config.document import Document, plain
-from syncrelay.config.drafts import GroupDraft, drafts
+from syncrelay.config.drafts import GroupDraft, absolute_names, drafts
 from syncrelay.config.errors import ConfigError
 from syncrelay.config.file import File, FileKeys
 from syncrelay.config.filling import with_defaults
 from syncrelay.config.interfaces import Interfaces
+from syncrelay.config.merging import merged_documents, merged_files
 from syncrelay.config.names_in_graph import NamesInFile
+from syncrelay.config.own_topics import check_own_topics
 from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import Config, resolve
-from syncrelay.config.source import Source, check_text, read_source
+from syncrelay.config.source import PATIENCE_S, Source, check_text, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
 
@@ -25,17 +28,19 @@ _NO_INDEX = "message types were not checked: there is no ament index here (sourc
 
 
 def load(
-    path: str,
-    *,
+    *paths: str,
     environ: Mapping[str, str] = os.environ,
     package_missing: Severity = Severity.ERROR,
+    patience_s: float = PATIENCE_S,
 ) -> Config:
-    """Return what a file says, `-` for standard input.
+    """Return what a file says, `-` for standard input; of several files, what they say together.
 
-    With `package_missing` as a note, a type whose package isn't installed yet is no fault. Raises ConfigError
-    with everything that is wrong.
+    Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. With
+    `package_missing` as a note, a type whose package isn't installed yet is no fault. A pipe is read for so many
+    seconds. Raises ConfigError with everything that is wrong.
     """
-    return _config(read_source(path), environ, package_missing)
+    reads = [partial(read_source, path, index=index, patience_s=patience_s) for index, path in enumerate(paths)]
+    return _config(_parts(reads, environ), environ, package_missing)
 
 
 def load_text(
@@ -46,28 +51,58 @@ def load_text(
     package_missing: Severity = Severity.ERROR,
 ) -> Config:
     """Return what the text of a file says; as `load`."""
-    return _config(check_text(text, name=name), environ, package_missing)
+    return _config(_parts([lambda: check_text(text, name=name)], environ), environ, package_missing)
 
 
-def _config(source: Source, environ: Mapping[str, str], package_missing: Severity) -> Config:
-    document, problems = compose(source, environ)
-    document = with_defaults(document)
-    file, faults = _validate(document)
-    problems += faults
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """One file: its tree with defaults filled in, its keys where all of them are in order, and what is wrong."""
+
+    document: Document
+    file: FileKeys | None
+    problems: Sequence[Problem]
+
+
+def _config(parts: Sequence[_Part], environ: Mapping[str, str], package_missing: Severity) -> Config:
+    document, repeated = merged_documents([part.document for part in parts])
+    problems = [*(problem for part in parts for problem in part.problems), *repeated]
     groups = drafts(document)
     problems += check_between(groups, document)
+    problems += check_own_topics(groups, document, absolute_names(document))
     problems += _types(groups, document, environ, package_missing)
-    found = _in_order(problems)
-    if file is None or any(problem.severity is Severity.ERROR for problem in found):
+    found = _in_order(problems, files=[source.name for source in document.sources.values()])
+    files = [part.file for part in parts if part.file is not None]
+    if len(files) < len(parts) or any(problem.severity is Severity.ERROR for problem in found):
         raise ConfigError(found)
-    return resolve(file, names=NamesInFile(document), notes=found)
+    return resolve(merged_files(files), names=NamesInFile(document), notes=found)
 
 
-def _validate(document: Document) -> tuple[FileKeys | None, list[Problem]]:
+def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) -> list[_Part]:
+    """Read every file. Raises ConfigError, with what is wrong in the others too, where one has no tree."""
+    parts: list[_Part] = []
+    problems: list[Problem] = []
+    for read in reads:
+        try:
+            parts.append(_part(read(), environ, is_alone=len(reads) == 1))
+            problems += parts[-1].problems
+        except ConfigError as error:
+            problems += error.problems
+    if len(parts) < len(reads):
+        raise ConfigError(_in_order(problems, files=[problem.file for problem in problems]))
+    return parts
+
+
+def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Part:
+    document, problems = compose(source, environ)
+    document = with_defaults(document)
+    keys = plain(document.root)
+    if isinstance(keys, dict) and not is_alone:
+        # The groups may all be in the others.
+        keys = {"groups": {}, **keys}
     try:
-        return File.model_validate(plain(document.root)), []
+        return _Part(document, File.model_validate(keys), problems)
     except ValidationError as error:
-        return None, translate(error.errors(include_url=False), document)
+        return _Part(document, None, problems + translate(error.errors(include_url=False), document))
 
 
 def _types(
@@ -75,13 +110,15 @@ def _types(
 ) -> Iterator[Problem]:
     interfaces = Interfaces.find(environ)
     if interfaces is None:
-        yield Problem(document.name, "", _NO_INDEX, "not_checked", severity=Severity.NOTE)
+        first = document.sources[0]
+        yield first.problem(_NO_INDEX, code="not_checked", span=None, severity=Severity.NOTE)
         return
     for problem in check_types(groups, document, interfaces):
         yield replace(problem, severity=package_missing) if problem.code == "package_missing" else problem
 
 
-def _in_order(problems: Iterable[Problem]) -> tuple[Problem, ...]:
-    """Sort by place, and show once what one value gives rise to in several groups."""
-    by_place = sorted(problems, key=lambda problem: problem.span or (0, 0, 0))
-    return tuple({(problem.span, problem.text): problem for problem in reversed(by_place)}.values())[::-1]
+def _in_order(problems: Iterable[Problem], *, files: Iterable[str]) -> tuple[Problem, ...]:
+    """Sort by file and place, and show once what one value gives rise to in several groups."""
+    order = {name: number for number, name in enumerate(dict.fromkeys(files))}
+    by_place = sorted(problems, key=lambda problem: (order[problem.file], problem.span or (0, 0, 0)))
+    return tuple({(each.file, each.span, each.text): each for each in reversed(by_place)}.values())[::-1]

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from syncrelay.config.keys import (
+    MOST,
     NOT_NULL,
     Duration,
     FieldPath,
@@ -173,7 +174,7 @@ class Group(Keys):
     queue_size: int = Field(
         default=10,
         ge=1,
-        le=1_000_000,
+        le=MOST,
         description="Messages kept per input while they wait for a match. Default: 10.",
         examples=[10],
     )
@@ -197,6 +198,7 @@ class Group(Keys):
     every: int = Field(
         default=1,
         ge=1,
+        le=MOST,
         description="Only each n-th set leaves; the others are dropped whole, as `thinned`. Default: 1, every set.",
         examples=[2],
     )

@@ -22,11 +22,15 @@ class Severity(Enum):
 
 
 class Span(NamedTuple):
-    """A token in the file: line and column from 1, and its width on that line, all in characters."""
+    """A token in the file: line and column from 1, and its width on that line, all in characters.
+
+    `source` tells which file it is, of several that are read together.
+    """
 
     line: int
     column: int
     width: int
+    source: int = 0
 
 
 @dataclass(frozen=True, slots=True)

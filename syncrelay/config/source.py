@@ -1,19 +1,33 @@
 """The text of a file, or the reason why it can't be one."""
 
+import os
 import re
+import select
+import stat
 import sys
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
+from io import FileIO
 from pathlib import Path
 from typing import Final
 
 from syncrelay.config.errors import ConfigError
-from syncrelay.config.problems import Problem, Span
+from syncrelay.config.problems import Problem, Severity, Span
 from syncrelay.config.wording import nearest
 
 STDIN: Final = "-"
 # A thousand groups of four topics are half of it.
 _MOST_BYTES: Final = 1_000_000
 _MOST_LINES: Final = 50_000
+PATIENCE_S: Final = 10.0
+"""How long a pipe may take to come to its end: `<(...)` is one, and a FIFO to which nobody ever writes."""
+
+_NO_FILES: Final = {
+    stat.S_IFDIR: "directory",
+    stat.S_IFCHR: "device",
+    stat.S_IFBLK: "device",
+    stat.S_IFSOCK: "socket",
+}
 # The line breaks of YAML 1.1, which PyYAML counts by.
 _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 # What YAML does not allow in a file (YAML 1.2, 5.1).
@@ -22,35 +36,74 @@ _UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U000100
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A file's name as the user gave it, its text and its lines."""
+    """A file's name as the user gave it, its text and its lines; `index` is its place among files read together."""
 
     name: str
     text: str
     lines: tuple[str, ...]
+    index: int = 0
 
     def line(self, number: int) -> str:
         """Return a line by its number from 1; the line behind the last is empty."""
         return self.lines[number - 1] if number <= len(self.lines) else ""
 
-    def problem(self, text: str, *, code: str, span: Span | None, path: str = "") -> Problem:
+    def problem(
+        self, text: str, *, code: str, span: Span | None, path: str = "", severity: Severity = Severity.ERROR
+    ) -> Problem:
         """Return a problem of this file."""
-        return Problem(self.name, path, text, code, span, self.line(span.line) if span else "")
+        return Problem(self.name, path, text, code, span, self.line(span.line) if span else "", severity)
 
 
-def read_source(path: str) -> Source:
-    """Return the text of a file, `-` for standard input; raises ConfigError where it has none."""
+def shown_name(path: str) -> str:
+    """Return what problems call a file that the user named so."""
+    return "<stdin>" if path == STDIN else path or "''"
+
+
+def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) -> Source:
+    """Return the text of a file, `-` for standard input, which alone is waited for without end.
+
+    A pipe has so many seconds to come to its end. Raises ConfigError where there is no text.
+    """
     if path == STDIN:
-        return decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name="<stdin>")
+        return replace(decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path)), index=index)
     if not path:
-        raise _unreadable("''", "is no file name")
+        raise _unreadable(shown_name(path), "is no file name")
     try:
-        with Path(path).open("rb") as file:
-            content = file.read(_MOST_BYTES + 1)
+        content = _content(path, patience_s)
+    except TimeoutError as error:
+        text = f"its end did not come within {patience_s:g} s: is it a pipe that nobody writes to, or closes?"
+        raise _unreadable(path, text) from error
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
     except ValueError as error:
         raise _unreadable(path, "is no file name") from error
-    return decode(content, name=path)
+    return replace(decode(content, name=path), index=index)
+
+
+def _content(path: str, patience_s: float) -> bytes:
+    """Return what a file holds, up to one byte more than it may. Raises TimeoutError for a pipe that does not end."""
+    kind = _NO_FILES.get(stat.S_IFMT(Path(path).stat().st_mode))
+    if kind is not None:
+        # Not even opened: to open a device may do something.
+        raise _unreadable(path, f"is a {kind}, expected a YAML file")
+    # Not to wait for whoever writes to a pipe: that has an end below.
+    with FileIO(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)) as file:
+        return _read(file, deadline=time.monotonic() + patience_s)
+
+
+def _read(file: FileIO, *, deadline: float) -> bytes:
+    waiting = select.poll()
+    waiting.register(file, select.POLLIN)
+    content = bytearray()
+    while len(content) <= _MOST_BYTES:
+        if not waiting.poll(max(0.0, deadline - time.monotonic()) * 1000):
+            raise TimeoutError
+        chunk = file.read(_MOST_BYTES + 1 - len(content))
+        if chunk == b"":
+            break
+        # None where another reader of the pipe was first.
+        content += chunk or b""
+    return bytes(content)
 
 
 def decode(content: bytes, *, name: str) -> Source:
@@ -99,8 +152,6 @@ def _reason(path: str, error: OSError) -> str:
     match error:
         case FileNotFoundError():
             return f"no such file{_similar_file(Path(path))}"
-        case IsADirectoryError():
-            return "is a directory, expected a YAML file"
         case _:
             return f"cannot be read: {error.strerror}"
 

@@ -63,8 +63,10 @@ def parse_rate(value: object) -> int:
     if not hertz.is_finite() or hertz <= 0:
         raise ValueError(f"expected a rate above 0, such as 10 Hz, found {describe(value)}")
     period = NS_PER_UNIT["s"] / hertz
-    if not 1 <= period <= MAX_NS:
+    if period < 1:
         raise ValueError(f"{quoted(str(value))} is out of range, at most 1 GHz")
+    if period > MAX_NS:
+        raise ValueError(f"{quoted(str(value))} is out of range, at least once in 292 years")
     return round(period)
 
 

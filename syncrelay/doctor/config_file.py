@@ -13,8 +13,10 @@ from syncrelay.doctor.words import counted
 _REMAP_CODES: Final = {"loop": "remap_loop", "repeated_output": "remap_outputs"}
 
 
-def check_file(file: str, problems: Sequence[Problem]) -> Iterator[Diagnosis]:
-    """Yield what is wrong with a file. A package that is missing is a fault of this environment, not of the file."""
+def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[Diagnosis]:
+    """Yield what is wrong with files that run together. A package that is missing is this environment's fault."""
+    together = "--together " if len(files) > 1 else ""
+    named = all_of(files) if files else ""
     errors = [problem for problem in problems if problem.severity is Severity.ERROR]
     noted = [problem for problem in problems if problem not in errors]
     missing = [replace(each, severity=Severity.ERROR) for each in noted if each.code == "package_missing"]
@@ -22,14 +24,14 @@ def check_file(file: str, problems: Sequence[Problem]) -> Iterator[Diagnosis]:
     if errors:
         yield mend(
             "file",
-            f"{file} has {counted(len(errors), 'error')}:\n{render(errors)}",
-            so="the relay refuses the file and ends at once",
-            do=f"mend the file; to check it again: syncrelay validate {file}",
+            f"{counted(len(errors), 'error')} in {named}:\n{render(errors)}",
+            so="the relay refuses it and ends at once",
+            do=f"mend what is marked; to check again: syncrelay validate {together}{' '.join(files)}",
         )
     if missing:
         yield mend(
             "package_missing",
-            f"{file} names types of packages that this environment does not have:\n{render(missing)}",
+            f"types of packages that this environment does not have, in {named}:\n{render(missing)}",
             so="the relay starts, but their groups wait until the packages are there",
             do="build the packages with colcon for this Python, then in this shell: source install/setup.bash\n"
             "(in the image: put them into docker/messages before it is built)",
@@ -37,7 +39,7 @@ def check_file(file: str, problems: Sequence[Problem]) -> Iterator[Diagnosis]:
     if unchecked:
         yield know(
             "not_checked",
-            f"{file} could not be checked in full:\n{render(unchecked)}",
+            f"{named} could not be checked in full:\n{render(unchecked)}",
             so="a fault in these places shows only when the relay runs",
             do="nothing, if you are sure of them",
         )

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from syncrelay.config import Config, ConfigError, Problem, Severity, TopicConfig, load
-from syncrelay.doctor.config_file import check_file, check_remaps, check_types
+from syncrelay.doctor.config_file import check_files, check_remaps, check_types
 from syncrelay.doctor.container import check_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, know, worst_first
 from syncrelay.doctor.discovery import check_discovery, range_of
@@ -30,11 +30,11 @@ from syncrelay.ros.trial import Plan, Trial, try_out
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What to examine: a file or none, ROS arguments as for the relay, and for how long to look at the graph."""
+    """What to examine: files that run together or none, ROS arguments as the relay's, how long to look at the graph."""
 
     environ: Mapping[str, str]
     heartbeat_variable: str
-    file: str | None = None
+    files: tuple[str, ...] = ()
     ros_args: tuple[str, ...] = ()
     live_s: float | None = None
 
@@ -64,8 +64,8 @@ def examine(request: Request) -> Examination:
     middleware = middleware_of(installation)
     found += _surroundings(request, middleware)
     environment = tuple(found)
-    config, problems = _load(request) if request.file else (None, ())
-    found += check_file(request.file or "", problems)
+    config, problems = _load(request) if request.files else (None, ())
+    found += check_files(request.files, problems)
     trial = try_out(_plan(config, problems, request.ros_args), environ) if installation.rclpy else None
     if trial is not None:
         found += check_start(trial, before=environment)
@@ -103,7 +103,7 @@ def _surroundings(request: Request, middleware: str) -> Iterator[Diagnosis]:
 
 def _load(request: Request) -> tuple[Config | None, Sequence[Problem]]:
     try:
-        config = load(str(request.file), environ=request.environ, package_missing=Severity.NOTE)
+        config = load(*request.files, environ=request.environ, package_missing=Severity.NOTE)
     except ConfigError as error:
         return None, error.problems
     return config, config.notes

@@ -8,6 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Float64
 
 from syncrelay.config import Config
+from syncrelay.config.own_topics import DIAGNOSTICS, SCALARS
 from syncrelay.explain import Distribution, GroupReport, InputFacts, explanation
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.status import Level, level
@@ -77,7 +78,7 @@ class Diagnostics:
         self._node = node
         self._entities = entities
         self._name = node.get_fully_qualified_name()
-        self._publisher = entities.publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = entities.publisher(DiagnosticArray, DIAGNOSTICS, 10)
 
     def publish(self, reports: Sequence[GroupReport]) -> None:
         """Publish the state of all groups, if anyone listens."""
@@ -108,7 +109,7 @@ class Scalars:
         self._entities = entities
         self._publishers: dict[str, Any] = {}
         try:
-            for figure in ("sets_hz", "span_ms", "latency_ms"):
+            for figure in SCALARS:
                 self._publishers[figure] = entities.publisher(Float64, f"~/{group}/{figure}", 10)
         except RefusedError:
             self.close()

@@ -69,6 +69,10 @@ def test_the_version_is_that_of_the_package(tmp_path):
         (["validate"], "the following arguments are required: FILE\n  syncrelay validate --help says more"),
         (["validate", "--formt=json", "f.yaml"], "unknown argument --formt=json, did you mean `--format`?"),
         (["validate", "--format", "xml", "f.yaml"], "argument --format: invalid choice: 'xml'"),
+        (
+            ["analyze", "rig.mcap", "--config", "f.yaml", "--config", "g.yaml"],
+            "--config is here several times: analyze",
+        ),
         (["schema", "f.yaml"], "unknown argument f.yaml"),
         (["doctor", "f.yaml"], "unknown argument f.yaml"),
         (["doctor", "--seconds", "3"], "--seconds N is for how long --live looks at the graph, and --live is missing"),

@@ -175,6 +175,18 @@ def test_the_files_errors_are_shown_as_validate_shows_them(base, tmp_path):
 
 
 @pytest.mark.ros
+def test_several_files_are_examined_as_one(base, tmp_path):
+    paths = [tmp_path / "f.yaml", tmp_path / "g.yaml"]
+    for path in paths:
+        path.write_text(GOOD)
+    _, found = examine(base, *(word for path in paths for word in ("--config", str(path))))
+    assert found["file"]["what"].startswith(
+        f"1 error in {paths[0]} and {paths[1]}:\n{paths[1]}:3:3: groups.front: the "
+    )
+    assert found["file"]["do"].endswith(f"syncrelay validate --together {paths[0]} {paths[1]}")
+
+
+@pytest.mark.ros
 def test_a_package_that_is_missing_is_a_fault_of_the_environment(base, tmp_path):
     (tmp_path / "f.yaml").write_text(GOOD.replace("/b, type: sensor_msgs", "/b, type: acme_msgs"))
     _, found = examine(base, "--config", str(tmp_path / "f.yaml"))

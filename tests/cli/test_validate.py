@@ -59,6 +59,48 @@ def test_a_dash_is_standard_input(folder, environ):
     assert (done.returncode, done.stderr) == (1, ERROR.replace("f.yaml", "<stdin>"))
 
 
+@pytest.mark.parametrize(
+    "command", ["{validate} <(cat good.yaml)", "cat good.yaml | {validate} -", "cat good.yaml | {validate} /dev/stdin"]
+)
+def test_what_another_program_writes_is_read_to_its_end(command, folder, environ):
+    validate = f"{sys.executable} -m syncrelay validate"
+    done = subprocess.run(
+        ["/bin/bash", "-c", command.format(validate=validate)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environ},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith(": ok, 1 group, 2 topics\n")
+
+
+def test_files_together_are_checked_as_the_relay_takes_them(folder, environ):
+    rear = GOOD.replace("front", "rear")
+    (folder / "rear.yaml").write_text(rear)
+    (folder / "loop.yaml").write_text(rear.replace("/a", "/front/b"))
+    done = run("validate", "--together", "good.yaml", "rear.yaml", folder=folder, environ=environ)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "good.yaml, rear.yaml: ok together, 2 groups, 2 topics\n"
+    each = run("validate", "good.yaml", "loop.yaml", folder=folder, environ=environ)
+    assert each.stdout == "good.yaml: ok, 1 group, 2 topics\nloop.yaml: ok, 1 group, 2 topics\n"
+    together = run("validate", "--together", "good.yaml", "loop.yaml", folder=folder, environ=environ)
+    assert (together.returncode, together.stdout) == (1, "")
+    assert together.stderr.startswith("good.yaml:7:17: groups.front.topics[1].topic: the default output `/front/b` is")
+    relayed = run("--config", "good.yaml", "--config", "loop.yaml", folder=folder, environ=environ)
+    assert (relayed.returncode, relayed.stderr) == (1, together.stderr)
+
+
+def test_json_tells_of_files_together_in_which_the_problem_is(folder, environ):
+    words = ["validate", "--together", "--format=json", "good.yaml", "f.yaml"]
+    good, front = json.loads(run(*words, folder=folder, environ=environ).stdout)
+    assert (good["file"], good["ok"], good["problems"]) == ("good.yaml", True, [])
+    assert (front["file"], front["ok"]) == ("f.yaml", False)
+    assert [problem["code"] for problem in front["problems"]] == ["duplicate_key", "bad_value"]
+
+
 def test_what_could_not_be_checked_is_noted_beside_the_file(folder, environ):
     (folder / "opaque.yaml").write_text(
         GOOD.replace("/a, type: sensor_msgs/msg/Image", "/a, type: dock_msgs/msg/Opaque")

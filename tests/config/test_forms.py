@@ -132,7 +132,7 @@ def test_what_is_no_file_says_what_it_is(tmp_path):
     assert text_of(str(tmp_path)) == f"{tmp_path}: is a directory, expected a YAML file"
     assert text_of("") == "'': is no file name"
     assert text_of("a\0b") == "a\\x00b: is no file name"
-    assert text_of("/dev/zero") == "/dev/zero: over 1 MB, is this the right file?"
+    assert text_of("/dev/zero") == "/dev/zero: is a device, expected a YAML file"
     assert "cannot be read" in text_of("x" * 5000)
 
 

@@ -33,6 +33,7 @@ BEYOND_A_SCHEMA = {
     "one_topic_two_qos",
     "one_topic_two_types",
     "optional_without_max_wait",
+    "outputs_of_the_node_itself",
     "output_is_an_input_of_another_group",
     "output_is_an_input_of_its_group",
     "output_is_its_own_input",

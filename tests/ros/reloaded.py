@@ -14,16 +14,16 @@ class ReloadedFile:
 
     def __init__(self, stage: Stage, *arguments: str, **groups: Any) -> None:
         self.relay = stage.relay(config(groups, metrics=ANY_PORT), *arguments)
-        self._path = stage.folder / "config-0.yaml"
-        if not self._path.exists():
-            self._path = max(stage.folder.glob("config-*.yaml"))
+        self.path = stage.folder / "config-0.yaml"
+        if not self.path.exists():
+            self.path = max(stage.folder.glob("config-*.yaml"))
         self.relay.wait_for_log("status and metrics: ")
 
     def write(self, text: str) -> None:
         # In one go: a file that is half written is no file of the user's.
-        new = self._path.with_suffix(".new")
+        new = self.path.with_suffix(".new")
         new.write_text(text)
-        new.replace(self._path)
+        new.replace(self.path)
 
     def reload(self, **groups: Any) -> None:
         """Write the file, have it read, and wait until it is taken."""

@@ -4,6 +4,7 @@ import fcntl
 import json
 import os
 import pty
+import signal
 import subprocess
 import sys
 import termios
@@ -122,6 +123,25 @@ def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
     aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
     collector, player = stage.collector(aligned), stage.player(_PAIR)
     relaying.connect(player, collector, recording, aligned)
+
+
+def test_a_pipe_moved_over_a_watched_file_holds_nothing_up(stage: Stage):
+    file = ReloadedFile(stage, "--watch", front=_FRONT)
+    relay, path = file.relay, file.path
+    os.mkfifo(path.with_suffix(".pipe"))
+    path.with_suffix(".pipe").replace(path)
+    # Somebody opens the pipe to write to it only once the relay reads it.
+    held = os.open(path, os.O_WRONLY)
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
+    collector, player = stage.collector(aligned), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, aligned)
+    wait_until(lambda: file.count("refused_reloads") == 1, "the pipe to be given up")
+    os.close(held)
+    file.write(config({"front": _FRONT, "rear": _rear()}, metrics=ANY_PORT))
+    wait_until(lambda: file.count("reloads") == 1, "the file that replaced it to be read")
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
 
 
 def test_a_watched_file_is_read_when_it_changes(stage: Stage):

@@ -1,0 +1,126 @@
+"""The relay's files, read again on a thread of their own: a pipe or a file system that hangs stops nobody else."""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Final, Self
+
+if TYPE_CHECKING:
+    from syncrelay.config import Config
+
+# `syncrelay reload` waits for 10 s.
+_PATIENCE_S: Final = 6.0
+# Of it, what a pipe may take to come to its end: it says so itself.
+_PIPE_S: Final = 5.0
+_LOOK_S: Final = 0.5
+
+
+class ConfigFiles:
+    """Reads files again when asked, and where they are watched when one has changed.
+
+    A context manager, which does not wait for a read that hangs: the thread ends with the process.
+    """
+
+    def __init__(self, paths: Sequence[str], *, watched: bool) -> None:
+        """Note what the files are: a change from here on is seen."""
+        self._paths = tuple(paths)
+        self._known = self._marks() if watched else None
+        self._lock = threading.Lock()
+        self._wanted = threading.Event()
+        self._ended = False
+        self._read: Future[Config] | None = None
+        # Since when somebody waits for what is being read, and whether they were told that it takes long.
+        self._since: float | None = None
+        self._is_given_up = False
+        self._done: Callable[[], None] = lambda: None
+
+    def __enter__(self) -> Self:
+        threading.Thread(target=self._run, name="syncrelay-files", daemon=True).start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended = True
+        self._wanted.set()
+
+    def call_when_read(self, done: Callable[[], None]) -> None:
+        """Have `done` called, on the thread that reads, when there is something to take."""
+        self._done = done
+
+    def read_again(self) -> None:
+        """Have the files read."""
+        with self._lock:
+            self._since = self._since or time.monotonic()
+        self._wanted.set()
+
+    def take(self) -> "Future[Config] | None":
+        """Return what was read since this was last asked: a Config, or what reading raised.
+
+        A read that takes too long is a ConfigError. Should it come to its end all the same, its Config is next.
+        """
+        with self._lock:
+            read, self._read = self._read, None
+            is_late = self._since is not None and time.monotonic() - self._since > _PATIENCE_S
+            if read is not None or self._is_given_up or not is_late:
+                return read
+            self._is_given_up = True
+        return _failed(self._paths)
+
+    def _run(self) -> None:
+        while not self._ended:
+            self._wanted.wait(None if self._known is None else _LOOK_S)
+            if (self._have_changed() or self._wanted.is_set()) and not self._ended:
+                self._wanted.clear()
+                self._read_now()
+
+    def _read_now(self) -> None:
+        from syncrelay.config import Severity, load
+
+        with self._lock:
+            self._since = self._since or time.monotonic()
+        read: Future[Config] = Future()
+        try:
+            read.set_result(load(*self._paths, package_missing=Severity.NOTE, patience_s=_PIPE_S))
+        except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
+            read.set_exception(error)
+        with self._lock:
+            if not (self._is_given_up and read.exception()):
+                self._read = read
+            self._since = time.monotonic() if self._wanted.is_set() else None
+            self._is_given_up = False
+        self._done()
+
+    def _have_changed(self) -> bool:
+        """Tell whether a watched file is another than when this was last asked; not while one is gone."""
+        if self._known is None:
+            return False
+        marks = self._marks()
+        if None in marks or marks == self._known:
+            return False
+        self._known = marks
+        return True
+
+    def _marks(self) -> tuple[tuple[int, int, int] | None, ...]:
+        return tuple(_mark(Path(path)) for path in self._paths)
+
+
+def _mark(path: Path) -> tuple[int, int, int] | None:
+    """Return what changes with a file, behind whatever links lead to it: a mounted volume changes them instead."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_ino, status.st_mtime_ns, status.st_size
+
+
+def _failed(paths: Sequence[str]) -> "Future[Config]":
+    from syncrelay.config import ConfigError, Problem
+
+    failed: Future[Config] = Future()
+    text = f"could not be read within {_PATIENCE_S:g} s"
+    failed.set_exception(ConfigError([Problem(", ".join(paths), "", text, "unreadable")]))
+    return failed

@@ -1,0 +1,147 @@
+"""Files that are read again beside the relay: what is read is told once, and what hangs holds nobody up."""
+
+import os
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future
+from pathlib import Path
+
+import pytest
+
+import syncrelay.config
+from syncrelay.cli import config_files
+from syncrelay.cli.config_files import ConfigFiles
+from syncrelay.config import Config, ConfigError
+from tests.cli.command import GOOD
+from tests.ros.processes import wait_until
+
+OTHER = GOOD.replace("front", "rear")
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    (tmp_path / "fusion.yaml").write_text(GOOD)
+    return tmp_path / "fusion.yaml"
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have what hangs told soon, and a pipe still be waited for."""
+    monkeypatch.setattr(config_files, "_PATIENCE_S", 0.05)
+
+
+@pytest.fixture
+def files(path: Path) -> Iterator[ConfigFiles]:
+    with ConfigFiles([str(path)], watched=False) as opened:
+        yield opened
+
+
+def taken(files: ConfigFiles) -> Future[Config]:
+    """What is read next."""
+    found: list[Future[Config]] = []
+
+    def is_read() -> bool:
+        read = files.take()
+        found.extend([read] if read is not None else [])
+        return bool(found)
+
+    wait_until(is_read, "what is read")
+    return found[0]
+
+
+def names(read: Future[Config]) -> list[str]:
+    return [group.name for group in read.result().groups]
+
+
+def replace(path: Path, text: str) -> None:
+    path.with_suffix(".new").write_text(text)
+    path.with_suffix(".new").replace(path)
+
+
+def fifo_over(path: Path) -> Path:
+    os.mkfifo(path.with_suffix(".pipe"))
+    path.with_suffix(".pipe").replace(path)
+    return path
+
+
+def test_nothing_is_read_unasked(files: ConfigFiles, path: Path):
+    replace(path, OTHER)
+    assert files.take() is None
+
+
+def test_what_is_read_is_told_once_and_to_who_waits(files: ConfigFiles, path: Path):
+    told = threading.Event()
+    files.call_when_read(told.set)
+    replace(path, OTHER)
+    files.read_again()
+    assert told.wait(60)
+    assert names(taken(files)) == ["rear"]
+    assert files.take() is None
+
+
+def test_what_reading_raises_is_raised_where_the_file_is_wanted(files: ConfigFiles, path: Path, monkeypatch):
+    replace(path, "version: 2\n")
+    files.read_again()
+    with pytest.raises(ConfigError, match="expected 1, the version of the format"):
+        taken(files).result()
+
+    def fail(*_paths: str, **_options: object) -> None:
+        raise ZeroDivisionError("a bug of ours")
+
+    monkeypatch.setattr(syncrelay.config, "load", fail)
+    files.read_again()
+    with pytest.raises(ZeroDivisionError, match="a bug of ours"):
+        taken(files).result()
+    monkeypatch.undo()
+    replace(path, OTHER)
+    files.read_again()
+    assert names(taken(files)) == ["rear"]
+
+
+def test_each_of_several_files_is_watched(path: Path):
+    other = path.with_name("other.yaml")
+    other.write_text("version: 1\n")
+    with ConfigFiles([str(path), str(other)], watched=True) as files:
+        replace(other, OTHER)
+        assert names(taken(files)) == ["front", "rear"]
+        replace(path, GOOD.replace("front", "left"))
+        assert names(taken(files)) == ["left", "rear"]
+        other.unlink()
+        replace(path, GOOD)
+        replace(other, OTHER)
+        assert names(taken(files)) == ["front", "rear"]
+
+
+def test_a_pipe_moved_over_a_watched_file_is_told_and_then_what_replaces_it_is_read(path: Path, monkeypatch):
+    monkeypatch.setattr(config_files, "_PIPE_S", 0.05)
+    with ConfigFiles([str(path)], watched=True) as files:
+        fifo_over(path)
+        with pytest.raises(ConfigError, match="is it a pipe that nobody writes to, or closes"):
+            taken(files).result()
+        replace(path, OTHER)
+        assert names(taken(files)) == ["rear"]
+
+
+@pytest.mark.usefixtures("impatient")
+def test_what_hangs_is_told_once_and_taken_when_it_comes_after_all(files: ConfigFiles, path: Path):
+    fifo_over(path)
+    files.read_again()
+    with pytest.raises(ConfigError, match=r"fusion.yaml: could not be read within 0.05 s$"):
+        taken(files).result()
+    files.read_again()
+    assert files.take() is None
+    path.write_text(OTHER)
+    assert names(taken(files)) == ["rear"]
+
+
+@pytest.mark.usefixtures("impatient")
+def test_what_fails_after_all_is_not_told_twice(files: ConfigFiles, path: Path):
+    fifo_over(path)
+    read = threading.Event()
+    files.call_when_read(read.set)
+    files.read_again()
+    with pytest.raises(ConfigError, match="could not be read within"):
+        taken(files).result()
+    path.write_text("version: 2\n")
+    assert read.wait(60)
+    assert files.take() is None

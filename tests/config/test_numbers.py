@@ -1,0 +1,105 @@
+"""Numbers that no key has a use for, at every key of the file: each is refused where it stands."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from syncrelay.config import ConfigError, load_text
+from syncrelay.config.file import GROUP_MODEL_OF, Defaults, FileKeys, topic_model
+from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
+from syncrelay.config.qos import QosOverrides
+
+# As YAML reads them: larger than a double can be, longer than a duration, and what no text of digits can write.
+_WITHOUT_END = {
+    "309 digits": "9" * 309,
+    "309 digits below 0": "-" + "9" * 309,
+    "400 digits": "9" * 400,
+    "401 digits": "9" * 401,
+    "5000 digits": "9" * 5000,
+    "hexadecimal": "0x" + "f" * 398,
+    "octal": "0o" + "7" * 398,
+    "1e400": "1e400",
+    "-1e400": "-1e400",
+    "1e99999": "1e99999",
+    "infinity": ".inf",
+    "not a number": ".nan",
+    "ns": f"{'9' * 40}.{'9' * 40}e999 ns",
+    "min": f"-{'9' * 40}e999 min",
+    "kHz": f"{'9' * 40}e999 kHz",
+    "Hz": "1e-999 Hz",
+}
+_NUMBER = '"number"'
+
+
+def _file(group: dict[str, Any], topic: dict[str, Any] | None = None, **top: Any) -> dict[str, Any]:
+    topics = [{"topic": name, "type": "sensor_msgs/msg/Image", **(topic or {})} for name in ("/a", "/b")]
+    return {"version": 1, "groups": {"front": {"topics": topics, **group}}, **top}
+
+
+def _group(of: str, **keys: Any) -> dict[str, Any]:
+    needed = {"policy": of, "slop": "20ms", "trigger": "/a", "key": "header.stamp"}
+    return {key: needed[key] for key in GROUP_MODEL_OF[of].model_fields if key in needed} | keys
+
+
+def _places() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every key of the file, with a file that has a number there."""
+    for key in FileKeys.model_fields:
+        yield key, _file(_group("exact_time")) | {key: "number"}
+    for name, model in {"node": NodeConfig, "metrics": MetricsConfig, "diagnostics": DiagnosticsConfig}.items():
+        for key in model.model_fields:
+            yield f"{name}.{key}", _file(_group("exact_time"), **{name: {key: "number"}})
+    for key in Defaults.model_fields:
+        yield f"defaults.{key}", _file({"policy": "exact_time"}, defaults={key: "number"})
+    for policy, group in GROUP_MODEL_OF.items():
+        for key in group.model_fields:
+            yield f"groups.front.{key}", _file(_group(policy, **{key: "number"}))
+        for key in topic_model(group).model_fields:
+            yield f"groups.front.topics[0].{key}", _file(_group(policy), {key: "number"})
+    for key in QosOverrides.model_fields:
+        yield f"groups.front.topics[0].qos.{key}", _file(_group("exact_time"), {"qos": {key: "number"}})
+    for key in StampField.model_fields:
+        yield f"groups.front.topics[0].stamp.{key}", _file(_group("exact_time"), {"stamp": {key: "number"}})
+
+
+@pytest.mark.parametrize("number", _WITHOUT_END.values(), ids=_WITHOUT_END)
+def test_at_every_key_a_number_without_end_is_refused_where_it_stands(number: str, environ):
+    for place, file in _places():
+        text = json.dumps(file).replace(_NUMBER, number)
+        with pytest.raises(ConfigError) as raised:
+            load_text(text, environ=environ)
+        there = [each for each in raised.value.problems if text.startswith(number, each.span.column - 1)]
+        assert there, str(raised.value)
+        # A default may be refused for the group that it is used in.
+        assert there[0].path in (place, place.replace("defaults", "groups.front")), str(raised.value)
+        assert len(there[0].text) < 300
+
+
+@pytest.mark.parametrize("number", ["1000001", "2147483648", "18446744073709551616"])
+@pytest.mark.parametrize("place", ["groups.front.queue_size", "groups.front.every", "groups.front.topics[0].qos.depth"])
+def test_more_messages_than_dds_counts_are_refused(place: str, number: str, environ):
+    text = json.dumps(dict(_places())[place]).replace(_NUMBER, number)
+    with pytest.raises(ConfigError, match="expected 1000000 or less, found the number") as raised:
+        load_text(text, environ=environ)
+    assert raised.value.problems[0].path == place
+
+
+def test_no_limit_as_rosbag2_writes_it_is_the_longest_duration(environ):
+    endless = {"deadline": {"sec": 9223372036, "nsec": 854775807}, "lifespan": {"sec": 10**399, "nsec": 10**399}}
+    (group,) = load_text(json.dumps(_file(_group("exact_time"), {"qos": endless})), environ=environ).groups
+    assert group.topics[0].qos.deadline == group.topics[0].qos.lifespan == 2**63 - 1
+
+
+@pytest.mark.parametrize(
+    ("slop", "said"),
+    [
+        ("20", "20 without a unit is 20 s; write 20ms if milliseconds are meant, else 20s"),
+        ("1234567.5", "1234567.5 without a unit is 1234567.5 s; write 1234567.5ms if"),
+        ("9223372036", "9223372036 without a unit is 9223372036 s; write 9223372036ms if"),
+    ],
+)
+def test_a_slop_of_whole_seconds_is_noted_with_what_was_written(slop: str, said: str, environ):
+    text = json.dumps(_file(_group("approximate_time", slop="number"))).replace(_NUMBER, slop)
+    (note,) = load_text(text, environ=environ).notes
+    assert note.text.startswith(said)

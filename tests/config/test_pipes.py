@@ -1,0 +1,101 @@
+"""What is no plain file: it is read to its end, or said to have none in time."""
+
+import os
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import ConfigError, load
+
+GOOD = """\
+version: 1
+groups:
+  front:
+    policy: exact_time
+    topics:
+      - {topic: /a, type: sensor_msgs/msg/Image}
+      - {topic: /b, type: sensor_msgs/msg/Image}
+"""
+_NO_END = "its end did not come within 0.2 s: is it a pipe that nobody writes to, or closes?"
+
+
+@contextmanager
+def beside(act: Callable[[], None]) -> Iterator[None]:
+    """Do something on a thread of its own, and see it done."""
+    thread = threading.Thread(target=act)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
+
+
+@pytest.fixture
+def fifo(tmp_path: Path) -> Path:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    return tmp_path / "pipe.yaml"
+
+
+def text_of(path: Path | str, *, patience_s: float = 0.2) -> str:
+    with pytest.raises(ConfigError) as raised:
+        load(str(path), environ={}, patience_s=patience_s)
+    return str(raised.value)
+
+
+def test_a_pipe_that_nobody_writes_to_is_given_up(fifo: Path):
+    assert text_of(fifo) == f"{fifo}: {_NO_END}"
+
+
+@pytest.mark.parametrize("content", ["", GOOD])
+def test_a_pipe_that_nobody_closes_is_given_up(content: str, fifo: Path):
+    held = os.open(fifo, os.O_RDWR)
+    os.write(held, content.encode())
+    assert text_of(fifo) == f"{fifo}: {_NO_END}"
+    os.close(held)
+
+
+def test_a_pipe_is_read_to_its_end_in_whatever_pieces_it_comes(fifo: Path):
+    def write() -> None:
+        with fifo.open("wb", buffering=0) as pipe:
+            for byte in GOOD.encode():
+                pipe.write(bytes([byte]))
+
+    with beside(write):
+        config = load(str(fifo), environ={}, patience_s=60)
+    assert [group.name for group in config.groups] == ["front"]
+
+
+def test_a_pipe_that_is_closed_at_once_is_an_empty_file(fifo: Path):
+    with beside(lambda: fifo.open("wb").close()):
+        assert "the file is empty" in text_of(fifo, patience_s=60)
+
+
+def test_of_a_pipe_without_end_no_more_is_read_than_a_file_may_hold(fifo: Path):
+    def write() -> None:
+        with suppress(BrokenPipeError), fifo.open("wb", buffering=0) as pipe:
+            while True:
+                pipe.write(b"# more\n" * 1000)
+
+    with beside(write):
+        assert text_of(fifo, patience_s=60) == f"{fifo}: over 1 MB, is this the right file?"
+
+
+def test_a_file_of_a_terabyte_is_refused_by_its_first_megabyte(tmp_path: Path):
+    with (tmp_path / "huge.yaml").open("wb") as file:
+        file.truncate(2**40)
+    assert text_of(tmp_path / "huge.yaml").endswith(": over 1 MB, is this the right file?")
+
+
+def test_a_socket_is_no_file(tmp_path: Path):
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(tmp_path / "f.yaml"))
+        assert text_of(tmp_path / "f.yaml") == f"{tmp_path}/f.yaml: is a socket, expected a YAML file"
+
+
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/null", "/dev/tty", "/dev/full"])
+def test_a_device_is_not_even_opened(device: str):
+    assert text_of(device) == f"{device}: is a device, expected a YAML file"

@@ -1,0 +1,150 @@
+"""Several files as one: the same rules between them as within one, and what is wrong told by file and line."""
+
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import Config, ConfigError, Severity, load, load_text
+
+_TOPIC = "      - {{topic: {topic}, type: sensor_msgs/msg/{kind}}}\n"
+
+
+def group(name: str, *topics: str, keys: str = "", kind: str = "Image") -> str:
+    """A group of a file, with its keys in a line above its topics."""
+    listed = "".join(_TOPIC.format(topic=topic, kind=kind) for topic in topics)
+    return f"  {name}:\n    policy: exact_time\n{keys and f'    {keys}'}{keys and chr(10)}    topics:\n{listed}"
+
+
+def file(*groups: str, top: str = "") -> str:
+    return f"version: 1\n{top}groups:\n{''.join(groups)}"
+
+
+FRONT = file(group("front", "/a", "/b"))
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def together(environ: dict[str, str], **texts: str) -> Config:
+    """Load texts as the files one.yaml, two.yaml and so on."""
+    for name, text in texts.items():
+        Path(f"{name}.yaml").write_text(text)
+    return load(*(f"{name}.yaml" for name in texts), environ=environ)
+
+
+def errors(environ: dict[str, str], **texts: str) -> list[str]:
+    """What is wrong with files together, a line each."""
+    with pytest.raises(ConfigError) as raised:
+        together(environ, **texts)
+    places = [(each.file, each.span.line if each.span else 0) for each in raised.value.problems]
+    assert places == sorted(places, key=lambda place: (list(texts).index(place[0].removesuffix(".yaml")), place[1]))
+    return [line for line in str(raised.value).splitlines() if not line.startswith("  ")]
+
+
+def test_files_together_are_what_one_file_with_all_their_groups_is(environ):
+    top = "node: {name: relay, namespace: /robot}\nmetrics: null\n"
+    front, rear = group("front", "a", "~/b"), group("rear", "a", "c", keys="restamp: a")
+    whole = load_text(file(front, rear, top=top), environ=environ)
+    assert together(environ, one=file(front), two=file(rear, top=top)) == whole
+    assert [each.name for each in together(environ, two=file(rear, top=top), one=file(front)).groups] == [
+        "rear",
+        "front",
+    ]
+
+
+def test_defaults_are_for_the_groups_of_their_own_file(environ):
+    config = together(
+        environ,
+        one=file(group("front", "/a", "/b"), top="defaults: {queue_size: 5}\n"),
+        two=file(group("rear", "/a", "/b"), top="defaults: {queue_size: 7}\n"),
+        three=file(group("left", "/a", "/b")),
+    )
+    assert [each.keys.queue_size for each in config.groups] == [5, 7, 10]
+
+
+def test_a_file_may_have_the_node_alone(environ):
+    config = together(environ, one="version: 1\nnode: {name: relay}\ndiagnostics: null\n", two=FRONT)
+    assert (config.node.name, config.diagnostics, len(config.groups)) == ("relay", None, 1)
+    assert errors(environ, one="version: 1\nnode: {}\n", two="version: 1\n") == [
+        "one.yaml:1:1: groups: expected one group or more, found none"
+    ]
+
+
+@pytest.mark.parametrize("key", ["node: {}", "metrics: null", "diagnostics: {}"])
+def test_what_there_is_once_is_refused_twice_with_both_places(key, environ):
+    name = key.partition(":")[0]
+    assert errors(environ, one=f"{FRONT}{key}\n", two=file(group("rear", "/c", "/d"), top=f"{key}\n")) == [
+        f"two.yaml:2:1: {name}: `{name}` is in line 8 of one.yaml too: files that run together have it once"
+    ]
+
+
+def test_one_name_of_two_groups_is_refused_with_both_places(environ):
+    assert errors(environ, one=FRONT, two=file(group("rear", "/c", "/d"), group("front", "/c", "/d"))) == [
+        "two.yaml:8:3: groups.front: the group `front` is in line 3 of one.yaml too: give one of them another name"
+    ]
+
+
+def test_defaults_without_a_group_are_refused(environ):
+    assert errors(environ, one="version: 1\ndefaults: {queue_size: 5}\n", two=FRONT) == [
+        "one.yaml:2:1: defaults: `defaults` are for the groups of their own file, and this one has none"
+    ]
+
+
+def test_outputs_that_meet_are_refused_across_files(environ):
+    assert errors(environ, one=FRONT, two=file(group("rear", "/a", "/b", keys="output_prefix: /front"))) == [
+        f"two.yaml:{line}:17: groups.rear.topics[{index}].topic: the default output `/front/{topic}` is taken by"
+        f" line {line - 1} of one.yaml, give it another `output`"
+        for index, (line, topic) in enumerate([(7, "a"), (8, "b")])
+    ]
+
+
+def test_an_output_that_another_file_takes_in_is_a_loop(environ):
+    (error,) = errors(environ, one=FRONT, two=file(group("rear", "/front/a", "/c")))
+    assert error == (
+        "one.yaml:6:17: groups.front.topics[0].topic: the default output `/front/a` is an input too (line 6 of"
+        " two.yaml): its messages would come back, give it another `output`"
+    )
+
+
+def test_one_topic_has_one_type_in_all_files(environ):
+    (error,) = errors(environ, one=FRONT, two=file(group("rear", "/a", "/c", kind="Imu")))
+    assert error == (
+        "two.yaml:6:27: groups.rear.topics[0].type: `/a` is `sensor_msgs/msg/Image` in line 6 of one.yaml, and one"
+        " topic has one type"
+    )
+
+
+def test_one_topic_has_one_qos_in_all_files(environ):
+    rear = file(group("rear", "/a", "/c")).replace("Image}", "Image, qos: sensor_data}", 1)
+    (error,) = errors(environ, one=FRONT, two=rear)
+    assert error.startswith("two.yaml:6:55: groups.rear.topics[0].qos: `/a` has another `qos` in line 6 of one.yaml: ")
+
+
+def test_figures_that_one_file_asks_for_are_no_outputs_of_another(environ):
+    scalars = "version: 1\ndiagnostics: {scalars: true}\n"
+    (error,) = errors(environ, one=FRONT.replace("Image}", "Image, output: ~/front/span_ms}", 1), two=scalars)
+    assert error.startswith("one.yaml:6:58: groups.front.topics[0].output: the output `/syncrelay/front/span_ms` is")
+
+
+def test_everything_wrong_with_all_files_is_told_at_once(environ):
+    assert errors(environ, one=FRONT.replace("policy", "polcy"), two="a: 1\n b: 2\n", three="") == [
+        "one.yaml:4:5: groups.front.polcy: unknown key, did you mean `policy`?",
+        "two.yaml:2:2: indented deeper than the line above, which has a value already",
+        "three.yaml: the file is empty, expected at least `version: 1` and `groups:`",
+    ]
+    assert errors(environ, one=FRONT.replace("version: 1", "version: 2"), two=FRONT.replace("exact", "exakt")) == [
+        "one.yaml:1:10: version: expected 1, the version of the format, found the number `2`",
+        "two.yaml:3:3: groups.front: the group `front` is in line 3 of one.yaml too: give one of them another name",
+        "two.yaml:4:13: groups.front.policy: unknown value `exakt_time`, did you mean `exact_time`?",
+    ]
+
+
+def test_notes_name_their_file(environ):
+    opaque = file(group("rear", "/c", "/d")).replace("sensor_msgs/msg/Image", "other_msgs/msg/Image", 1)
+    Path("one.yaml").write_text(FRONT)
+    Path("two.yaml").write_text(opaque)
+    (note,) = load("one.yaml", "two.yaml", environ=environ, package_missing=Severity.NOTE).notes
+    assert (note.file, note.span.line, note.source) == ("two.yaml", 6, opaque.splitlines()[5])
