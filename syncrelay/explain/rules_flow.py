@@ -12,6 +12,8 @@ from syncrelay.sync.messages import DropReason
 _MISSING: Final = 0.05
 _FEWEST: Final = 5
 _TOO_SLOW: Final = 500_000_000
+# What waited while the process stood still comes within this of its end.
+_AFTER: Final = SECOND
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
 _FEW: Final = 0.8
 # Nearly all sets that were possible: then what a queue dropped was not missed.
@@ -31,8 +33,8 @@ _WHAT_HELPS: Final = {
 def bursts(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that are held up on their way and then come at once."""
     figures = an_input.figures
-    # Where the relay itself stood still, all messages come at once.
-    if not figures.bursts or facts.waited >= _TOO_SLOW:
+    # Where the relay itself was held up, all messages come at once.
+    if not figures.bursts or _waited(facts) >= _TOO_SLOW:
         return
     times = "once" if figures.bursts == 1 else f"{figures.bursts} times"
     who = nodes(an_input)
@@ -128,14 +130,31 @@ def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found
 
 
 def too_slow(facts: GroupFacts) -> Found:
-    """Find that the relay does not keep up."""
-    if facts.waited >= _TOO_SLOW:
+    """Find that messages of the group waited for the relay."""
+    waited = _waited(facts)
+    if waited >= _TOO_SLOW:
         yield Finding(
             Code.TOO_SLOW,
             Severity.WARN,
-            f"messages lay here for {words.duration(facts.waited)} before the relay came to them",
-            "give it more CPU, or spread the groups over several relays with --group",
+            f"messages waited up to {words.duration(waited)} for the relay",
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group",
         )
+
+
+def _waited(facts: GroupFacts) -> int:
+    """Return how long messages waited for the relay: unread by it, or outside while the whole process stood still.
+
+    A standstill alone has kept nothing waiting. It has where messages came at once when it was over.
+    """
+    return max(facts.waited, *(_waited_outside(facts, each) for each in facts.inputs))
+
+
+def _waited_outside(facts: GroupFacts, an_input: InputFacts) -> int:
+    standstill, burst_at = facts.standstill, an_input.figures.burst_at
+    if standstill is None or burst_at is None or abs(burst_at - standstill.until) > _AFTER:
+        return 0
+    return min(standstill.ns, an_input.figures.held)
 
 
 def slowed(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

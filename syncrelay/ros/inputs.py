@@ -243,6 +243,13 @@ class TopicInput:
             endpoints, than=self._node.get_fully_qualified_name(), own=ours if self._publishes else len(endpoints)
         )
 
+    def take_wait(self) -> int:
+        """How long a message at most lay unread since this was last asked, in nanoseconds. On the loop's thread."""
+        if self._source is None:
+            return 0
+        waited, self._source.waited = self._source.waited, 0
+        return waited
+
     def lost(self) -> int:
         """How many messages DDS lost on the way here since the subscription was made."""
         return int(self._lost.take_event().total_count) if self._lost is not None else 0

@@ -39,7 +39,8 @@ class _Remaps:
     def __init__(self, chance: random.Random) -> None:
         self._namespace = chance.choice(["", "", "/robot"])
         names = [self._expanded(name) for name in _NAMES] + ["/f/b", "/g/b", "/f/c"]
-        self._rules = {chance.choice(names): chance.choice(names) for _ in range(chance.randint(0, 3))}
+        targets = [*names, "/rosout", "/diagnostics"]
+        self._rules = {chance.choice(names): chance.choice(targets) for _ in range(chance.randint(0, 3))}
 
     def __call__(self, name: str) -> str:
         return self._rules.get(self._expanded(name), self._expanded(name))

@@ -3,7 +3,7 @@
 from cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
 from groups import MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Distribution, Severity
+from syncrelay.explain import Code, Distribution, Severity, Standstill
 from syncrelay.sync.messages import DropReason
 
 # Code, severity, facts, sentence, suggestion.
@@ -83,8 +83,25 @@ FOUND = {
         Code.TOO_SLOW,
         Severity.WARN,
         a_group(waited=700 * MS),
-        "messages lay here for 700 ms before the relay came to them",
-        "give it more CPU, or spread the groups over several relays with --group",
+        "messages waited up to 700 ms for the relay",
+        (
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group"
+        ),
+    ),
+    "messages that came at once when a standstill was over": (
+        Code.TOO_SLOW,
+        Severity.WARN,
+        a_group(
+            camera(figures={"bursts": 1, "held": 3 * S, "burst_at": NOW - 4 * S}),
+            LIDAR,
+            standstill=Standstill(NOW - 5 * S, 2 * S),
+        ),
+        "messages waited up to 2 s for the relay",
+        (
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group"
+        ),
     ),
     "an input that comes at a tenth of its rate": (
         Code.SLOWED,
@@ -161,6 +178,15 @@ QUIETLY = {
     "messages that came at once because the relay stood still": (
         Code.BURSTS,
         a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, waited=S),
+    ),
+    "a standstill in which no message came": (Code.TOO_SLOW, a_group(standstill=Standstill(NOW - S, 3 * S))),
+    "messages that came at once at another time than that of a standstill": (
+        Code.TOO_SLOW,
+        a_group(
+            camera(figures={"bursts": 1, "held": 3 * S, "burst_at": NOW - 3 * S}),
+            LIDAR,
+            standstill=Standstill(NOW - 5 * S, 2 * S),
+        ),
     ),
     "messages that lay for less than half a second": (Code.TOO_SLOW, a_group(waited=499 * MS)),
     "four of five possible sets": (Code.FEW_SETS, a_group(figures={"rate_hz": 8.0})),
