@@ -23,8 +23,8 @@ class InputFigures:
     it has not. Of the last messages, oldest first, `received` holds when they came, `stamps` and `delays`, the times of
     receipt minus the stamps, leave out stamps of 0. `nearest` holds, of an optional input, the spans of the tightest
     sets with it, whenever its messages came. `bursts` counts how often messages were held up and came at once, `held`
-    is for how long at most, `burst_at` when they last did. `fell_by` and `fell_at` tell of the last backward jump of
-    its stamps.
+    is for how long at most, `held_up` from when to when, each time. `fell_by` and `fell_at` tell of the last backward
+    jump of its stamps.
     """
 
     rate_hz: float = 0.0
@@ -42,7 +42,7 @@ class InputFigures:
     nearest: Distribution = NOTHING
     bursts: int = 0
     held: int = 0
-    burst_at: int | None = None
+    held_up: Sequence[tuple[int, int]] = ()
     fell_by: int | None = None
     fell_at: int | None = None
 

@@ -112,7 +112,7 @@ class InputObservation:
             nearest=Distribution(self._nearest[:]),
             bursts=len(bursts),
             held=max((each.held for each in bursts), default=0),
-            burst_at=bursts[-1].at if bursts else None,
+            held_up=[(each.at - each.held, each.at) for each in bursts],
             fell_by=fell_by,
             fell_at=fell_at,
         )
@@ -168,7 +168,7 @@ class InputObservation:
         while self._bursts and self._bursts[0].at <= stamped[-1][1] - WINDOW_NS:
             self._bursts.popleft()
         before = list(self._newest_arrivals)
-        self._newest_arrivals.extend(stamped[-AT_ONCE:])
+        self._newest_arrivals.extend(stamped)
         delays = [*(received - stamp for stamp, received in before), *delays]
         if max(delays) - min(delays) >= LEAST_HELD_NS:
             self._bursts.extend(bursts([*before, *stamped]))

@@ -12,8 +12,6 @@ from syncrelay.sync.messages import DropReason
 _MISSING: Final = 0.05
 _FEWEST: Final = 5
 _TOO_SLOW: Final = 500_000_000
-# What waited while the process stood still comes within this of its end.
-_AFTER: Final = SECOND
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
 _FEW: Final = 0.8
 # Nearly all sets that were possible: then what a queue dropped was not missed.
@@ -145,16 +143,16 @@ def too_slow(facts: GroupFacts) -> Found:
 def _waited(facts: GroupFacts) -> int:
     """Return how long messages waited for the relay: unread by it, or outside while the whole process stood still.
 
-    A standstill alone has kept nothing waiting. It has where messages came at once when it was over.
+    A standstill alone has kept nothing waiting. It has where messages that came at once were held up then.
     """
     return max(facts.waited, *(_waited_outside(facts, each) for each in facts.inputs))
 
 
 def _waited_outside(facts: GroupFacts, an_input: InputFacts) -> int:
-    standstill, burst_at = facts.standstill, an_input.figures.burst_at
-    if standstill is None or burst_at is None or abs(burst_at - standstill.until) > _AFTER:
+    if facts.standstill is None:
         return 0
-    return min(standstill.ns, an_input.figures.held)
+    until, ns = facts.standstill
+    return max((min(end, until) - max(begin, until - ns) for begin, end in an_input.figures.held_up), default=0)
 
 
 def slowed(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -1,6 +1,7 @@
 """What is a burst, and what only looks like one."""
 
 import random
+from collections import deque
 
 import pytest
 from groups import MS, S
@@ -63,6 +64,6 @@ def test_a_burst_is_found_once_whenever_the_looks_are(seed):
     while left:
         size = chance.randint(1, 20)
         came, left = left[:size], left[size:]
-        seen.add(came)
+        seen.add(deque(came))
     figures = seen.figures(fed=0, dropped={}, seconds=0.0, now=5 * S)
-    assert (figures.bursts, figures.held, figures.burst_at) == (1, 999 * MS, 3 * S)
+    assert (figures.bursts, figures.held, figures.held_up) == (1, 999 * MS, [(2001 * MS, 3 * S)])
