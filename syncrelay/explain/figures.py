@@ -83,7 +83,8 @@ class GroupFigures:
 
     `spans` and `latencies` are those of the last sets. `nearest` holds the span of the tightest set that each
     message of the input that sets the pace could have had, `nearest_since` those measured after the last set;
-    `missing` is the share of the window's sets, 0 to 1, that each input was missing from. `resumed` is when the first
+    `missing` is the share of the window's sets, 0 to 1, that each input was missing from, `sets_since_without` how many
+    sets had it since. `resumed` is when the first
     set left after a silence.
     """
 
@@ -101,6 +102,7 @@ class GroupFigures:
     nearest: Distribution = NOTHING
     nearest_since: Distribution = NOTHING
     missing: tuple[float, ...] = ()
+    sets_since_without: tuple[int, ...] = ()
 
     @property
     def last_sets(self) -> tuple[tuple[int, int], ...]:

@@ -10,6 +10,10 @@ from syncrelay.explain.rules_stamps import other_clock
 from syncrelay.sync.messages import DropReason
 
 _MISSING: Final = 0.05
+# An input is back when so many times as many sets have it as had one without it on average before.
+_BACK: Final = 3
+# It is away when so many of its messages did not come.
+_AWAY: Final = 3
 _FEWEST: Final = 5
 _TOO_SLOW: Final = 500_000_000
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
@@ -68,9 +72,11 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 
 def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find an optional input that sets leave without."""
+    """Find an optional input that sets leave without; the causes that are told are those that were seen."""
     missing = facts.figures.missing[index]
     if an_input.required or missing <= _MISSING or not facts.figures.rate_hz:
+        return
+    if missing * facts.figures.sets_since_without[index] >= _BACK:
         return
     waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
     why, what_helps = _why_without(facts, an_input)
@@ -84,11 +90,13 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
 
 
 def _why_without(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str]:
-    """Tell stamps that fit no set from messages that come after theirs has left."""
+    """Tell an input that is away, stamps that fit no set, and messages that come after theirs has left."""
+    unknown = "", f"see whether {nodes(an_input)} sends it, and how late it comes"
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
-    if tolerance is None or not an_input.figures.rate_hz or len(nearest) < _FEWEST:
-        longer = "" if facts.max_wait is None else ", or write a larger `max_wait`"
-        return "", f"see why {name} does not come in time{longer}"
+    if (away := _away(facts, an_input)) is not None:
+        return away
+    if tolerance is None or len(nearest) < _FEWEST:
+        return unknown
     behind = _behind(facts, an_input)
     if abs(behind) > max(SECOND, tolerance.ns):
         side = "behind" if behind > 0 else "ahead of"
@@ -102,8 +110,25 @@ def _why_without(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str]:
             f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
             f"write `{tolerance.key}: {words.at_least(nearest.quantile(0.99))}`, which would take in 99 %",
         )
-    later = f", {words.duration(behind)} after the others," if behind > 0 else ""
-    return f": it comes{later} too late", f"write a larger `max_wait`, or see what holds {name} up"
+    if facts.max_wait is not None and behind > facts.max_wait:
+        return (
+            f": it comes {words.duration(behind)} after the others, too late",
+            f"write a larger `max_wait`, or see what holds {name} up",
+        )
+    return unknown
+
+
+def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
+    """Say that an input does not come at all, or not any more; None if it comes."""
+    figures = an_input.figures
+    look = f"look at {nodes(an_input)}"
+    if figures.last_received is None:
+        return ": no message of it has come", look
+    quiet = facts.figures.now - figures.last_received
+    usual = round(SECOND / figures.usual_hz) if figures.usual_hz else 0
+    if quiet > max(SECOND, _AWAY * usual):
+        return f": it has not come for {words.seconds(quiet)}", look
+    return None
 
 
 def _behind(facts: GroupFacts, an_input: InputFacts) -> int:

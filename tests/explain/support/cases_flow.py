@@ -29,7 +29,7 @@ FOUND = {
             camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
         ),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "see why /camera does not come in time, or write a larger `max_wait`",
+        "see whether /usb_cam sends it, and how late it comes",
     ),
     "an optional input whose stamps fit no set": (
         Code.WAITING_FOR_OPTIONAL,
@@ -56,10 +56,31 @@ FOUND = {
         Severity.WARN,
         without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100)),
         (
-            "100 % of the sets leave without /camera after waiting 100 ms for it: it comes, 300 ms after the others,"
-            " too late"
+            "100 % of the sets leave without /camera after waiting 100 ms for it: it comes 300 ms after the others, too"
+            " late"
         ),
         "write a larger `max_wait`, or see what holds /camera up",
+    ),
+    "an optional input that went away": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100), last_received=NOW - 4 * S),
+        "100 % of the sets leave without /camera after waiting 100 ms for it: it has not come for 4 s",
+        "look at /usb_cam",
+    ),
+    "an optional input that never came": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(last_received=None),
+        "100 % of the sets leave without /camera after waiting 100 ms for it: no message of it has come",
+        "look at /usb_cam",
+    ),
+    "an optional input that comes in time and is missing all the same": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=104 * MS, nearest=Distribution([3 * MS] * 100)),
+        "100 % of the sets leave without /camera after waiting 100 ms for it",
+        "see whether /usb_cam sends it, and how late it comes",
     ),
     "messages that were held up": (
         Code.BURSTS,
@@ -175,6 +196,10 @@ QUIETLY = {
     "a set in twenty without an optional input": (
         Code.WAITING_FOR_OPTIONAL,
         a_group(camera(required=False), LIDAR, figures={"missing": (0.05, 0.0)}),
+    ),
+    "an optional input that has been back for three times as many sets as it missed": (
+        Code.WAITING_FOR_OPTIONAL,
+        a_group(camera(required=False), LIDAR, figures={"missing": (0.5, 0.0), "sets_since_without": (6, 100)}),
     ),
     "messages that came at once because the relay stood still": (
         Code.BURSTS,
