@@ -87,6 +87,8 @@ class StopRequest:
 
     def _stop(self) -> None:
         self.requested = True
+        # There is nothing to read again; and as it ends, Python would let the signal kill the process.
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
         if self._wake is not None:
             self._wake()
         elif not self._deferred:

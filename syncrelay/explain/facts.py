@@ -47,7 +47,7 @@ class Refusal:
     def text(self) -> str:
         """The whole in words."""
         reason = f"this process has it as {self.held_as} already" if self.held_as else self.why
-        return f"DDS does not {self.verb} {self.topic} as {self.type}: {reason}"
+        return f"the relay cannot {self.verb} {self.topic} as {self.type}: {reason}"
 
 
 @dataclass(frozen=True, slots=True)

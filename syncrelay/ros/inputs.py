@@ -287,8 +287,6 @@ class TopicInput:
 
         An output that DDS does not make anew goes on as it was.
         """
-        if self._profile is not None:
-            _LOG.info("%s: its publishers' QoS changed, subscribing anew", self.name)
         subscription = self._entities.subscription(self._message_type, self._topic, profile)
         publishers: dict[User, Any] = {}
         for user in self._users if self._publishes else ():
@@ -297,14 +295,20 @@ class TopicInput:
             except RefusedError as error:
                 user.refusal = None if user.publisher else error.refusal
                 self._put_off(error)
+        lost = None
         try:
+            lost = _losses(subscription)
             source = self._path.source(subscription, self._deliver)
             old = self._loop.call(lambda: self._swap(source, publishers)).result()
-        except (RclCallError, OSError) as error:
+        except (_rclpy.RCLError, RclCallError, OSError) as error:
+            # It would hold on to the subscription.
+            lost = None
             for entity in (*publishers.values(), subscription):
                 self._entities.end(entity)
             raise RefusedError(Refusal("receive", self.name, self.type, why=str(error))) from error
-        self._profile, self._lost = profile, _losses(subscription)
+        if self._profile is not None:
+            _LOG.info("%s: its publishers' QoS changed, subscribed anew", self.name)
+        self._profile, self._lost = profile, lost
         old.append(self._subscription)
         self._subscription = subscription
         for entity in old:
@@ -360,4 +364,10 @@ class TopicInput:
 
 
 def _losses(subscription: Any) -> Any:
-    return _rclpy.EventHandle(subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST)
+    """What counts the messages that DDS loses, None where it tells nothing of them. Raises RCLError."""
+    try:
+        return _rclpy.EventHandle(
+            subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST
+        )
+    except _rclpy.UnsupportedEventTypeError:
+        return None

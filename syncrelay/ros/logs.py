@@ -55,7 +55,10 @@ class RosoutHandler(logging.Handler):
         }
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(record.getMessage())
+        try:
+            self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(record.getMessage())
+        except Exception:  # noqa: BLE001  whoever logs goes on, as with every handler of logging
+            self.handleError(record)
 
 
 def name_after(node_name: str) -> None:

@@ -158,7 +158,8 @@ class Relay:
         try:
             self._take_on(config)
         except BaseException:
-            self._take_on(self._config)
+            if self._wirings.groups != before:
+                self._take_on(self._config)
             raise
         self._config = config
         kept = {group.config.name for group in self._wirings.groups if group in before}

@@ -34,7 +34,7 @@ class Wiring:
 
     def _missing(self, index: int, topic_input: TopicInput) -> str | None:
         refusal = topic_input.refusal(self.group, index)
-        return topic_input.missing or (f"DDS, which does not {refusal.verb} {refusal.topic}" if refusal else None)
+        return topic_input.missing or (f"DDS to let it {refusal.verb} {refusal.topic}" if refusal else None)
 
     @property
     def uses(self) -> list[_Use]:

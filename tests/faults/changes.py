@@ -12,7 +12,7 @@ from tests.ros.configs import LOSSLESS, config
 
 _TYPES = tuple(f"sensor_msgs/msg/{name}" for name in ("Imu", "MagneticField", "Temperature"))
 _TOPICS = ("/a", "/b", "/c", "/d", "/e", "/f")
-_MORE_OUTPUTS = ("/g", "/h", "/i", "/j")
+_MORE_OUTPUTS = ("/g", "/h", "/i", "/j", "/k")
 _POLICIES = ("exact_time", "approximate_time", "approximate_time_eager")
 # What is subscribed to and published though nobody else does.
 _AT_ONCE = (

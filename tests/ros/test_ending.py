@@ -3,7 +3,6 @@
 import random
 import signal
 import subprocess
-import sys
 
 import pytest
 
@@ -69,6 +68,15 @@ def test_a_second_signal_ends_it_at_once(stage: Stage, step: str, first: signal.
     assert relay.wait() == -second
 
 
+def test_whoever_has_the_file_read_while_it_ends_does_not_kill_it(stage: Stage):
+    relay = stage.relay(config({"front": _FRONT}))
+    relay.wait_for_log("front: waiting for")
+    relay.send(signal.SIGTERM)
+    while relay.running():
+        relay.send(signal.SIGHUP)
+    assert relay.wait() == 0
+
+
 def test_the_summary_accounts_for_every_message(stage: Stage):
     collector = stage.collector(_PAIR_OUT)
     relay = stage.relay(config({"front": _FRONT}))
@@ -124,25 +132,31 @@ def test_it_leaves_nothing_in_shared_memory(stage: Stage, number: signal.Signals
     assert stage.left_in_shared_memory() == set()
 
 
-# A bug of ours on the receive thread: the real relay with one method that raises.
-_WITH_A_BUG = """\
-import sys
-from syncrelay.cli import main
-from syncrelay.ros.group import GroupRelay
-def receive(*_): raise ZeroDivisionError("in the middle of the data")
-GroupRelay.receive = receive
-sys.exit(main(["--config", sys.argv[1]]))
+_FAILS_AT_THE_END = """
+from syncrelay.sync.group import SyncGroup
+
+flush = SyncGroup.flush
+
+def failing(self, reason):
+    if self._is_limited:
+        raise ZeroDivisionError("at the end")
+    return flush(self, reason)
+
+SyncGroup.flush = failing
 """
 
 
-def test_a_bug_on_the_receive_thread_ends_the_relay_and_is_told(stage: Stage):
-    path = stage.folder / "fusion.yaml"
-    path.write_text(config({"front": _FRONT}))
-    (stage.folder / "with_a_bug.py").write_text(_WITH_A_BUG)
-    relay = stage.start("relay", [sys.executable, str(stage.folder / "with_a_bug.py"), str(path)])
+def test_a_bug_in_the_end_of_one_group_is_told_and_leaves_the_others_theirs(stage: Stage):
+    stage.before_each_relay(_FAILS_AT_THE_END)
+    relay = stage.relay(config({"front": {**_FRONT, "max_wait": "1s"}, "rear": {**_FRONT, "output_prefix": "/back"}}))
     player = stage.player(_PAIR)
     player.match()
-    player.start(at("/camera", *range(0, 60_000, 50)))
-    assert relay.wait() == 70
-    assert "ZeroDivisionError: in the middle of the data" in relay.stderr
-    assert "this is a bug in syncrelay" in relay.stderr
+    # The last of them wait for partners.
+    player.play(at("/camera", 0, 10, 20))
+    player.acknowledge()
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+    summary = read_summary(relay.stderr)
+    assert summary["rear"].inputs["/camera"].received == 3
+    assert set(summary) == {"front", "rear"}
+    assert relay.stderr.count("ZeroDivisionError: at the end") == 1

@@ -88,11 +88,11 @@ def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stag
     told = {name: wait_for_finding(file.relay, "refused_by_dds", name) for name in ("outputs", "subscriptions")}
     events, log = "rcl_interfaces/msg/ParameterEvent", "rcl_interfaces/msg/Log"
     assert {name: (finding["severity"], finding["topic"], finding["text"]) for name, finding in told.items()} == {
-        "outputs": ("error", "/x", f"DDS does not publish /o1 as {_IMU}: this process has it as {events} already"),
+        "outputs": ("error", "/x", f"the relay cannot publish /o1 as {_IMU}: this process has it as {events} already"),
         "subscriptions": (
             "error",
             "/z",
-            f"DDS does not subscribe to /z as {_FIELD}: this process has it as {log} already",
+            f"the relay cannot subscribe to /z as {_FIELD}: this process has it as {log} already",
         ),
     }
     assert "refused_by_dds" not in findings(file.relay)
@@ -109,7 +109,7 @@ def test_a_file_with_an_output_that_dds_refuses_is_left_aside_and_all_goes_on(st
     # The first output would have to end for the other group's, which could be made.
     third = _group(("/x", _IMU, "/o3"), ("/mag", _FIELD, "/o1"))
     why = file.refuse(config({"front": _FRONT, "swap": third}, metrics=ANY_PORT))
-    assert why.startswith(f"DDS does not publish /o3 as {_IMU}: ")
+    assert why.startswith(f"the relay cannot publish /o3 as {_IMU}: ")
     _wait_for_outputs(collector, {"/o1": _IMU, "/o2": _FIELD})
     player.play(recording)
     relaying.conclude(player, collector, recording, _ALIGNED)
@@ -117,10 +117,11 @@ def test_a_file_with_an_output_that_dds_refuses_is_left_aside_and_all_goes_on(st
 
 
 _FAILING = """
+import syncrelay.explain as explain
 from syncrelay.config import GroupConfig
 from syncrelay.sync.group import SyncGroup
 
-add, engine = SyncGroup.add, GroupConfig.engine
+add, engine, judge, made = SyncGroup.add, GroupConfig.engine, explain.remarkable, {}
 
 def failing_add(self, message, *, now):
     if message.stamp % 1000 == 7 and self._is_limited:
@@ -128,11 +129,19 @@ def failing_add(self, message, *, now):
     return add(self, message, now=now)
 
 def failing_engine(self):
-    if self.name == "impossible":
+    # One is made for the group, and later one for those who watch it, when it has taken the place of another.
+    made[self.name] = made.get(self.name, 0) + 1
+    if self.name == "impossible" or (self.name == "half_possible" and made[self.name] == 2):
         raise OverflowError("too large to be an engine")
     return engine(self)
 
+def failing_judge(facts):
+    if facts.name == "unjudged":
+        raise ZeroDivisionError("no rate")
+    return judge(facts)
+
 SyncGroup.add, GroupConfig.engine = failing_add, failing_engine
+explain.remarkable = failing_judge
 """
 
 
@@ -159,13 +168,15 @@ def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_o
     relaying.conclude(player, collector, recording, of_failing)
 
 
-def test_a_bug_that_a_file_finds_leaves_the_relay_with_its_old_file(stage: Stage):
+@pytest.mark.parametrize("name", ["impossible", "half_possible"])
+def test_a_bug_that_a_file_finds_leaves_the_relay_with_its_old_file(stage: Stage, name: str):
     stage.before_each_relay(_FAILING)
     recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
-    file = ReloadedFile(stage, front=_FRONT)
+    file = ReloadedFile(stage, front=_FRONT, swap=_SWAP)
     collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
     relaying.connect(player, collector, recording, _ALIGNED)
-    why = file.refuse(config({"front": {**_FRONT, "queue_size": 7}, "impossible": _FRONT}, metrics=ANY_PORT))
+    _wait_for_outputs(collector, {"/o1": _IMU, "/o2": _FIELD})
+    why = file.refuse(config({"front": _FRONT, "swap": _SWAPPED, name: _FRONT}, metrics=ANY_PORT))
     assert why.startswith("a bug in syncrelay kept it from taking on the file, all goes on as before")
     assert "Traceback" in why
     assert why.endswith("OverflowError: too large to be an engine")
@@ -173,4 +184,20 @@ def test_a_bug_that_a_file_finds_leaves_the_relay_with_its_old_file(stage: Stage
     player.play(recording)
     relaying.conclude(player, collector, recording, _ALIGNED)
     assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 3
+    _wait_for_outputs(collector, {"/o1": _IMU, "/o2": _FIELD})
     file.reload(front=_FRONT, rear=_SWAP)
+
+
+def test_a_group_that_cannot_be_judged_is_relayed_and_others_are_judged(stage: Stage):
+    stage.before_each_relay(_FAILING)
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    relay = stage.relay(config({"unjudged": _FRONT, "front": _FRONT}, metrics=ANY_PORT))
+    aligned = {**_ALIGNED, "/unjudged/camera": VECTOR, "/unjudged/lidar": VECTOR}
+    collector, player = stage.collector(aligned), stage.player(_PAIR)
+    relaying.connect(player, collector, recording, aligned)
+    player.play(recording)
+    relaying.conclude(player, collector, recording, aligned)
+    assert len(relaying.sets_within(recording, collector, aligned)) == 3
+    wait_for_finding(relay, "healthy")
+    relay.wait_for_log("a bug in syncrelay while looking at unjudged; the relay goes on")
+    assert relay.stderr.count("ZeroDivisionError: no rate") == 1

@@ -12,6 +12,7 @@ from syncrelay.config import load_text
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Refusal
 from tests.ros.configs import config
+from tests.ros.processes import wait_until
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 entities = pytest.importorskip("syncrelay.ros.entities")
@@ -54,7 +55,7 @@ def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
     thread.start()
     wirings = Wirings(entities=refusing, node=node, path=path, loop=loop)
     try:
-        yield SimpleNamespace(node=node, entities=refusing, wirings=wirings, context=context)
+        yield SimpleNamespace(node=node, entities=refusing, wirings=wirings, path=path)
     finally:
         loop.stop()
         thread.join()
@@ -113,7 +114,7 @@ def test_what_cannot_be_made_after_the_old_ended_leaves_all_as_it_was(here):
     before, groups = _published(here), here.wirings.groups
     answers = iter([False, False, False, True, False, False])
     here.entities.refuses = lambda: next(answers)
-    with pytest.raises(ReloadError, match="DDS does not publish /a as any: no more memory"):
+    with pytest.raises(ReloadError, match="the relay cannot publish /a as any: no more memory"):
         here.wirings.wire([groups[1], *_groups(**_OTHER)])
     assert _published(here) == before
     assert here.wirings.groups == groups
@@ -168,6 +169,29 @@ def test_what_others_in_the_process_made_is_refused_in_the_words_of_dds(here):
     assert refusal.held_as is None
     assert "incompatible type" in refusal.why
     assert wiring.inputs[1].refusal(wiring.group, 1) is None
+
+
+def test_a_topic_that_gives_no_messages_any_more_is_subscribed_anew_and_told(here):
+    sources, source = [], here.path.source
+    here.path.source = lambda *of: sources.append(source(*of)) or sources[-1]
+    here.wirings.wire(_groups(**_ONE))
+    _look(here)
+    wiring = here.wirings.all[0]
+    failing = wiring.inputs[0]
+    publisher = here.node.create_publisher(import_type(_IMU), "/x", 10)
+    sources[0].take = lambda: {}["no such"]
+    wait_until(lambda: publisher.publish(import_type(_IMU)()) or failing.is_due, "the source to fail")
+    failing.look()
+    assert failing.refusal(wiring.group, 0).why == "'no such'"
+    assert failing.refusal(wiring.group, 1) == failing.refusal(wiring.group, 0)
+    assert wiring.inputs[1].refusal(wiring.group, 1) is None
+    assert "/x" not in _subscribed(here)
+    failing.try_again()
+    failing.look()
+    assert failing.refusal(wiring.group, 0) is None
+    wait_until(
+        lambda: publisher.publish(import_type(_IMU)()) or wiring.group.counts()[0].fed > 0, "messages of the new source"
+    )
 
 
 def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:

@@ -19,14 +19,14 @@ FOUND = {
         Code.REFUSED_BY_DDS,
         Severity.ERROR,
         a_group(camera(refusal=Refusal("publish", "/out", IMAGE, held_as="std_msgs/msg/Int64")), LIDAR),
-        f"DDS does not publish /out as {IMAGE}: this process has it as std_msgs/msg/Int64 already",
+        f"the relay cannot publish /out as {IMAGE}: this process has it as std_msgs/msg/Int64 already",
         "give one of the two another name: a process has one type for each topic",
     ),
-    "an optional input that DDS does not subscribe to": (
+    "an optional input that the relay cannot subscribe to": (
         Code.REFUSED_BY_DDS,
         Severity.WARN,
         a_group(camera(required=False, refusal=Refusal("subscribe to", "/camera", IMAGE, why="out of memory")), LIDAR),
-        f"DDS does not subscribe to /camera as {IMAGE}: out of memory",
+        f"the relay cannot subscribe to /camera as {IMAGE}: out of memory",
         "the relay tries again every few seconds; if it stays, look at limits of memory and open files",
     ),
     "a type that is not installed": (
