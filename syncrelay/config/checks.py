@@ -8,7 +8,7 @@ from syncrelay.config.drafts import GroupDraft, TopicDraft, node_name, remapped_
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem, Severity
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
-from syncrelay.config.wording import did_you_mean, quoted
+from syncrelay.config.wording import quoted
 
 # The longest of what every node offers below its name.
 _LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
@@ -80,7 +80,7 @@ def _restamp(group: GroupDraft, document: Document) -> Iterator[Problem]:
     inputs = [topic.topic for topic in group.topics if topic.topic]
     if group.restamp in _RESTAMP_WORDS or group.restamp_topic in inputs:
         return
-    hint = did_you_mean(group.restamp, (*_RESTAMP_WORDS, *inputs))
+    hint = document.did_you_mean(group.restamp, (*_RESTAMP_WORDS, *inputs))
     text = f"{quoted(group.restamp)} is not an input of this group, nor none, earliest or latest{hint}"
     yield _at(document, (*group.path, "restamp"), text, code="bad_value")
 
@@ -91,7 +91,7 @@ def _trigger(group: GroupDraft, document: Document) -> Iterator[Problem]:
     inputs = {topic.topic: topic for topic in group.topics if topic.topic}
     path = (*group.path, "trigger")
     if group.trigger_topic not in inputs:
-        hint = did_you_mean(group.trigger, inputs)
+        hint = document.did_you_mean(group.trigger, inputs)
         yield _at(document, path, f"{quoted(group.trigger)} is not an input of this group{hint}", code="bad_value")
     elif not inputs[group.trigger_topic].is_required:
         text = f"{quoted(group.trigger)} triggers every set, so it cannot be optional (`required: false`)"

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import yaml
 
-from syncrelay.config.document import Document, Entry, MappingNode, Node, ScalarNode, SequenceNode
+from syncrelay.config.document import MOST_VALUES, Document, Entry, MappingNode, Node, ScalarNode, SequenceNode
 from syncrelay.config.errors import ConfigError
 from syncrelay.config.problems import Path, Problem, Span, dotted
 from syncrelay.config.scalars import Scalar, read_plain
@@ -22,8 +22,12 @@ from syncrelay.config.wording import quoted
 LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 # A file that uses every key is 7 levels deep.
 _DEEPEST: Final = 50
-# Values after following every alias: a thousand groups are a tenth of it.
-_MOST_VALUES: Final = 200_000
+# Of those with single keys and values, which may be at the end of a long path.
+_MOST_PROBLEMS: Final = 1_000
+# No name of ROS is as long, and every problem below a key tells the key.
+_LONGEST_KEY: Final = 255
+# A text of so many characters counts as one value more.
+_CHARACTERS: Final = 100
 
 
 def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[Problem]]:
@@ -111,6 +115,8 @@ class _Composer:
         self._place(self._value(event, span), event.anchor)
 
     def _key(self, key: str, span: Span) -> None:
+        if len(key) > _LONGEST_KEY:
+            raise self._refusal(f"a key of {len(key)} characters, at most {_LONGEST_KEY} are allowed", span)
         top = self._open[-1]
         top.step, top.key = key, span
         assert isinstance(top.node, MappingNode)  # noqa: S101  only a mapping awaits a key
@@ -123,7 +129,8 @@ class _Composer:
 
     def _value(self, event: yaml.ScalarEvent, span: Span) -> ScalarNode:
         try:
-            return ScalarNode(span, self._resolved(event))
+            value = self._resolved(event)
+            return ScalarNode(span, value, size=1 + (len(value) // _CHARACTERS if isinstance(value, str) else 0))
         except ValueError as error:
             self._report(str(error), span, code="substitution")
             return ScalarNode(span, None, readable=False)
@@ -146,8 +153,8 @@ class _Composer:
         if self._awaits_key():
             raise self._refusal("an alias cannot be a key", span)
         self._place(target, None)
-        if sum(container.node.size for container in self._open) > _MOST_VALUES:
-            raise self._refusal(f"with every alias followed the file has over {_MOST_VALUES} values", span)
+        if sum(container.node.size for container in self._open) > MOST_VALUES:
+            raise self._refusal(f"with every alias followed the file has over {MOST_VALUES} values", span)
 
     def _place(self, node: Node, anchor: str | None) -> None:
         if anchor:
@@ -175,6 +182,9 @@ class _Composer:
             raise self._refusal(f"tags such as {quoted(written)} are not supported", self._span(event))
 
     def _report(self, text: str, span: Span, *, code: str) -> None:
+        if len(self.problems) == _MOST_PROBLEMS:
+            text = "the file was not read on from here: there are errors enough above"
+            raise ConfigError([*self.problems, self._source.problem(text, span=span, code="yaml")])
         self.problems.append(self._source.problem(text, path=dotted(self._path()), span=span, code=code))
 
     def _refusal(self, text: str, span: Span) -> ConfigError:

@@ -7,7 +7,7 @@ that variable unset and put the index into the Python environment's own prefix.
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Final, Self
@@ -19,9 +19,11 @@ _INDEX: Final = Path("share/ament_index/resource_index")
 
 @dataclass(frozen=True)
 class Interfaces:
-    """The installed interfaces below some prefixes, of which earlier ones hide later ones."""
+    """The installed interfaces below some prefixes, of which earlier ones hide later ones; each is read once."""
 
     prefixes: tuple[Path, ...]
+    _types: dict[str, tuple[str, ...]] = field(default_factory=dict, compare=False, repr=False)
+    _fields: dict[str, tuple[Field, ...] | None] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def find(cls, environ: Mapping[str, str]) -> Self | None:
@@ -43,12 +45,21 @@ class Interfaces:
 
     def types(self, package: str) -> tuple[str, ...]:
         """Return a package's types in full (`pkg/msg/Name`, `pkg/srv/Name`, `pkg/action/Name`)."""
-        prefix = self.packages[package]
-        listed = (prefix / _INDEX / "rosidl_interfaces" / package).read_text(encoding="utf-8", errors="replace")
-        return tuple(sorted({f"{package}/{line.rpartition('.')[0]}" for line in listed.split() if "." in line}))
+        if package not in self._types:
+            listed = self.packages[package] / _INDEX / "rosidl_interfaces" / package
+            lines = listed.read_text(encoding="utf-8", errors="replace").split()
+            self._types[package] = tuple(
+                sorted({f"{package}/{line.rpartition('.')[0]}" for line in lines if "." in line})
+            )
+        return self._types[package]
 
     def fields(self, type_name: str) -> tuple[Field, ...] | None:
         """Return the fields of an installed message type; None where its .msg file cannot be read."""
+        if type_name not in self._fields:
+            self._fields[type_name] = self._read_fields(type_name)
+        return self._fields[type_name]
+
+    def _read_fields(self, type_name: str) -> tuple[Field, ...] | None:
         package = type_name.partition("/")[0]
         prefix = self.packages.get(package)
         if prefix is None:

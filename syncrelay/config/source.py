@@ -71,7 +71,7 @@ def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) ->
     try:
         content = _content(path, patience_s)
     except TimeoutError as error:
-        text = f"its end did not come within {patience_s:g} s: is it a pipe that nobody writes to, or closes?"
+        text = f"could not be read to its end within {patience_s:g} s: is it a pipe that nobody writes to, or closes?"
         raise _unreadable(path, text) from error
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
@@ -86,8 +86,8 @@ def _content(path: str, patience_s: float) -> bytes:
     if kind is not None:
         # Not even opened: to open a device may do something.
         raise _unreadable(path, f"is a {kind}, expected a YAML file")
-    # Not to wait for whoever writes to a pipe: that has an end below.
-    with FileIO(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)) as file:
+    # Not to wait until somebody writes to a pipe: the wait has an end below.
+    with FileIO(path, opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
         return _read(file, deadline=time.monotonic() + patience_s)
 
 

@@ -1,6 +1,6 @@
 """pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, TypeAlias
 
 from pydantic import BaseModel
@@ -19,7 +19,7 @@ from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.qos import QosOverrides
 from syncrelay.config.scalars import read_plain
-from syncrelay.config.wording import all_of, describe, did_you_mean, nearest, one_of, quoted
+from syncrelay.config.wording import all_of, describe, one_of, or_nearest, quoted
 
 Location: TypeAlias = tuple[str | int, ...]
 """A place in pydantic's words: a path with the tags of unions in it."""
@@ -68,23 +68,31 @@ _TRUTH_WORDS: Final = ("yes", "no", "on", "off", "true", "false")
 
 def translate(errors: Sequence[ErrorDetails], document: Document) -> list[Problem]:
     """Return a problem for every error, but none for what only follows from another problem."""
-    misspelt = set(_meant_keys(errors))
+    # In the order of the file: what is meant is looked for in the first of many.
+    located = sorted(
+        ((_path(error["loc"]), error) for error in errors), key=lambda each: document.key_span(each[0])[:2]
+    )
+    meant = {
+        path: document.nearest(str(path[-1]), _model(error["loc"][:-1]).model_fields)
+        for path, error in located
+        if error["type"] == "extra_forbidden"
+    }
+    misspelt = {(*path[:-1], key) for path, key in meant.items()}
     problems = []
-    for error in errors:
-        path = _path(error["loc"])
+    for path, error in located:
         if error["type"] == "missing" and path in misspelt:
             continue
         node = document.node(path)
         if isinstance(node, ScalarNode) and not node.readable:
             continue
-        problems.append(_problem(error, path, document))
+        problems.append(_problem(error, path, meant.get(path), document))
     return problems
 
 
-def _problem(error: ErrorDetails, path: Path, document: Document) -> Problem:
+def _problem(error: ErrorDetails, path: Path, meant: str | None, document: Document) -> Problem:
     match error["type"]:
         case "extra_forbidden":
-            text = _unknown_key(error["loc"])
+            text = _unknown_key(error["loc"], meant, document)
             return document.problem(path, text, code="unknown_key", span=document.key_span(path))
         case "missing":
             text = f"missing, {_what_is_missing(error['loc'])}"
@@ -95,10 +103,10 @@ def _problem(error: ErrorDetails, path: Path, document: Document) -> Problem:
         case kind:
             at_key = error["loc"][-1] == "[key]"
             span = document.key_span(path) if at_key else document.value_span(path)
-            return document.problem(path, _bad_value(error), code="bad_value", span=span)
+            return document.problem(path, _bad_value(error, document), code="bad_value", span=span)
 
 
-def _bad_value(error: ErrorDetails) -> str:
+def _bad_value(error: ErrorDetails, document: Document) -> str:
     found = error["input"]
     context: dict[str, Any] = error.get("ctx", {})
     match error["type"]:
@@ -110,14 +118,15 @@ def _bad_value(error: ErrorDetails) -> str:
             return f"expected {context['le']} or less, found {describe(found)}"
         case "literal_error":
             words = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
-            return _no_such_word(found, words, error["loc"])
+            return _no_such_word(found, words, error["loc"], document)
         case _:
             return f"{error['msg'][0].lower()}{error['msg'][1:]}, found {describe(found)}"
 
 
-def _no_such_word(found: object, words: Sequence[str], loc: Location) -> str:
-    if isinstance(found, str) and nearest(found, words):
-        return f"unknown value {quoted(found)}{did_you_mean(found, words)}"
+def _no_such_word(found: object, words: Sequence[str], loc: Location, document: Document) -> str:
+    close = document.nearest(found, words) if isinstance(found, str) else None
+    if close is not None:
+        return f"unknown value {quoted(str(found))}{or_nearest(close)}"
     choices = [*words, _MAPPING_FORMS[str(loc[-2])]] if loc[-1] == "<name>" else words
     return f"expected {one_of(choices)}, found {describe(found)}"
 
@@ -133,22 +142,23 @@ def _found(value: object, kind: str) -> str:
     return found
 
 
-def _unknown_key(loc: Location) -> str:
+def _unknown_key(loc: Location, meant: str | None, document: Document) -> str:
     key = str(loc[-1])
     model = _model(loc[:-1])
     for models in (GROUP_MODEL_OF, _TOPIC_MODEL_OF):
+        if model not in models.values():
+            continue
         owners = [policy for policy, other in models.items() if key in other.model_fields]
-        if owners and model in models.values():
+        if owners:
             return f"{_policy(loc)} has no `{key}`, only {all_of(owners)}"
     levels = [level for level, owner in _LEVELS.items() if key in owner.model_fields]
-    if levels and nearest(key, model.model_fields, likeness=_A_SLIP) is None:
+    if levels and document.nearest(key, model.model_fields, likeness=_A_SLIP) is None:
         return f"unknown key here, `{key}` is a key of {levels[0]}"
     if "$" in key:
         return "unknown key; variables are filled in in values only"
     if ":" in key:
         return "unknown key, is a space missing behind the colon?"
-    hint = did_you_mean(key, model.model_fields)
-    return f"unknown key{hint}" if hint else f"unknown key, expected {one_of(model.model_fields)}"
+    return f"unknown key{or_nearest(meant)}" if meant else f"unknown key, expected {one_of(model.model_fields)}"
 
 
 def _model(loc: Location) -> type[BaseModel]:
@@ -169,16 +179,6 @@ def _model(loc: Location) -> type[BaseModel]:
 def _policy(loc: Location) -> str:
     """Return the tag of the group's model, which is its policy's name."""
     return str(loc[2]).strip("<>")
-
-
-def _meant_keys(errors: Sequence[ErrorDetails]) -> Iterator[Path]:
-    """Yield the paths of missing keys that stand there misspelt."""
-    for error in errors:
-        if error["type"] == "extra_forbidden":
-            *parents, key = _path(error["loc"])
-            meant = nearest(str(key), _model(error["loc"][:-1]).model_fields)
-            if meant:
-                yield (*parents, meant)
 
 
 def _what_is_missing(loc: Location) -> str:

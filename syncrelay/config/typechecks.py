@@ -8,7 +8,7 @@ from syncrelay.config.drafts import GroupDraft, TopicDraft
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.msgfile import HEADER, PRIMITIVES, TIME, Field
 from syncrelay.config.problems import Path, Problem, Severity
-from syncrelay.config.wording import did_you_mean, nearest, one_of, quoted
+from syncrelay.config.wording import one_of, or_nearest, quoted
 
 
 def check_types(groups: Sequence[GroupDraft], document: Document, interfaces: Interfaces) -> Iterator[Problem]:
@@ -24,7 +24,7 @@ def _check_topic(topic: TopicDraft, document: Document, interfaces: Interfaces) 
         return
     path = (*topic.path, "type")
     span = document.value_span(path)
-    fault = _not_installed(topic.type, interfaces)
+    fault = _not_installed(topic.type, document, interfaces)
     if fault is not None:
         text, code = fault
         yield document.problem(path, text, code=code, span=span)
@@ -50,13 +50,13 @@ def _check_fields(
         yield from _check_field(topic, key, document, interfaces)
 
 
-def _not_installed(type_name: str, interfaces: Interfaces) -> tuple[str, str] | None:
+def _not_installed(type_name: str, document: Document, interfaces: Interfaces) -> tuple[str, str] | None:
     package = type_name.partition("/")[0]
     if package not in interfaces.packages:
         if package in interfaces.other_packages:
             return f"the package {quoted(package)} defines no messages", "unknown_type"
         # Half of a package's name is _msgs or _interfaces.
-        hint = did_you_mean(package, interfaces.packages, likeness=0.8)
+        hint = document.did_you_mean(package, interfaces.packages, likeness=0.8)
         return f"the package {quoted(package)} is not installed here, or not sourced{hint}", "package_missing"
     types = interfaces.types(package)
     if type_name in types:
@@ -66,14 +66,13 @@ def _not_installed(type_name: str, interfaces: Interfaces) -> tuple[str, str] | 
     for kind, word in (("srv", "a service"), ("action", "an action")):
         if f"{package}/{kind}/{name}" in types:
             return f"{quoted(name)} is {word} of {package}, expected a message type", "unknown_type"
-    close = next(_same_name_elsewhere(name, interfaces), None) or _nearest_message(name, messages)
-    hint = f", did you mean `{close}`?" if close else ""
-    return f"the package {package} has no message {quoted(name)}{hint}", "unknown_type"
+    close = next(_same_name_elsewhere(name, interfaces), None) or _nearest_message(name, messages, document)
+    return f"the package {package} has no message {quoted(name)}{or_nearest(close)}", "unknown_type"
 
 
-def _nearest_message(name: str, messages: Sequence[str]) -> str | None:
+def _nearest_message(name: str, messages: Sequence[str], document: Document) -> str | None:
     by_name = {message.rpartition("/")[2]: message for message in messages}
-    close = nearest(name, by_name)
+    close = document.nearest(name, by_name)
     return by_name[close] if close else None
 
 
@@ -130,13 +129,19 @@ _A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a text or 
 def _check_field(
     topic: TopicDraft, field: _FieldDraft, document: Document, interfaces: Interfaces
 ) -> Iterator[Problem]:
-    text = _field_fault(str(topic.type), (), field.steps.split("."), field.wanted, interfaces)
+    text = _field_fault(str(topic.type), (), field.steps.split("."), field.wanted, interfaces, document=document)
     if text is not None:
         yield document.problem(field.path, text, code="no_such_field", span=document.value_span(field.path))
 
 
 def _field_fault(
-    type_name: str, above: tuple[str, ...], steps: Sequence[str], wanted: _Wanted, interfaces: Interfaces
+    type_name: str,
+    above: tuple[str, ...],
+    steps: Sequence[str],
+    wanted: _Wanted,
+    interfaces: Interfaces,
+    *,
+    document: Document,
 ) -> str | None:
     """Follow the steps of a path; say where it misses what is wanted. A type without .msg is believed."""
     first, *rest = steps
@@ -146,13 +151,13 @@ def _field_fault(
     by_name = {field.name: field for field in fields}
     field = by_name.get(first)
     if field is None:
-        close = nearest(first, by_name)
+        close = document.nearest(first, by_name)
         hint = f"did you mean `{'.'.join((*above, close, *rest))}`?" if close else f"it has {one_of(by_name)}"
         return f"{type_name} has no field {quoted(first)}, {hint}"
     if field.is_array:
         return f"{quoted(first)} of {type_name} is an array, expected one {wanted.name.removeprefix('a ')}"
     if rest:
-        return _field_fault(field.type, (*above, first), rest, wanted, interfaces)
+        return _field_fault(field.type, (*above, first), rest, wanted, interfaces, document=document)
     if field.type in wanted.types:
         return None
     hint = _time_below((*above, first), field, interfaces)

@@ -2,11 +2,15 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Final
 
-_LONGEST_QUOTE = 60
+LIKENESS: Final = 0.6
+"""From so much of 1 on a word is taken for another that is misspelt."""
+
+_LONGEST_QUOTE: Final = 60
 
 
-def nearest(word: str, candidates: Iterable[str], *, likeness: float = 0.6) -> str | None:
+def nearest(word: str, candidates: Iterable[str], *, likeness: float = LIKENESS) -> str | None:
     """Return the candidate most like `word`, whatever its case; None if none is as alike as `likeness` of 1."""
     by_lower: dict[str, str] = {}
     for candidate in candidates:
@@ -15,15 +19,20 @@ def nearest(word: str, candidates: Iterable[str], *, likeness: float = 0.6) -> s
     return by_lower[found[0]] if found else None
 
 
-def did_you_mean(word: str, candidates: Iterable[str], *, likeness: float = 0.6) -> str:
+def did_you_mean(word: str, candidates: Iterable[str], *, likeness: float = LIKENESS) -> str:
     """Return `, did you mean ...?` for the nearest candidate, or nothing."""
-    found = nearest(word, candidates, likeness=likeness)
+    return or_nearest(nearest(word, candidates, likeness=likeness))
+
+
+def or_nearest(found: str | None) -> str:
+    """Return `, did you mean ...?` for a word that was found, or nothing."""
     return f", did you mean `{found}`?" if found else ""
 
 
 def quoted(text: str) -> str:
     """Return the text in backticks, or quotes if it has some, on one line and no longer than can be read."""
-    line = printable(text)
+    # What is cut off is not looked at: a value may be long, and be quoted often.
+    line = printable(text[: _LONGEST_QUOTE + 1])
     if len(line) > _LONGEST_QUOTE:
         line = line[: _LONGEST_QUOTE - 1] + "…"
     return f"'{line}'" if "`" in line else f"`{line}`"

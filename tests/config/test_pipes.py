@@ -20,7 +20,7 @@ groups:
       - {topic: /a, type: sensor_msgs/msg/Image}
       - {topic: /b, type: sensor_msgs/msg/Image}
 """
-_NO_END = "its end did not come within 0.2 s: is it a pipe that nobody writes to, or closes?"
+_NO_END = "could not be read to its end within 0.2 s: is it a pipe that nobody writes to, or closes?"
 
 
 @contextmanager

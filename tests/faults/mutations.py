@@ -11,7 +11,28 @@ null  ~  true  yes  0  -1  1e308  -0.0  .nan  .inf  0x7f  1_000  12:30:45  []  {
 {a: {b: {c: d}}}  [1, 2  {a  *a  &a b  !!python/object:os.system x  !x y  <<: {a: b}  # nothing  ---  ...
 ${HOME}  ${UNSET}  ${UNSET:-${UNSET}}  $  $$  ${  '  "  'unclosed  "\\u12"  %YAML 3.0  ? a  - - -
 std_msgs/msg/String  std_msgs/String  a/b/c/d  sensor_msgs/srv/X  ../../etc/passwd"""
-_VALUES = (*(value for line in _ODD.splitlines() for value in line.split("  ")), "", "9" * 40, "x" * 5000)
+_LONG = (
+    "9" * 40,
+    "9" * 309,
+    "-" + "9" * 400,
+    "9" * 5000,
+    "0x" + "f" * 398,
+    "9" * 40 + "e999 min",
+    "1e-999 Hz",
+    "x" * 5000,
+)
+_STRANGE = (
+    "\u202e/a",
+    "/\ufeff",
+    "a\u0301" * 40,
+    "\U0001f916",
+    "/\u0660",
+    "\u2028",
+    "\ud7ff\ue000",
+    "\u00a0 ",
+    '"\\e[2J"',
+)
+_VALUES = (*(value for line in _ODD.splitlines() for value in line.split("  ")), "", *_LONG, *_STRANGE)
 _BYTES = tuple(map(bytes.fromhex, ["00", "ff", "feff", "c3", "09", "0d", "85", "e280a8", "eda080", "f4908080"]))
 
 _Mutation = Callable[[bytes, random.Random], bytes]
@@ -95,3 +116,57 @@ def mutated(content: bytes, chance: random.Random) -> bytes:
         if content:
             content = chance.choice(_MUTATIONS)(content, chance)
     return content
+
+
+# Words that mean something somewhere in the file, and some that never do.
+_NAMES = """\
+version node metrics diagnostics defaults groups name namespace use_sim_time transport listen scalars front rear
+policy queue_size slop age_penalty max_wait max_rate every restamp output_prefix trigger max_age key topics topic type
+output qos required offset stamp min_period field history depth reliability durability deadline lifespan liveliness
+sec nsec exact_time latest_time equal_key approximate_time earliest /a /b sensor_msgs/msg/Image /clock << ? $ frnot"""
+_WORDS = _NAMES.split()
+
+
+def made_up(chance: random.Random) -> bytes:
+    """A document of the words that a file is made of, in no order: nested, repeated, anchored, of any values."""
+    shape = chance.choice((_tree, _many_keys, _deep))
+    return f"version: 1\n{shape(chance)}\n".encode("utf-8", "surrogatepass")
+
+
+def _tree(chance: random.Random, *, depth: int = 0) -> str:
+    """A mapping of mappings, lists and values; at its top in lines of its own."""
+    keys = [chance.choice(_WORDS) for _ in range(chance.randrange(1, 7))]
+    entries = [f"{key}: {_node(chance, depth=depth + 1)}" for key in keys]
+    return "\n".join(entries) if depth == 0 else f"{{{', '.join(entries)}}}"
+
+
+def _node(chance: random.Random, *, depth: int) -> str:
+    anchor = chance.choice(("", "", "", "", "&a ", "&b "))
+    if depth > 6 or chance.random() < 0.4:
+        return chance.choice(("*a", "*b", *_WORDS)) if chance.random() < 0.7 else anchor + chance.choice(_VALUES)
+    if chance.random() < 0.4:
+        return f"{anchor}[{', '.join(_node(chance, depth=depth + 1) for _ in range(chance.randrange(4)))}]"
+    return anchor + _tree(chance, depth=depth)
+
+
+def _many_keys(chance: random.Random) -> str:
+    """Thousands of keys or items at one place, which may all be one."""
+    word, value = chance.choice(_WORDS), chance.choice((*_WORDS, "{}", "[]", "*a"))
+    opened, entry, closed = chance.choice(
+        (
+            ("", "{word}{number}: {value}\n", ""),
+            ("groups: {", "g{number}: {{{word}: {value}}}, ", "}"),
+            ("groups: {front: {policy: exact_time, topics: [", "{{{word}: {value}, topic: /t{number}}}, ", "]}}"),
+            ("groups: {front: {", "{word}: {value}, ", "}}"),
+            (f"defaults: {{{word}: [{'1, ' * 500}]}}\ngroups: {{", "g{number}: {{}}, ", "}"),
+        )
+    )
+    count = chance.randrange(1, 300)
+    entries = (entry.format(word=word, number=number, value=value) for number in range(count))
+    return f"a: &a {chance.choice(_VALUES)}\n{opened}{''.join(entries)}{closed}"
+
+
+def _deep(chance: random.Random) -> str:
+    """Brackets within brackets, more than anybody recurses into."""
+    opened = chance.choice(("[", "{a: ", "- ", "? ", "[{a: ", "groups: {front: {topics: [{qos: {", "&a [", "!!map {"))
+    return opened * chance.randrange(1, 3000) + chance.choice(("", "1", "*a", "]" * 50, "}" * 50))

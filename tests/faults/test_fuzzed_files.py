@@ -6,19 +6,22 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from syncrelay.config import ConfigError, load
 from tests.faults.extent import chosen
-from tests.faults.mutations import mutated
+from tests.faults.mutations import made_up, mutated
 
 pytestmark = pytest.mark.faults
 
 _EXAMPLES = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 _FILES = chosen(short=1500, long=10_000)
 _BATCHES = 4
+_MADE_UP = chosen(short=150, long=5000)
+_PAIRS = chosen(short=80, long=2000)
 
 
 @pytest.mark.timeout(chosen(short=300, long=1200))
@@ -33,16 +36,47 @@ def test_a_file_of_any_content_is_in_order_or_an_error_that_says_why(batch: int,
     figures(f"{sum(became.values())} fuzzed files (part {batch + 1} of {_BATCHES}): {dict(became)}, nothing else")
 
 
-def _loaded(path: Path) -> str:
-    """What became of a file; anything but a configuration or an error with words flies on, with its content."""
+@pytest.mark.timeout(chosen(short=300, long=1200))
+def test_a_document_made_up_of_our_words_is_in_order_or_an_error_that_says_why(tmp_path: Path, figures):
+    path, became = tmp_path / "fusion.yaml", Counter()
+    for number in range(_MADE_UP):
+        path.write_bytes(made_up(random.Random(number)))
+        became[_loaded(path)] += 1
+    assert became.keys() <= {"in order", "refused"}
+    figures(f"{sum(became.values())} documents made up of the file's own words: {dict(became)}, nothing else")
+
+
+@pytest.mark.timeout(chosen(short=300, long=1200))
+def test_files_of_any_content_together_are_in_order_or_an_error_that_says_where(tmp_path: Path, figures):
+    paths, became = [tmp_path / "one.yaml", tmp_path / "two.yaml"], Counter()
+    for number in range(_PAIRS):
+        chance = random.Random(number)
+        for path in paths:
+            content = chance.choice(_EXAMPLES).read_bytes()
+            path.write_bytes(chance.choice((content, mutated(content, chance), made_up(chance))))
+        became[_loaded(*paths)] += 1
+    assert became.keys() == {"in order", "refused"}
+    figures(f"{sum(became.values())} pairs of fuzzed files: {dict(became)}, nothing else")
+
+
+def _loaded(*paths: Path) -> str:
+    """What became of files; anything but a configuration or an error with words flies on, with their content."""
     try:
-        load(str(path))
+        config = load(*map(str, paths))
     except ConfigError as error:
-        return "refused" if str(error) else "refused without a word"
+        return "refused" if _says_where(error, paths) else "refused without a word"
     except Exception as error:
-        error.add_note(repr(path.read_bytes()))
+        error.add_note(repr([path.read_bytes() for path in paths]))
         raise
-    return "in order"
+    # What is in order can be run: no number is too large for the engine.
+    return "in order" if all(group.engine() for group in config.groups) else "without an engine"
+
+
+def _says_where(error: ConfigError, paths: Sequence[Path]) -> bool:
+    lines = {str(path): path.read_bytes().decode("utf-8", "replace") for path in paths}
+    return bool(str(error)) and all(
+        problem.text and problem.source in lines[problem.file] for problem in error.problems
+    )
 
 
 # What would run or read something, if whoever reads the file obeyed it.

@@ -3,6 +3,7 @@
 import random
 import signal
 import subprocess
+import sys
 
 import pytest
 

@@ -144,6 +144,20 @@ def test_a_pipe_moved_over_a_watched_file_holds_nothing_up(stage: Stage):
     assert relay.wait() == 0
 
 
+def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
+    second = stage.folder / "second.yaml"
+    second.write_text(config({"rear": _rear()}))
+    file = ReloadedFile(stage, "--config", str(second), "--watch", front=_FRONT)
+    file.relay.wait_for_log("rear: waiting for")
+    state = status(file.relay)
+    assert [group["name"] for group in state["groups"]] == ["front", "rear"]
+    assert state["relay"]["config"] == f"{file.path}, {second}"
+    second.write_text(config({"rear": _rear(), "left": _rear(output_prefix="/left")}))
+    file.relay.wait_for_log("the file was read again: 2 groups go on, 1 begin")
+    file.write(config({"left": _FRONT}, metrics=ANY_PORT))
+    file.relay.wait_for_log(f"of {file.path} too: give one of them another name")
+
+
 def test_a_watched_file_is_read_when_it_changes(stage: Stage):
     file = ReloadedFile(stage, "--watch", front=_FRONT)
     file.write(config({"front": _FRONT, "rear": _rear()}, metrics=ANY_PORT))
