@@ -63,9 +63,11 @@ def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopReque
 
 def prepare_ros() -> None:
     """Import rclpy with this process kept to its machine; raises RosUnavailableError where ROS cannot be used."""
+    from syncrelay.ros.domain import require_domain
     from syncrelay.ros.environment import require_rclpy
 
     os.environ.update(isolation(os.environ))
+    require_domain(os.environ)
     require_rclpy()
 
 

@@ -67,7 +67,8 @@ def _relay_parser() -> Parser:
         "--explain",
         metavar="N",
         type=_positive,
-        help="run for N seconds, then print how every group fares and why; exit code 1 unless all are healthy",
+        help="look for N seconds without publishing, then print how every group fares and why; exit code 1 unless all"
+        " are healthy",
     )
     options.add_argument(
         "--log-level",

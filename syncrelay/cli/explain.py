@@ -1,4 +1,4 @@
-"""`syncrelay --config FILE --explain N`: run for N seconds and say how every group fares."""
+"""`syncrelay --config FILE --explain N`: look for N seconds, publish nothing, and say how every group fares."""
 
 import time
 from collections.abc import Iterator
@@ -13,22 +13,36 @@ if TYPE_CHECKING:
 
 
 def explain(relay: "Relay", seconds: float, *, stop: StopRequest) -> int:
-    """Print the findings of all groups once the time is over or a signal came; 0 if every group is healthy."""
-    end = time.monotonic() + seconds
+    """Print the findings of all groups once the time is over or a signal came; 0 if every group is healthy.
+
+    If one is not, the last line says what decided that.
+    """
+    began = time.monotonic()
+    end = began + seconds
     while not stop.requested and (left := end - time.monotonic()) > 0:
         relay.step(left)
     reports = relay.look()
     for report in reports:
         for line in _lines(report):
             put(line)
-    return DONE if all(_is_healthy(report) for report in reports) else AT_FAULT
+    looked_s = time.monotonic() - began
+    faults = [f"{report.facts.name} {fault}" for report in reports if (fault := _fault(report, looked_s))]
+    if not faults:
+        return DONE
+    put(f"exit code 1: {'; '.join(faults)}")
+    return AT_FAULT
 
 
-def _is_healthy(report: "GroupReport") -> bool:
+def _fault(report: "GroupReport", looked_s: float) -> str | None:
+    """Say why a group is not healthy, None if it is."""
     from syncrelay.explain import Severity
 
-    gave_sets = report.facts.figures.last_set is not None
-    return gave_sets and all(finding.severity is Severity.OK for finding in report.findings)
+    for severity, word in ((Severity.ERROR, "error"), (Severity.WARN, "warning")):
+        if count := sum(finding.severity is severity for finding in report.findings):
+            return f"has {count} {word}{'s' if count > 1 else ''}"
+    if report.facts.figures.last_set is None:
+        return f"gave no set in {looked_s:.0f} s, too short a time to tell why: write a larger N for --explain"
+    return None
 
 
 def _lines(report: "GroupReport") -> Iterator[str]:

@@ -38,8 +38,8 @@ def run(
 ) -> int:
     """Relay the groups of files, all of them if `groups` is empty; 0 after an orderly end.
 
-    With `explain_s`, end after so many seconds with the findings, and 1 unless all groups are healthy. The files are
-    read again at SIGHUP, and with `watch` when one changes.
+    With `explain_s`, only look: publish nothing, and end after so many seconds with the findings, and 1 unless all
+    groups are healthy. The files are read again at SIGHUP, and with `watch` when one changes.
 
     Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
     cannot be used.
@@ -59,6 +59,7 @@ def run(
     require_rclpy()
     from syncrelay.cli.explain import explain
     from syncrelay.cli.summary import summarize
+    from syncrelay.ros.entities import Purpose
     from syncrelay.ros.relay import Relay
 
     stop.defer()
@@ -71,6 +72,7 @@ def run(
             groups=groups or None,
             ros_args=ros_args,
             beat=heartbeat.beat if heartbeat else None,
+            purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
         ) as relay,
         files,
     ):

@@ -4,12 +4,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode, SequenceNode, plain
-from syncrelay.config.drafts import GroupDraft, TopicDraft
+from syncrelay.config.drafts import GroupDraft, TopicDraft, node_name, remapped_from
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem, Severity
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
 from syncrelay.config.wording import quoted
 
+# The longest of what every node offers below its name.
+_LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
 # What is longer is refused as out of range.
 _LONGEST_S = MAX_NS // NS_PER_UNIT["s"]
 _RESTAMP_WORDS = ("none", "earliest", "latest")
@@ -18,13 +20,20 @@ _RESTAMP_WORDS = ("none", "earliest", "latest")
 def check_between(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
     """Yield what is wrong between the keys of a file, types aside."""
     yield from _too_few(groups, document)
+    yield from _node(document)
     for group in groups:
-        yield from _repeated_inputs(group, document)
         yield from _restamp(group, document)
         yield from _trigger(group, document)
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
         yield from _unit(group, document)
+    yield from check_names(groups, document)
+
+
+def check_names(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
+    """Yield what is wrong between the names of topics, be they the file's own or what remaps make of them."""
+    for group in groups:
+        yield from _repeated_inputs(group, document)
     yield from _shared_topics(groups, document)
     yield from _outputs(groups, document)
     yield from _too_long(groups, document)
@@ -48,10 +57,23 @@ def _repeated_inputs(group: GroupDraft, document: Document) -> Iterator[Problem]
         if topic.topic is None:
             continue
         if topic.topic in first:
-            line = document.value_span((*first[topic.topic].path, "topic")).line
-            text = f"{quoted(topic.topic)} is in this group twice, first in line {line}"
-            yield _at(document, (*topic.path, "topic"), text, code="repeated_topic")
+            path = (*topic.path, "topic")
+            line = _line_of_topic(first[topic.topic], document, beside=path)
+            text = f"{topic.topic_said} is in this group twice, first in {line}"
+            yield _at(document, path, text, code="repeated_topic")
         first.setdefault(topic.topic, topic)
+
+
+def _node(document: Document) -> Iterator[Problem]:
+    """Yield a name and namespace that are too long together."""
+    name = node_name(document)
+    if len(name) > _LONGEST_NODE:
+        path = ("node", "namespace") if document.find(("node", "namespace")) else ("node", "name")
+        text = (
+            f"the node's full name has {len(name)} characters, at most {_LONGEST_NODE} are allowed: it becomes part of"
+            " the names of its services"
+        )
+        yield _at(document, path, text, code="bad_value")
 
 
 def _restamp(group: GroupDraft, document: Document) -> Iterator[Problem]:
@@ -116,7 +138,7 @@ def _shared_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator
         if topic.type and other.type and topic.type != other.type:
             path = (*topic.path, "type")
             line = document.line((*other.path, "type"), beside=path)
-            text = f"{quoted(topic.topic)} is {quoted(other.type)} in {line}, and one topic has one type"
+            text = f"{topic.topic_said} is {quoted(other.type)} in {line}, and one topic has one type"
             yield _at(document, path, text, code="conflict")
         if topic.qos != other.qos:
             yield _qos_conflict(topic, other, document)
@@ -127,7 +149,7 @@ def _qos_conflict(topic: TopicDraft, other: TopicDraft, document: Document) -> P
     path = own if document.find(own) else (*topic.path, "topic")
     others = (*other.path, "qos") if document.find((*other.path, "qos")) else (*other.path, "topic")
     line = document.line(others, beside=path)
-    text = f"{quoted(str(topic.topic))} has another `qos` in {line}: it is subscribed once, write the same in both"
+    text = f"{topic.topic_said} has another `qos` in {line}: it is subscribed once, write the same in both"
     return _at(document, path, text, code="conflict")
 
 
@@ -137,17 +159,22 @@ def _outputs(groups: Sequence[GroupDraft], document: Document) -> Iterator[Probl
     for topic in _topics(groups):
         if topic.output is None:
             continue
-        name = quoted(topic.output)
+        name = topic.output_said
         what = f"the output {name}" if topic.has_own_output else f"the default output {name}"
         if topic.output in inputs:
-            line = document.line((*inputs[topic.output].path, "topic"), beside=topic.output_path)
+            line = _line_of_topic(inputs[topic.output], document, beside=topic.output_path)
             text = f"{what} is an input too ({line}): its messages would come back, give it another `output`"
             yield _at(document, topic.output_path, text, code="loop")
         elif topic.output in outputs:
-            line = document.line(outputs[topic.output].output_path, beside=topic.output_path)
+            other = outputs[topic.output]
+            line = document.line(other.output_path, beside=topic.output_path) + remapped_from(other.output_before)
             text = f"{what} is taken by {line}, give it another `output`"
             yield _at(document, topic.output_path, text, code="repeated_output")
         outputs.setdefault(topic.output, topic)
+
+
+def _line_of_topic(topic: TopicDraft, document: Document, *, beside: Path) -> str:
+    return document.line((*topic.path, "topic"), beside=beside) + remapped_from(topic.topic_before)
 
 
 def _too_long(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:

@@ -1,7 +1,7 @@
 """A file's groups and topics as far as they can be read: checks between them don't wait for every key to be right."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from syncrelay.config.document import Document, MappingNode, SequenceNode, mappings, plain
@@ -15,11 +15,15 @@ from syncrelay.config.names import (
 )
 from syncrelay.config.problems import Path
 from syncrelay.config.typenames import check_field_path, check_type_name
+from syncrelay.config.wording import quoted
 
 
 @dataclass(frozen=True, slots=True)
 class TopicDraft:
-    """A topic. Names are absolute; what is missing or wrong is None. `key_path` is where its key is written."""
+    """A topic. Names are absolute; what is missing or wrong is None. `key_path` is where its key is written.
+
+    Where remaps make others of the names, `topic_before` and `output_before` are those that the file gives.
+    """
 
     path: Path
     topic: str | None
@@ -32,6 +36,18 @@ class TopicDraft:
     is_required: bool
     key: str | None
     key_path: Path
+    topic_before: str | None = None
+    output_before: str | None = None
+
+    @property
+    def topic_said(self) -> str:
+        """The topic as a sentence names it, with what remaps made it from."""
+        return _said(self.topic, self.topic_before)
+
+    @property
+    def output_said(self) -> str:
+        """The output, likewise."""
+        return _said(self.output, self.output_before)
 
     @property
     def output_path(self) -> Path:
@@ -62,9 +78,37 @@ class GroupDraft:
         return str(self.path[-1])
 
 
+def remapped_from(before: str | None) -> str:
+    """Return what a sentence adds to a name that remaps made of another; nothing where there is none."""
+    return "" if before is None else f", remapped from {quoted(before)}"
+
+
+def _said(name: str | None, before: str | None) -> str:
+    return f"{quoted(str(name))}{remapped_from(before)}{',' if before else ''}"
+
+
 def drafts(document: Document) -> tuple[GroupDraft, ...]:
     """Return what can be read of a file's groups."""
-    absolute = absolute_names(document)
+    return _drafts(document, absolute_names(document))
+
+
+def remapped_drafts(document: Document, resolve: Callable[[str], str]) -> tuple[GroupDraft, ...]:
+    """Return the groups of a file under the names that a node makes of the file's own: `resolve` gives them."""
+    return tuple(
+        replace(group, topics=tuple(map(_remapped, group.topics, before.topics)))
+        for group, before in zip(_drafts(document, resolve), drafts(document), strict=True)
+    )
+
+
+def _remapped(topic: TopicDraft, before: TopicDraft) -> TopicDraft:
+    return replace(
+        topic,
+        topic_before=before.topic if before.topic != topic.topic else None,
+        output_before=before.output if before.output != topic.output else None,
+    )
+
+
+def _drafts(document: Document, absolute: Callable[[str], str]) -> tuple[GroupDraft, ...]:
     groups = document.find(("groups",))
     if groups is None:
         return ()
@@ -117,6 +161,11 @@ def _topic(
         key=_checked(check_field_path, _value(node if has_own_key else group, "key")),
         key_path=(*(path if has_own_key else path[:-2]), "key"),
     )
+
+
+def node_name(document: Document) -> str:
+    """Return the full name that a file gives to its node."""
+    return absolute_names(document)("~")
 
 
 def absolute_names(document: Document) -> Callable[[str], str]:

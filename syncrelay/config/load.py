@@ -10,12 +10,13 @@ from pydantic import ValidationError
 from syncrelay.config.checks import check_between
 from syncrelay.config.compose import compose
 from syncrelay.config.document import Document, plain
-from syncrelay.config.drafts import GroupDraft, drafts
+from syncrelay.config.drafts import GroupDraft, absolute_names, drafts
 from syncrelay.config.errors import ConfigError
 from syncrelay.config.file import File, FileKeys
 from syncrelay.config.filling import with_defaults
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.merging import merged_documents, merged_files
+from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.own_topics import check_own_topics
 from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import Config, resolve
@@ -67,13 +68,13 @@ def _config(parts: Sequence[_Part], environ: Mapping[str, str], package_missing:
     problems = [*(problem for part in parts for problem in part.problems), *repeated]
     groups = drafts(document)
     problems += check_between(groups, document)
-    problems += check_own_topics(groups, document)
+    problems += check_own_topics(groups, document, absolute_names(document))
     problems += _types(groups, document, environ, package_missing)
     found = _in_order(problems, files=[source.name for source in document.sources.values()])
     files = [part.file for part in parts if part.file is not None]
     if len(files) < len(parts) or any(problem.severity is Severity.ERROR for problem in found):
         raise ConfigError(found)
-    return resolve(merged_files(files), notes=found)
+    return resolve(merged_files(files), names=NamesInFile(document), notes=found)
 
 
 def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) -> list[_Part]:

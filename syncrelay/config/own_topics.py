@@ -1,12 +1,11 @@
 """The topics that the node itself has, beside those of its groups."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 from syncrelay.config.document import Document, plain
-from syncrelay.config.drafts import GroupDraft, absolute_names
+from syncrelay.config.drafts import GroupDraft
 from syncrelay.config.problems import Problem
-from syncrelay.config.wording import quoted
 
 DIAGNOSTICS: Final = "/diagnostics"
 SCALARS: Final = ("sets_hz", "span_ms", "latency_ms")
@@ -27,34 +26,40 @@ _OF_EVERY_NODE: Final = {
 }
 
 
-def check_own_topics(groups: Sequence[GroupDraft], document: Document) -> Iterator[Problem]:
-    """Yield outputs onto the node's own topics, and inputs that make another type of one: DDS refuses both."""
-    own = _own_topics(groups, document)
+def check_own_topics(
+    groups: Sequence[GroupDraft], document: Document, absolute: Callable[[str], str]
+) -> Iterator[Problem]:
+    """Yield outputs onto the node's own topics, and inputs that make another type of one: DDS refuses both.
+
+    `absolute` gives the name that a topic has, as it gave those of the groups.
+    """
+    own = _own_topics(groups, document, absolute)
     for topic in (topic for group in groups for topic in group.topics):
         if topic.output in own:
             text = (
-                f"the output {quoted(topic.output)} is a topic of the node itself, for {own[topic.output].purpose}:"
+                f"the output {topic.output_said} is a topic of the node itself, for {own[topic.output].purpose}:"
                 " give it another `output`"
             )
             span = document.value_span(topic.output_path)
             yield document.problem(topic.output_path, text, code="own_topic", span=span)
         if topic.topic in own and topic.type not in (None, own[topic.topic].type):
             text = (
-                f"{quoted(topic.topic)} is a topic of the node itself, for {own[topic.topic].purpose}, and of the type"
+                f"{topic.topic_said} is a topic of the node itself, for {own[topic.topic].purpose}, and of the type"
                 f" `{own[topic.topic].type}`: one topic has one type"
             )
             path = (*topic.path, "type")
             yield document.problem(path, text, code="conflict", span=document.value_span(path))
 
 
-def _own_topics(groups: Sequence[GroupDraft], document: Document) -> dict[str, OwnTopic]:
+def _own_topics(
+    groups: Sequence[GroupDraft], document: Document, absolute: Callable[[str], str]
+) -> dict[str, OwnTopic]:
     node = document.find(("diagnostics",))
     asked = plain(node) if node is not None else {}
-    own = dict(_OF_EVERY_NODE)
+    own = {absolute(name): topic for name, topic in _OF_EVERY_NODE.items()}
     if asked is not None:
-        own[DIAGNOSTICS] = OwnTopic("diagnostic_msgs/msg/DiagnosticArray", "its diagnostics")
+        own[absolute(DIAGNOSTICS)] = OwnTopic("diagnostic_msgs/msg/DiagnosticArray", "its diagnostics")
     if isinstance(asked, dict) and asked.get("scalars") is True:
-        absolute = absolute_names(document)
         for group in groups:
             for figure in SCALARS:
                 purpose = f"`{figure}` of the group {group.name}"

@@ -1,6 +1,6 @@
 """What the relay is told: a file with every default filled in."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from syncrelay.config.file import FileKeys
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
@@ -14,6 +14,7 @@ from syncrelay.config.models import (
     Topic,
 )
 from syncrelay.config.names import default_output
+from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.policies import AnyGroup, EqualKeyGroup, Inputs
 from syncrelay.config.problems import Problem
 from syncrelay.config.qos import QosOverrides, QosPreset
@@ -66,6 +67,7 @@ class GroupConfig:
 class Config:
     """A file that is in order. `notes` say what could not be checked, or is hardly meant.
 
+    `names` tells what is wrong with it once remaps have made others of its topics' names.
     `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published.
     """
 
@@ -73,13 +75,14 @@ class Config:
     groups: tuple[GroupConfig, ...]
     listen: Listen | None
     diagnostics: DiagnosticsConfig | None
+    names: NamesInFile = field(compare=False, repr=False)
     notes: tuple[Problem, ...] = ()
 
 
-def resolve(file: FileKeys, *, notes: tuple[Problem, ...]) -> Config:
+def resolve(file: FileKeys, *, names: NamesInFile, notes: tuple[Problem, ...]) -> Config:
     """Return a validated file with every default filled in."""
     groups = tuple(_group(name, group, file.node) for name, group in file.groups.items())
-    return Config(file.node, groups, _listen(file.metrics), file.diagnostics, notes)
+    return Config(file.node, groups, _listen(file.metrics), file.diagnostics, names, notes)
 
 
 def _listen(metrics: MetricsConfig | None) -> Listen | None:

@@ -2,10 +2,14 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Final
 
 from syncrelay.config import Config, Problem, Severity, TopicConfig, render
 from syncrelay.config.wording import all_of, counted
 from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+
+# The name of a check is a contract: these are older than the sentences of the file.
+_REMAP_CODES: Final = {"loop": "remap_loop", "repeated_output": "remap_outputs"}
 
 
 def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[Diagnosis]:
@@ -56,26 +60,16 @@ def check_types(config: Config, unusable: Mapping[str, str]) -> Iterator[Diagnos
 
 
 def check_remaps(config: Config, names: Mapping[str, str]) -> Iterator[Diagnosis]:
-    """Yield names that meet only after remaps; `names` has what each name of the file becomes."""
-    inputs = {names[topic.topic]: topic for topic in _topics(config)}
-    outputs: dict[str, TopicConfig] = {}
-    for topic in _topics(config):
-        name = names[topic.output]
-        if name in inputs:
-            yield mend(
-                "remap_loop",
-                f"remaps make the output {topic.output} and the input {inputs[name].topic} one topic: {name}",
-                so="the relay receives what it sends, again and again",
-                do="take the remap away, or give the output another name in the file: output: /...",
-            )
-        elif name in outputs and outputs[name].output != topic.output:
-            yield mend(
-                "remap_outputs",
-                f"remaps make the outputs {outputs[name].output} and {topic.output} one topic: {name}",
-                so="messages of two inputs are mixed on it",
-                do="take the remap away, or give one of them another name in the file: output: /...",
-            )
-        outputs.setdefault(name, topic)
+    """Yield what is wrong with the file only after remaps; `names` has what each name of the file becomes."""
+    problems = config.names.problems(names.__getitem__, groups=[group.name for group in config.groups])
+    for code in dict.fromkeys(problem.code for problem in problems):
+        yield mend(
+            _REMAP_CODES.get(code, f"remap_{code}"),
+            f"remaps give topics of the file names that the relay refuses:\n"
+            f"{render([problem for problem in problems if problem.code == code])}",
+            so="the relay ends at once with exit code 1; on a reload it keeps the file that it runs",
+            do="take the remap away, or give the topic another name in the file",
+        )
 
 
 def _topics(config: Config) -> Iterator[TopicConfig]:

@@ -1,17 +1,14 @@
 """How nodes find each other: the variables of ROS, as rcl reads them."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from syncrelay.config.wording import did_you_mean, quoted
 from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.ros.domain import domain_of, no_domain
 
 RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
-_LARGEST_DOMAIN: Final = 232
-# rcl reads numbers as C does: a leading 0 is octal, 0x hexadecimal, and what follows the digits is passed over.
-_NUMBER: Final = re.compile(r"\s*\+?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)(.*)", re.DOTALL)
 # DDS: 250 UDP ports for each domain, from 7400 on.
 _FIRST_PORT: Final = 7400
 _PORTS: Final = 250
@@ -27,21 +24,6 @@ class Discovery:
     environ: Mapping[str, str]
     ephemeral_ports: tuple[int, int]
     unresolved_peers: tuple[str, ...] = ()
-
-
-def domain_of(environ: Mapping[str, str]) -> int | None:
-    """Return the domain that rcl takes from ROS_DOMAIN_ID; None where it takes none and fails."""
-    text = environ.get("ROS_DOMAIN_ID", "")
-    if not text:
-        return 0
-    found = _NUMBER.fullmatch(text)
-    if found is None:
-        return None
-    digits, rest = found.groups()
-    number = int(digits, 16) if digits[:2].lower() == "0x" else int(digits, 8 if digits[0] == "0" else 10)
-    if (number == 0 and rest) or number > _LARGEST_DOMAIN:
-        return None
-    return number
 
 
 def ports_of(domain: int) -> range:
@@ -76,7 +58,7 @@ def _domain(found: Discovery) -> Iterator[Diagnosis]:
     if domain is None:
         yield mend(
             "domain_id",
-            f"ROS_DOMAIN_ID={text} is no domain: expected a number from 0 to {_LARGEST_DOMAIN}",
+            no_domain(found.environ),
             so="no node starts with it, or it lands on a domain that nobody meant",
             do="export ROS_DOMAIN_ID=0    or the number that the other nodes have; 0 to 101 are safe on Linux",
         )

@@ -7,9 +7,9 @@ from syncrelay.config import Config, ConfigError, Problem, Severity, TopicConfig
 from syncrelay.doctor.config_file import check_files, check_remaps, check_types
 from syncrelay.doctor.container import check_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, know, worst_first
-from syncrelay.doctor.discovery import check_discovery, domain_of, range_of
+from syncrelay.doctor.discovery import check_discovery, range_of
 from syncrelay.doctor.folders import check_folders
-from syncrelay.doctor.graph import check_clock, check_company, check_own_name, check_sizes, check_topics
+from syncrelay.doctor.graph import check_clock, check_company, check_outputs, check_own_name, check_sizes, check_topics
 from syncrelay.doctor.installation import Installation, check_installation, middleware_of
 from syncrelay.doctor.listen import check_listen
 from syncrelay.doctor.machine.discovery import look_at_discovery, look_at_transport
@@ -23,6 +23,7 @@ from syncrelay.doctor.shared_memory import check_shared_memory
 from syncrelay.doctor.stamps import Matched, check_stamps
 from syncrelay.doctor.start import check_start
 from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
+from syncrelay.ros.domain import domain_of
 from syncrelay.ros.sighting import Sighting
 from syncrelay.ros.trial import Plan, Trial, try_out
 
@@ -67,7 +68,7 @@ def examine(request: Request) -> Examination:
     found += check_files(request.files, problems)
     trial = try_out(_plan(config, problems, request.ros_args), environ) if installation.rclpy else None
     if trial is not None:
-        found += check_start(trial, ros_args=request.ros_args, before=environment)
+        found += check_start(trial, before=environment)
         found += _of_file(config, trial)
     sighting = None
     if request.live_s is not None:
@@ -116,14 +117,13 @@ def _plan(config: Config | None, problems: Sequence[Problem], ros_args: Sequence
     types = dict.fromkeys(
         topic.type for topic in topics if not any(f"`{topic.type.partition('/')[0]}`" in text for text in missing)
     )
-    # The file's wish stands before the command line's, which so has the last word, as in the relay.
-    simulated = ("-p", "use_sim_time:=true") if config.node.use_sim_time else ()
     return Plan(
         node=config.node.name,
         namespace=config.node.namespace,
         types=tuple(types),
-        names=tuple(dict.fromkeys(name for topic in topics for name in (topic.topic, topic.output))),
-        ros_args=(*simulated, *ros_args),
+        names=config.names.written,
+        ros_args=tuple(ros_args),
+        use_sim_time=config.node.use_sim_time,
     )
 
 
@@ -150,7 +150,9 @@ def _look(config: Config | None, trial: Trial, *, seconds: float) -> Sighting:
     require_rclpy()
     from syncrelay.ros.look import look  # noqa: PLC0415
 
-    return look(_topics(config, trial), seconds=seconds, use_sim_time=trial.use_sim_time)
+    topics = [topic for group in (config.groups if config else ()) for topic in group.topics]
+    outputs = [trial.names[topic.output] for topic in topics]
+    return look(_topics(config, trial), outputs=outputs, seconds=seconds, use_sim_time=trial.use_sim_time)
 
 
 def _of_graph(
@@ -161,6 +163,7 @@ def _of_graph(
         return
     yield from check_clock(sighting, use_sim_time=trial.use_sim_time)
     yield from check_own_name(sighting, trial.node)
+    yield from check_outputs(sighting, trial.node)
     yield from check_topics(sighting, optional=_optional(config, trial))
     if config.node.transport == "default" and uses_defaults(environ):
         yield from check_sizes(sighting)

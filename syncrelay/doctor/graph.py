@@ -53,6 +53,19 @@ def check_own_name(sighting: Sighting, node: str) -> Iterator[Diagnosis]:
         )
 
 
+def check_outputs(sighting: Sighting, node: str) -> Iterator[Diagnosis]:
+    """Yield outputs of the file that others publish already; what has the relay's name is told by `check_own_name`."""
+    for output in sighting.outputs:
+        others = dict.fromkeys(each for each in output.nodes if each != node)
+        if others:
+            yield mend(
+                "output_taken",
+                f"{output.name}, an output of the file, is published by {all_of(others)}",
+                so="beside the relay, whoever subscribes to it gets the messages of both",
+                do=f"end {all_of(others)}, or give the output another name in the file: output: /...",
+            )
+
+
 def check_clock(sighting: Sighting, *, use_sim_time: bool) -> Iterator[Diagnosis]:
     """Yield whether /clock is what the file expects."""
     if use_sim_time and not sighting.clocks:

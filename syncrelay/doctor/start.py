@@ -15,7 +15,7 @@ _WHAT: Final = {
 }
 
 
-def check_start(trial: Trial, *, ros_args: Sequence[str], before: Sequence[Diagnosis]) -> Iterator[Diagnosis]:
+def check_start(trial: Trial, *, before: Sequence[Diagnosis]) -> Iterator[Diagnosis]:
     """Yield why a node does not start, unless something to mend that was found `before` explains it.
 
     Of one that starts, yield why it receives at a higher cost, if it does.
@@ -27,15 +27,11 @@ def check_start(trial: Trial, *, ros_args: Sequence[str], before: Sequence[Diagn
             so="the relay works, and each message costs it more CPU",
             do="report it, with the first line of this examination",
         )
-    if trial.failed is None or any(found.severity is Severity.MEND for found in before):
+    if trial.failed is Step.ARGUMENTS:
+        fault, _, advice = trial.fault.partition("\n")
+        yield mend("ros_args", fault, so="the relay ends at once with exit code 2", do=advice.strip())
         return
-    if trial.failed is Step.INIT and ros_args:
-        yield mend(
-            "ros_args",
-            f"ROS does not take --ros-args {' '.join(ros_args)}:\n{trial.fault}",
-            so="the relay ends at once with exit code 2",
-            do="mend the arguments behind --ros-args; remaps are written -r FROM:=TO, parameters -p NAME:=VALUE",
-        )
+    if trial.failed is None or any(found.severity is Severity.MEND for found in before):
         return
     yield mend(
         "no_start",

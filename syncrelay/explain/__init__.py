@@ -4,7 +4,7 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 """
 
 from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Mismatch, Refusal, Tolerance
+from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Mismatch, Refusal, Standstill, Tolerance
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.find import explanation, find, remarkable
 from syncrelay.explain.findings import Code, Finding, Severity
@@ -36,6 +36,7 @@ __all__ = [
     "SentSets",
     "Severity",
     "Silence",
+    "Standstill",
     "Tolerance",
     "explanation",
     "find",

@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.sync.counts import InputCounts
@@ -64,7 +64,8 @@ class InputFacts:
 
     `name` is the topic's in the graph, `not_importable` says why its type cannot be used here, `refusal` what DDS does
     not make for it, `alike` are topics of the graph that may have been meant, `lost` counts what DDS lost on the way of
-    late. `key` is the newest message's. `offset` is added to stamps for matching, in nanoseconds.
+    late. `rivals` are others that publish its output, seen so without a break since `rivals_since`. `key` is the newest
+    message's. `offset` is added to stamps for matching, in nanoseconds.
     """
 
     name: str
@@ -79,8 +80,17 @@ class InputFacts:
     not_importable: str | None = None
     refusal: Refusal | None = None
     lost: int = 0
+    rivals: tuple[Endpoint, ...] = ()
+    rivals_since: int = 0
     key: Hashable = None
     offset: int = 0
+
+
+class Standstill(NamedTuple):
+    """The process got no turn for so many nanoseconds, until a time."""
+
+    until: int
+    ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +100,8 @@ class GroupFacts:
     `tolerance` is None where stamps may be any distance apart, as with `equal_key`. `by_stamp` says whether stamps are
     what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
     others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it does
-    not; `waited` how long messages at most lay before the relay took them; `failure` what stopped the group for good.
+    not; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
+    late; `failure` what stopped the group for good.
     """
 
     name: str
@@ -106,6 +117,7 @@ class GroupFacts:
     least_period: int | None = None
     clock_stopped: int | None = None
     waited: int = 0
+    standstill: Standstill | None = None
     failure: str | None = None
 
     @property

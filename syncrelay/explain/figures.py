@@ -23,7 +23,8 @@ class InputFigures:
     it has not. Of the last messages, oldest first, `received` holds when they came, `stamps` and `delays`, the times of
     receipt minus the stamps, leave out stamps of 0. `nearest` holds, of an optional input, the spans of the tightest
     sets with it, whenever its messages came. `bursts` counts how often messages were held up and came at once, `held`
-    is for how long at most. `fell_by` and `fell_at` tell of the last backward jump of its stamps.
+    is for how long at most, `held_up` from when to when, each time. `fell_by` and `fell_at` tell of the last backward
+    jump of its stamps.
     """
 
     rate_hz: float = 0.0
@@ -41,6 +42,7 @@ class InputFigures:
     nearest: Distribution = NOTHING
     bursts: int = 0
     held: int = 0
+    held_up: Sequence[tuple[int, int]] = ()
     fell_by: int | None = None
     fell_at: int | None = None
 
@@ -81,7 +83,8 @@ class GroupFigures:
 
     `spans` and `latencies` are those of the last sets. `nearest` holds the span of the tightest set that each
     message of the input that sets the pace could have had, `nearest_since` those measured after the last set;
-    `missing` is the share of the window's sets, 0 to 1, that each input was missing from. `resumed` is when the first
+    `missing` is the share of the window's sets, 0 to 1, that each input was missing from, `sets_since_without` how many
+    sets had it since. `resumed` is when the first
     set left after a silence.
     """
 
@@ -99,6 +102,7 @@ class GroupFigures:
     nearest: Distribution = NOTHING
     nearest_since: Distribution = NOTHING
     missing: tuple[float, ...] = ()
+    sets_since_without: tuple[int, ...] = ()
 
     @property
     def last_sets(self) -> tuple[tuple[int, int], ...]:

@@ -32,6 +32,7 @@ _RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.duplicates),
     rules_stamps.clock_drift,
     of_each_input(rules_graph.subscriber_qos),
+    of_each_input(rules_graph.output_taken),
 )
 
 

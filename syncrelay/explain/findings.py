@@ -46,6 +46,7 @@ class Code(Enum):
     CLOCK_DRIFT = "clock_drift"
     FEW_SETS = "few_sets"
     SUBSCRIBER_QOS = "subscriber_qos"
+    OUTPUT_TAKEN = "output_taken"
     UNEXPLAINED = "unexplained"
     STARTING = "starting"
     HEALTHY = "healthy"

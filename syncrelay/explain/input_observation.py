@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from operator import lt, sub
 from typing import Final, NamedTuple, TypeAlias
 
-from syncrelay.explain.bursts import LEAST_HELD_NS, Burst, bursts
+from syncrelay.explain.bursts import AT_ONCE, LEAST_HELD_NS, Burst, bursts
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.drift import Drift, drift
 from syncrelay.explain.figures import InputFigures
@@ -51,7 +51,7 @@ class InputObservation:
         self._delays = no_values()
         self._faults: deque[_Faults] = deque()
         self._bursts: deque[Burst] = deque()
-        self._last: tuple[int, int] | None = None
+        self._newest_arrivals: deque[tuple[int, int]] = deque(maxlen=AT_ONCE)
         self._points: deque[tuple[int, int]] = deque(maxlen=_DRIFT_POINTS)
         self._points_seen = 0
         self._drift: Drift | None = None
@@ -95,7 +95,7 @@ class InputObservation:
             if at > now - WINDOW_NS:
                 duplicates += repeated
                 out_of_order += late
-        held = [each.held for each in self._bursts if each.at > now - WINDOW_NS]
+        bursts = [each for each in self._bursts if each.at > now - WINDOW_NS]
         return InputFigures(
             rate_hz=rate_hz,
             usual_hz=usual_hz,
@@ -110,8 +110,9 @@ class InputObservation:
             duplicates=duplicates,
             out_of_order=out_of_order,
             nearest=Distribution(self._nearest[:]),
-            bursts=len(held),
-            held=max(held, default=0),
+            bursts=len(bursts),
+            held=max((each.held for each in bursts), default=0),
+            held_up=[(each.at - each.held, each.at) for each in bursts],
             fell_by=fell_by,
             fell_at=fell_at,
         )
@@ -122,7 +123,7 @@ class InputObservation:
             del kept[:]
         self._faults.clear()
         self._bursts.clear()
-        self._last = None
+        self._newest_arrivals.clear()
         self._points.clear()
         self._drift = None
 
@@ -166,9 +167,11 @@ class InputObservation:
     def _find_bursts(self, stamped: Arrivals, delays: Sequence[int]) -> None:
         while self._bursts and self._bursts[0].at <= stamped[-1][1] - WINDOW_NS:
             self._bursts.popleft()
-        last, self._last = self._last or stamped[0], stamped[-1]
-        if max(delays) - min(*delays, last[1] - last[0]) >= LEAST_HELD_NS:
-            self._bursts.extend(bursts([last, *stamped]))
+        before = list(self._newest_arrivals)
+        self._newest_arrivals.extend(stamped)
+        delays = [*(received - stamp for stamp, received in before), *delays]
+        if max(delays) - min(delays) >= LEAST_HELD_NS:
+            self._bursts.extend(bursts([*before, *stamped]))
 
     def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:
         """Give messages a second, of the window or of the last few where it held fewer, and while they came."""

@@ -52,6 +52,7 @@ class Observation:
             if not needed and trigger is None
         }
         self._nearest, self._nearest_since = no_values(), no_values()
+        self._sets_since_without = [0] * len(offsets_ns)
 
     def add(
         self, arrivals: Sequence[Arrivals], sets: SentSets, counts: Sequence[InputCounts], total_sets: int, *, now: int
@@ -62,6 +63,8 @@ class Observation:
         stamps = list(zip(*(stamps for stamps, _ in sets), strict=True)) or [()] * len(self._inputs)
         missing = tuple([each.count(None) for each in stamps])
         self._looks.append(_Look(now, tuple(counts), total_sets, len(sets), missing))
+        if len(self._required) < len(self._inputs):
+            self._sets_since_without = list(map(_since_without, self._sets_since_without, stamps))
         while len(self._looks) > 1 and self._looks[1].at <= now - WINDOW_NS:
             self._looks.popleft()
         fallen = [each.add(new) for each, new in zip(self._inputs, arrivals, strict=True)]
@@ -89,6 +92,7 @@ class Observation:
             nearest=Distribution(self._nearest[:]),
             nearest_since=Distribution(self._nearest_since[:]),
             missing=self._missing(now),
+            sets_since_without=tuple(self._sets_since_without),
         )
         return group, inputs
 
@@ -176,6 +180,12 @@ class Observation:
         return self._inputs[index].figures(
             fed=after.fed - before.fed, dropped={reason: n for reason, n in gone.items() if n}, seconds=seconds, now=now
         )
+
+
+def _since_without(before: int, stamps: Sequence[int | None]) -> int:
+    """Count on how many sets there were since the last one without an input, whose stamps in the new sets these are."""
+    last = next((count for count, stamp in enumerate(reversed(stamps)) if stamp is None), None)
+    return before + len(stamps) if last is None else last
 
 
 class _Look(NamedTuple):

@@ -10,6 +10,10 @@ from syncrelay.explain.rules_stamps import other_clock
 from syncrelay.sync.messages import DropReason
 
 _MISSING: Final = 0.05
+# An input is back when so many times as many sets have it as had one without it on average before.
+_BACK: Final = 3
+# It is away when so many of its messages did not come.
+_AWAY: Final = 3
 _FEWEST: Final = 5
 _TOO_SLOW: Final = 500_000_000
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
@@ -31,8 +35,8 @@ _WHAT_HELPS: Final = {
 def bursts(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that are held up on their way and then come at once."""
     figures = an_input.figures
-    # Where the relay itself stood still, all messages come at once.
-    if not figures.bursts or facts.waited >= _TOO_SLOW:
+    # Where the relay itself was held up, all messages come at once.
+    if not figures.bursts or _waited(facts) >= _TOO_SLOW:
         return
     times = "once" if figures.bursts == 1 else f"{figures.bursts} times"
     who = nodes(an_input)
@@ -68,9 +72,11 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 
 def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find an optional input that sets leave without."""
+    """Find an optional input that sets leave without; the causes that are told are those that were seen."""
     missing = facts.figures.missing[index]
     if an_input.required or missing <= _MISSING or not facts.figures.rate_hz:
+        return
+    if missing * facts.figures.sets_since_without[index] >= _BACK:
         return
     waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
     why, what_helps = _why_without(facts, an_input)
@@ -84,11 +90,13 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
 
 
 def _why_without(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str]:
-    """Tell stamps that fit no set from messages that come after theirs has left."""
+    """Tell an input that is away, stamps that fit no set, and messages that come after theirs has left."""
+    unknown = "", f"see whether {nodes(an_input)} sends it, and how late it comes"
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
-    if tolerance is None or not an_input.figures.rate_hz or len(nearest) < _FEWEST:
-        longer = "" if facts.max_wait is None else ", or write a larger `max_wait`"
-        return "", f"see why {name} does not come in time{longer}"
+    if (away := _away(facts, an_input)) is not None:
+        return away
+    if tolerance is None or len(nearest) < _FEWEST:
+        return unknown
     behind = _behind(facts, an_input)
     if abs(behind) > max(SECOND, tolerance.ns):
         side = "behind" if behind > 0 else "ahead of"
@@ -102,8 +110,25 @@ def _why_without(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str]:
             f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
             f"write `{tolerance.key}: {words.at_least(nearest.quantile(0.99))}`, which would take in 99 %",
         )
-    later = f", {words.duration(behind)} after the others," if behind > 0 else ""
-    return f": it comes{later} too late", f"write a larger `max_wait`, or see what holds {name} up"
+    if facts.max_wait is not None and behind > facts.max_wait:
+        return (
+            f": it comes {words.duration(behind)} after the others, too late",
+            f"write a larger `max_wait`, or see what holds {name} up",
+        )
+    return unknown
+
+
+def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
+    """Say that an input does not come at all, or not any more; None if it comes."""
+    figures = an_input.figures
+    look = f"look at {nodes(an_input)}"
+    if figures.last_received is None:
+        return ": no message of it has come", look
+    quiet = facts.figures.now - figures.last_received
+    usual = round(SECOND / figures.usual_hz) if figures.usual_hz else 0
+    if quiet > max(SECOND, _AWAY * usual):
+        return f": it has not come for {words.seconds(quiet)}", look
+    return None
 
 
 def _behind(facts: GroupFacts, an_input: InputFacts) -> int:
@@ -128,14 +153,31 @@ def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found
 
 
 def too_slow(facts: GroupFacts) -> Found:
-    """Find that the relay does not keep up."""
-    if facts.waited >= _TOO_SLOW:
+    """Find that messages of the group waited for the relay."""
+    waited = _waited(facts)
+    if waited >= _TOO_SLOW:
         yield Finding(
             Code.TOO_SLOW,
             Severity.WARN,
-            f"messages lay here for {words.duration(facts.waited)} before the relay came to them",
-            "give it more CPU, or spread the groups over several relays with --group",
+            f"messages waited up to {words.duration(waited)} for the relay",
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group",
         )
+
+
+def _waited(facts: GroupFacts) -> int:
+    """Return how long messages waited for the relay: unread by it, or outside while the whole process stood still.
+
+    A standstill alone has kept nothing waiting. It has where messages that came at once were held up then.
+    """
+    return max(facts.waited, *(_waited_outside(facts, each) for each in facts.inputs))
+
+
+def _waited_outside(facts: GroupFacts, an_input: InputFacts) -> int:
+    if facts.standstill is None:
+        return 0
+    until, ns = facts.standstill
+    return max((min(end, until) - max(begin, until - ns) for begin, end in an_input.figures.held_up), default=0)
 
 
 def slowed(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -11,6 +11,8 @@ _GRACE: Final = 2 * SECOND
 _NO_MESSAGE: Final = 5 * SECOND
 # Fast DDS's lease: for so long one that was killed is still in the graph.
 _LEASE: Final = 20 * SECOND
+# A relay that ends in order while its successor starts is gone by then.
+_ENDING: Final = 3 * SECOND
 # A pause that is so many times the longest before it is news.
 _PAUSES: Final = 3
 
@@ -168,3 +170,18 @@ def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Foun
                 f"have {subscriber.node} request {why.offered}, or {an_input.name}'s publisher offer {why.requested}",
                 index,
             )
+
+
+def output_taken(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find others that publish an output, as a second relay of the same file does."""
+    if an_input.rivals and facts.figures.now - an_input.rivals_since >= _ENDING:
+        they = " and ".join(dict.fromkeys(each.node for each in an_input.rivals))
+        verb, whose = ("publishes", "both") if len(an_input.rivals) == 1 else ("publish", "all")
+        yield Finding(
+            Code.OUTPUT_TAKEN,
+            Severity.WARN,
+            f"{they} {verb} {an_input.output} too: whoever subscribes to it gets the messages of {whose}",
+            "end all publishers but one, or give this output another name, `output: ...`; a node that was killed is"
+            " gone from the graph after 20 s",
+            index,
+        )

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Refusal, Tolerance
+from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Refusal, Standstill, Tolerance
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.sync.counts import InputCounts
@@ -22,6 +22,8 @@ class InputGraph:
     not_importable: str | None = None
     refusal: Refusal | None = None
     lost: int = 0
+    rivals: tuple[Endpoint, ...] = ()
+    rivals_since: int = 0
 
 
 class GroupWatch:
@@ -62,6 +64,7 @@ class GroupWatch:
         now: int,
         clock_stopped: int | None = None,
         waited: int = 0,
+        standstill: Standstill | None = None,
         failure: str | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
@@ -86,6 +89,8 @@ class GroupWatch:
                     not_importable=shown.not_importable,
                     refusal=shown.refusal,
                     lost=shown.lost,
+                    rivals=shown.rivals,
+                    rivals_since=shown.rivals_since,
                     key=key,
                     offset=topic.offset_ns,
                 )
@@ -100,6 +105,7 @@ class GroupWatch:
             least_period=keys.max_rate,
             clock_stopped=clock_stopped,
             waited=waited,
+            standstill=standstill,
             failure=failure,
         )
 

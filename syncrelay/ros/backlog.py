@@ -21,8 +21,6 @@ class Backlog:
     """Takes messages and delivers them, the oldest first; at most one of each source is held between calls."""
 
     def __init__(self) -> None:
-        self.longest_wait = 0
-        """How long a message at most has waited since DDS received it, in nanoseconds; the reader sets it back."""
         self._heads: list[_Head] = []
         self.held: set[Source] = set()
         """The sources that a held message is of."""
@@ -43,12 +41,10 @@ class Backlog:
         for source in sources:
             if source not in self.held:
                 self._take(source)
-        if self._heads:
-            self.longest_wait = max(self.longest_wait, until - self._heads[0][0])
         for _ in range(_BATCH):
             if not self._heads or self._heads[0][0] > until:
                 return
-            self._take(self._hand_on(heappop(self._heads)))
+            self._take(self._hand_on(heappop(self._heads), until))
 
     def deliver_until(self, until: int, sources: Iterable[Source]) -> None:
         """Deliver what these sources received up to a time, in nanoseconds of the system clock, however much it is."""
@@ -57,12 +53,13 @@ class Backlog:
             if source not in self.held:
                 self._take(source)
         while self._heads and self._heads[0][0] <= until:
-            self._take(self._hand_on(heappop(self._heads)))
+            self._take(self._hand_on(heappop(self._heads), until))
 
     def deliver_held(self) -> None:
         """Deliver what is held, at the end: its sources are not drained."""
         while self._heads:
-            self._hand_on(heappop(self._heads))
+            head = heappop(self._heads)
+            self._hand_on(head, head[0])
 
     def forget(self, source: Source) -> None:
         """Deliver what is held of a source that ends."""
@@ -70,7 +67,7 @@ class Backlog:
             head = next(head for head in self._heads if head[4] is source)
             self._heads.remove(head)
             self._heads.sort()
-            self._hand_on(head)
+            self._hand_on(head, head[0])
 
     def _deliver_alone(self, source: Source, until: int) -> None:
         """Deliver as the only one what one source has, a batch at most: nearly always, and without any sorting."""
@@ -78,7 +75,7 @@ class Backlog:
             taken = source.take()
             if taken is None:
                 return
-            self.longest_wait = max(self.longest_wait, until - taken[0])
+            source.waited = max(source.waited, until - taken[0])
             for _ in range(_BATCH):
                 received, payload, content = taken
                 if received > until:
@@ -92,9 +89,10 @@ class Backlog:
             return
         self._hold(source, taken)
 
-    def _hand_on(self, head: _Head) -> Source:
+    def _hand_on(self, head: _Head, until: int) -> Source:
         received, _, payload, content, source = head
         self.held.discard(source)
+        source.waited = max(source.waited, until - received)
         try:
             source.deliver(payload, content, received)
         except Exception as error:  # noqa: BLE001

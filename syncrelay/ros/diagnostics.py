@@ -10,7 +10,7 @@ from std_msgs.msg import Float64
 from syncrelay.config import Config
 from syncrelay.config.own_topics import DIAGNOSTICS, SCALARS
 from syncrelay.explain import Distribution, GroupReport, InputFacts, explanation
-from syncrelay.ros.entities import Entities, RefusedError
+from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.status import Level, level
 
 _LEVELS: Final = {
@@ -38,7 +38,7 @@ class Telling:
 
     def adopt(self, config: Config, groups: Sequence[str]) -> None:
         """Publish what this file asks for of these groups from now on; what was published before goes on."""
-        asked = config.diagnostics
+        asked = config.diagnostics if self._entities.purpose is Purpose.RELAY else None
         self._wanted = () if asked is None else (_ALL, *groups) if asked.scalars else (_ALL,)
         for key in [key for key in self._tellers if key not in self._wanted]:
             self._tellers.pop(key).close()

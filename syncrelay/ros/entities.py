@@ -1,6 +1,7 @@
 """What DDS makes for the relay: raw subscriptions and publishers, each made or refused with a reason."""
 
 from collections.abc import Callable
+from enum import Enum
 from typing import Any, Final
 
 from rclpy.callback_groups import CallbackGroup
@@ -12,6 +13,13 @@ from syncrelay.ros.types import name_of
 
 # The publisher that rcl makes for every node's log is not among those that rclpy knows of.
 _ROSOUT: Final = ("/rosout", "rcl_interfaces/msg/Log")
+
+
+class Purpose(Enum):
+    """What a node is there for: to relay, or to look only, which publishes nothing."""
+
+    RELAY = "relay"
+    LOOK = "look"
 
 
 class RefusedError(Exception):
@@ -42,8 +50,10 @@ class Entities:
     need not be the true one: so what would be refused for that is not asked for.
     """
 
-    def __init__(self, node: Any) -> None:
+    def __init__(self, node: Any, purpose: Purpose) -> None:
         self._node = node
+        self.purpose = purpose
+        """Where it is to look, nobody asks for publishers."""
         self._left_to_the_loop = _LeftToTheReceiveLoop()
         # An entity of the node itself, which never ends, stands for itself.
         self._holders: dict[str, dict[Any, str]] = {}

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, Final
 
@@ -58,6 +59,16 @@ def subscribers(infos: Iterable[Any], offered: QoSProfile) -> tuple[Endpoint, ..
 
 def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None]) -> tuple[Endpoint, ...]:
     return tuple(Endpoint(node_of(info), printable(info.topic_type), why(info.qos_profile)) for info in infos)
+
+
+def others(infos: Iterable[Any], *, than: str, own: int) -> tuple[Endpoint, ...]:
+    """Return the endpoints of other nodes than the one of this full name, which has so many `own` of them.
+
+    What has its name and is not among those is of a second node of that name.
+    """
+    found = _endpoints(infos, lambda _: None)
+    namesakes = [replace(each, node=f"another node of the name {than}") for each in found if each.node == than]
+    return (*(each for each in found if each.node != than), *namesakes[own:])
 
 
 def is_nameless(info: Any) -> bool:

@@ -14,7 +14,7 @@ from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint, Refusal
 from syncrelay.ros import graph
 from syncrelay.ros.direct.rcl import RclCallError
-from syncrelay.ros.entities import Entities, RefusedError
+from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.path import Content, Deliver, Path, Source
 from syncrelay.ros.qos import input_profile, output_profile
@@ -91,6 +91,10 @@ class TopicInput:
         return self._wants_look or self._message_type is None or (self._lacks and self._may_try)
 
     @property
+    def _publishes(self) -> bool:
+        return self._entities.purpose is Purpose.RELAY
+
+    @property
     def _lacks(self) -> bool:
         return self._refusal is not None or any(user.refusal for user in self._users)
 
@@ -127,8 +131,11 @@ class TopicInput:
         return user
 
     def equip(self, user: User) -> None:
-        """Make the publisher of one who will be attached, if its QoS is known. Raises RefusedError."""
-        if self._profile is not None and user.publisher is None:
+        """Make the publisher of one who will be attached, if it is to have one and its QoS is known.
+
+        Raises RefusedError.
+        """
+        if self._publishes and self._profile is not None and user.publisher is None:
             user.publisher = self._publisher(user, self._profile)
             user.refusal = None
 
@@ -224,6 +231,25 @@ class TopicInput:
         output = self._node.resolve_topic_name(group.config.topics[index].output)
         return graph.subscribers(self._node.get_subscriptions_info_by_topic(output), self._profile)
 
+    def rivals(self, group: GroupRelay, index: int) -> tuple[Endpoint, ...]:
+        """Look at who else publishes the output that a group has for this topic.
+
+        For one that only looks, the relay itself, which has its name, is nobody else.
+        """
+        output = self._node.resolve_topic_name(group.config.topics[index].output)
+        ours = sum(user.publisher is not None for user in self._users if user.group is group and user.index == index)
+        endpoints = self._node.get_publishers_info_by_topic(output)
+        return graph.others(
+            endpoints, than=self._node.get_fully_qualified_name(), own=ours if self._publishes else len(endpoints)
+        )
+
+    def take_wait(self) -> int:
+        """How long a message at most lay unread since this was last asked, in nanoseconds. On the loop's thread."""
+        if self._source is None:
+            return 0
+        waited, self._source.waited = self._source.waited, 0
+        return waited
+
     def lost(self) -> int:
         """How many messages DDS lost on the way here since the subscription was made."""
         return int(self._lost.take_event().total_count) if self._lost is not None else 0
@@ -263,7 +289,7 @@ class TopicInput:
         """
         subscription = self._entities.subscription(self._message_type, self._topic, profile)
         publishers: dict[User, Any] = {}
-        for user in self._users:
+        for user in self._users if self._publishes else ():
             try:
                 publishers[user] = self._publisher(user, profile)
             except RefusedError as error:

@@ -14,10 +14,10 @@ from syncrelay.config import TopicConfig
 from syncrelay.config.wording import nearest
 from syncrelay.errors import RosUnavailableError, TypeImportError
 from syncrelay.printable import printable
-from syncrelay.ros.graph import is_nameless, node_of, topics_in
+from syncrelay.ros.graph import is_nameless, topics_in
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.qos import input_profile
-from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
+from syncrelay.ros.sighting import SeenOutput, SeenPublisher, SeenTopic, Sighting
 from syncrelay.ros.types import StampReader, import_type, stamp_reader
 
 _NODE: Final = "_syncrelay_doctor"
@@ -29,8 +29,8 @@ _CLOCK_TYPE: Final = "rosgraph_msgs/msg/Clock"
 _MOST_SAMPLED: Final = 2_000
 
 
-def look(topics: Mapping[str, TopicConfig], *, seconds: float, use_sim_time: bool) -> Sighting:
-    """Join the graph and return what was seen of these topics, by their names in it, and of all others.
+def look(topics: Mapping[str, TopicConfig], *, outputs: Sequence[str], seconds: float, use_sim_time: bool) -> Sighting:
+    """Join the graph and return what was seen of these topics and outputs, by their names in it, and of all others.
 
     Raises RosUnavailableError where rclpy does not start.
     """
@@ -38,7 +38,7 @@ def look(topics: Mapping[str, TopicConfig], *, seconds: float, use_sim_time: boo
     node = None
     try:
         node = join(context, _NODE)
-        return _watch(node, topics, seconds=seconds, use_sim_time=use_sim_time)
+        return _watch(node, topics, outputs=outputs, seconds=seconds, use_sim_time=use_sim_time)
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"the graph cannot be looked at: {error}") from error
     finally:
@@ -101,6 +101,7 @@ def _watch(
     node: Any,
     topics: Mapping[str, TopicConfig],
     *,
+    outputs: Sequence[str],
     seconds: float,
     use_sim_time: bool,
 ) -> Sighting:
@@ -122,6 +123,7 @@ def _watch(
         n_topics=len(published),
         n_nameless=sum(1 for name in published if any(map(is_nameless, _publishers(node, name)))),
         topics=tuple(_seen(node, topic, listed) for topic in watched),
+        outputs=tuple(SeenOutput(name, _named(_publishers(node, name))) for name in outputs),
         clocks=node.count_publishers(_CLOCK),
         ticks=clock.ticks,
     )
@@ -188,11 +190,19 @@ def _seen_publisher(endpoint: Any, topic: _Watched) -> SeenPublisher:
         compatibility, reason = qos_check_compatible(offered, topic.profile)
         mismatch = _in_words(reason) if compatibility == QoSCompatibility.ERROR else None
     return SeenPublisher(
-        node="" if is_nameless(endpoint) else node_of(endpoint),
+        node=_name(endpoint),
         type=printable(endpoint.topic_type),
         offers=f"{_word(offered.reliability)}, {_word(offered.durability)}",
         mismatch=mismatch,
     )
+
+
+def _name(endpoint: Any) -> str:
+    return "" if is_nameless(endpoint) else node_of(endpoint)
+
+
+def _named(endpoints: Sequence[Any]) -> tuple[str, ...]:
+    return tuple(filter(None, map(_name, endpoints)))
 
 
 def _word(policy: Any) -> str:

@@ -16,6 +16,7 @@ from syncrelay.explain import (
     RecentDrop,
     Severity,
     Silence,
+    Standstill,
     remarkable,
 )
 from syncrelay.ros.bugs import Bugs
@@ -38,6 +39,8 @@ _SETTLING_LOOKS: Final = 2
 _IN_TURN: Final = 10
 # ... and none waits for more than so many looks: a silence is one of 5 s.
 _LONGEST_TURN: Final = 4
+# What sets a clock right at once, and not by making it run faster or slower.
+_STEP_NS: Final = 100_000_000
 # A /clock at 1 Hz stands still for a second between two ticks.
 _CLOCK_STOPPED_NS: Final = 2_500_000_000
 
@@ -60,6 +63,7 @@ class _Ends(NamedTuple):
 
     output: str
     subscribers: tuple[Endpoint, ...]
+    rivals: tuple[Endpoint, ...]
     alike: tuple[str, ...]
 
 
@@ -76,8 +80,11 @@ class Monitor:
         self._reports: dict[GroupRelay, GroupReport] = {}
         self._losses: dict[TopicInput, _Losses] = {}
         self._ends: dict[tuple[GroupRelay, int], _Ends] = {}
-        self._waits: deque[int] = deque(maxlen=_LAST_LOOKS)
-        self._overslept = 0
+        self._rivals_since: dict[tuple[GroupRelay, int], int] = {}
+        self._waits: dict[TopicInput, deque[int]] = {}
+        self._standstills: deque[Standstill | None] = deque(maxlen=_LAST_LOOKS)
+        self._standstill: Standstill | None = None
+        self._wall_clock = _WallClock()
         self.watch(wirings)
 
     @property
@@ -97,16 +104,20 @@ class Monitor:
         }
         inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
         self._losses = {each: self._losses.get(each) or _Losses() for each in inputs}
+        self._waits = {each: self._waits.get(each) or deque(maxlen=_LAST_LOOKS) for each in inputs}
         self._reports = {group: report for group, report in self._reports.items() if group in self._watched}
         self._ends.clear()
+        self._rivals_since = {key: at for key, at in self._rivals_since.items() if key[0] in self._watched}
 
     def graph_changed(self) -> None:
         """Hear that what is known of the graph may no longer be so."""
         self._ends.clear()
 
     def overslept(self, seconds: float) -> None:
-        """Hear by how much a rest was longer than it should be: what kept this thread kept all messages waiting."""
-        self._overslept = max(self._overslept, round(seconds * 1e9))
+        """Hear by how much a rest was longer than it should be: the process may have stood still."""
+        standstill = Standstill(time.time_ns(), round(seconds * 1e9))
+        if self._standstill is None or standstill.ns > self._standstill.ns:
+            self._standstill = standstill
 
     def look(self) -> None:
         """Look at all groups: gather, find, log. Raises CancelledError where the receive loop has ended."""
@@ -121,10 +132,14 @@ class Monitor:
         self._look(longest_ago[: max(_IN_TURN, ceil(len(longest_ago) / _LONGEST_TURN))])
 
     def _look(self, wirings: Sequence[Wiring]) -> None:
-        waited, seen = self._loop.call(lambda: self._gather(wirings)).result()
+        waits, seen = self._loop.call(lambda: self._gather(wirings)).result()
         now = time.time_ns()
-        self._waits.append(max(waited, self._overslept))
-        self._overslept = 0
+        # Receipt is by the wall clock: a step of that is no wait.
+        has_stepped = self._wall_clock.has_stepped()
+        for lately, waited in zip(self._waits.values(), waits, strict=True):
+            lately.append(0 if has_stepped else waited)
+        self._standstills.append(self._standstill)
+        self._standstill = None
         stopped = self._clock.stopped_for(now) if self._clock else None
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
@@ -138,48 +153,86 @@ class Monitor:
         watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
         shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
         failure = wiring.group.failure
-        facts = watch.facts(shown, now=now, clock_stopped=stopped, waited=max(self._waits), failure=failure)
+        facts = watch.facts(
+            shown,
+            now=now,
+            clock_stopped=stopped,
+            waited=max(waited for each in wiring.inputs for waited in self._waits[each]),
+            standstill=max(filter(None, self._standstills), key=lambda each: each.ns, default=None),
+            failure=failure,
+        )
         found = remarkable(facts)
         self._reports[wiring.group] = GroupReport(facts, found, gathered.last)
         for remark in silence.look(facts, found):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 
-    def _gather(self, wirings: Sequence[Wiring]) -> tuple[int, list[_Seen]]:
-        """Take what came and left, between two messages. On the loop's thread."""
+    def _gather(self, wirings: Sequence[Wiring]) -> tuple[list[int], list[_Seen]]:
+        """Take how long messages of each input waited, and what came and left. On the loop's thread."""
         groups = [wiring.group for wiring in wirings]
-        return self._loop.longest_wait(), [
+        return [each.take_wait() for each in self._waits], [
             _Seen(group.watched(), group.counts(), group.engine.sets, tuple(group.last)) for group in groups
         ]
 
     def _graph(self, group: GroupRelay, index: int, topic_input: TopicInput) -> InputGraph:
         ends = self._ends.get((group, index))
         if ends is None:
-            ends = self._ends[group, index] = _Ends(
-                output=self._node.resolve_topic_name(group.config.topics[index].output),
-                subscribers=topic_input.subscribers(group, index),
-                alike=() if topic_input.publishers else self._alike(topic_input),
-            )
+            ends = self._ends[group, index] = self._ends_of(group, index, topic_input)
         return InputGraph(
             name=topic_input.name,
             output=ends.output,
             publishers=topic_input.publishers,
             subscribers=ends.subscribers,
+            rivals=ends.rivals,
+            rivals_since=self._rivals_since.get((group, index), 0),
             alike=ends.alike,
             not_importable=topic_input.not_importable,
             refusal=topic_input.refusal(group, index),
             lost=self._losses[topic_input].lately,
         )
 
+    def _ends_of(self, group: GroupRelay, index: int, topic_input: TopicInput) -> _Ends:
+        rivals = topic_input.rivals(group, index)
+        if rivals:
+            self._rivals_since.setdefault((group, index), time.time_ns())
+        else:
+            self._rivals_since.pop((group, index), None)
+        return _Ends(
+            output=self._node.resolve_topic_name(group.config.topics[index].output),
+            subscribers=topic_input.subscribers(group, index),
+            rivals=rivals,
+            alike=() if topic_input.publishers else self._alike(topic_input),
+        )
+
     def _alike(self, topic_input: TopicInput) -> tuple[str, ...]:
         """Find what may have been meant: our own outputs are not it."""
-        outputs = {topic.output for wiring in self._wirings for topic in wiring.group.config.topics}
+        outputs = {
+            self._node.resolve_topic_name(topic.output)
+            for wiring in self._wirings
+            for topic in wiring.group.config.topics
+        }
         published = [
             (name, types)
             for name, types in topics_in(self._node).items()
             if name not in outputs and self._node.count_publishers(name)
         ]
         return topics_alike(topic_input.name, topic_input.type, published)
+
+
+class _WallClock:
+    """Sees whether the system's clock was set since it was last asked."""
+
+    def __init__(self) -> None:
+        self._offset = self._now()
+
+    def has_stepped(self) -> bool:
+        """Whether it went otherwise than time does."""
+        before, self._offset = self._offset, self._now()
+        return abs(self._offset - before) > _STEP_NS
+
+    @staticmethod
+    def _now() -> int:
+        return time.time_ns() - time.monotonic_ns()
 
 
 class _Losses:

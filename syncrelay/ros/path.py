@@ -23,6 +23,11 @@ class Source(Protocol):
     """A subscription that is drained."""
 
     deliver: Deliver
+    waited: int
+    """How long a message at most has lain there, from its receipt to the look that found it; the reader sets it back.
+
+    In nanoseconds.
+    """
 
     def take(self) -> Taken | None:
         """Take its oldest message; None if there is none that it has heard of."""

@@ -15,6 +15,7 @@ class RclpySource:
 
     def __init__(self, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver
+        self.waited = 0
         self.handle = subscription.handle
         self._type = subscription.msg_type
 

@@ -79,11 +79,6 @@ class ReceiveLoop:
             self.wake()
         return future
 
-    def longest_wait(self) -> int:
-        """How long a message at most has waited since this was last asked, in nanoseconds. On the loop's thread."""
-        waited, self._backlog.longest_wait = self._backlog.longest_wait, 0
-        return waited
-
     def wake(self) -> None:
         """Have the loop look at its calls and deadlines now."""
         self._watch.wake()

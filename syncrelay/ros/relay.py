@@ -11,27 +11,23 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
-import rclpy
 from rclpy.clock import JumpThreshold
-from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-from rclpy.signals import SignalHandlerOptions
 
-from syncrelay.config import Config
-from syncrelay.errors import ReloadError, RosUnavailableError, UsageError
+from syncrelay.config import Config, ConfigError, GroupConfig
+from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, recent
 from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.diagnostics import Telling
-from syncrelay.ros.entities import Entities
-from syncrelay.ros.environment import keep_stdout, log_arguments
+from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
+from syncrelay.ros.start import make_node, resolver, start
 from syncrelay.ros.transport import apply_transport
 from syncrelay.ros.wirings import Wiring, Wirings
 from syncrelay.status import Phase, RelayState
@@ -72,21 +68,34 @@ class Relay:
         groups: Collection[str] | None = None,
         ros_args: Sequence[str] = (),
         beat: Callable[[], None] | None = None,
+        purpose: Purpose = Purpose.RELAY,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
 
+        Whose purpose is to look has all but publishers: sets leave to nowhere.
+
+        Raises ConfigError where remaps make the file's names meet, UsageError where ROS does not take `ros_args`.
         `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
         turns, once a second at least.
         """
-        self._context = _init(config, ros_args)
-        self.node = rclpy.create_node(config.node.name, namespace=config.node.namespace, context=self._context)
+        apply_transport(config.node.transport, os.environ)
+        self._context = start(ros_args, simulated=config.node.use_sim_time)
+        self.node = make_node(
+            config.node.name, namespace=config.node.namespace, context=self._context, ros_args=ros_args
+        )
+        self._resolve = resolver(self.node, ros_args)
+        self._config, self._names = config, groups
+        try:
+            self._require_distinct_names(config)
+        except SyncRelayError:
+            self._leave()
+            raise
         name_after(self.node.get_logger().name)
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
         # Nanoseconds of a clock that only measures waiting: ROS time if simulated, else one that never jumps.
         self._now: Callable[[], int] = self._simulated_now if self._sim_time else time.monotonic_ns
-        self._config, self._names = config, groups
         path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
         self.receive_path = path.name
         self._bugs = Bugs()
@@ -98,7 +107,7 @@ class Relay:
             contain=lambda error: self._bugs.tell("receiving", error),
         )
         self._graph_changes = path.graph_changes(self.node)
-        entities = Entities(self.node)
+        entities = Entities(self.node, purpose)
         self._wirings = Wirings(entities=entities, node=self.node, path=path, loop=self._loop)
         self._telling = Telling(self.node, entities)
         self.monitor = Monitor((), node=self.node, loop=self._loop, simulated=self._sim_time, bugs=self._bugs)
@@ -140,9 +149,11 @@ class Relay:
         """Run the groups of a file that was read again: those that are as before go on, with all that they hold.
 
         A group that failed begins anew. On the main thread. Whatever it raises, the groups of the file before go on:
-        ReloadError where the file asks for what needs a restart, or for a publisher that DDS does not make.
+        ReloadError where the file asks for what needs a restart, or for a publisher that DDS does not make,
+        ConfigError where remaps make its names meet.
         """
         _require_same_node(self._config, config)
+        self._require_distinct_names(config)
         before = self._wirings.groups
         try:
             self._take_on(config)
@@ -165,9 +176,18 @@ class Relay:
         self._reload_error = reason
         self._refused_reloads += 1
 
+    def _chosen(self, config: Config) -> list[GroupConfig]:
+        return [each for each in config.groups if self._names is None or each.name in self._names]
+
+    def _require_distinct_names(self, config: Config) -> None:
+        """Hold the names after all remaps to what is asked of a file's own; raises ConfigError."""
+        problems = config.names.problems(self._resolve, groups=[each.name for each in self._chosen(config)])
+        if problems:
+            raise ConfigError(problems)
+
     def _take_on(self, config: Config) -> None:
         running = [group for group in self._wirings.groups if group.failure is None]
-        chosen = [each for each in config.groups if self._names is None or each.name in self._names]
+        chosen = self._chosen(config)
         as_before = [next((group for group in running if group.config == each), None) for each in chosen]
         self._wirings.wire(
             [group or GroupRelay(each, now=self._now) for group, each in zip(as_before, chosen, strict=True)]
@@ -281,6 +301,9 @@ class Relay:
         self._threads.shutdown()
         self._loop.close()
         _LOG.removeHandler(self._rosout)
+        self._leave()
+
+    def _leave(self) -> None:
         self.node.destroy_node()
         self._context.try_shutdown()
 
@@ -374,28 +397,3 @@ def _describe(wiring: Wiring) -> GroupSnapshot:
         recent=recent(group.last),
         waiting_for=wiring.waiting_for,
     )
-
-
-def _init(config: Config, ros_args: Sequence[str]) -> Context:
-    """Start rclpy in a context of its own.
-
-    Raises UsageError where it does not take the arguments, RosUnavailableError where it does not start without.
-    """
-    # The file's wish stands before the command line's, which so has the last word. Our own log is on stderr:
-    # the same lines from rcl would double it.
-    simulated = ["-p", "use_sim_time:=true"] if config.node.use_sim_time else []
-    ours = ["--ros-args", "--disable-stdout-logs", *log_arguments(), *simulated, "--"]
-    apply_transport(config.node.transport, os.environ)
-    keep_stdout()
-    context = Context()
-    try:
-        rclpy.init(
-            args=[*ours, "--ros-args", *ros_args],
-            context=context,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-    except (_rclpy.RCLError, _rclpy.UnknownROSArgsError) as error:
-        if ros_args:
-            raise UsageError(f"ROS does not take --ros-args {' '.join(ros_args)}: {error}") from error
-        raise RosUnavailableError(f"rclpy does not start: {error}") from error
-    return context

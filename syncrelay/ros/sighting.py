@@ -38,6 +38,14 @@ class SeenTopic:
 
 
 @dataclass(frozen=True, slots=True)
+class SeenOutput:
+    """An output of the file, under its name in the graph, and the nodes that publish it, as far as they are named."""
+
+    name: str
+    nodes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Sighting:
     """The graph. `nodes` are all others in full, each as often as it is there.
 
@@ -53,3 +61,4 @@ class Sighting:
     topics: tuple[SeenTopic, ...] = ()
     clocks: int = 0
     ticks: int = 0
+    outputs: tuple[SeenOutput, ...] = ()

@@ -28,6 +28,7 @@ BEYOND_A_SCHEMA = {
     "slop_without_end",
     "message_misspelt",
     "names_too_long_in_full",
+    "node_name_too_long_in_full",
     "nothing_required",
     "one_topic_two_qos",
     "one_topic_two_types",

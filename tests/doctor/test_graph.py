@@ -1,11 +1,20 @@
 """What was seen of the graph, by values."""
 
+from dataclasses import replace
+
 import pytest
 
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.graph import check_clock, check_company, check_own_name, check_sizes, check_topics
+from syncrelay.doctor.graph import (
+    check_clock,
+    check_company,
+    check_outputs,
+    check_own_name,
+    check_sizes,
+    check_topics,
+)
 from syncrelay.doctor.stamps import Matched, check_stamps
-from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
+from syncrelay.ros.sighting import SeenOutput, SeenPublisher, SeenTopic, Sighting
 
 IMAGE, IMU = "sensor_msgs/msg/Image", "sensor_msgs/msg/Imu"
 MEND, KNOW = Severity.MEND, Severity.KNOW
@@ -53,6 +62,13 @@ def test_two_publishers_of_one_topic_are_to_know():
     )
     assert (found.code, found.severity) == ("several_publishers", KNOW)
     assert found.what == "/image is published by /camera_driver and /twin"
+
+
+def test_an_output_that_others_publish_is_to_mend_but_not_the_relays_own():
+    outputs = (SeenOutput("/front/image", ("/syncrelay", "/bag", "/bag")), SeenOutput("/front/imu", ("/syncrelay",)))
+    (found,) = check_outputs(replace(sighting(image()), outputs=outputs), "/syncrelay")
+    assert (found.code, found.severity) == ("output_taken", MEND)
+    assert found.what == "/front/image, an output of the file, is published by /bag"
 
 
 def test_messages_over_the_shared_memory_are_to_know_with_their_size():

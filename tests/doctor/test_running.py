@@ -10,11 +10,11 @@ from syncrelay.ros.trial import Trial
 
 
 def test_a_path_that_costs_more_is_to_know_with_its_reason():
-    (found,) = check_start(Trial(path="rclpy", path_fault="other fields"), ros_args=(), before=())
+    (found,) = check_start(Trial(path="rclpy", path_fault="other fields"), before=())
     assert (found.code, found.severity) == ("receive_path", Severity.KNOW)
     assert found.what == "messages pass through rclpy: librcl is not as expected here (other fields)"
-    assert list(check_start(Trial(path="direct"), ros_args=(), before=())) == []
-    assert list(check_start(Trial(path="rclpy"), ros_args=(), before=())) == []
+    assert list(check_start(Trial(path="direct"), before=())) == []
+    assert list(check_start(Trial(path="rclpy"), before=())) == []
 
 
 def test_a_port_that_is_taken_is_to_know_where_the_file_asks_for_it():

@@ -6,11 +6,12 @@ import pytest
 
 from syncrelay.doctor.container import Isolation, check_isolation
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.discovery import Discovery, check_discovery, domain_of, range_of
+from syncrelay.doctor.discovery import Discovery, check_discovery, range_of
 from syncrelay.doctor.folders import Written, check_folders
 from syncrelay.doctor.network import Interface, check_network
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile, check_shared_memory
 from syncrelay.doctor.transport import Transport, check_transport, uses_shared_memory
+from syncrelay.ros.domain import domain_of
 
 MEND, KNOW = Severity.MEND, Severity.KNOW
 

@@ -1,9 +1,13 @@
 """What is a burst, and what only looks like one."""
 
+import random
+from collections import deque
+
 import pytest
 from groups import MS, S
 
 from syncrelay.explain.bursts import Burst, bursts
+from syncrelay.explain.input_observation import InputObservation
 
 
 def _stream(first, last, *, period=10 * MS, delay=MS):
@@ -50,3 +54,16 @@ def test_every_burst_is_found():
 )
 def test_no_burst(arrivals):
     assert list(bursts(arrivals)) == []
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_a_burst_is_found_once_whenever_the_looks_are(seed):
+    chance = random.Random(seed)
+    left = _stream(S, 2 * S, period=50 * MS) + _held(2 * S, 3 * S, period=50 * MS) + _stream(3 * S + 20 * MS, 5 * S)
+    seen = InputObservation()
+    while left:
+        size = chance.randint(1, 20)
+        came, left = left[:size], left[size:]
+        seen.add(deque(came))
+    figures = seen.figures(fed=0, dropped={}, seconds=0.0, now=5 * S)
+    assert (figures.bursts, figures.held, figures.held_up) == (1, 999 * MS, [(2001 * MS, 3 * S)])

@@ -1,6 +1,9 @@
 """The order in which the backlog hands on what its sources have."""
 
+import random
 from collections import deque
+
+import pytest
 
 from syncrelay.ros.backlog import Backlog
 
@@ -10,13 +13,14 @@ class _Source:
 
     def __init__(self, delivered: list, *messages: tuple[int, str]):
         self.messages = deque(messages)
+        self.waited = 0
         self.deliver = lambda payload, _content, _received: delivered.append(payload)
 
     def take(self):
         if not self.messages:
             return None
         received, payload = self.messages.popleft()
-        return received, payload, payload.encode()
+        return received, payload, b""
 
     def doubt(self):
         pass
@@ -81,3 +85,23 @@ def test_messages_up_to_a_time_leave_however_many_they_are():
     backlog.deliver_held()
     assert delivered == [f"{n}" for n in range(902)]
     assert not backlog.held
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_each_source_tells_how_long_its_own_messages_waited_whenever_it_was_looked_at(seed):
+    chance = random.Random(seed)
+    backlog, delivered, waits = Backlog(), [], {}
+    sources = [_Source(delivered) for _ in range(chance.randint(1, 4))]
+    now = 0
+    for _ in range(chance.randint(1, 30)):
+        looked, now = now, now + chance.randint(1, 1000)
+        for source in sources:
+            came = sorted(chance.randint(looked, now + 5) for _ in range(chance.choice([0, 0, 1, 3])))
+            source.messages.extend((at, (source, at)) for at in came)
+        backlog.deliver(([each for each in sources if each.messages or each in backlog.held], now))
+        for source, at in delivered:
+            waits[source] = max(waits.get(source, 0), now - at)
+        delivered.clear()
+    assert {each: each.waited for each in sources if each.waited} == {
+        each: wait for each, wait in waits.items() if wait
+    }

@@ -65,7 +65,7 @@ def test_every_fault_of_a_graph_is_named_with_its_topic(stage: Stage):
         {"/left": VECTOR, "/right": VECTOR, "/zero": VECTOR, "/quiet": VECTOR, "/camera/image": VECTOR}
     )
     stage.player({"/lossy": VECTOR}, reliability="best_effort")
-    stage.player({"/strange": IMAGE})
+    stage.player({"/strange": IMAGE, "/clocks/left": VECTOR}, node="stranger")
     player.start(
         merged(now("/left"), now("/right", behind_s=37.2), now("/zero", stamped=False), now("/camera/image")), speed=1
     )
@@ -85,14 +85,15 @@ def test_every_fault_of_a_graph_is_named_with_its_topic(stage: Stage):
     code, to_mend, _ = examine(stage, text, "--seconds", "5")
     assert code == 1
     said = {each["code"]: each for each in to_mend}
-    assert set(said) == {"clocks_apart", "unstamped", "silent", "no_publisher", "other_type", "qos"}
+    assert set(said) == {"clocks_apart", "unstamped", "silent", "no_publisher", "other_type", "qos", "output_taken"}
     assert len(to_mend) == len(said)
     assert "clocks: the stamps of /right are 37.2 s behind those of /left" in said["clocks_apart"]["what"]
     assert "at /right: offset: 37." in said["clocks_apart"]["do"]
     assert said["unstamped"]["what"].startswith("/zero: ")
     assert said["silent"]["what"].startswith("/quiet is published by /player, but no message came in 5 s")
     assert "did you mean /camera/image" in said["no_publisher"]["do"]
-    assert said["other_type"]["what"].startswith(f"/strange is published as another type by /player ({IMAGE})")
+    assert said["other_type"]["what"].startswith(f"/strange is published as another type by /stranger ({IMAGE})")
+    assert said["output_taken"]["what"] == "/clocks/left, an output of the file, is published by /stranger"
     assert said["qos"]["what"].endswith(
         "(offers best_effort, volatile):\nbest effort publisher and reliable subscription"
     )

@@ -119,7 +119,8 @@ def _compare(ours: MessageInfo, theirs: Mapping[str, int]) -> None:
 @contextmanager
 def _endpoints(node: Any) -> Iterator[tuple[Any, Any]]:
     """A raw subscription and a publisher, on a topic that nobody else has and `ros2 topic list` hides."""
-    topic = f"_syncrelay_check_{uuid.uuid4().hex}"
+    # Of no namespace: one that is long would make the name longer than DDS takes.
+    topic = f"/_syncrelay_check_{uuid.uuid4().hex}"
     subscription = node.create_subscription(Time, topic, _never_called, 10, raw=True)
     publisher = node.create_publisher(Time, topic, 10)
     try:

@@ -17,6 +17,7 @@ class DirectSource:
 
     def __init__(self, rcl: Rcl, pool: Pool, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver
+        self.waited = 0
         self.heard_of = 0
         """How many messages are to be taken: asking librcl once more costs nearly as much as a message."""
         self._pool = pool

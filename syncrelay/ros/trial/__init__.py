@@ -15,24 +15,29 @@ _OVERRULED: Final = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
 
 
 class Step(Enum):
-    """What is tried, in this order."""
+    """What is tried, in this order, but ARGUMENTS: what comes after --ros-args can fail at any of the last three."""
 
     IMPORT = "import"
     TYPES = "types"
     INIT = "init"
     NODE = "node"
     NAMES = "names"
+    ARGUMENTS = "arguments"
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What to try: a node of this name, the import of types, and what remaps make of topic names."""
+    """What to try: a node of this name, the import of types, and what remaps make of topic names.
+
+    `use_sim_time` is what the file says.
+    """
 
     node: str = "syncrelay"
     namespace: str = ""
     types: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     ros_args: tuple[str, ...] = ()
+    use_sim_time: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +68,7 @@ def try_out(plan: Plan, environ: Mapping[str, str]) -> Trial:
         "types": plan.types,
         "names": plan.names,
         "ros_args": plan.ros_args,
+        "use_sim_time": plan.use_sim_time,
     }
     try:
         done = subprocess.run(

@@ -5,8 +5,8 @@ import os
 import sys
 from typing import Any
 
-from syncrelay.errors import RosUnavailableError, TypeImportError
-from syncrelay.ros.environment import keep_stdout, log_arguments, require_rclpy
+from syncrelay.errors import RosUnavailableError, TypeImportError, UsageError
+from syncrelay.ros.environment import require_rclpy
 from syncrelay.ros.path import PathName
 from syncrelay.ros.trial import Step
 from syncrelay.ros.types import import_type
@@ -38,33 +38,30 @@ def _import_types(types: list[str]) -> None:
 
 
 def _start(plan: dict[str, Any]) -> None:
-    import rclpy  # noqa: PLC0415  after require_rclpy
-    from rclpy.context import Context  # noqa: PLC0415
-    from rclpy.impl.implementation_singleton import rclpy_implementation  # noqa: PLC0415
-    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
-    from rclpy.utilities import get_rmw_implementation_identifier  # noqa: PLC0415
+    from rclpy.utilities import get_rmw_implementation_identifier  # noqa: PLC0415  after require_rclpy
 
-    refused = (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError)
-    keep_stdout()
-    context = Context()
+    from syncrelay.ros.start import make_node, resolver, start  # noqa: PLC0415  after require_rclpy
+
+    ros_args = plan["ros_args"]
     step = Step.INIT
     _say(step, middleware=get_rmw_implementation_identifier())
     try:
-        rclpy.init(
-            args=["--ros-args", "--disable-stdout-logs", *log_arguments(), "--", "--ros-args", *plan["ros_args"]],
-            context=context,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
+        context = start(ros_args, simulated=plan["use_sim_time"])
         step = Step.NODE
         _say(step)
-        node = rclpy.create_node(plan["node"], namespace=plan["namespace"], context=context)
-    except refused as error:
-        _say(step, fault=str(error))
+        node = make_node(plan["node"], namespace=plan["namespace"], context=context, ros_args=ros_args)
+        resolve = resolver(node, ros_args)
+        names = {name: resolve(name) for name in plan["names"]}
+    except UsageError as error:
+        _say(Step.ARGUMENTS, fault=str(error))
+        return
+    except RosUnavailableError as error:
+        _say(step, fault=str(error.__cause__ or error))
         return
     _say(
         Step.NAMES,
         full_name=node.get_fully_qualified_name(),
-        names={name: node.resolve_topic_name(name) for name in plan["names"]},
+        names=names,
         use_sim_time=bool(node.get_parameter("use_sim_time").value),
         **_path(node),
     )

@@ -3,7 +3,7 @@
 from cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
 from groups import MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Distribution, Severity
+from syncrelay.explain import Code, Distribution, Severity, Standstill
 from syncrelay.sync.messages import DropReason
 
 # Code, severity, facts, sentence, suggestion.
@@ -29,7 +29,7 @@ FOUND = {
             camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
         ),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "see why /camera does not come in time, or write a larger `max_wait`",
+        "see whether /usb_cam sends it, and how late it comes",
     ),
     "an optional input whose stamps fit no set": (
         Code.WAITING_FOR_OPTIONAL,
@@ -56,10 +56,31 @@ FOUND = {
         Severity.WARN,
         without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100)),
         (
-            "100 % of the sets leave without /camera after waiting 100 ms for it: it comes, 300 ms after the others,"
-            " too late"
+            "100 % of the sets leave without /camera after waiting 100 ms for it: it comes 300 ms after the others, too"
+            " late"
         ),
         "write a larger `max_wait`, or see what holds /camera up",
+    ),
+    "an optional input that went away": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100), last_received=NOW - 4 * S),
+        "100 % of the sets leave without /camera after waiting 100 ms for it: it has not come for 4 s",
+        "look at /usb_cam",
+    ),
+    "an optional input that never came": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(last_received=None),
+        "100 % of the sets leave without /camera after waiting 100 ms for it: no message of it has come",
+        "look at /usb_cam",
+    ),
+    "an optional input that comes in time and is missing all the same": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=104 * MS, nearest=Distribution([3 * MS] * 100)),
+        "100 % of the sets leave without /camera after waiting 100 ms for it",
+        "see whether /usb_cam sends it, and how late it comes",
     ),
     "messages that were held up": (
         Code.BURSTS,
@@ -83,8 +104,26 @@ FOUND = {
         Code.TOO_SLOW,
         Severity.WARN,
         a_group(waited=700 * MS),
-        "messages lay here for 700 ms before the relay came to them",
-        "give it more CPU, or spread the groups over several relays with --group",
+        "messages waited up to 700 ms for the relay",
+        (
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group"
+        ),
+    ),
+    "messages that came at once when a standstill was over": (
+        Code.TOO_SLOW,
+        Severity.WARN,
+        a_group(
+            # The last second of them by the network, which sends again what it could not deliver.
+            camera(figures={"bursts": 1, "held": 4 * S, "held_up": [(NOW - 8 * S, NOW - 4 * S)]}),
+            LIDAR,
+            standstill=Standstill(NOW - 5 * S, 2 * S),
+        ),
+        "messages waited up to 2 s for the relay",
+        (
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group"
+        ),
     ),
     "an input that comes at a tenth of its rate": (
         Code.SLOWED,
@@ -158,9 +197,22 @@ QUIETLY = {
         Code.WAITING_FOR_OPTIONAL,
         a_group(camera(required=False), LIDAR, figures={"missing": (0.05, 0.0)}),
     ),
+    "an optional input that has been back for three times as many sets as it missed": (
+        Code.WAITING_FOR_OPTIONAL,
+        a_group(camera(required=False), LIDAR, figures={"missing": (0.5, 0.0), "sets_since_without": (6, 100)}),
+    ),
     "messages that came at once because the relay stood still": (
         Code.BURSTS,
         a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, waited=S),
+    ),
+    "a standstill in which no message came": (Code.TOO_SLOW, a_group(standstill=Standstill(NOW - S, 3 * S))),
+    "messages that came at once at another time than that of a standstill": (
+        Code.TOO_SLOW,
+        a_group(
+            camera(figures={"bursts": 1, "held": S, "held_up": [(NOW - 5 * S, NOW - 4 * S)]}),
+            LIDAR,
+            standstill=Standstill(NOW - 5 * S, 2 * S),
+        ),
     ),
     "messages that lay for less than half a second": (Code.TOO_SLOW, a_group(waited=499 * MS)),
     "four of five possible sets": (Code.FEW_SETS, a_group(figures={"rate_hz": 8.0})),

@@ -140,10 +140,34 @@ FOUND = {
         "/fusion requests /front/camera with durability transient_local, the relay offers volatile, so it gets nothing",
         "have /fusion request volatile, or /camera's publisher offer transient_local",
     ),
+    "an output that another node publishes": (
+        Code.OUTPUT_TAKEN,
+        Severity.WARN,
+        a_group(camera(rivals=(Endpoint("/bag", IMAGE),), rivals_since=NOW - 3 * S), LIDAR),
+        "/bag publishes /front/camera too: whoever subscribes to it gets the messages of both",
+        (
+            "end all publishers but one, or give this output another name, `output: ...`; a node that was killed is"
+            " gone from the graph after 20 s"
+        ),
+    ),
+    "an output that two other nodes publish": (
+        Code.OUTPUT_TAKEN,
+        Severity.WARN,
+        a_group(camera(rivals=(Endpoint("/bag", IMAGE), Endpoint("/old", IMAGE)), rivals_since=NOW - 9 * S), LIDAR),
+        "/bag and /old publish /front/camera too: whoever subscribes to it gets the messages of all",
+        (
+            "end all publishers but one, or give this output another name, `output: ...`; a node that was killed is"
+            " gone from the graph after 20 s"
+        ),
+    ),
 }
 
 # The code that must not be found, facts.
 QUIETLY = {
+    "another relay that is about to end": (
+        Code.OUTPUT_TAKEN,
+        a_group(camera(rivals=(Endpoint("/syncrelay", IMAGE),), rivals_since=NOW - 2900 * MS), LIDAR),
+    ),
     "no publisher in the first two seconds": (
         Code.NO_PUBLISHER,
         a_group(camera(publishers=()), LIDAR, figures={"began": NOW - 1900 * MS}),

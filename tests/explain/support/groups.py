@@ -54,6 +54,7 @@ def a_group(*inputs, figures=None, **facts):
         latencies=Distribution([2 * MS] * 100),
         nearest=Distribution([5 * MS] * 100),
         missing=(0.0,) * len(each),
+        sets_since_without=(0,) * len(each),
     )
     return GroupFacts(
         **{

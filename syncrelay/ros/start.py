@@ -1,0 +1,91 @@
+"""The relay's node: rclpy started with what the file and the command line say, and in words what ROS refuses of it."""
+
+import os
+import re
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.signals import SignalHandlerOptions
+
+from syncrelay.config.wording import quoted
+from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
+from syncrelay.printable import printable
+from syncrelay.ros.domain import require_domain
+from syncrelay.ros.environment import keep_stdout, log_arguments
+
+# Where in rcl's sources it gave up: that tells its authors something, not whoever wrote the arguments.
+_PLACE_IN_RCL: Final = re.compile(r", at [^ ,]+:\d+")
+# What rcl says of arguments, and of nothing else.
+_OF_ARGUMENTS: Final = re.compile(
+    r"(Couldn't parse|Enclave name is not valid|invalid node name|invalid namespace|[^:]*external configuration).*",
+    re.DOTALL,
+)
+
+
+def start(ros_args: Sequence[str], *, simulated: bool) -> Context:
+    """Start rclpy in a context of its own, signals left alone; `simulated` time is what the file asks for.
+
+    Raises UsageError where ROS does not take the arguments, RosUnavailableError where it does not start.
+    """
+    # The file's wish stands before the command line's, which so has the last word. Our own log is on stderr:
+    # the same lines from rcl would double it.
+    wish = ["-p", "use_sim_time:=true"] if simulated else []
+    ours = ["--ros-args", "--disable-stdout-logs", *log_arguments(), *wish, "--"]
+    require_domain(os.environ)
+    keep_stdout()
+    context = Context()
+    try:
+        rclpy.init(
+            args=[*ours, "--ros-args", *ros_args], context=context, signal_handler_options=SignalHandlerOptions.NO
+        )
+    except _rclpy.UnknownROSArgsError as error:
+        raise _not_taken(ros_args, f"{error} is unknown") from error
+    except _rclpy.RCLError as error:
+        raise _refused(f"rclpy does not start: {error}", ros_args) from error
+    return context
+
+
+def make_node(name: str, *, namespace: str, context: Context, ros_args: Sequence[str]) -> Any:
+    """Make the relay's node; raises as `start`."""
+    try:
+        return rclpy.create_node(name, namespace=namespace, context=context)
+    except NameValidationException as error:
+        what, name, *_ = (line.strip(" '") for line in str(error).splitlines())
+        raise _not_taken(ros_args, f"{what} {quoted(name)}") from error
+    except ParameterException as error:
+        raise _not_taken(ros_args, str(error)) from error
+    except _rclpy.RCLError as error:
+        raise _refused(f"no node starts: {error}", ros_args) from error
+
+
+def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:
+    """Give what makes of a topic's name its name in the graph, after all remaps.
+
+    It raises UsageError for a name of which they make one that ROS refuses.
+    """
+
+    def resolve(name: str) -> str:
+        try:
+            return str(node.resolve_topic_name(name))
+        except _rclpy.RCLError as error:
+            raise _not_taken(ros_args, f"of the topic {quoted(name)} they make none: {error}") from error
+
+    return resolve
+
+
+def _refused(words: str, ros_args: Sequence[str]) -> SyncRelayError:
+    of_arguments = _OF_ARGUMENTS.search(words)
+    return _not_taken(ros_args, of_arguments.group()) if of_arguments else RosUnavailableError(words)
+
+
+def _not_taken(ros_args: Sequence[str], reason: str) -> UsageError:
+    words = printable(" ".join(ros_args))
+    why = printable(_PLACE_IN_RCL.sub("", reason))
+    return UsageError(
+        f"ROS does not take --ros-args {words}: {why}\n"
+        "  remaps are written -r FROM:=TO, parameters -p NAME:=VALUE, a namespace -r __ns:=/NAMESPACE"
+    )

@@ -1,0 +1,130 @@
+"""Random histories of an optional input: what is said of why sets leave without it has really been so."""
+
+import heapq
+import random
+from collections import deque
+from dataclasses import dataclass, field
+
+from groups import BEGAN, MS, S
+
+from syncrelay.config import load_text
+from syncrelay.explain import Code, GroupWatch, InputGraph, find
+from syncrelay.sync import Match, Message
+
+_SLOP = 20 * MS
+_PERIOD = 100 * MS
+_LASTS_S = 40
+_SEEDS = range(40)
+_FILE = """
+version: 1
+groups:
+  front:
+    policy: approximate_time
+    slop: 20ms
+    max_wait: {max_wait}ms
+    topics:
+      - {{topic: /a, type: sensor_msgs/msg/Imu}}
+      - {{topic: /b, type: sensor_msgs/msg/Imu}}
+      - {{topic: /c, type: sensor_msgs/msg/Imu, required: false}}
+"""
+_GRAPH = [InputGraph(topic, f"/front{topic}") for topic in ("/a", "/b", "/c")]
+
+
+@dataclass
+class _History:
+    """One run: how the optional input comes, and what became of it."""
+
+    chance: random.Random
+    sets: list[tuple[tuple[int | None, ...], int]] = field(default_factory=list)
+    came: list[tuple[int, int]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.max_wait = self.chance.choice([50, 100, 300])
+        self.delay = self.chance.choice([0, 0, 20, 80, 150, 600]) * MS
+        self.shift = self.chance.choice([0, 0, 0, 0, 45, -3_000, 40_000]) * MS
+        self.pauses = sorted(self.chance.randint(0, _LASTS_S) for _ in range(self.chance.choice([0, 2, 4])))
+
+    def messages(self) -> list[tuple[int, int, int]]:
+        """Times of receipt, inputs and stamps, in the order of receipt."""
+        sent = range(BEGAN + S, BEGAN + _LASTS_S * S, _PERIOD)
+        required = [(at + 5 * MS + self.chance.randint(0, 3 * MS), index, at) for at in sent for index in (0, 1)]
+        optional = [(at + 6 * MS + self.delay, 2, at + self.shift) for at in sent if not self._is_paused(at)]
+        return sorted(required + optional)
+
+    def _is_paused(self, at: int) -> bool:
+        return sum((at - BEGAN) // S >= pause for pause in self.pauses) % 2 == 1
+
+    def came_too_late(self) -> bool:
+        """Whether a message came that fits a set which had left without it."""
+        return any(
+            received > left and max(*stamps[:2], stamp) - min(*stamps[:2], stamp) <= _SLOP
+            for stamps, left in self.sets
+            if stamps[2] is None
+            for stamp, received in self.came
+        )
+
+
+def _findings(history: _History):
+    """The findings about the optional input, look by look, with the time; the history grows meanwhile."""
+    (config,) = load_text(_FILE.format(max_wait=history.max_wait), environ={}).groups
+    engine, watch = config.engine(), GroupWatch(config, began=BEGAN)
+    looks = list(range(BEGAN + S, BEGAN + (_LASTS_S + 2) * S, history.chance.choice([1, 1, 4]) * S))
+    events = list(heapq.merge(((at, -1, 0) for at in looks), history.messages()))
+    arrivals, sent = tuple(deque() for _ in range(3)), deque()
+
+    def settle(outcomes, now):
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                newest = max(each.payload for each in outcome.messages if each is not None)
+                history.sets.append((outcome.stamps, now))
+                sent.append((outcome.stamps, now - newest))
+
+    for at, index, stamp in events:
+        while (due := engine.next_deadline()) is not None and due <= at:
+            settle(engine.expire(now=due), due)
+        if index >= 0:
+            arrivals[index].append((stamp, at))
+            if index == 2:
+                history.came.append((stamp, at))
+            settle(engine.add(Message(index, stamp, at), now=at), at)
+            continue
+        watch.add(arrivals, sent, engine.counts(), engine.sets, now=at)
+        arrivals, sent = tuple(deque() for _ in range(3)), deque()
+        facts = watch.facts(_GRAPH, now=at)
+        yield at, next((each for each in find(facts) if each.code is Code.WAITING_FOR_OPTIONAL), None)
+
+
+def test_no_cause_is_named_that_did_not_hold():
+    said = set()
+    for seed in _SEEDS:
+        history = _History(random.Random(seed))
+        for at, finding in _findings(history):
+            if finding is None:
+                continue
+            cause = finding.text.partition(": ")[2]
+            if "too late" in cause:
+                assert history.came_too_late(), (seed, finding)
+                assert "`max_wait`" in finding.suggestion
+            elif "span" in cause:
+                assert abs(history.shift) > _SLOP, (seed, finding)
+            elif "behind" in cause or "ahead" in cause:
+                assert abs(history.shift) > S, (seed, finding)
+            elif "has not come for" in cause:
+                assert at - history.came[-1][1] > S, (seed, finding)
+            elif "no message" in cause:
+                assert not history.came, (seed, finding)
+            else:
+                assert not cause
+                assert "max_wait" not in finding.suggestion
+            said.add(cause.partition(" of ")[0][:6])
+    # Each cause has been seen, and that none is known.
+    assert {cause[:6] for cause in said} >= {"", "it com", "it has", "its st", "the ne"}
+
+
+def test_an_input_that_has_been_in_every_set_for_long_is_not_told():
+    for seed in _SEEDS:
+        history = _History(random.Random(seed))
+        for _, finding in _findings(history):
+            latest = [stamps[2] for stamps, _ in history.sets[-60:]]
+            if len(latest) == 60 and None not in latest:
+                assert finding is None, seed

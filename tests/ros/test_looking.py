@@ -1,0 +1,72 @@
+"""Who only looks publishes nothing, and who relays tells of others that publish the same outputs."""
+
+import signal
+
+import pytest
+
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.processes import wait_until
+from tests.ros.sensors import PAIR, assert_logged, front, play, stream
+from tests.ros.stage import Collector, Stage
+from tests.ros.status import findings, wait_for_finding
+from tests.ros.streams import merged
+
+pytestmark = pytest.mark.ros
+
+_RIG = merged(stream("/camera", hz=10), stream("/lidar", hz=10, shift_ms=7))
+_SCALARS = {"diagnostics": {"scalars": True}}
+_PUBLISHED = ("/front/camera", "/front/lidar", "/diagnostics", "/syncrelay/front/sets_hz")
+
+
+def _publishers(collector: Collector) -> list[int]:
+    return [len(collector.endpoints(topic, kind="publisher", node="/syncrelay")) for topic in _PUBLISHED]
+
+
+def test_a_run_that_explains_beside_the_relay_publishes_nothing_and_sees_no_rival(stage: Stage):
+    collector = stage.collector()
+    relay = stage.relay(front(top=_SCALARS))
+    play(stage, _RIG)
+    wait_until(lambda: _publishers(collector) == [1, 1, 1, 1], "the relay's publishers")
+    looks = stage.relay(front(top=_SCALARS), "--explain", "12")
+    inputs = [f"{topic} of both" for topic in PAIR]
+    wait_until(
+        lambda: [len(collector.endpoints(topic, kind="subscription", node="/syncrelay")) for topic in PAIR] == [2, 2],
+        f"subscriptions of {inputs}",
+    )
+    seen: list[list[int]] = []
+    wait_until(lambda: bool(seen.append(_publishers(collector))) or not looks.running(), "the end of the look")
+    assert all(each == [1, 1, 1, 1] for each in seen)
+    assert looks.wait() == 0
+    assert looks.stdout.endswith("[healthy]\n")
+    assert "output_taken" not in looks.stdout
+    assert "output_taken" not in findings(relay)
+
+
+def test_a_relay_tells_of_a_second_one_and_of_others_that_publish_its_outputs(stage: Stage):
+    relay = stage.relay(front())
+    play(stage, _RIG)
+    wait_for_finding(relay, "healthy")
+    assert "output_taken" not in findings(relay)
+    second = stage.relay(front())
+    text = wait_for_finding(relay, "output_taken")["text"]
+    assert text.startswith("another node of the name /syncrelay publishes /front/")
+    assert text.endswith(" too: whoever subscribes to it gets the messages of both")
+    assert_logged(second, r"\[WARN\] .* front: another node of the name /syncrelay publishes /front/")
+    second.send(signal.SIGTERM)
+    assert second.wait() == 0
+    wait_until(lambda: "output_taken" not in findings(relay), "the end of the second relay to be seen")
+    stage.player({"/front/lidar": VECTOR}, node="bag")
+    wait_until(
+        lambda: findings(relay).get("output_taken", {}).get("text", "").startswith("/bag publishes /front/lidar too"),
+        "the other publisher to be told",
+    )
+
+
+def test_a_look_that_is_too_short_says_what_decided(stage: Stage):
+    relay = stage.relay(front(), "--explain", "1")
+    assert relay.wait() == 1
+    first, last = relay.stdout.splitlines()
+    assert first.endswith("[starting]")
+    assert last == (
+        "exit code 1: front gave no set in 1 s, too short a time to tell why: write a larger N for --explain"
+    )

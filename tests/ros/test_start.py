@@ -1,0 +1,139 @@
+"""What ROS refuses as the relay starts, and what remaps make impossible: a sentence, an exit code, no traceback."""
+
+import random
+from collections.abc import Iterator
+
+import pytest
+
+from syncrelay.config import ConfigError, load_text
+from syncrelay.errors import RosUnavailableError, UsageError
+from tests.cli.command import GOOD, run
+from tests.ros.processes import ros_environment
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+ros_start = pytest.importorskip("syncrelay.ros.start")
+Relay = pytest.importorskip("syncrelay.ros.relay").Relay
+
+pytestmark = pytest.mark.ros
+
+_LONG = "a" * 230
+_FLAGS = ("-r", "--remap", "-p", "--param", "--params-file", "--log-level", "-e", "--bogus", "--ros-args", "--", "")
+_WORDS = (
+    "/x:=/y",
+    "__ns:=/a",
+    "__ns:=a//b",
+    f"__ns:=/{_LONG}",
+    "__node:=n",
+    "__node:=/n",
+    f"__node:={_LONG}{_LONG}",
+    f"/x:=/{_LONG}{_LONG}",
+    "=:",
+    "*:=/a",
+    "use_sim_time:=maybe",
+    "use_sim_time:=[1",
+    "use_sim_time:=true",
+    "start_type_description_service:=5",
+    "a.b:=3",
+    "/nowhere",
+    "/etc/passwd",
+    "info",
+    "é:=ü",
+    "\x1b[31m:=x",
+    "x:=\n",
+    "",
+)
+
+
+@pytest.fixture(autouse=True)
+def _alone(ros_domain: int, tmp_path, monkeypatch):
+    for name, value in ros_environment(domain=ros_domain, folder=tmp_path, python_path=[]).items():
+        monkeypatch.setenv(name, value)
+
+
+def _started(ros_args: list[str]) -> str:
+    """Start a node with these arguments and end it; the name that it gives to `/x`."""
+    context = ros_start.start(ros_args, simulated=False)
+    try:
+        node = ros_start.make_node("syncrelay", namespace="", context=context, ros_args=ros_args)
+        try:
+            return ros_start.resolver(node, ros_args)("/x")
+        finally:
+            node.destroy_node()
+    finally:
+        context.try_shutdown()
+
+
+@pytest.mark.parametrize(
+    ("ros_args", "said"),
+    [
+        (["-p", "use_sim_time:=maybe"], "'maybe' of type 'STRING', expecting type 'BOOL'"),
+        (["-r", f"__ns:=/{_LONG}"], "topic length should not exceed"),
+        (["-r", f"__node:={_LONG}{_LONG}"], "node name length should not exceed '255'"),
+        (["-r", f"/x:=/{_LONG}{_LONG}"], "of the topic `/x` they make none"),
+        (["-r", "nonsense"], "Couldn't parse remap rule: '-r nonsense'"),
+        (["--params-file", "/nowhere.yaml"], "Error opening YAML file"),
+        (["-e", "enclave"], "Enclave name is not valid"),
+        (["--bogus"], "--bogus"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_arguments_that_ros_does_not_take_are_usage(ros_args, said):
+    with pytest.raises(UsageError) as raised:
+        _started(ros_args)
+    assert str(raised.value).startswith("ROS does not take --ros-args -")
+    assert said in str(raised.value)
+    assert "/project/" not in str(raised.value)
+
+
+def _arguments(chance: random.Random) -> Iterator[str]:
+    for _ in range(chance.randint(1, 3)):
+        yield from (chance.choice(_FLAGS), chance.choice(_WORDS))
+
+
+def test_of_any_arguments_there_comes_a_node_or_a_sentence():
+    chance = random.Random(14)
+    said = []
+    for _ in range(300):
+        try:
+            _started(list(_arguments(chance)))
+        except UsageError as error:
+            said.append(str(error))
+    assert 0 < len(said) < 300
+    assert all(text.startswith("ROS does not take --ros-args ") for text in said)
+    assert all("\x1b" not in text for text in said)
+
+
+@pytest.mark.parametrize("domain", ["300", "-1", "abc", "08", "233"])
+def test_a_domain_that_is_none_is_refused_before_dds_ends_the_process(domain, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+    with pytest.raises(RosUnavailableError, match=f"ROS_DOMAIN_ID={domain} is no domain: expected a number from 0 to"):
+        ros_start.start([], simulated=False)
+
+
+@pytest.mark.parametrize(
+    ("words", "environ", "code", "said"),
+    [
+        (["--ros-args", "-p", "use_sim_time:=maybe"], {}, 2, "syncrelay: ROS does not take --ros-args -p"),
+        ([], {"ROS_DOMAIN_ID": "300"}, 69, "syncrelay: ROS_DOMAIN_ID=300 is no domain"),
+        (["--ros-args", "-r", "/front/a:=/a"], {}, 1, "the default output `/a`, remapped from `/front/a`, is an input"),
+    ],
+    ids=["parameter", "domain", "loop"],
+)
+def test_the_relay_ends_with_a_sentence(words, environ, code, said, tmp_path):
+    (tmp_path / "f.yaml").write_text(GOOD)
+    done = run("--config", "f.yaml", *words, folder=tmp_path, environ=environ)
+    assert done.returncode == code
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_reload_that_remaps_turn_into_a_loop_is_refused_and_the_running_file_kept():
+    running = load_text(GOOD)
+    with Relay(running, ros_args=["-r", "/c:=/front/a"]) as relay:
+        before = relay.snapshot()
+        with pytest.raises(ConfigError) as raised:
+            relay.reload(load_text(GOOD.replace("topic: /b", "topic: /c")))
+        after = relay.snapshot()
+    assert "`/front/a` is an input too (line 7, remapped from `/c`)" in str(raised.value)
+    assert [each.topic for group in after.groups for each in group.inputs] == ["/a", "/b"]
+    assert after == before

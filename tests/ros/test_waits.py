@@ -1,0 +1,61 @@
+"""Messages that wait for the relay: told of the groups that they are of, and of no other."""
+
+import time
+from threading import Event
+
+import pytest
+
+from syncrelay.config import load_text
+from syncrelay.explain import Code
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.processes import DEADLINE_S, wait_until
+from tests.ros.stage import Stage
+from tests.ros.streams import at, merged
+
+Relay = pytest.importorskip("syncrelay.ros.relay", reason="rclpy is not installed").Relay
+
+pytestmark = pytest.mark.ros
+
+_FRONT = dict.fromkeys(("/a", "/b"), VECTOR)
+_REAR = dict.fromkeys(("/c", "/d"), VECTOR)
+_FILE = config(
+    {name: {"policy": "exact_time", "topics": inputs(topics)} for name, topics in (("front", _FRONT), ("rear", _REAR))},
+    metrics=None,
+)
+
+
+def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(stage: Stage, monkeypatch):
+    for name, value in stage.environment.items():
+        monkeypatch.setenv(name, value)
+    may_turn = Event()
+    may_turn.set()
+    player = stage.player(_FRONT | _REAR)
+    with Relay(load_text(_FILE), beat=lambda: may_turn.wait(DEADLINE_S)) as relay:
+
+        def sets_of(*counts: int) -> bool:
+            relay.step(0)
+            return [group.sets for group in relay.snapshot().groups] == list(counts)
+
+        def told() -> dict[str, bool]:
+            return {
+                report.facts.name: any(finding.code is Code.TOO_SLOW for finding in report.findings)
+                for report in relay.look()
+            }
+
+        wait_until(lambda: relay.step(0) or all(each.subscribed for each in _inputs(relay)), "the subscriptions")
+        player.match()
+        player.play(merged(at("/a", 0), at("/b", 0), at("/c", 0), at("/d", 0)))
+        wait_until(lambda: sets_of(1, 1), "a set of both groups")
+        assert told() == {"front": False, "rear": False}
+        may_turn.clear()
+        player.play(merged(at("/a", 10), at("/b", 10)))
+        played = time.monotonic()
+        wait_until(lambda: time.monotonic() > played + 0.7, "the messages to have waited")
+        may_turn.set()
+        wait_until(lambda: sets_of(2, 1), "the set that waited")
+        assert told() == {"front": True, "rear": False}
+
+
+def _inputs(relay):
+    return [each for group in relay.snapshot().groups for each in group.inputs]
