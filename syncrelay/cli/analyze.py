@@ -14,7 +14,7 @@ from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new
 from syncrelay.cli.reading import reading
-from syncrelay.config import Severity, load_text
+from syncrelay.config import load_text
 from syncrelay.config.source import read_source
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, UsageError
@@ -47,7 +47,7 @@ def analyze_bag(bag: str, asked: Asked) -> int:
             _tell_faults(recording)
             return DONE
         text = read_source(asked.config).text if asked.config else _proposed(recording, asked.topics)
-        wirings = wire(load_text(text, name=asked.config or "<topics>", package_missing=Severity.NOTE), recording)
+        wirings = wire(load_text(text, name=asked.config or "<topics>"), recording)
         for problem in (problem for wiring in wirings for problem in wiring.problems):
             remark(printable(problem))
         with reading(recording):

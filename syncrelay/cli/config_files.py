@@ -78,13 +78,13 @@ class ConfigFiles:
                 self._read_now()
 
     def _read_now(self) -> None:
-        from syncrelay.config import Severity, load
+        from syncrelay.config import load
 
         with self._lock:
             self._since = self._since or time.monotonic()
         read: Future[Config] = Future()
         try:
-            read.set_result(load(*self._paths, package_missing=Severity.NOTE, patience_s=_PIPE_S))
+            read.set_result(load(*self._paths, patience_s=_PIPE_S))
         except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
             read.set_exception(error)
         with self._lock:

@@ -15,7 +15,7 @@ from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.reading import reading
 from syncrelay.cli.summary import summarize
-from syncrelay.config import Severity, load
+from syncrelay.config import load
 from syncrelay.config.wording import counted
 from syncrelay.printable import printable
 from syncrelay.sync import Match, Outcome
@@ -36,7 +36,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     Lines go to stdout, and the summary then to stderr. Raises ConfigError for a faulty file, BagError for a
     recording that cannot be read, or has not the stamps that the file names.
     """
-    config = load(*config_paths, package_missing=Severity.NOTE)
+    config = load(*config_paths)
     with ExitStack() as opened:
         recording = open_recording(bags)
         opened.callback(recording.close)

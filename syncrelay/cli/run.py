@@ -44,14 +44,14 @@ def run(
     Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
     cannot be used.
     """
-    from syncrelay.config import Severity, load, where
+    from syncrelay.config import load, where
     from syncrelay.ros.environment import require_rclpy
     from syncrelay.ros.logs import LOGGER, configure
 
     configure(log_level, log_format)
     # Before they are read: what changes while the relay starts is seen too.
     files = ConfigFiles(config_paths, watched=watch)
-    config = load(*config_paths, package_missing=Severity.NOTE)
+    config = load(*config_paths)
     for note in config.notes:
         if note.code == "unit":
             LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)

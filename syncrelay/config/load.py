@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 from pydantic import ValidationError
@@ -30,17 +30,15 @@ _NO_INDEX = "message types were not checked: there is no ament index here (sourc
 def load(
     *paths: str,
     environ: Mapping[str, str] = os.environ,
-    package_missing: Severity = Severity.ERROR,
     patience_s: float = PATIENCE_S,
 ) -> Config:
     """Return what a file says, `-` for standard input; of several files, what they say together.
 
-    Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. With
-    `package_missing` as a note, a type whose package isn't installed yet is no fault. A pipe is read for so many
-    seconds. Raises ConfigError with everything that is wrong.
+    Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. A pipe is
+    read for so many seconds. Raises ConfigError with everything that is wrong.
     """
     reads = [partial(read_source, path, index=index, patience_s=patience_s) for index, path in enumerate(paths)]
-    return _config(_parts(reads, environ), environ, package_missing)
+    return _config(_parts(reads, environ), environ)
 
 
 def load_text(
@@ -48,10 +46,9 @@ def load_text(
     *,
     name: str = "<text>",
     environ: Mapping[str, str] = os.environ,
-    package_missing: Severity = Severity.ERROR,
 ) -> Config:
     """Return what the text of a file says; as `load`."""
-    return _config(_parts([lambda: check_text(text, name=name)], environ), environ, package_missing)
+    return _config(_parts([lambda: check_text(text, name=name)], environ), environ)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +60,13 @@ class _Part:
     problems: Sequence[Problem]
 
 
-def _config(parts: Sequence[_Part], environ: Mapping[str, str], package_missing: Severity) -> Config:
+def _config(parts: Sequence[_Part], environ: Mapping[str, str]) -> Config:
     document, repeated = merged_documents([part.document for part in parts])
     problems = [*(problem for part in parts for problem in part.problems), *repeated]
     groups = drafts(document)
     problems += check_between(groups, document)
     problems += check_own_topics(groups, document, absolute_names(document))
-    problems += _types(groups, document, environ, package_missing)
+    problems += _types(groups, document, environ)
     found = _in_order(problems, files=[source.name for source in document.sources.values()])
     files = [part.file for part in parts if part.file is not None]
     if len(files) < len(parts) or any(problem.severity is Severity.ERROR for problem in found):
@@ -105,16 +102,13 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
         return _Part(document, None, problems + translate(error.errors(include_url=False), document))
 
 
-def _types(
-    groups: Sequence[GroupDraft], document: Document, environ: Mapping[str, str], package_missing: Severity
-) -> Iterator[Problem]:
+def _types(groups: Sequence[GroupDraft], document: Document, environ: Mapping[str, str]) -> Iterator[Problem]:
     interfaces = Interfaces.find(environ)
     if interfaces is None:
         first = document.sources[0]
         yield first.problem(_NO_INDEX, code="not_checked", span=None, severity=Severity.NOTE)
         return
-    for problem in check_types(groups, document, interfaces):
-        yield replace(problem, severity=package_missing) if problem.code == "package_missing" else problem
+    yield from check_types(groups, document, interfaces)
 
 
 def _in_order(problems: Iterable[Problem], *, files: Iterable[str]) -> tuple[Problem, ...]:

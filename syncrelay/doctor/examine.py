@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from syncrelay.config import Config, ConfigError, Problem, Severity, TopicConfig, load
+from syncrelay.config import Config, ConfigError, Problem, TopicConfig, load
 from syncrelay.doctor.config_file import check_files, check_remaps, check_types
 from syncrelay.doctor.container import check_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, know, worst_first
@@ -103,7 +103,7 @@ def _surroundings(request: Request, middleware: str) -> Iterator[Diagnosis]:
 
 def _load(request: Request) -> tuple[Config | None, Sequence[Problem]]:
     try:
-        config = load(*request.files, environ=request.environ, package_missing=Severity.NOTE)
+        config = load(*request.files, environ=request.environ)
     except ConfigError as error:
         return None, error.problems
     return config, config.notes

@@ -14,7 +14,7 @@ from syncrelay.config import TopicConfig
 from syncrelay.config.wording import nearest
 from syncrelay.errors import RosUnavailableError, TypeImportError
 from syncrelay.printable import printable
-from syncrelay.ros.graph import is_nameless, topics_in
+from syncrelay.ros.graph import is_nameless, node_of, topics_in
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.sighting import SeenOutput, SeenPublisher, SeenTopic, Sighting

@@ -7,7 +7,7 @@ import pytest
 from syncrelay.bag import open_recording
 from syncrelay.bag.replay import received, replay
 from syncrelay.bag.wiring import wire
-from syncrelay.config import Severity, load_text
+from syncrelay.config import load_text
 from syncrelay.errors import BagError
 from syncrelay.sync import Drop, DropReason, Match
 from tests.bag.making import CUSTOM, CUSTOM_STORE, HEADERLESS, blip, rig, write_mcap, write_ros1, write_rosbag2
@@ -27,7 +27,7 @@ def _replayed(path, group, **file_keys):
     """The sets and drops with the moments at which they left, and the result of the one group."""
     left = []
     with closing(open_recording([str(path)])) as recording:
-        file = load_text(config({"front": group}, **file_keys), package_missing=Severity.NOTE)
+        file = load_text(config({"front": group}, **file_keys))
         wirings = wire(file, recording)
         (result,) = replay(recording, wirings, listeners=[lambda _, outcome, now: left.append((outcome, now))])
     return left, result

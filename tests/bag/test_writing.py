@@ -14,7 +14,7 @@ from syncrelay.bag.qos import PRESETS, Profile, output_profile, read_profiles, w
 from syncrelay.bag.replay import replay
 from syncrelay.bag.wiring import wire
 from syncrelay.bag.writing import SetWriter
-from syncrelay.config import AUTO, QosOverrides, QosPreset, Severity, load_text
+from syncrelay.config import AUTO, QosOverrides, QosPreset, load_text
 from syncrelay.errors import BagError
 from tests.bag.making import BEST_EFFORT, CUSTOM, CUSTOM_STORE, CUSTOM_TEXT, blip, rig, write_mcap, write_ros1
 from tests.bag.making import write_rosbag2 as write_folder
@@ -32,7 +32,7 @@ def _written(bag: Path, output: Path, **keys) -> list[Frame]:
     group = {"policy": "approximate_time", "slop": "5ms", "topics": inputs(_PAIR), **keys}
     with closing(open_recording([str(bag)])) as recording, McapOutput(output) as written:
         writer = SetWriter(written)
-        wirings = wire(load_text(config({"front": group}), package_missing=Severity.NOTE), recording)
+        wirings = wire(load_text(config({"front": group})), recording)
         for wiring in wirings:
             writer.begin(wiring)
         replay(recording, wirings, listeners=[writer.take])

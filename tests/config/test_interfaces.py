@@ -57,17 +57,17 @@ def test_a_type_without_its_definition_is_a_note_if_its_stamp_matters(environ):
 
 
 def test_a_package_that_may_come_later_is_a_note(environ):
-    (note,) = notes("my_msgs/msg/Mine", environ, package_missing=Severity.NOTE)
+    (note,) = notes("my_msgs/msg/Mine", environ)
     assert (note.severity, note.code) == (Severity.NOTE, "package_missing")
-    with pytest.raises(ConfigError) as raised:
-        notes("my_msgs/msg/Mine", environ)
-    assert [problem.code for problem in raised.value.problems] == ["package_missing"]
+    assert note.text == "the package `my_msgs` is not installed here, or not sourced"
+    (note,) = notes("sensor_msg/msg/Image", environ)
+    assert note.text.endswith("not sourced, did you mean `sensor_msgs`?")
 
 
 def test_a_restamp_is_believed_if_a_type_cannot_be_looked_into(environ):
     text = FILE.format(type="my_msgs/msg/Mine, stamp: receive").replace("sensor_msgs/msg/Image", "std_msgs/msg/String")
     text = text.replace("String}", "String, stamp: receive}").replace("exact_time", "exact_time\n    restamp: latest")
-    assert len(load_text(text, environ=environ, package_missing=Severity.NOTE).notes) == 1
+    assert len(load_text(text, environ=environ).notes) == 1
 
 
 def test_fields_are_read_as_the_interface_definition_says():

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.config import Config, ConfigError, Severity, load, load_text
+from syncrelay.config import Config, ConfigError, load, load_text
 
 _TOPIC = "      - {{topic: {topic}, type: sensor_msgs/msg/{kind}}}\n"
 
@@ -146,5 +146,5 @@ def test_notes_name_their_file(environ):
     opaque = file(group("rear", "/c", "/d")).replace("sensor_msgs/msg/Image", "other_msgs/msg/Image", 1)
     Path("one.yaml").write_text(FRONT)
     Path("two.yaml").write_text(opaque)
-    (note,) = load("one.yaml", "two.yaml", environ=environ, package_missing=Severity.NOTE).notes
+    (note,) = load("one.yaml", "two.yaml", environ=environ).notes
     assert (note.file, note.span.line, note.source) == ("two.yaml", 6, opaque.splitlines()[5])

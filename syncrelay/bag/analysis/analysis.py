@@ -16,7 +16,7 @@ from syncrelay.bag.analysis.trial import LastingFinding, Trial, try_group, watch
 from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.recording import Channel, Recording
 from syncrelay.bag.wiring import Wiring
-from syncrelay.config import GroupConfig, Severity, load_text
+from syncrelay.config import GroupConfig, load_text
 
 
 # No slots: what takes long is found when it is first asked for, and kept.
@@ -98,7 +98,7 @@ def settled(analysis: Analysis) -> Analysis:
 
 def group_of(text: str, name: str) -> GroupConfig:
     """Return a group of a file's text."""
-    groups = load_text(text, package_missing=Severity.NOTE).groups
+    groups = load_text(text).groups
     return next(group for group in groups if group.name == name)
 
 
