@@ -18,6 +18,9 @@ STAMP_BYTES: Final = slice(_STAMP_AT, _STAMP_END)
 
 _MIN_SECONDS: Final = -(2**31)
 _MAX_SECONDS: Final = 2**31 - 1
+LATEST_STAMP: Final = _MAX_SECONDS * _NS_PER_SECOND + _NS_PER_SECOND - 1
+"""The greatest stamp that a Header can hold, of January 2038, in nanoseconds."""
+
 _BIG_ENDIAN: Final = Struct(">iI")
 _LITTLE_ENDIAN: Final = Struct("<iI")
 # The second byte of the encapsulation header; the first is 0 for all of them.

@@ -64,7 +64,19 @@ def field_reader(fields_of: FieldsOf, type_name: str, path: str) -> Callable[[Pa
     where the type has no such field, or it is not one value.
     """
     skips, found = _route(fields_of, type_name, path.split("."))
-    read = _reader(found, path)
+    return _behind(skips, _reader(found, path))
+
+
+def time_reader(fields_of: FieldsOf, type_name: str, path: str) -> Callable[[Payload], int | None]:
+    """Return what reads the time at a dotted path as field_reader does; raises it for any other field as well."""
+    skips, found = _route(fields_of, type_name, path.split("."))
+    if found != TIME:
+        raise UnreadableFieldError(f"{path} is {found}, expected {TIME}")
+    return _behind(skips, _read_time)
+
+
+def _behind(skips: Sequence[_Skip], read: _Read) -> Callable[[Payload], Any]:
+    """Return what reads a value behind others."""
 
     def read_field(payload: Payload) -> Any:
         encapsulation = _ENCAPSULATIONS.get(payload[1]) if len(payload) >= _BODY_AT and not payload[0] else None
@@ -147,8 +159,10 @@ def _run_skipper(size: int, count: int) -> _Skip:
 
 def _repeater(skip: _Skip, count: int) -> _Skip:
     def repeat(data: _Bytes, place: int) -> int:
+        _require_room(data, place, count)
         for _ in range(count):
             place = skip(data, place)
+            _require_room(data, place, 0)
         return place
 
     return repeat
@@ -181,10 +195,14 @@ def _message_skipper(fields_of: FieldsOf, type_name: str) -> _Skip:
 def _read_length(data: _Bytes, place: int) -> tuple[int, int]:
     place = _align(data, place, 4)
     (count,) = Struct(f"{data.order}I").unpack_from(data.body, place)
-    # No element is smaller than a byte: a larger count is a lie, and would be counted down for hours.
+    _require_room(data, place, count)
+    return count, place + 4
+
+
+def _require_room(data: _Bytes, place: int, count: int) -> None:
+    """No element is smaller than a byte: a larger count is a lie, and would be counted down for hours."""
     if count > len(data.body) - place:
         raise _Lying
-    return count, place + 4
 
 
 def _skip_string(data: _Bytes, place: int) -> int:

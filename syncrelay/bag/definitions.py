@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 from rosbags.convert.converter import is_same_wireformat
 from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from syncrelay.bag.recording import Channel, Definition
@@ -21,6 +21,10 @@ Convert: TypeAlias = Callable[[bytes], bytes | None]
 
 _HEADER: Final = "std_msgs/msg/Header"
 _IDL_RULE: Final = "=" * 80 + "\n"
+# Far beyond the definitions of real messages, and what is done with them takes seconds.
+_LONGEST: Final = 1_000_000
+_MOST_FIELDS: Final = 20_000
+_DEEPEST: Final = 50
 # rosidl's words for the primitives of .msg files, as its Python classes tell them.
 _ROSIDL: Final = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
 
@@ -57,6 +61,8 @@ def converter(channel: Channel) -> Convert:
         raise BagError(f"{channel.topic}: the definition of {channel.type} in the bag cannot be read")
 
     def convert(payload: bytes) -> bytes | None:
+        # No element is smaller than a byte: a larger count is a lie, and would be counted down for hours.
+        store.max_sequence_length = max(1, len(payload))
         try:
             return bytes(store.ros1_to_cdr(payload, channel.type))
         except SerdeError:
@@ -88,19 +94,49 @@ def jazzy_definition(type_name: str) -> tuple[Definition, str]:
 
 @lru_cache(maxsize=256)
 def _store_of(type_name: str, definition: Definition | None) -> Typestore:
-    """A store of what a definition holds: the type and all that it is made of; Jazzy's where there is none."""
-    if definition is None:
+    """A store of what a definition holds: the type and all that it is made of; Jazzy's where that is of no use."""
+    if definition is None or len(definition.text) > _LONGEST:
         return _jazzy()
     store = get_typestore(Stores.EMPTY)
     try:
         types = _parsed(type_name, definition)
         # ROS 1's Header begins with `seq`, which rosbags skips by itself.
         types.pop(_HEADER, None)
-        store.register({_HEADER: _jazzy().fielddefs[_HEADER]})
-        store.register({name: fields for name, fields in types.items() if name not in store.fielddefs})
-    except (TypesysError, KeyError, ValueError):
+        types = {_HEADER: _jazzy().fielddefs[_HEADER], **types}
+        types = {name: fields for name, fields in types.items() if name not in store.fielddefs}
+        _require_bearable({**store.fielddefs, **types})
+        store.register(types)
+    except Exception:  # noqa: BLE001  the parser asserts and recurses, and what it read becomes code: it may raise anything
         return _jazzy()
     return store
+
+
+def _require_bearable(types: Mapping[str, Any]) -> None:
+    """Raise ValueError or KeyError where types hold themselves, what is not there, or more than a message can."""
+    weights: dict[str, int] = {}
+
+    def weight_of(name: str, depth: int) -> int:
+        if depth > _DEEPEST:
+            raise ValueError(f"{name} holds itself")
+        if name not in weights:
+            weights[name] = sum(weight_of_field(description, depth) for _, description in types[name][1])
+        if weights[name] > _MOST_FIELDS:
+            raise ValueError(f"{name} has more fields than a message can")
+        return weights[name]
+
+    def weight_of_field(description: Any, depth: int) -> int:
+        kind, what = description
+        if kind == Nodetype.NAME:
+            return weight_of(what, depth + 1)
+        if kind == Nodetype.BASE:
+            return 1
+        element, count = what
+        # Numbers beside each other are one thing to skip, all else is gone through.
+        is_plain = kind == Nodetype.SEQUENCE or (element[0] == Nodetype.BASE and element[1][0] != "string")
+        return weight_of_field(element, depth) * (1 if is_plain else count)
+
+    for name in types:
+        weight_of(name, 0)
 
 
 def _parsed(type_name: str, definition: Definition) -> dict[str, Any]:

@@ -1,37 +1,44 @@
-"""MCAP files (the specification at mcap.dev): by their index, or by one made in a first pass where there is none."""
+"""MCAP files: by their index, or by one made in a first pass where there is none that can be trusted."""
 
 import os
-from collections.abc import Callable, Collection, Iterator
-from io import BytesIO
+import zlib
+from collections.abc import Collection, Iterator
+from contextlib import suppress
 from pathlib import Path
-from struct import Struct, error
-from typing import BinaryIO, Final
+from struct import Struct
+from typing import Final
 
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.reader import make_reader
 from mcap.records import Channel as ChannelRecord
-from mcap.records import Chunk, Schema
-from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
-from mcap.summary import Summary
-from zstandard import ZstdError
+from mcap.records import Chunk, ChunkIndex, Schema, Statistics
 
+from syncrelay.bag.losses import Losses
+from syncrelay.bag.mcap_records import (
+    MESSAGE_FIELDS,
+    RECORD,
+    UNREADABLE,
+    messages,
+    parsed,
+    parsed_from,
+    records,
+    unpacked,
+)
 from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import read_profiles
 from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
-from syncrelay.bag.segments import Segment, read_in_order
+from syncrelay.bag.segments import Segment, extent, read_in_order
 from syncrelay.errors import BagError
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 """What an MCAP file begins with, and ends with if it was closed."""
 
-_RECORD: Final = Struct("<BQ")
-# Opcode, length, channel id, sequence, log time, publish time; the payload follows.
-_MESSAGE: Final = Struct("<BQHIQQ")
+# Where the summary begins, where its offsets do, the checksum of all from the summary up to here.
+_FOOTER: Final = Struct("<QQI")
+_CHECKSUM_SIZE: Final = 4
 # Messages outside of chunks are read by the piece.
 _PIECE: Final = 4_000_000
-_UNREADABLE: Final = (McapError, CRCValidationError, ZstdError, RuntimeError, error, ValueError)
+# No text of a schema or a channel is so long.
+_LONGEST_TEXT: Final = 64_000_000
 _ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
 
 
@@ -39,49 +46,38 @@ class McapFile:
     """One MCAP file, opened for reading; see Recording."""
 
     def __init__(self, path: Path, name: str) -> None:
-        """Open a file that messages call `name`; raises BagError where it is none."""
-        self._name = name
+        """Open a file that messages call `name`."""
         self._file = path.open("rb")
+        self._losses = Losses(name)
         self.size = os.fstat(self._file.fileno()).st_size
         self.position = 0
-        self.faults: list[str] = []
         self._segments: list[Segment] = []
         self._chunked: set[Segment] = set()
         self._schemas: dict[int, Schema] = {}
         self._records: dict[int, ChannelRecord] = {}
-        summary = self._summary()
-        if summary is not None and summary.chunk_indexes and summary.channels:
-            self._schemas, self._records = summary.schemas, summary.channels
-            self._segments = [
-                Segment(each.chunk_start_offset, each.chunk_length, each.message_start_time, each.message_end_time)
-                for each in summary.chunk_indexes
-            ]
-            self._chunked = set(self._segments)
-        else:
+        if not self._read_index():
             self._scan()
         self._by_id = {number: self._channel(record) for number, record in self._records.items()}
         self.channels = tuple(self._by_id.values())
-        self.begin = min((each.begin for each in self._segments), default=0)
-        self.end = max((each.end for each in self._segments), default=0)
+        self.begin, self.end = extent(self._segments)
+
+    @property
+    def faults(self) -> list[str]:
+        """See Recording."""
+        return self._losses.sentences
 
     def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
         """See Recording."""
         among = frozenset(wanted)
-        chosen = {number: channel for number, channel in self._by_id.items() if channel in among}
-        for segment, messages in read_in_order(self._segments, lambda each: self._read(each, chosen)):
+        chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
+        for segment, found in read_in_order(self._segments, lambda each: self._read(each, chosen), self._losses):
             self.position += segment.size
-            yield from messages
+            yield from found
         self.position = self.size
 
     def close(self) -> None:
         """See Recording."""
         self._file.close()
-
-    def _summary(self) -> Summary | None:
-        try:
-            return make_reader(self._file).get_summary()
-        except (*_UNREADABLE, OSError):
-            return None
 
     def _channel(self, record: ChannelRecord) -> Channel:
         schema = self._schemas.get(record.schema_id)
@@ -95,103 +91,160 @@ class McapFile:
             record.metadata.get("topic_type_hash", ""),
         )
 
-    def _read(self, segment: Segment, wanted: dict[int, Channel]) -> list[RawMessage]:
+    def _read(self, segment: Segment, channels: dict[int, Channel | None]) -> list[RawMessage]:
+        found: list[RawMessage] = []
         try:
-            return list(_messages(self._content(segment), wanted))
-        except _UNREADABLE as fault:
-            self.faults.append(f"{self._name}: the chunk at byte {segment.offset} is damaged and left out: {fault}")
-            return []
+            found.extend(messages(self._content(segment), channels))
+        except UNREADABLE as fault:
+            self._losses.damaged(f"the chunk at byte {segment.offset}", fault, read=len(found))
+        return found
 
     def _content(self, segment: Segment) -> bytes:
-        self._file.seek(segment.offset)
         if segment not in self._chunked:
-            return self._file.read(segment.size)
-        self._file.seek(_RECORD.size, os.SEEK_CUR)
-        return _unpacked(Chunk.read(ReadDataStream(self._file)))
+            return self._bytes(segment.offset, segment.size)
+        opcode, length = RECORD.unpack(self._bytes(segment.offset, RECORD.size))
+        if opcode != Opcode.CHUNK or length != segment.size - RECORD.size:
+            raise ValueError("it is not what the index says")
+        return unpacked(self._chunk(segment))
+
+    def _chunk(self, record: Segment) -> Chunk:
+        self._file.seek(record.offset + RECORD.size)
+        chunk: Chunk = parsed_from(Chunk, self._file, record.size - RECORD.size)
+        return chunk
+
+    def _bytes(self, place: int, size: int) -> bytes:
+        """Read bytes that the file has: the caller has checked that."""
+        self._file.seek(place)
+        return self._file.read(size)
+
+    def _walk(self, place: int, end: int) -> Iterator[tuple[int, int, int]]:
+        """Yield opcode, begin and end of what each record of a part of the file holds.
+
+        Raises EOFError where the part ends within a record.
+        """
+        while place < end:
+            begin = place + RECORD.size
+            opcode, length = RECORD.unpack(self._bytes(place, RECORD.size)) if begin <= end else (0, end)
+            place = begin + length
+            if place > end:
+                raise EOFError("a record ends behind the end")
+            yield opcode, begin, place
+
+    def _read_index(self) -> bool:
+        """Take channels and chunks from the summary at the end of the file; False where it tells none, or a lie."""
+        try:
+            chunks = list(self._summary())
+        except UNREADABLE:
+            chunks = []
+        ordered = sorted(chunks, key=lambda each: each.chunk_start_offset)
+        ends = [each.chunk_start_offset + each.chunk_length for each in ordered]
+        if (
+            not (chunks and self._records)
+            or ordered[0].chunk_start_offset < len(MAGIC)
+            or ends[-1] > self.size
+            or any(end > after.chunk_start_offset for end, after in zip(ends, ordered[1:], strict=False))
+            or any(each.message_start_time > each.message_end_time for each in chunks)
+        ):
+            return False
+        self._segments = [
+            Segment(each.chunk_start_offset, each.chunk_length, each.message_start_time, each.message_end_time)
+            for each in chunks
+        ]
+        self._chunked = set(self._segments)
+        return True
+
+    def _summary(self) -> Iterator[ChunkIndex]:
+        """Take in schemas and channels of the summary, yield its chunks; raises one of UNREADABLE."""
+        end = self.size - len(MAGIC) - RECORD.size - _FOOTER.size
+        if end < len(MAGIC):
+            raise EOFError("there is no footer")
+        head, footer = self._bytes(end, RECORD.size), self._bytes(end + RECORD.size, _FOOTER.size)
+        begin, _, checksum = _FOOTER.unpack(footer)
+        if head != RECORD.pack(Opcode.FOOTER, _FOOTER.size) or not len(MAGIC) <= begin < end:
+            raise ValueError("there is no summary")
+        if checksum not in (0, self._checksum(begin, end + RECORD.size + _FOOTER.size - _CHECKSUM_SIZE)):
+            raise ValueError("its checksum does not fit")
+        count = told = 0
+        for opcode, place, stop in self._walk(begin, end):
+            match opcode:
+                case Opcode.SCHEMA | Opcode.CHANNEL:
+                    self._define(opcode, self._text(place, stop))
+                case Opcode.CHUNK_INDEX:
+                    yield parsed(ChunkIndex, self._text(place, stop))
+                    count += 1
+                case Opcode.STATISTICS:
+                    told = parsed(Statistics, self._text(place, stop)).chunk_count
+        if told not in (0, count):
+            raise ValueError("chunks are missing in it")
+
+    def _checksum(self, begin: int, end: int) -> int:
+        checksum = 0
+        for place in range(begin, end, _PIECE):
+            checksum = zlib.crc32(self._bytes(place, min(_PIECE, end - place)), checksum)
+        return checksum
+
+    def _text(self, begin: int, end: int) -> bytes:
+        """Read what a record holds that is not to be large."""
+        if end - begin > _LONGEST_TEXT:
+            raise ValueError(f"{end - begin} bytes are no description")
+        return self._bytes(begin, end - begin)
 
     def _scan(self) -> None:
         """Find channels and segments by going through the file to its end, or as far as it can be read."""
-        self._file.seek(len(MAGIC))
+        self._schemas.clear()
+        self._records.clear()
         loose = _Pieces()
-        while (place := self._file.tell()) < self.size:
-            head = self._file.read(_RECORD.size)
-            opcode, length = _RECORD.unpack(head) if len(head) == _RECORD.size else (0, self.size)
-            if opcode == Opcode.DATA_END:
-                break
-            end = place + _RECORD.size + length
-            if end > self.size:
-                self.faults.append(f"{self._name}: cut off at byte {place} of {self.size}, what is before it is read")
-                break
-            self._note(opcode, Segment(place, end - place, 0, 0), loose)
-            self._file.seek(end)
+        place = len(MAGIC)
+        try:
+            for opcode, begin, end in self._walk(place, self.size):
+                if opcode == Opcode.DATA_END:
+                    break
+                self._note(opcode, begin, end, loose)
+                place = end
+        except UNREADABLE:
+            self._losses.cut_off(place, self.size)
         self._segments += loose.segments()
 
-    def _note(self, opcode: int, record: Segment, loose: "_Pieces") -> None:
+    def _note(self, opcode: int, begin: int, end: int, loose: "_Pieces") -> None:
         """Take in what a record of the file says."""
-        match opcode:
-            case Opcode.SCHEMA | Opcode.CHANNEL:
-                self._define(opcode, self._file)
-            case Opcode.MESSAGE:
-                content = self._file.read(_MESSAGE.size - _RECORD.size)
-                time = int.from_bytes(content[6:14], "little")
-                loose.add(Segment(record.offset, record.size, time, time))
-            case Opcode.CHUNK:
-                self._note_chunk(record)
+        place = begin - RECORD.size
+        try:
+            match opcode:
+                case Opcode.SCHEMA | Opcode.CHANNEL:
+                    self._define(opcode, self._text(begin, end))
+                case Opcode.MESSAGE:
+                    time = int.from_bytes(self._bytes(begin, min(MESSAGE_FIELDS, end - begin))[6:14], "little")
+                    loose.add(Segment(place, end - place, time, time))
+                case Opcode.CHUNK:
+                    self._note_chunk(Segment(place, end - place, 0, 0))
+        except UNREADABLE as fault:
+            self._losses.damaged(f"the {Opcode(opcode).name.lower()} at byte {place}", fault)
 
     def _note_chunk(self, record: Segment) -> None:
-        try:
-            chunk = Chunk.read(ReadDataStream(self._file))
-            content = _unpacked(chunk)
-        except _UNREADABLE as fault:
-            self.faults.append(f"{self._name}: the chunk at byte {record.offset} is damaged and left out: {fault}")
-            return
-        for opcode, place, _ in _records(content):
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._define(opcode, BytesIO(content[place + _RECORD.size :]))
+        chunk = self._chunk(record)
+        content = unpacked(chunk)
         segment = Segment(record.offset, record.size, chunk.message_start_time, chunk.message_end_time)
         self._segments.append(segment)
         self._chunked.add(segment)
+        # Where its records end too soon is said when its messages are read.
+        with suppress(*UNREADABLE):
+            for opcode, begin, end in records(content):
+                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    self._define_in(record, opcode, content[begin:end])
 
-    def _define(self, opcode: int, content: BinaryIO | BytesIO) -> None:
-        stream = ReadDataStream(content)
+    def _define_in(self, chunk: Segment, opcode: int, content: bytes) -> None:
+        try:
+            self._define(opcode, content)
+        except UNREADABLE as fault:
+            self._losses.damaged(f"a {Opcode(opcode).name.lower()} in the chunk at byte {chunk.offset}", fault)
+
+    def _define(self, opcode: int, content: bytes) -> None:
         if opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream)
+            schema = parsed(Schema, content)
             self._schemas[schema.id] = schema
         else:
-            channel = ChannelRecord.read(stream)
+            channel = parsed(ChannelRecord, content)
             self._records[channel.id] = channel
-
-
-def _unpacked(chunk: Chunk) -> bytes:
-    stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-    return stream.read(size)
-
-
-def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield opcode, begin and end of each record."""
-    place = 0
-    while place < len(content):
-        opcode, length = _RECORD.unpack_from(content, place)
-        end = place + _RECORD.size + length
-        yield opcode, place, end
-        place = end
-
-
-def _messages(content: bytes, wanted: dict[int, Channel]) -> Iterator[RawMessage]:
-    """Yield the messages of a run of records. The innermost loop of reading: half a microsecond each."""
-    unpack, begin_payload, message = _MESSAGE.unpack_from, _MESSAGE.size, Opcode.MESSAGE.value
-    find: Callable[[int], Channel | None] = wanted.get
-    place, size = 0, len(content)
-    while place < size:
-        if content[place] != message:
-            place += _RECORD.size + _RECORD.unpack_from(content, place)[1]
-            continue
-        _, length, number, _, time, _ = unpack(content, place)
-        end = place + _RECORD.size + length
-        channel = find(number)
-        if channel is not None:
-            yield channel, time, content[place + begin_payload : end]
-        place = end
 
 
 class _Pieces:

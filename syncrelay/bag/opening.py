@@ -53,9 +53,10 @@ def open_recording(paths: Sequence[str]) -> Recording:
     with ExitStack() as opened:
         files: list[Recording] = []
         unreadable: list[BagError] = []
+        faults: list[str] = []
         for path in _files(paths):
             try:
-                file = _open(path, opened)
+                file = _open(path, opened, faults)
             except BagError as error:
                 unreadable.append(error)
                 continue
@@ -63,7 +64,7 @@ def open_recording(paths: Sequence[str]) -> Recording:
             files.append(file)
         if not files:
             raise unreadable[0]
-        return Files(files, opened.pop_all(), faults=[str(error) for error in unreadable])
+        return Files(files, opened.pop_all(), faults=[*map(str, unreadable), *faults])
 
 
 class Files:
@@ -138,17 +139,16 @@ def _similar(path: Path) -> str:
     return did_you_mean(path.name, beside)
 
 
-def _open(path: Path, opened: ExitStack) -> Recording:
+def _open(path: Path, opened: ExitStack, faults: list[str]) -> Recording:
     """Open one file by its content, decompressed into a temporary one if it is compressed as a whole."""
     magic = _magic(path)
     for begin, decompressor in _DECOMPRESSORS.items():
         if magic.startswith(begin):
-            content, faults = _decompressed(path, decompressor, opened)
-            if faults and not content.stat().st_size:
-                raise BagError(faults[0])
-            file = _open_plain(content, _magic(content), str(path))
-            file.faults.extend(faults)
-            return file
+            content, found = _decompressed(path, decompressor, opened)
+            if found and not content.stat().st_size:
+                raise BagError(found[0])
+            faults += found
+            return _open_plain(content, _magic(content), str(path))
     return _open_plain(path, magic, str(path))
 
 
@@ -164,6 +164,8 @@ def _open_plain(path: Path, magic: bytes, name: str) -> Recording:
 
 
 def _magic(path: Path) -> bytes:
+    if not path.is_file():
+        raise BagError(f"{path}: is not a file that can be read from any place, as a recording has to be")
     try:
         with path.open("rb") as file:
             return file.read(_LONGEST_MAGIC)

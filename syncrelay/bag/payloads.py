@@ -6,8 +6,8 @@ from typing import Any, Final, TypeAlias
 
 from syncrelay.bag.definitions import begins_with_header, converter, fields_of
 from syncrelay.bag.recording import Channel, Encoding
-from syncrelay.cdr import read_stamp
-from syncrelay.cdr_fields import UnreadableFieldError, field_reader
+from syncrelay.cdr import LATEST_STAMP, read_stamp
+from syncrelay.cdr_fields import FieldsOf, UnreadableFieldError, field_reader, time_reader
 from syncrelay.config import StampField, StampSource
 from syncrelay.errors import BagError
 
@@ -27,7 +27,7 @@ def stamp_reader(source: StampSource, channel: Channel) -> ReadStamp | None:
     if source == "receive":
         return None
     if isinstance(source, StampField):
-        return value_reader(channel, source.field)
+        return _in_place(channel, source.field, time_reader)
     if begins_with_header(channel) is False:
         raise BagError(
             f"{channel.topic}: {channel.type} does not begin with a std_msgs/msg/Header, where the stamp is looked for:"
@@ -41,6 +41,12 @@ def value_reader(channel: Channel, path: str) -> Callable[[bytes], Any]:
 
     Raises BagError where the type has no such field, or the recording does not define it.
     """
+    return _in_place(channel, path, field_reader)
+
+
+def _in_place(
+    channel: Channel, path: str, reader: Callable[[FieldsOf, str, str], Callable[[bytes], Any]]
+) -> Callable[[bytes], Any]:
     fields = fields_of(channel)
     if fields is None:
         raise BagError(
@@ -48,7 +54,7 @@ def value_reader(channel: Channel, path: str) -> Callable[[bytes], Any]:
         )
     package, _, name = channel.type.split("/")
     try:
-        read = field_reader(fields, f"{package}/{name}", path)
+        read = reader(fields, f"{package}/{name}", path)
     except UnreadableFieldError as error:
         raise BagError(f"{channel.topic}: {channel.type} has no field {path} to go by: {error}") from error
     if channel.encoding is not Encoding.ROS1:
@@ -63,10 +69,14 @@ def value_reader(channel: Channel, path: str) -> Callable[[bytes], Any]:
 
 
 def read_ros1_stamp(payload: bytes) -> int | None:
-    """Return the stamp of the Header that a ROS 1 payload begins with, in nanoseconds; None if it is malformed."""
+    """Return the stamp of the Header that a ROS 1 payload begins with, in nanoseconds; None if it is malformed.
+
+    So is one after January 2038, which ROS 2 has no stamp for.
+    """
     if len(payload) < _ROS1_STAMP.size:
         return None
     seconds, nanoseconds = _ROS1_STAMP.unpack_from(payload)
     if nanoseconds >= _NS_PER_SECOND:
         return None
-    return int(seconds * _NS_PER_SECOND + nanoseconds)
+    stamp = int(seconds * _NS_PER_SECOND + nanoseconds)
+    return stamp if stamp <= LATEST_STAMP else None

@@ -7,6 +7,7 @@ from typing import Any, Final
 import yaml
 
 from syncrelay.config import QosOverrides, QosPreset
+from syncrelay.config.compose import LOADER
 
 # rclpy's default for every duration is 0, which is unset; rosbag2 writes it so, too.
 _UNSET: Final = 0
@@ -20,6 +21,8 @@ _NAMES: Final[Mapping[str, Sequence[str]]] = {
     "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
     "liveliness": ("system_default", "automatic", "manual_by_node", "manual_by_topic", "unknown", "best_available"),
 }
+# A list of profiles, each of which has durations.
+_DEEPEST: Final = 5
 _DURATIONS: Final = ("deadline", "lifespan", "liveliness_lease_duration")
 
 
@@ -73,15 +76,27 @@ def output_profile(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) 
     return replace(served, **asked.model_dump(exclude_none=True))
 
 
-def read_profiles(recorded: Any) -> tuple[Profile, ...]:
-    """Return the profiles of `offered_qos_profiles`, a YAML text or what it holds; none where it makes no sense."""
+def read_profiles(recorded: str) -> tuple[Profile, ...]:
+    """Return the profiles of `offered_qos_profiles`, a YAML text; none where it makes no sense."""
     try:
-        listed = yaml.safe_load(recorded) if isinstance(recorded, str) else recorded
-    except yaml.YAMLError:
+        listed = yaml.load(recorded, Loader=LOADER) if _is_plain(recorded) else None  # noqa: S506  a safe one
+    except (yaml.YAMLError, ValueError):
         return ()
     if not isinstance(listed, list):
         return ()
     return tuple(_read_profile(each) for each in listed if isinstance(each, dict))
+
+
+def _is_plain(text: str) -> bool:
+    """Tell whether a text nests no deeper than profiles do, and has no aliases, which can stand for gigabytes."""
+    depth = 0
+    for event in yaml.parse(text, Loader=LOADER):
+        if isinstance(event, yaml.AliasEvent):
+            return False
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            return False
+    return True
 
 
 def write_profile(profile: Profile) -> dict[str, Any]:
@@ -111,5 +126,5 @@ def _name(key: str, value: Any) -> str:
 def _nanoseconds(value: Any) -> int:
     try:
         return int(value["sec"]) * _NS_PER_SECOND + int(value["nsec"])
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         return _UNSET

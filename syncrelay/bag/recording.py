@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol, TypeAlias
+from typing import Final, Protocol, TypeAlias
 
 from syncrelay.bag.qos import Profile
 from syncrelay.printable import printable
@@ -53,7 +53,10 @@ class Channel:
 
 
 RawMessage: TypeAlias = tuple[Channel, int, bytes]
-"""A channel, when the message was received in nanoseconds, and its payload."""
+"""A channel, when the message was received in nanoseconds, 0 to LATEST, and its payload."""
+
+LATEST: Final = 2**62 - 1
+"""The latest time of receipt, in 2116: ROS 1 tells none that is later, and what two times differ by fits 64 bits."""
 
 
 class Recording(Protocol):

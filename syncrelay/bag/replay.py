@@ -6,9 +6,9 @@ from typing import Any, Final, TypeAlias
 
 from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.payloads import stamp_reader, value_reader
-from syncrelay.bag.recording import Channel, Encoding, RawMessage, Recording
+from syncrelay.bag.recording import LATEST, Channel, Encoding, RawMessage, Recording
 from syncrelay.bag.wiring import Wiring
-from syncrelay.cdr import has_place_for_stamp
+from syncrelay.cdr import LATEST_STAMP, has_place_for_stamp
 from syncrelay.sync import DropReason, InputCounts, Message, Outcome, SyncGroup
 
 Listener: TypeAlias = Callable[[Wiring, Outcome, int], None]
@@ -68,22 +68,23 @@ class GroupReplay:
 
     def _feed(self, index: int, channel: Channel) -> _Feed:
         feed = self._feed_any(index, channel)
-        if not self._is_to_be_restamped(index, channel):
+        by = self.wiring.inputs[index].config.stamp
+        # Reading a header's stamp shows that there is a place for one, and that a header can hold it.
+        if self.wiring.group.restamp is None or by == "header":
             return feed
+        latest = LATEST_STAMP if by == "receive" else LATEST
+        needs_place = self._has_header(channel)
 
         def feed_if_it_can_be_restamped(raw: RawMessage) -> None:
-            if has_place_for_stamp(raw[2]):
+            if raw[1] <= latest and (not needs_place or has_place_for_stamp(raw[2])):
                 feed(raw)
             else:
                 self._reject(index, raw)
 
         return feed_if_it_can_be_restamped
 
-    def _is_to_be_restamped(self, index: int, channel: Channel) -> bool:
-        """Whether a stamp is to be written where none is read: else reading it shows that there is a place for it."""
-        by_header = self.wiring.inputs[index].config.stamp == "header"
-        is_ros2 = channel.encoding is not Encoding.ROS1
-        return self.wiring.group.restamp is not None and is_ros2 and not by_header and bool(begins_with_header(channel))
+    def _has_header(self, channel: Channel) -> bool:
+        return channel.encoding is not Encoding.ROS1 and bool(begins_with_header(channel))
 
     def _feed_any(self, index: int, channel: Channel) -> _Feed:
         topic = self.wiring.inputs[index].config
@@ -133,6 +134,7 @@ def replay(recording: Recording, wirings: Sequence[Wiring], *, listeners: Sequen
     for group in groups:
         for channel, feed in group.feeds():
             feeds.setdefault(channel, []).append(feed)
+    now = recording.begin
     for raw in recording.messages(feeds.keys()):
         channel, now, _ = raw
         for group in limited:
@@ -140,7 +142,8 @@ def replay(recording: Recording, wirings: Sequence[Wiring], *, listeners: Sequen
         for feed in feeds[channel]:
             feed(raw)
     for group in groups:
-        group.finish(recording.end)
+        # What tells the end of a damaged recording may lie.
+        group.finish(max(now, recording.end))
     return [group.result() for group in groups]
 
 

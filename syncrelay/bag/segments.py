@@ -3,13 +3,14 @@
 Segments may overlap in time, as several threads write them. Only what overlaps is held in memory.
 """
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Final
 
-from syncrelay.bag.recording import RawMessage
+from syncrelay.bag.losses import Losses
+from syncrelay.bag.recording import LATEST, RawMessage
 
 _RECEIVED: Final = itemgetter(1)
 
@@ -24,18 +25,35 @@ class Segment:
     end: int
 
 
+def extent(segments: Sequence[Segment]) -> tuple[int, int]:
+    """Return the first and the last time of receipt that segments tell of; 0 of none."""
+    times = [time for each in segments for time in (each.begin, each.end) if 0 <= time <= LATEST]
+    return min(times, default=0), max(times, default=0)
+
+
 def read_in_order(
-    segments: Sequence[Segment], read: Callable[[Segment], list[RawMessage]]
+    segments: Sequence[Segment], read: Callable[[Segment], list[RawMessage]], losses: Losses
 ) -> Iterator[tuple[Segment, list[RawMessage]]]:
-    """Yield, for each segment in turn, the messages that nothing later can precede."""
+    """Yield, for each segment in turn, the messages that nothing later can precede.
+
+    What comes too late for that, as its segment tells other times than it has, is counted by `losses`, as is what
+    belongs to no channel or no time, and is left out.
+    """
     by_time = sorted(segments, key=lambda segment: segment.begin)
     held: list[RawMessage] = []
+    until = 0
     for place, segment in enumerate(by_time):
         held += read(segment)
         # Sorted runs, one behind another, are merged in one go.
         held.sort(key=_RECEIVED)
+        held = losses.kept(held)
+        too_late = bisect_left(held, until, key=_RECEIVED)
+        if too_late:
+            losses.too_late(too_late)
         due = len(held)
         if place + 1 < len(by_time):
             due = bisect_right(held, by_time[place + 1].begin, key=_RECEIVED)
         yield segment, held[:due]
+        if due:
+            until = held[due - 1][1]
         del held[:due]

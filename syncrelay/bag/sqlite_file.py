@@ -1,25 +1,44 @@
-"""rosbag2's sqlite3 files, by SQL. What a recorder that was killed left in the write-ahead log is read too."""
+"""rosbag2's sqlite3 files, by SQL. What a recorder that was killed left in the write-ahead log is read too.
+
+Whatever a column is declared as, sqlite3 keeps values of any kind in it: those of another kind are left out.
+"""
 
 import os
+import reprlib
 import sqlite3
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
-import zstandard
+from zstandard import ZstdError
 
+from syncrelay.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.bag.qos import read_profiles
-from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
+from syncrelay.bag.recording import LATEST, Channel, Definition, Encoding, RawMessage
+from syncrelay.bag.unpacking import zstd_unpacker
 from syncrelay.errors import BagError
 
 MAGIC: Final = b"SQLite format 3\0"
 """What every sqlite3 file begins with."""
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
-_BY_TIME: Final = "SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({}) ORDER BY timestamp"
+# Those of no known topic too, so that they are missed.
+_BY_TIME: Final = """
+SELECT topic_id, timestamp, data FROM messages WHERE topic_id IS NULL OR topic_id NOT IN ({}) ORDER BY timestamp"""
+# By the index of the times: no scan.
+_END_OF: Final = """
+SELECT timestamp FROM messages WHERE timestamp BETWEEN 0 AND ? AND typeof(timestamp) = 'integer'
+ORDER BY timestamp {} LIMIT 1"""
+_FIRST_PAYLOADS: Final = "SELECT data FROM messages WHERE typeof(data) = 'blob' LIMIT 3"
 _ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
+# A sentence of sqlite3's own that quotes a damaged name is no text, which is a ValueError.
+_UNREADABLE: Final = (sqlite3.Error, ValueError, MemoryError)
+_NOT_UNPACKED: Final = (ZstdError, ValueError, EOFError, MemoryError)
+# A row takes ten bytes or more and some tens of steps; a view without an end, or pages in a circle, take more.
+_STEPS_PER_BYTE: Final = 50
+_STEPS_AT_ONCE: Final = 1_000_000
 
 
 class SqliteFile:
@@ -27,33 +46,45 @@ class SqliteFile:
 
     def __init__(self, path: Path, name: str) -> None:
         """Open a file that messages call `name`; raises BagError where it is no recording."""
-        self._name = name
-        self.faults: list[str] = []
+        self._losses = Losses(name)
         self.size = path.stat().st_size
         self.position = 0
         self._database = _opened(path, name)
         try:
             self.channels = tuple(self._channels())
-            # Both ends of an index: no scan.
-            self.begin = self._first("SELECT min(timestamp) FROM messages") or 0
-            self.end = self._first("SELECT max(timestamp) FROM messages") or 0
-            self._is_compressed = bytes(self._first("SELECT data FROM messages LIMIT 1") or b"").startswith(_ZSTD)
-        except sqlite3.Error as fault:
+            # Of a damaged index, the first may be the later one.
+            self.begin, self.end = sorted(self._end(order) for order in ("ASC", "DESC"))
+            self._unpack = self._unpacker()
+        except _UNREADABLE as fault:
             self._database.close()
             raise BagError(f"{name}: cannot be read as a rosbag2 recording: {fault}") from fault
+
+    @property
+    def faults(self) -> list[str]:
+        """See Recording."""
+        return self._losses.sentences
 
     def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {channel.id: channel for channel in self.channels if channel in among}
-        rows = self._database.execute(_BY_TIME.format(", ".join(map(str, chosen))))
-        unpack = zstandard.ZstdDecompressor().decompress
+        others = [channel.id for channel in self.channels if channel.id not in chosen]
+        unpack, leave_out = self._unpack, self._losses.leave_out
         try:
-            for number, time, payload in rows:
+            for number, time, payload in self._database.execute(_BY_TIME.format(_marks(len(others))), others):
+                channel = chosen.get(number)
+                if channel is None or type(time) is not int or type(payload) is not bytes or not 0 <= time <= LATEST:
+                    leave_out(_why(channel, time, payload))
+                    continue
                 self.position += len(payload)
-                yield chosen[number], time, unpack(payload) if self._is_compressed else payload
-        except (sqlite3.Error, zstandard.ZstdError) as fault:
-            self.faults.append(f"{self._name}: damaged, what could be read is read: {fault}")
+                try:
+                    content = payload if unpack is None else unpack(payload)
+                except _NOT_UNPACKED:
+                    leave_out("the payload cannot be decompressed")
+                    continue
+                yield channel, time, content
+        except _UNREADABLE as fault:
+            self._losses.say(f"damaged, what could be read is read: {fault or 'there is not enough memory'}")
         self.position = self.size
 
     def close(self) -> None:
@@ -67,14 +98,18 @@ class SqliteFile:
         definitions = dict(self._definitions())
         query = f"SELECT id, name, type, serialization_format, {qos}, {type_hash} FROM topics"  # noqa: S608  columns
         for number, topic, type_name, encoding, profiles, hashed in self._database.execute(query):
+            if type(number) is not int or not all(isinstance(each, str) for each in (topic, type_name, encoding)):
+                described = ", ".join(map(reprlib.repr, (number, topic, type_name, encoding)))
+                self._losses.say(f"a topic is left out: expected a number, a name, a type and an encoding: {described}")
+                continue
             yield Channel(
                 number,
                 topic,
                 type_name,
                 _ENCODINGS.get(encoding, encoding),
                 definitions.get(type_name),
-                read_profiles(profiles),
-                hashed,
+                read_profiles(profiles) if isinstance(profiles, str) else (),
+                hashed if isinstance(hashed, str) else "",
             )
 
     def _definitions(self) -> Iterator[tuple[str, Definition]]:
@@ -82,19 +117,44 @@ class SqliteFile:
         with suppress(sqlite3.OperationalError):
             query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
             for type_name, encoding, text in self._database.execute(query):
-                yield type_name, Definition(encoding, text)
+                if all(isinstance(each, str) for each in (type_name, encoding, text)):
+                    yield type_name, Definition(encoding, text)
 
-    def _first(self, query: str) -> int | None:
-        row = self._database.execute(query).fetchone()
-        return row[0] if row else None
+    def _end(self, order: str) -> int:
+        """Return the first or the last time of receipt, 0 if there is none."""
+        row = self._database.execute(_END_OF.format(order), (LATEST,)).fetchone()
+        return int(row[0]) if row else 0
+
+    def _unpacker(self) -> Callable[[bytes], bytes] | None:
+        firsts = self._database.execute(_FIRST_PAYLOADS)
+        return zstd_unpacker() if any(payload.startswith(_ZSTD) for (payload,) in firsts) else None
+
+
+def _marks(count: int) -> str:
+    return ", ".join("?" * count)
+
+
+def _why(channel: Channel | None, time: object, payload: object) -> str:
+    """Tell why a row is no message."""
+    if channel is None:
+        return OF_NO_CHANNEL
+    if type(time) is not int:
+        return "the time of receipt is no integer"
+    return "the payload is no BLOB" if type(payload) is not bytes else OF_NO_TIME
 
 
 def _opened(path: Path, name: str) -> sqlite3.Connection:
     """Open a file without changing it or what is beside it."""
     log = path.with_name(f"{path.name}-wal")
     # A log is read only where its index can be made beside it; immutable files are read without it.
-    mode = "mode=ro" if log.exists() and os.access(path.parent, os.W_OK) else "mode=ro&immutable=1"
+    is_logged = log.exists() and os.access(path.parent, os.W_OK)
+    mode = "mode=ro" if is_logged else "mode=ro&immutable=1"
     try:
-        return sqlite3.connect(f"file:{quote(str(path.absolute()))}?{mode}", uri=True)
+        database = sqlite3.connect(f"file:{quote(str(path.absolute()))}?{mode}", uri=True)
     except sqlite3.Error as fault:
         raise BagError(f"{name}: cannot be opened: {fault}") from fault
+    database.text_factory = lambda text: text.decode(errors="replace")
+    steps = _STEPS_PER_BYTE * (path.stat().st_size + (log.stat().st_size if is_logged else 0))
+    left = iter(range(1 + steps // _STEPS_AT_ONCE))
+    database.set_progress_handler(lambda: next(left, None) is None, _STEPS_AT_ONCE)
+    return database

@@ -16,7 +16,7 @@ from syncrelay.bag.analysis.nearest import pair, tightest
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.analysis.suggest import possible_sets, suggest
 from syncrelay.bag.analysis.topics import figures_of
-from syncrelay.bag.analysis.trial import try_group, watch_group
+from syncrelay.bag.analysis.trial import looked_at, try_group, watch_group
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -264,6 +264,40 @@ def test_the_findings_are_those_of_the_running_relay():
     first = watch_group(group_of(text, "front"), streams)[0]
     assert (first.finding.code.value, first.finding.severity.name) == ("over_slop", "ERROR")
     assert 20 < first.seconds <= 30
+
+
+def _watched(streams):
+    topics = inputs({"/a": VECTOR, "/b": VECTOR})
+    text = config({"front": {"policy": "approximate_time", "slop": "10ms", "topics": topics}})
+    return {
+        (each.finding.code.value, each.finding.input): each.seconds
+        for each in watch_group(group_of(text, "front"), streams)
+    }
+
+
+@pytest.mark.parametrize("pause", [60, 300, 5_000, 86_400, 54 * 365 * 86_400])
+def test_a_pause_is_found_for_as_long_as_it_lasts(pause):
+    before, after = _every(100 * MS, 300), _every(100 * MS, 300, phase=(30 + pause) * _SECOND)
+    found = _watched(_streams([*before, *after], [*before, *after]))
+    assert found.keys() == {("silent", 0), ("silent", 1)}
+    assert all(pause - 6 <= seconds <= pause for seconds in found.values())
+
+
+def test_one_message_of_1970_does_not_keep_the_others_from_being_judged():
+    stamps = _every(100 * MS, 300)
+    (first, second) = _streams(stamps, [stamp + 30 * MS for stamp in stamps])
+    for values, value in ((first.stamps, stamps[0] - MS), (first.received, 5 * _SECOND), (first.places, -1)):
+        values.insert(0, value)
+    assert 20 < _watched([first, second])["over_slop", None] <= 30
+
+
+@given(st.one_of(st.integers(-(2**63), 200), st.integers(0, 2**63)))
+def test_few_seconds_of_a_pause_are_looked_at_and_they_stand_for_all(seconds):
+    looks = looked_at(seconds)
+    assert looks == sorted(set(looks))
+    assert len(looks) <= 32 + 63
+    assert looks[:16] == list(range(1, min(16, max(0, seconds)) + 1))
+    assert looks[-16:] == list(range(max(1, seconds - 15), seconds + 1))
 
 
 def test_a_trial_loses_no_message():

@@ -163,7 +163,7 @@ def test_of_a_file_that_is_cut_off_what_is_whole_is_read(make, tmp_path):
     frames, (fault,) = _read(path)
     assert 0 < len(frames) < len(whole)
     assert frames == whole[: len(frames)]
-    assert "cut off at byte" in fault
+    assert "cut off or damaged at byte" in fault
 
 
 def test_a_ros1_bag_that_was_never_closed_is_read(tmp_path):
@@ -241,8 +241,8 @@ def test_qos_and_definitions_are_those_that_were_recorded(tmp_path):
         ("notes.txt", b"hello", "is no recording, expected MCAP, a sqlite3 file of rosbag2 or a ROS 1 bag"),
         ("empty.mcap", b"", "is empty"),
         ("old.bag", b"#ROSBAG V1.2\n", "is a bag of another format than 2.0"),
-        ("torn.mcap", b"\x89MCAP0\r\n\x01", "no message can be read: .*cut off at byte 8 of 9"),
-        ("torn.bag", b"#ROSBAG V2.0\n\x45\0\0\0", "no message can be read: .*cut off at byte 13"),
+        ("torn.mcap", b"\x89MCAP0\r\n\x01", "no message can be read: .*cut off or damaged at byte 8 of 9"),
+        ("torn.bag", b"#ROSBAG V2.0\n\x45\0\0\0", "no message can be read: .*cut off or damaged at byte 13"),
         ("other.db3", b"SQLite format 3\0" + bytes(100), "cannot be read as a rosbag2 recording"),
     ],
 )

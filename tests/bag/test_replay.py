@@ -152,10 +152,25 @@ def test_messages_without_a_readable_stamp_are_counted(tmp_path):
 
 def test_a_channel_that_is_not_of_ros_is_named(tmp_path):
     path = tmp_path / "rig.mcap"
-    write_mcap(path, rig(1))
+    write_mcap(path, rig(1), enable_crcs=False)
     content = path.read_bytes().replace(b"\x03\0\0\0cdr", b"\x03\0\0\0xml")
     path.write_bytes(content)
     recording = open_recording([str(path)])
     (wiring,) = wire(load_text(config({"front": _group(inputs(_PAIR))})), recording)
     recording.close()
     assert any("/camera is recorded as xml, expected cdr" in problem for problem in wiring.problems)
+
+
+@pytest.mark.parametrize("stamp", ["receive", {"field": "seen"}])
+def test_only_what_a_header_can_hold_restamps_a_set(stamp, tmp_path):
+    # Received after January 2038, which a header does not tell.
+    late = 2**31 * 10**9 + 5
+    frames = [Frame("/blip", CUSTOM, late, blip(BEGIN, seen=BEGIN)), *at("/lidar", 0)]
+    path = write_mcap(tmp_path / "rig.mcap", frames, store=CUSTOM_STORE)
+    topics = inputs({"/blip": CUSTOM, "/lidar": VECTOR})
+    topics[0]["stamp"] = stamp
+    left, _ = _replayed(path, _group(topics, restamp="latest", max_wait="0ms"))
+    if stamp == "receive":
+        assert (0, DropReason.MALFORMED) in _drops(left)
+    else:
+        assert _sets(left) == [(BEGIN, BEGIN)]

@@ -4,6 +4,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+import yaml
 from mcap.reader import make_reader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -149,8 +150,48 @@ def test_profiles_are_read_from_every_version_of_the_metadata():
     (profile,) = read_profiles(numbers)
     assert (profile.history, profile.reliability, profile.durability) == ("unknown", "best_effort", "transient_local")
     assert profile.deadline == 1_000_000_005
-    assert read_profiles([write_profile(profile)]) == (profile,)
+    assert read_profiles(yaml.safe_dump([write_profile(profile)])) == (profile,)
     assert [read_profiles(text) for text in ("", "x: [", "5")] == [(), (), ()]
+
+
+_LAUGHS = "".join(f"- &l{n} [{', '.join([f'*l{n - 1}'] * 9) if n else 'lol'}]\n" for n in range(12))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 5000,
+        "- {a: " * 5000,
+        "- {reliability: " + "[" * 5000 + "]" * 5000 + "}",
+        f"- {{reliability: reliable}}\n{_LAUGHS}",
+        "- 2001-99-99",
+        f"- {'9' * 5000}",
+        "- {? [] : x}",
+        "- !!python/name:os.system",
+        "\0",
+    ],
+    ids=[
+        "nested",
+        "nested maps",
+        "nested in a profile",
+        "aliases",
+        "no date",
+        "no number",
+        "no key",
+        "a tag",
+        "no text",
+    ],
+)
+def test_profiles_that_nobody_offers_are_none(text):
+    assert read_profiles(text) == ()
+
+
+def test_values_that_no_profile_has_are_unknown_or_unset():
+    (profile,) = read_profiles(
+        '- {reliability: [a, b], durability: "\\e[31m", history: 99, deadline: {sec: .inf, nsec: 0}}'
+    )
+    assert (profile.reliability, profile.durability, profile.history) == ("unknown",) * 3
+    assert profile.deadline == 0
 
 
 @pytest.mark.ros

@@ -8,8 +8,9 @@ import numpy.typing as npt
 
 from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds, Stream
 from syncrelay.bag.analysis.topics import Spread, spread
+from syncrelay.bag.recording import LATEST
 
-# Farther than any stamp, and twice it still fits.
+# Farther than what is told apart, and twice it still fits.
 _FAR = 2**61
 
 
@@ -122,7 +123,10 @@ def _sorted(stream: Stream, offset: int) -> _Sorted:
     # Of a repeated stamp the last counts, as for the engine.
     _, last = np.unique(stamps[is_set][::-1], return_index=True)
     at = len(stamps[is_set]) - 1 - last
-    return _Sorted(stamps[is_set][at] + offset, places[is_set][at], np.sort(places))
+    # Within what can be subtracted from each other, whatever the file says.
+    shift = max(-LATEST, min(LATEST, offset))
+    shifted = np.clip(stamps[is_set][at] + shift, -LATEST, LATEST)
+    return _Sorted(shifted, places[is_set][at], np.sort(places))
 
 
 def _sides(pivots: Nanoseconds, stamps: Nanoseconds) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
@@ -130,6 +134,7 @@ def _sides(pivots: Nanoseconds, stamps: Nanoseconds) -> tuple[Nanoseconds, Nanos
     behind = np.searchsorted(stamps, pivots, side="left")
     after = np.where(behind < len(stamps), stamps[np.clip(behind, 0, len(stamps) - 1)] - pivots, _FAR)
     before = np.where(behind > 0, pivots - stamps[np.clip(behind - 1, 0, len(stamps) - 1)], _FAR)
+    before, after = np.minimum(before, _FAR), np.minimum(after, _FAR)
     return np.where(after == 0, 0, before), after, behind
 
 

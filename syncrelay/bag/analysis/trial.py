@@ -14,6 +14,8 @@ from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome
 _SECOND: Final = 1_000_000_000
 # What a start or an end brings, and nothing more.
 _PASSING: Final = 3
+# Longer than what is said of the last seconds is remembered.
+_CLOSELY: Final = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,44 +125,69 @@ def try_group(group: GroupConfig, streams: Sequence[Stream]) -> Trial:
 
 
 def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingFinding, ...]:
-    """Return what the running relay would have found, looking once a second, the worst and longest first."""
+    """Return what the running relay would have found, looking once a second, the worst and longest first.
+
+    However long nothing is received, it takes no more than some tens of looks.
+    """
     run = _Run(group, streams)
-    graph = [
-        _graph_of(topic.topic, topic.output, topic.type, bool(stream.places))
-        for topic, stream in zip(group.topics, streams, strict=True)
-    ]
     begin = min((stream.received[0] for stream in streams if stream.received), default=0)
-    watch = GroupWatch(group, began=begin)
-    found: dict[tuple[Code, int | None], tuple[Finding, int]] = {}
-    arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]
-    keys: list[Hashable] = [None] * len(streams)
-    seen = 0
+    watch = _Watch(run, streams, begin)
     due = begin + _SECOND
-
-    def look(now: int) -> None:
-        nonlocal arrivals, seen
-        new = [(each.stamps, each.latency) for each in run.sets[seen:]]
-        seen = len(run.sets)
-        watch.add(arrivals, new, run.engine.counts(), run.engine.sets, keys=tuple(keys), now=now)
-        arrivals = [[] for _ in streams]
-        for finding in find(watch.facts(graph, now=now)):
-            which = (finding.code, finding.input)
-            found[which] = (finding, found.get(which, (finding, 0))[1] + 1)
-
     for index, at in run.order:
         received = streams[index].received[at]
-        while received >= due:
-            look(due)
-            due += _SECOND
+        seconds = (received - due) // _SECOND + 1
+        before = 0
+        for second in looked_at(seconds):
+            watch.look(due + (second - 1) * _SECOND, lasting=second - before)
+            before = second
+        due += before * _SECOND
         run.feed(index, at)
         if streams[index].stamps[at] != UNREADABLE:
-            arrivals[index].append((streams[index].stamps[at], received))
+            watch.arrivals[index].append((streams[index].stamps[at], received))
         if (key := run.key(index, at)) is not None:
-            keys[index] = key
-    look(due)
-    lasting = [LastingFinding(finding, seconds) for finding, seconds in found.values()]
+            watch.keys[index] = key
+    watch.look(due, lasting=1)
+    lasting = [LastingFinding(finding, seconds) for finding, seconds in watch.found.values()]
     bad = [each for each in lasting if each.finding.severity is not Severity.OK and each.seconds >= _PASSING]
     return tuple(sorted(bad, key=lambda each: (-each.finding.severity, -each.seconds)))
+
+
+def looked_at(seconds: int) -> list[int]:
+    """Return which of so many seconds without a message are looked at: first and last ones, between ever fewer.
+
+    When a pause begins and ends, findings come and go; one of years is as one of minutes.
+    """
+    first = range(1, min(seconds, _CLOSELY) + 1)
+    between = (_CLOSELY << times for times in range(1, (max(0, seconds) // _CLOSELY).bit_length()))
+    last = range(max(seconds - _CLOSELY, _CLOSELY) + 1, seconds + 1)
+    return sorted({*first, *between, *last})
+
+
+class _Watch:
+    """Looks at a run, and remembers what it found, as it last was, and for how many seconds."""
+
+    def __init__(self, run: _Run, streams: Sequence[Stream], begin: int) -> None:
+        self.found: dict[tuple[Code, int | None], tuple[Finding, int]] = {}
+        self.arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]
+        self.keys: list[Hashable] = [None] * len(streams)
+        self._run = run
+        self._seen = 0
+        self._watch = GroupWatch(run.group, began=begin)
+        self._graph = [
+            _graph_of(topic.topic, topic.output, topic.type, bool(stream.places))
+            for topic, stream in zip(run.group.topics, streams, strict=True)
+        ]
+
+    def look(self, now: int, *, lasting: int) -> None:
+        """Look at a moment that stands for so many seconds."""
+        sets, engine = self._run.sets, self._run.engine
+        new = [(each.stamps, each.latency) for each in sets[self._seen :]]
+        self._seen = len(sets)
+        self._watch.add(self.arrivals, new, engine.counts(), engine.sets, keys=tuple(self.keys), now=now)
+        self.arrivals = [[] for _ in self.arrivals]
+        for finding in find(self._watch.facts(self._graph, now=now)):
+            key = (finding.code, finding.input)
+            self.found[key] = (finding, self.found.get(key, (finding, 0))[1] + lasting)
 
 
 def _graph_of(topic: str, output: str, type_name: str, is_recorded: bool) -> InputGraph:  # noqa: FBT001  a fact

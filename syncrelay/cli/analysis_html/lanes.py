@@ -16,6 +16,9 @@ _STRETCH: Final = 10 * _SECOND
 # another clock, or of a recording that began again.
 _ASTRAY: Final = 2 * _SECOND
 _NONE: Final = -1
+# What is made of it, with any time of receipt and any stamp, fits 64 bits.
+_LARGEST_OFFSET: Final = 2**61
+_LONGEST: Final = 2**63 - 1
 # Its messages serve many sets, and stand in their lane once.
 _REPEATING: Final = "latest_time"
 
@@ -56,7 +59,8 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
     n_inputs = len(group.streams)
     missing = np.array([[stamp is None for stamp in each.stamps] for each in sets], dtype=bool).reshape(-1, n_inputs)
     stamps = np.array([[stamp or 0 for stamp in each.stamps] for each in sets], dtype=np.int64).reshape(-1, n_inputs)
-    times = stamps + np.array([topic.offset_ns for topic in group.group.topics], dtype=np.int64) - origin
+    offsets = _offsets(group)
+    times = stamps + np.array(offsets, dtype=np.int64) - origin
     latest = np.max(np.where(missing, np.iinfo(np.int64).min, times), axis=1, initial=np.iinfo(np.int64).min)
     complete = np.array([each.left - each.latency for each in sets], dtype=np.int64) - begin
     is_astray = np.abs(latest - complete) > _ASTRAY
@@ -68,7 +72,7 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
         is_new = _is_new(stamps[there, index]) if group.group.keys.policy == _REPEATING else np.ones(there.sum(), bool)
         first, which = np.flatnonzero(is_new), np.cumsum(is_new) - 1
         matched = times[there, index][first]
-        dropped, codes, n_astray = _dropped(group, index, origin, begin)
+        dropped, codes, n_astray = _dropped(group, index, origin - offsets[index], begin)
         astray += n_astray
         all_times = np.concatenate([matched, dropped])
         all_codes = np.concatenate([np.full(len(matched), CODES[MATCHED], dtype=np.int64), codes])
@@ -85,8 +89,8 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
         lanes=tuple(lanes),
         members=np.stack(places, axis=1)[by_begin],
         begins=begins[by_begin],
-        spans=np.array([each.span for each in sets], dtype=np.int64)[by_begin],
-        latencies=np.array([each.latency for each in sets], dtype=np.int64)[by_begin],
+        spans=np.array([min(each.span, _LONGEST) for each in sets], dtype=np.int64)[by_begin],
+        latencies=np.array([min(each.latency, _LONGEST) for each in sets], dtype=np.int64)[by_begin],
         astray=astray,
         each=1,
     )
@@ -102,12 +106,17 @@ def _is_new(stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
 def _usual_delay(group: GroupAnalysis) -> int:
     """Return how long after its stamp, offset included, a message was usually received."""
     delays = []
-    for topic, stream in zip(group.group.topics, group.streams, strict=True):
+    for offset, stream in zip(_offsets(group), group.streams, strict=True):
         stamps, received, _ = stream.numbers()
         is_set = (stamps != 0) & (stamps != UNREADABLE)
-        delays.append(received[is_set] - stamps[is_set] - topic.offset_ns)
+        delays.append(received[is_set] - stamps[is_set] - offset)
     every = np.concatenate(delays)
     return int(np.quantile(every, 0.5, method="inverted_cdf")) if len(every) else 0
+
+
+def _offsets(group: GroupAnalysis) -> list[int]:
+    """Return the offsets of the inputs, within what can be drawn: the file may ask for centuries."""
+    return [max(-_LARGEST_OFFSET, min(_LARGEST_OFFSET, topic.offset_ns)) for topic in group.group.topics]
 
 
 def _dropped(group: GroupAnalysis, index: int, origin: int, begin: int) -> tuple[Nanoseconds, Nanoseconds, int]:
@@ -115,7 +124,7 @@ def _dropped(group: GroupAnalysis, index: int, origin: int, begin: int) -> tuple
     drops = [each for each in group.trial.drops if each.input == index]
     stamps = np.array([each.stamp for each in drops], dtype=np.int64)
     received = np.array([each.received for each in drops], dtype=np.int64)
-    times = stamps + group.group.topics[index].offset_ns - origin
+    times = stamps - origin
     is_astray = (stamps == 0) | (np.abs(times - received + begin) > _ASTRAY)
     codes = np.array([CODES[each.reason.value] for each in drops], dtype=np.int64)
     return np.where(is_astray, received - begin, times), codes, int(np.count_nonzero(is_astray))

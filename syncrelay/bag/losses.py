@@ -1,0 +1,67 @@
+"""What of a file cannot be read: damaged places a sentence each, single messages a sentence for each cause."""
+
+from collections import Counter
+from typing import Final
+
+from syncrelay.bag.recording import LATEST, Channel, RawMessage
+
+STRAY: Final[RawMessage] = (Channel(-1, "", "", ""), -1, b"")
+"""Stands in place of a message of a channel that the file does not describe: of a time before all others."""
+
+OF_NO_CHANNEL: Final = "of a channel that the file does not describe"
+OF_NO_TIME: Final = "received at a time that no clock shows, before 1970 or after 2116"
+
+
+class Losses:
+    """Gathers them while a file is read."""
+
+    def __init__(self, name: str) -> None:
+        """Begin with none; messages call the file `name`."""
+        self._name = name
+        self._said: list[str] = []
+        self._left_out: Counter[str] = Counter()
+        self._too_late = 0
+
+    @property
+    def sentences(self) -> list[str]:
+        """All so far."""
+        counted = [f"{_messages(count)} left out: {why}" for why, count in self._left_out.items() if count]
+        if self._too_late:
+            counted.append(f"{_messages(self._too_late)} out of order: the index tells other times than they have")
+        return [*self._said, *(f"{self._name}: {each}" for each in counted)]
+
+    def say(self, what: str) -> None:
+        """Take in what is wrong with the file."""
+        self._said.append(f"{self._name}: {what}")
+
+    def cut_off(self, place: int, size: int) -> None:
+        """Take in that nothing can be read from a byte on."""
+        self.say(f"cut off or damaged at byte {place} of {size}, what is before it is read")
+
+    def damaged(self, what: str, fault: BaseException, *, read: int = 0) -> None:
+        """Take in that of something, named with its article, only so many messages could be read."""
+        why = "there is not enough memory for it" if isinstance(fault, MemoryError) else fault
+        kept = f"after {_messages(read)} that can be read" if read else "and left out"
+        self.say(f"{what} is damaged {kept}{f': {why}' if str(why) else ''}")
+
+    def leave_out(self, why: str, count: int = 1) -> None:
+        """Count messages that are left out for a reason that tells no place."""
+        self._left_out[why] += count
+
+    def too_late(self, count: int) -> None:
+        """Count messages that are read, but behind later ones."""
+        self._too_late += count
+
+    def kept(self, messages: list[RawMessage]) -> list[RawMessage]:
+        """Return those of messages, sorted by their times, that are of a channel and of a time; count the others."""
+        if not messages or (messages[0][1] >= 0 and messages[-1][1] <= LATEST):
+            return messages
+        good = [each for each in messages if 0 <= each[1] <= LATEST]
+        strays = sum(each is STRAY for each in messages)
+        self.leave_out(OF_NO_CHANNEL, strays)
+        self.leave_out(OF_NO_TIME, len(messages) - len(good) - strays)
+        return good
+
+
+def _messages(count: int) -> str:
+    return f"{count} {'message' if count == 1 else 'messages'}"

@@ -1,0 +1,38 @@
+"""The commands that read recordings, run here: hundreds of times in the time that a process takes to start."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from syncrelay.cli.analyze import Asked, analyze_bag
+from syncrelay.cli.boundary import AT_FAULT, DONE
+from syncrelay.cli.init import init_from_bag
+from syncrelay.cli.replay import Wanted, replay
+from syncrelay.errors import SyncRelayError
+
+
+def _readers(bag: str, file: str, folder: Path) -> dict[str, Callable[[], int]]:
+    """What reads a recording, by how it is called; what is written goes into the folder."""
+    by_topics = Asked(config=None, topics=("/camera", "/lidar"), write=None, html=None, json=False)
+    with_html = Asked(config=file, topics=(), write=None, html=str(folder / "report.html"), json=False)
+    as_json = Asked(config=file, topics=(), write=None, html=None, json=True)
+    return {
+        "replay": lambda: replay([bag], file, Wanted(sets=True, drops=True, output=None)),
+        "replay -o": lambda: replay([bag], file, Wanted(sets=False, drops=False, output=str(folder / "out.mcap"))),
+        "analyze": lambda: analyze_bag(bag, with_html),
+        "analyze, JSON": lambda: analyze_bag(bag, as_json),
+        "analyze, topics": lambda: analyze_bag(bag, by_topics),
+        "init": lambda: init_from_bag(bag, None),
+    }
+
+
+def read_by_all(bag: Path, file: Path, folder: Path, about: str) -> None:
+    """Run all of them; what flies out of one, but an error in words, tells it, and `about` the recording."""
+    for command, run in _readers(str(bag), str(file), folder).items():
+        (folder / "out.mcap").unlink(missing_ok=True)
+        try:
+            assert run() in (DONE, AT_FAULT)
+        except SyncRelayError as error:
+            assert str(error), command  # noqa: PT017  any error of ours will do
+        except Exception as error:
+            error.add_note(f"{command} of a recording with {about}")
+            raise
