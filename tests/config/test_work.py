@@ -56,12 +56,11 @@ def _read(text: str, environ: dict[str, str], count: Callable[[Any, str, Any], N
     before = sys.getprofile()
     sys.setprofile(count)
     try:
-        load_text(text, environ=environ)
+        return load_text(text, environ=environ).notes
     except ConfigError as error:
         return error.problems
     finally:
         sys.setprofile(before)
-    return ()
 
 
 def _work(text: str, environ: dict[str, str]) -> int:
