@@ -94,6 +94,7 @@ class _Source:
     def __init__(self, *messages: bytes | Exception) -> None:
         self.messages = deque(messages)
         self.deliver = lambda *_: None
+        self.waited = 0
 
     def take(self):
         if not self.messages:
