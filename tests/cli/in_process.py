@@ -16,8 +16,8 @@ def _readers(bag: str, file: str, folder: Path) -> dict[str, Callable[[], int]]:
     with_html = Asked(config=file, topics=(), write=None, html=str(folder / "report.html"), json=False)
     as_json = Asked(config=file, topics=(), write=None, html=None, json=True)
     return {
-        "replay": lambda: replay([bag], file, Wanted(sets=True, drops=True, output=None)),
-        "replay -o": lambda: replay([bag], file, Wanted(sets=False, drops=False, output=str(folder / "out.mcap"))),
+        "replay": lambda: replay([bag], [file], Wanted(sets=True, drops=True, output=None)),
+        "replay -o": lambda: replay([bag], [file], Wanted(sets=False, drops=False, output=str(folder / "out.mcap"))),
         "analyze": lambda: analyze_bag(bag, with_html),
         "analyze, JSON": lambda: analyze_bag(bag, as_json),
         "analyze, topics": lambda: analyze_bag(bag, by_topics),

@@ -33,7 +33,7 @@ class _Refusing(entities.Entities):
     """Refuses, too, what a test says."""
 
     def __init__(self, node: Any) -> None:
-        super().__init__(node)
+        super().__init__(node, entities.Purpose.RELAY)
         self.refuses = lambda: False
 
     def publisher(self, message_type: Any, topic: str, profile: Any) -> Any:
