@@ -9,9 +9,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
 
-# Most tests wait on real processes, so more of them run at once than there are cores; who is done first takes from others.
+# Many tests wait on real processes, so one more runs at once than there are cores; who is done first takes from others.
 test: $(VENV)/test
-	$(BIN)/python -m pytest -n $(shell expr 2 \* $$(nproc)) --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest -n $(shell expr 1 + $$(nproc)) --dist worksteal $(ARGS)
 
 # Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
 test-container: $(VENV)/test
