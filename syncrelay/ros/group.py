@@ -19,6 +19,8 @@ _LOG = logging.getLogger("syncrelay")
 _RECENT = 256
 # What is kept for whoever watches, between two of his looks: at 1 kHz they may be 10 s apart.
 _WATCHED = 10_000
+# What is held while a group is suspended, which takes some tenths of a second.
+_HELD = 10_000
 
 
 class Batch(NamedTuple):
@@ -33,17 +35,23 @@ class Batch(NamedTuple):
     keys: tuple[Hashable, ...]
 
 
-class _Stopped:
-    """In the place of an engine that failed: takes messages and gives nothing. The counts stay as they were."""
+class _Still:
+    """In the place of an engine that failed or is suspended: gives nothing. The counts stay as they were.
 
-    def __init__(self, sets: int, counts: tuple[InputCounts, ...]) -> None:
+    Of what comes it holds the newest `most` messages, with the reason of one that is to be rejected.
+    """
+
+    def __init__(self, sets: int, counts: tuple[InputCounts, ...], *, most: int = 0) -> None:
         self.sets = sets
+        self.held: deque[tuple[Message, DropReason | None]] = deque(maxlen=most)
         self._counts = counts
 
     def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002  an engine's signature
+        self.held.append((message, None))
         return ()
 
     def reject(self, message: Message, reason: DropReason) -> Drop:
+        self.held.append((message, reason))
         return Drop(message, reason)
 
     def expire(self, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002
@@ -68,7 +76,7 @@ class GroupRelay:
 
     def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
         self.config = config
-        self.engine: SyncGroup | _Stopped = config.engine()
+        self.engine: SyncGroup | _Still = config.engine()
         self.failure: str | None = None
         """What stopped it; None of one that works."""
         self.last: deque[tuple[int | None, ...] | RecentDrop] = deque(maxlen=_RECENT)
@@ -79,6 +87,9 @@ class GroupRelay:
         self._watch()
         self._restamped = [False] * len(config.topics)
         self._outlets: list[Outlet | None] = [None] * len(config.topics)
+        self._suspended: SyncGroup | _Still = self.engine
+        self._held_by = _Still(0, ())
+        self._had: list[bool] = []
 
     def connect(self, index: int, outlet: Outlet, *, restamped: bool) -> None:
         """Publish one input's messages through an outlet from now on.
@@ -87,6 +98,32 @@ class GroupRelay:
         """
         self._outlets[index] = outlet
         self._restamped[index] = restamped
+
+    def suspend(self) -> None:
+        """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
+        counts = self.counts()
+        self._suspended = self.engine
+        self.engine = self._held_by = _Still(self.engine.sets, counts, most=_HELD)
+        self._outlets, self._had = [None] * self._n_inputs, [outlet is not None for outlet in self._outlets]
+
+    def resume(self) -> None:
+        """Go on with all that was held. Where an outlet is missing now, all is dropped: sets would lack a message."""
+        if self.failure is not None:
+            return
+        self.engine = self._suspended
+        lacks = any(had and outlet is None for had, outlet in zip(self._had, self._outlets, strict=True))
+        if lacks:
+            self.flush(DropReason.SHUTDOWN)
+        try:
+            for message, reason in self._held_by.held:
+                self._settle(self._resumed(message, DropReason.SHUTDOWN if lacks else reason))
+        except Exception as error:  # noqa: BLE001  it is this group's alone
+            self.fail(error)
+
+    def _resumed(self, message: Message, reason: DropReason | None) -> Sequence[Match | Drop]:
+        if reason is not None:
+            return (self.engine.reject(message, reason),)
+        return self.engine.add(message, now=self._now())
 
     def receive(self, index: int, payload: Any, received: int, stamp: int | None) -> None:
         """Take in a message of one input by its stamp, None where none could be read; times in nanoseconds."""
@@ -159,7 +196,7 @@ class GroupRelay:
             exc_info=error,
             extra={"group": self.config.name, "finding": Code.INTERNAL_ERROR.value},
         )
-        self.engine = _Stopped(self.engine.sets, self._last_counts())
+        self.engine = _Still(self.engine.sets, self._last_counts())
 
     def _last_counts(self) -> tuple[InputCounts, ...]:
         """Count once more, as far as what failed still can."""

@@ -26,6 +26,8 @@ _LOG = logging.getLogger("syncrelay")
 
 # What DDS refused is tried again this often, and at once after a reload, which may have freed a topic.
 _TRY_AGAIN_S: Final = 5.0
+# What rcl and the kernel refuse; all else is a bug of ours.
+_OF_RCL: Final = (_rclpy.RCLError, RclCallError, OSError)
 
 
 class User:
@@ -88,7 +90,12 @@ class TopicInput:
     @property
     def is_due(self) -> bool:
         """Whether it is to be looked at though the graph be as before: for its type, or for what DDS did not make."""
-        return self._wants_look or self._message_type is None or (self._lacks and self._may_try)
+        return (
+            self._wants_look
+            or self._failure is not None
+            or self._message_type is None
+            or (self._lacks and self._may_try)
+        )
 
     @property
     def _publishes(self) -> bool:
@@ -178,15 +185,19 @@ class TopicInput:
 
     def look(self) -> None:
         """Look at the graph; subscribe, anew where the publishers' QoS changed; `missing` says what is not there."""
-        self._wants_look = False
+        # Until all went well it is due again, though the graph be as before.
+        self._wants_look = True
         if self._failure is not None:
             self._end_failed(self._failure)
         self.missing = self._find_type() or self._find_publishers()
+        self._wants_look = False
 
     def _end_failed(self, error: Exception) -> None:
         self._failure = None
         self.close()
-        self._refused(RefusedError(Refusal("receive", self.name, self.type, why=str(error))))
+        self._refused(RefusedError(Refusal("receive", self.name, self.type, why=str(error) or type(error).__name__)))
+        if not isinstance(error, _OF_RCL):
+            raise error
 
     def _find_type(self) -> str | None:
         if self._message_type is not None:
@@ -272,7 +283,7 @@ class TopicInput:
         for user in lacking:
             self.equip_or_tell(user)
         if any(user.publisher is not None for user in lacking):
-            self._loop.call(lambda: self._connect_all(lacking)).result()
+            self._loop.call(lambda: self.connect(lacking)).result()
 
     def _refused(self, error: RefusedError) -> None:
         self._refusal = error.refusal
@@ -300,12 +311,14 @@ class TopicInput:
             lost = _losses(subscription)
             source = self._path.source(subscription, self._deliver)
             old = self._loop.call(lambda: self._swap(source, publishers)).result()
-        except (_rclpy.RCLError, RclCallError, OSError) as error:
+        except BaseException as error:
             # It would hold on to the subscription.
             lost = None
             for entity in (*publishers.values(), subscription):
                 self._entities.end(entity)
-            raise RefusedError(Refusal("receive", self.name, self.type, why=str(error))) from error
+            if isinstance(error, _OF_RCL):
+                raise RefusedError(Refusal("receive", self.name, self.type, why=str(error))) from error
+            raise
         if self._profile is not None:
             _LOG.info("%s: its publishers' QoS changed, subscribed anew", self.name)
         self._profile, self._lost = profile, lost
@@ -336,7 +349,8 @@ class TopicInput:
         """Hear that the source gives no more messages. On the loop's thread."""
         self._source, self._failure, self._wants_look = None, error, True
 
-    def _connect_all(self, users: Sequence[User]) -> None:
+    def connect(self, users: Sequence[User]) -> None:
+        """Publish by what publishers they have now, and feed those who lack none. On the loop's thread."""
         for user in users:
             if user.publisher is not None:
                 self._connect(user)

@@ -93,6 +93,11 @@ class Monitor:
         reports = self._reports
         return tuple(reports[wiring.group] for wiring in self._wirings if wiring.group in reports)
 
+    @property
+    def unjudged(self) -> tuple[str, ...]:
+        """The names of the groups of which there is no report."""
+        return tuple(wiring.group.config.name for wiring in self._wirings if wiring.group not in self._reports)
+
     def watch(self, wirings: Sequence[Wiring]) -> None:
         """Look at these groups from now on; what is known of those that were there before stays."""
         now = time.time_ns()
@@ -144,6 +149,8 @@ class Monitor:
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
         for wiring, gathered in zip(wirings, seen, strict=True):
+            # What was found before would stand for ever where a bug keeps it from being looked at.
+            self._reports.pop(wiring.group, None)
             with self._bugs.contained(f"looking at {wiring.group.config.name}"):
                 self._look_at(wiring, gathered, now, stopped)
 

@@ -3,7 +3,6 @@
 import gc
 import logging
 import os
-import threading
 import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
@@ -29,6 +28,7 @@ from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.ros.start import make_node, resolver, start
 from syncrelay.ros.transport import apply_transport
+from syncrelay.ros.wakeup import Wakeup
 from syncrelay.ros.wirings import Wiring, Wirings
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
@@ -122,7 +122,7 @@ class Relay:
         # What each group was last said to wait for; None of one that runs.
         self._announced: dict[str, str | None] = {}
         self._started = time.monotonic()
-        self._wake = threading.Event()
+        self._wake = Wakeup()
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
         self._services = SingleThreadedExecutor(context=self._context)
         self._services.add_node(self.node)
@@ -217,7 +217,6 @@ class Relay:
         until_look = max(0.0, self._next_look - time.monotonic())
         rest_s, began = min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
         self._wake.wait(rest_s)
-        self._wake.clear()
         self.monitor.overslept(time.monotonic() - began - rest_s)
 
     def _look_at_graph(self) -> None:
@@ -263,6 +262,7 @@ class Relay:
             reloads=self._reloads,
             refused_reloads=self._refused_reloads,
             reload_error=self._reload_error,
+            unjudged=self.monitor.unjudged,
         )
 
     def snapshot(self) -> RelaySnapshot:

@@ -83,15 +83,16 @@ class Wirings:
         used = {each for wiring in wirings for each in wiring.inputs}
         unused = [each for each in self.inputs if each not in used]
         gone = self._exchange(ended, unused, begun) if running else _switch(ended, begun)
+        # From here on these run, whatever becomes of the end of the others.
+        self._inputs = {key: topic_input for key, topic_input in inputs.items() if topic_input in used}
+        self.all = wirings
+        for topic_input in used:
+            topic_input.try_again()
         for _, user in gone:
             if user.publisher is not None:
                 self._entities.end(user.publisher)
         for topic_input in unused:
             topic_input.close()
-        for topic_input in used:
-            topic_input.try_again()
-        self._inputs = {key: topic_input for key, topic_input in inputs.items() if topic_input in used}
-        self.all = wirings
 
     def _exchange(self, ended: Sequence[Wiring], unused: Sequence[TopicInput], begun: Sequence[_Use]) -> list[_Use]:
         """Make the publishers of those who begin, and let them; the uses that are gone."""
@@ -127,7 +128,7 @@ class Wirings:
         """End what holds the topics of those who are late, then make their publishers, or else the old ones again."""
         over = [use for wiring in ended for use in wiring.uses]
         wanted = {self._node.resolve_topic_name(user.output) for _, user in late}
-        self._loop.call(lambda: _detach(ended)).result()
+        self._loop.call(lambda: _suspend(ended)).result()
         try:
             for _, user in over:
                 if user.publisher is not None and user.publisher.topic_name in wanted:
@@ -139,19 +140,18 @@ class Wirings:
             for topic_input, user in late:
                 topic_input.equip(user)
         except BaseException:
-            self._restore(over, late)
+            self._restore(ended, over, late)
             raise
-        self._loop.call(lambda: _switch(ended, begun)).result()
-        return over
+        return self._loop.call(lambda: _switch(ended, begun)).result()
 
-    def _restore(self, over: Sequence[_Use], late: Sequence[_Use]) -> None:
+    def _restore(self, ended: Sequence[Wiring], over: Sequence[_Use], late: Sequence[_Use]) -> None:
         for _, user in late:
             if user.publisher is not None:
                 publisher, user.publisher = user.publisher, None
                 self._entities.end(publisher)
         for topic_input, user in over:
             topic_input.equip_or_tell(user)
-        self._loop.call(lambda: _attach(over)).result()
+        self._loop.call(lambda: _resume(ended, over)).result()
 
     def _wiring(self, group: GroupRelay, inputs: dict[_Key, TopicInput]) -> Wiring:
         return Wiring(group, tuple(self._input(topic, inputs) for topic in group.config.topics))
@@ -184,6 +184,20 @@ def _detach(ended: Sequence[Wiring]) -> list[_Use]:
         for topic_input in wiring.inputs:
             topic_input.detach(wiring.group)
     return gone
+
+
+def _suspend(ended: Sequence[Wiring]) -> None:
+    """Let nothing more leave by publishers that end before their groups do; what comes is held."""
+    for wiring in ended:
+        wiring.group.suspend()
+
+
+def _resume(ended: Sequence[Wiring], over: Sequence[_Use]) -> None:
+    """Have groups that were to end go on, by what publishers they have now."""
+    for topic_input, user in over:
+        topic_input.connect([user])
+    for wiring in ended:
+        wiring.group.resume()
 
 
 def _attach(uses: Sequence[_Use]) -> None:

@@ -20,6 +20,7 @@ class RelayState:
 
     `receives_by` names the way by which messages are taken and published, `reloads` counts how often the file was
     read again and taken, `refused_reloads` how often it was left aside, `reload_error` says why the last time.
+    `unjudged` are groups of which there is no report, as before the first look.
     """
 
     node: str
@@ -32,6 +33,7 @@ class RelayState:
     reloads: int = 0
     refused_reloads: int = 0
     reload_error: str | None = None
+    unjudged: tuple[str, ...] = ()
 
 
 class Level(Enum):
@@ -57,6 +59,7 @@ def is_ready(state: RelayState) -> bool:
     return (
         state.phase is Phase.RUNNING
         and bool(state.groups)
+        and not state.unjudged
         and all(report.facts.failure is None for report in state.groups)
         and all(_is_served(each) for each in inputs)
     )

@@ -19,13 +19,15 @@ _ROS_PREFIXES = ("ROS_", "RMW_", "RCL_", "RCUTILS_", "FASTDDS_", "FASTRTPS_", "S
 _ROS_IDENTITY = {"ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION"}
 
 
-def wait_until(condition: Callable[[], bool], what: str, *, deadline_s: float = DEADLINE_S) -> None:
+def wait_until(
+    condition: Callable[[], bool], what: str, *, deadline_s: float = DEADLINE_S, poll_s: float = _POLL_S
+) -> None:
     """Return as soon as the condition holds; `what` says in an AssertionError what did not come."""
     end = time.monotonic() + deadline_s
     while not condition():
         if time.monotonic() > end:
             raise AssertionError(f"waited {deadline_s:.0f} s in vain for {what}")
-        time.sleep(_POLL_S)
+        time.sleep(poll_s)
 
 
 def ros_environment(*, domain: int, folder: Path, python_path: Sequence[Path]) -> dict[str, str]:

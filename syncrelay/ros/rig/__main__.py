@@ -12,11 +12,12 @@ from syncrelay.cdr import patch_stamp
 from syncrelay.ros.environment import log_arguments
 from syncrelay.ros.rig.processes import UP
 from syncrelay.ros.rig.schedule import SENSORS, Shot, schedule
+from syncrelay.ros.wakeup import Wakeup
 
 
 def main(arguments: Sequence[str]) -> int:
     """Publish until SIGINT, SIGTERM or, where asked, the end of stdin; return the exit code."""
-    stop = threading.Event()
+    stop = Wakeup()
     # Before rclpy is imported: a signal that came during the import would be lost.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -37,14 +38,14 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _stop_at_end_of_stdin(stop: threading.Event) -> None:
+def _stop_at_end_of_stdin(stop: Wakeup) -> None:
     # Not sys.stdin: a daemon thread that holds its lock would abort the interpreter's exit.
     while os.read(0, 4096):
         pass
     stop.set()
 
 
-def _publish(name: str, shots: Iterator[Shot], stop: threading.Event) -> None:
+def _publish(name: str, shots: Iterator[Shot], stop: Wakeup) -> None:
     """Send each message at its time; those due before the publisher was up are not made up for."""
     import rclpy  # noqa: PLC0415 - signals are handled before this
     from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: PLC0415
