@@ -27,6 +27,7 @@ def explain(relay: "Relay", seconds: float, *, stop: StopRequest) -> int:
             put(line)
     looked_s = time.monotonic() - began
     faults = [f"{report.facts.name} {fault}" for report in reports if (fault := _fault(report, looked_s))]
+    faults += [f"{name} could not be judged: see the log" for name in relay.monitor.unjudged]
     if not faults:
         return DONE
     put(f"exit code 1: {'; '.join(faults)}")

@@ -50,6 +50,7 @@ class StopRequest:
         signal.signal(signal.SIGHUP, self._request_reload)
         for number in _SIGNALS:
             _take_once(number)
+        _count_on_a_thread()
 
     def defer(self) -> None:
         """From here on there is something to end in order: only remember the request."""
@@ -95,6 +96,28 @@ class StopRequest:
             os.write(2, b"syncrelay: stopped before it started\n")
             # No exception: raised in the middle of an import, it could be swallowed there.
             os._exit(0)
+
+
+def _count_on_a_thread() -> None:
+    """Have two signals of different kinds end the process too, while the handlers' turn does not come."""
+    import threading
+
+    received, told = os.pipe()
+    os.set_blocking(told, False)
+    signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    threading.Thread(target=_end_at_the_second, args=(received,), daemon=True, name="syncrelay-signals").start()
+
+
+def _end_at_the_second(received: int) -> None:
+    seen = 0
+    while numbers := os.read(received, 64):
+        for number in numbers:
+            seen += number in _SIGNALS
+            if seen > 1 and os.getpid() == 1:
+                os._exit(_ENDED_BY + number)
+            elif seen > 1:
+                # Its handler is gone since it was taken once.
+                os.kill(os.getpid(), number)
 
 
 def _take_once(number: int) -> None:

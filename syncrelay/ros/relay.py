@@ -15,6 +15,7 @@ from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
 from syncrelay.config import Config, ConfigError, GroupConfig
+from syncrelay.config.wording import counted
 from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, recent
 from syncrelay.ros.bugs import Bugs
@@ -169,7 +170,8 @@ class Relay:
         # What is new is to be told of at once.
         self._next_look = time.monotonic()
         begin = len(self._wirings.groups) - len(kept)
-        _LOG.info("the file was read again: %d groups go on, %d begin", len(kept), begin)
+        go_on = f"{counted(len(kept), 'group')} {'goes' if len(kept) == 1 else 'go'} on"
+        _LOG.info("the file was read again: %s, %d %s", go_on, begin, "begins" if begin == 1 else "begin")
 
     def refuse_reload(self, reason: str) -> None:
         """Tell in `state` that the file was read again and is left aside."""

@@ -28,11 +28,15 @@ def fifo():
     os.mkfifo("pipe")
     open("pipe")
 
+def library(load=ctypes.CDLL):
+    # It is not even interrupted by a signal.
+    mutex, loaded = ctypes.create_string_buffer(64), load(None)
+    loaded.pthread_mutex_lock(mutex)
+    loaded.pthread_mutex_lock(mutex)
+
 def library_that_holds_all_of_python():
-    # As rclpy holds it while DDS makes a node. It is not even interrupted by a signal.
-    mutex, library = ctypes.create_string_buffer(64), ctypes.PyDLL(None)
-    library.pthread_mutex_lock(mutex)
-    library.pthread_mutex_lock(mutex)
+    # As rclpy holds it while DDS makes a node.
+    library(ctypes.PyDLL)
 
 stop = StopRequest()
 stop.install()
@@ -61,7 +65,7 @@ def _signal_twice(process: Process, first: signal.Signals, second: signal.Signal
     return process.wait()
 
 
-_ANYWHERE = ["python", "lock", "fifo", "library_that_holds_all_of_python"]
+_ANYWHERE = ["python", "lock", "fifo", "library", "library_that_holds_all_of_python"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
@@ -74,6 +78,14 @@ def test_a_second_signal_ends_what_hangs(where: str, number: signal.Signals, tmp
 def test_the_second_may_be_another_than_the_first(since: str, tmp_path: Path):
     hanging = _hanging(tmp_path, "python", since)
     assert _signal_twice(hanging, signal.SIGINT, signal.SIGTERM) == -signal.SIGTERM
+
+
+def test_the_second_may_be_another_though_the_handlers_turn_never_comes(tmp_path: Path):
+    hanging = _hanging(tmp_path, "library")
+    hanging.send(signal.SIGINT)
+    hanging.wait_until(lambda: not hanging.handles(signal.SIGINT), "the first signal to be taken")
+    hanging.send(signal.SIGTERM)
+    assert hanging.wait() == -signal.SIGTERM
 
 
 def test_of_pid_1_which_the_kernel_protects_the_second_signal_is_the_end_too(tmp_path: Path):

@@ -36,7 +36,18 @@ def right_groups(chance: random.Random, published: tuple[str, ...]) -> dict[str,
         if chance.random() < 0.5:
             # Fed in earnest, and shared with the group that stays.
             topics += [{"topic": chance.choice(published), "type": VECTOR, "qos": LOSSLESS}]
-        groups[name] = {"policy": chance.choice(_POLICIES), "queue_size": chance.randrange(2, 100), "topics": topics}
+        deadline = {}
+        if chance.random() < 0.5:
+            # Sets leave because time passes, whatever becomes of the outputs at that moment.
+            fed = [{"topic": each, "type": VECTOR, "qos": LOSSLESS} for each in published]
+            topics = [{**each, "required": False} for each in topics[:2]] + fed
+            deadline = {"max_wait": f"{chance.randrange(1, 30)}ms"}
+        groups[name] = {
+            **deadline,
+            "policy": chance.choice(_POLICIES),
+            "queue_size": chance.randrange(2, 100),
+            "topics": topics,
+        }
         if groups[name]["policy"] != "exact_time":
             groups[name]["slop"] = f"{chance.randrange(1, 50)}ms"
     return groups

@@ -88,6 +88,40 @@ def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then
     ]
 
 
+def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_came():
+    group, outlets = _group(), [_Outlet(), _Outlet()]
+
+    def connect() -> None:
+        for index, outlet in enumerate(outlets):
+            group.connect(index, outlet, restamped=False)
+
+    connect()
+    group.receive(0, b"before", 0, BEGIN)
+    group.suspend()
+    group.receive(1, b"meanwhile", 0, BEGIN)
+    group.receive(1, b"no stamp", 0, None)
+    group.expire(BEGIN)
+    assert group.next_deadline() is None
+    assert [outlet.sent for outlet in outlets] == [[], []]
+    connect()
+    group.resume()
+    assert [outlet.sent for outlet in outlets] == [[b"before"], [b"meanwhile"]]
+    assert [(each.fed, each.matched, sum(each.dropped.values())) for each in group.counts()] == [(1, 1, 0), (2, 1, 1)]
+
+
+def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in_part():
+    group, outlets = _group(), [_Outlet(), _Outlet()]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+    group.receive(0, b"before", 0, BEGIN)
+    group.suspend()
+    group.receive(1, b"meanwhile", 0, BEGIN)
+    group.connect(1, outlets[1], restamped=False)
+    group.resume()
+    assert [outlet.sent for outlet in outlets] == [[], []]
+    assert [(each.fed, each.dropped) for each in group.counts()] == [(1, {DropReason.SHUTDOWN: 1})] * 2
+
+
 class _Source:
     """Gives messages, and fails where an exception stands in the place of one."""
 
