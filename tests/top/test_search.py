@@ -21,6 +21,8 @@ from tests.top.speaker import slowly, speaking, without_end
 
 # Of this process alone: the names of all relays of a machine share one space.
 HOST = f"127.77.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
+# For a machine that others use too.
+PATIENT = {"timeout_s": 60, "whole_s": 60}
 HEAD = b"HTTP/1.1 200 OK\r\n\r\n"
 
 
@@ -36,7 +38,7 @@ def test_a_relay_is_found_at_whatever_port_until_it_ends(listen, reached_at):
         server.serve(lambda: state)
         # Others of this machine may be there too.
         assert base_urls(None).count(url) == 1
-        assert [answer.url for answer in search([url]).relays] == [url]
+        assert [answer.url for answer in search([url], **PATIENT).relays] == [url]
     assert server.place not in announced()
 
 
@@ -51,7 +53,7 @@ def test_a_relay_is_found_at_addresses_of_ip_6(listen):
         server.serve(lambda: state)
         url = f"http://[::1]:{server.place.port}"
         assert base_urls(None).count(url) == 1
-        assert [answer.url for answer in search([url]).relays] == [url]
+        assert [answer.url for answer in search([url], **PATIENT).relays] == [url]
 
 
 def test_the_usual_ports_are_asked_too_but_where_one_answers_everywhere():
@@ -122,7 +124,7 @@ def test_who_does_not_come_to_an_end_is_given_up(speech):
 @pytest.mark.parametrize("said", [b"", b"HTTP/1.1 200 OK\r\nContent-Length: 99999999999\r\n\r\n{"])
 def test_who_ends_before_the_answer_does_is_no_other_server(said):
     with speaking(lambda: iter([said])) as url, pytest.raises(NoAnswerError, match="ended before the answer did"):
-        ask(url)
+        ask(url, **PATIENT)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +144,7 @@ def test_who_ends_before_the_answer_does_is_no_other_server(said):
 )
 def test_who_answers_something_else_is_no_relay_and_writes_nothing_to_the_terminal(speech):
     with speaking(speech) as url, pytest.raises(OtherServerError) as caught:
-        ask(url)
+        ask(url, **PATIENT)
     assert str(caught.value).isprintable()
 
 
@@ -173,7 +175,7 @@ def test_relays_are_found_among_fifty_that_hang_or_never_end():
         urls = [stack.enter_context(speaking(speech)) for speech in speeches]
         relays = [stack.enter_context(serving(states.healthy())).url for _ in range(2)]
         # Long enough for a relay on a machine that others use too.
-        found = search([*urls[:25], *relays, *urls[25:]], timeout_s=3, whole_s=3)
+        found = search([*urls[:25], *relays, *urls[25:]], timeout_s=5, whole_s=5)
     assert [answer.url for answer in found.relays] == relays
     assert len(found.others) == 50
 
