@@ -1,5 +1,6 @@
 """From the words of the command line to a command and its exit code."""
 
+import os
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -102,6 +103,7 @@ def _relay(words: Sequence[str], stop: StopRequest) -> int:
         return _print(_version())
     if not arguments.config:
         parser.error("--config FILE is missing")
+    _refuse_twice(parser, arguments.config)
     from syncrelay.cli.run import run
 
     return run(
@@ -138,6 +140,7 @@ def _validate(words: Sequence[str], _stop: StopRequest) -> int:
     if _asks_for_help(words):
         return _print(parser.format_help())
     arguments = parser.read(words)
+    _refuse_twice(parser, arguments.files if arguments.together else [each for each in arguments.files if each == "-"])
     from syncrelay.cli.validate import validate
 
     return validate([arguments.files] if arguments.together else [[file] for file in arguments.files], arguments.format)
@@ -185,6 +188,7 @@ def _replay(words: Sequence[str], _stop: StopRequest) -> int:
     if _asks_for_help(words):
         return _print(parser.format_help())
     arguments = parser.read(words)
+    _refuse_twice(parser, arguments.config)
     from syncrelay.cli.replay import Wanted, replay
 
     return replay(arguments.bags, arguments.config, Wanted(arguments.json, arguments.drops, arguments.output))
@@ -297,6 +301,7 @@ def _doctor(words: Sequence[str], _stop: StopRequest) -> int:
 
     if arguments.seconds and not arguments.live:
         parser.error("--seconds N is for how long --live looks at the graph, and --live is missing")
+    _refuse_twice(parser, arguments.config)
     live_s = (arguments.seconds or 5.0) if arguments.live else None
     output_format = "json" if arguments.json else "text"
     return doctor(arguments.config, live_s, output_format, ros_args)
@@ -332,7 +337,7 @@ def _reload(words: Sequence[str], _stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay reload",
         description="Has the relay of this machine read its file again: groups that did not change go on, with all\n"
-        "that they hold. A file with an error is left aside, and the exit code is 1.",
+        "that they hold. With an error in the file it keeps its running configuration, and the exit code is 1.",
     )
     parser.add_argument("--url", metavar="URL", help="which relay, of several: its host:port or URL")
     _add_help(parser)
@@ -396,6 +401,17 @@ def _split_at_ros_args(words: Sequence[str]) -> tuple[Sequence[str], Sequence[st
         return words, ()
     at = list(words).index("--ros-args")
     return words[:at], words[at + 1 :]
+
+
+def _refuse_twice(parser: Parser, files: Sequence[str]) -> None:
+    """Refuse a file that is to run together with itself, however it is called; standard input is read once too."""
+    named: dict[str, str] = {}
+    for file in files:
+        place = file if file == "-" else os.path.realpath(file)
+        if place in named:
+            same = f"{file} is named twice" if named[place] == file else f"{named[place]} and {file} are the same file"
+            parser.error(f"{same}: name each file once")
+        named[place] = file
 
 
 def _unknown_command(word: str) -> str:

@@ -1,7 +1,7 @@
 """`syncrelay --config FILE --explain N`: look for N seconds, publish nothing, and say how every group fares."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
 
 
 def explain(relay: "Relay", seconds: float, *, stop: StopRequest) -> int:
-    """Print the findings of all groups once the time is over or a signal came; 0 if every group is healthy.
-
-    If one is not, the last line says what decided that.
-    """
+    """Print the findings of all groups once the time is over or a signal came; 0 if every group is healthy."""
     began = time.monotonic()
     end = began + seconds
     while not stop.requested and (left := end - time.monotonic()) > 0:
         relay.step(left)
-    reports = relay.look()
+    return conclude(relay.look(), time.monotonic() - began)
+
+
+def conclude(reports: "Sequence[GroupReport]", looked_s: float) -> int:
+    """Print the findings of groups; 0 if every one is healthy, else 1 with a last line that says what decided that."""
     for report in reports:
         for line in _lines(report):
             put(line)
-    looked_s = time.monotonic() - began
     faults = [f"{report.facts.name} {fault}" for report in reports if (fault := _fault(report, looked_s))]
     faults += [f"{name} could not be judged: see the log" for name in relay.monitor.unjudged]
     if not faults:

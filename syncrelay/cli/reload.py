@@ -20,7 +20,7 @@ _OTHERWISE: Final = "  Where the relay's file says `metrics: null`, send SIGHUP 
 
 
 def reload(named: str | None) -> int:
-    """Signal the relay and wait until it has read its file; 1 if it left the file aside.
+    """Signal the relay and wait until it has read its file; 1 if it kept its configuration.
 
     Raises SyncRelayError where no relay, or more than one, or one of another machine is found.
     """
@@ -35,7 +35,7 @@ def reload(named: str | None) -> int:
             put(printable(f"{now.node} has read {now.config} again"))
             return DONE
         if now.refused_reloads != before.refused_reloads:
-            say(one_entry(f"{now.node} goes on as before, its file is left aside:\n{now.reload_error}"))
+            say(one_entry(f"{now.node}: reload failed; it keeps its running configuration:\n{now.reload_error}"))
             return AT_FAULT
     raise SyncRelayError(f"{before.node} has not read its file within {_PATIENCE_S:.0f} s")
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from syncrelay.status import Server
 
 _BUG: Final = (
-    "a bug in syncrelay kept it from taking on the file, all goes on as before;"
+    "reload failed because of a bug in syncrelay; keeping the running configuration;"
     " please report it with these lines and the file:"
 )
 
@@ -98,7 +98,7 @@ def run(
 
 
 def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str], groups: Sequence[str]) -> None:
-    """Take on the files as they were read again; whatever is wrong with them, all goes on as before."""
+    """Take on the files as they were read again; whatever is wrong with them, the relay keeps its configuration."""
     from syncrelay.ros.logs import LOGGER
 
     try:
@@ -106,7 +106,7 @@ def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str],
         _require_groups(groups, config, config_paths)
         relay.reload(config)
     except SyncRelayError as error:
-        LOGGER.error("the file was read again and is left aside, all goes on as before:\n%s", error)
+        LOGGER.error("reload failed; keeping the running configuration:\n%s", error)
         relay.refuse_reload(str(error))
     except Exception as error:  # noqa: BLE001  a file that finds a bug of ours is no reason to end what runs
         LOGGER.exception("%s", _BUG)

@@ -49,7 +49,7 @@ def _print_text(findings: Sequence[Finding]) -> None:
 
 
 def _print_json(findings: Sequence[Finding]) -> None:
-    listed = [_as_json(file, finding) for finding in findings for file in dict.fromkeys(finding.files)]
+    listed = [_as_json(file, finding) for finding in findings for file in finding.files]
     put(json.dumps(listed, indent=2))
 
 

@@ -59,6 +59,16 @@ def logged_findings(relay: Process) -> set[str]:
     return {str(line.get("finding")) for line in lines if line["level"] not in ("info", "debug")}
 
 
+def assert_looked_at_a_healthy_rig(look: Process) -> None:
+    """A run that explains one healthy group found it so, or what a busy machine makes of it, and its end agrees."""
+    code = look.wait()
+    found = set(re.findall(r"^front: .* \[(\w+)\]$", look.stdout, re.MULTILINE))
+    assert found
+    assert found <= {"healthy"} | OF_A_BUSY_MACHINE, look.stdout
+    told = look.stdout.splitlines()[-1].startswith("exit code 1: front has ")
+    assert (code, told) == ((0, False) if found == {"healthy"} else (1, True)), look.stdout
+
+
 def assert_logged(relay: Process, pattern: str) -> None:
     """A line of the log holds the pattern, sooner or later."""
     relay.wait_until(lambda: re.search(pattern, relay.stderr) is not None, f"{pattern!r} in the log")

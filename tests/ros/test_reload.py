@@ -114,7 +114,7 @@ def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
     file = ReloadedFile(stage, front=_FRONT)
     why = file.refuse(config({"front": {**_FRONT, "slopp": "1ms"}}, metrics=ANY_PORT))
     assert "groups.front.slopp: unknown key, did you mean `slop`?" in why
-    assert "the file was read again and is left aside, all goes on as before" in file.relay.stderr
+    assert "reload failed; keeping the running configuration:" in file.relay.stderr
     assert "needs" not in file.refuse("")
     why = file.refuse(config({"front": _FRONT}, metrics=ANY_PORT, node={"name": "other"}))
     assert why == "`node` cannot change while the relay runs: restart it"
@@ -205,7 +205,7 @@ def test_a_command_has_it_read_and_tells_what_came_of_it(stage: Stage):
     file.write("groups: 5")
     failed = _command(stage, file.relay)
     assert failed.returncode == 1
-    assert "/syncrelay goes on as before, its file is left aside:" in failed.stderr
+    assert "/syncrelay: reload failed; it keeps its running configuration:" in failed.stderr
     assert "groups: expected a mapping" in failed.stderr
 
 

@@ -12,9 +12,10 @@ from syncrelay.top.client import ask
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import DEADLINE_S, wait_until
+from tests.ros.sensors import stream
 from tests.ros.stage import Stage
 from tests.ros.status import ANY_PORT, address, wait_for_finding
-from tests.ros.streams import at, merged
+from tests.ros.streams import merged
 from tests.top.terminal import Terminal
 
 pytestmark = pytest.mark.ros
@@ -32,8 +33,7 @@ def relay(stage: Stage):
     started = stage.relay(config(GROUPS, metrics=ANY_PORT))
     player = stage.player(PAIR)
     player.match()
-    camera, lidar = (at(topic, *range(shift, 60_000, 100)) for topic, shift in (("/camera", 0), ("/lidar", 7)))
-    player.start(merged(camera, lidar), speed=1)
+    player.start(merged(stream("/camera", hz=10), stream("/lidar", hz=10, shift_ms=7)), speed=1)
     wait_for_finding(started, "healthy")
     wait_for_finding(started, "no_publisher", "rear")
     return started
@@ -48,7 +48,8 @@ def test_its_groups_are_printed_once(stage: Stage, relay):
     code, shown, talk = once(stage, "--url", address(relay))
     assert (code, talk) == (0, "")
     assert f"/syncrelay at {address(relay)}: running, not ready" in shown
-    assert "front: OK" in shown
+    # On a busy machine it is something else now and then.
+    wait_until(lambda: "front: OK" in once(stage, "--url", address(relay))[1], "a group in order")
     assert re.search(r"/camera: [\d.]+ Hz, lag ", shown)
     assert "nobody publishes /rear (geometry_msgs/msg/Vector3Stamped)" in shown
 

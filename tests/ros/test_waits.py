@@ -47,7 +47,8 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
         player.match()
         player.play(merged(at("/a", 0), at("/b", 0), at("/c", 0), at("/d", 0)))
         wait_until(lambda: sets_of(1, 1), "a set of both groups")
-        assert told() == {"front": False, "rear": False}
+        # On a busy machine they may have waited too.
+        wait_until(lambda: told() == {"front": False, "rear": False}, "nothing that waited to be told")
         may_turn.clear()
         player.play(merged(at("/a", 10), at("/b", 10)))
         played = time.monotonic()

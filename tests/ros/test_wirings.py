@@ -201,7 +201,7 @@ def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:
         for place, name in enumerate(_NAMES)
         if chance.random() < 0.7 or place < 2
     }
-    outputs = [*(set(_NAMES) - came.keys()), "/g", "/h", "/i", "/j"]
+    outputs = [*sorted(set(_NAMES) - came.keys()), "/g", "/h", "/i", "/j"]
     chance.shuffle(outputs)
     groups: dict[str, list[tuple[str, str, str]]] = {}
     for name in chance.sample(("one", "two", "three"), k=chance.randrange(1, 4)):
