@@ -18,16 +18,20 @@ def explain(relay: "Relay", seconds: float, *, stop: StopRequest) -> int:
     end = began + seconds
     while not stop.requested and (left := end - time.monotonic()) > 0:
         relay.step(left)
-    return conclude(relay.look(), time.monotonic() - began)
+    reports = relay.look()
+    return conclude(reports, time.monotonic() - began, unjudged=relay.monitor.unjudged)
 
 
-def conclude(reports: "Sequence[GroupReport]", looked_s: float) -> int:
-    """Print the findings of groups; 0 if every one is healthy, else 1 with a last line that says what decided that."""
+def conclude(reports: "Sequence[GroupReport]", looked_s: float, *, unjudged: "Sequence[str]" = ()) -> int:
+    """Print the findings of groups; 0 if every one is healthy, else 1 with a last line that says what decided that.
+
+    `unjudged` are groups of which there is no report.
+    """
     for report in reports:
         for line in _lines(report):
             put(line)
     faults = [f"{report.facts.name} {fault}" for report in reports if (fault := _fault(report, looked_s))]
-    faults += [f"{name} could not be judged: see the log" for name in relay.monitor.unjudged]
+    faults += [f"{name} could not be judged: see the log" for name in unjudged]
     if not faults:
         return DONE
     put(f"exit code 1: {'; '.join(faults)}")

@@ -174,7 +174,7 @@ class Relay:
         _LOG.info("the file was read again: %s, %d %s", go_on, begin, "begins" if begin == 1 else "begin")
 
     def refuse_reload(self, reason: str) -> None:
-        """Tell in `state` that the file was read again and is left aside."""
+        """Tell in `state` that a reload failed, and why."""
         self._reload_error = reason
         self._refused_reloads += 1
 

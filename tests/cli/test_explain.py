@@ -32,3 +32,8 @@ def test_findings_of_a_group_decide_and_are_counted(capsys: pytest.CaptureFixtur
     lonely = _report(a_group(an_input(publishers=()), an_input("/lidar", publishers=())))
     assert conclude([_report(a_group()), lonely], 10) == AT_FAULT
     assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: front has 2 warnings"
+
+
+def test_a_group_of_which_there_is_no_report_is_not_healthy(capsys: pytest.CaptureFixture[str]):
+    assert conclude([_report(a_group())], 10, unjudged=["rear"]) == AT_FAULT
+    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: rear could not be judged: see the log"
