@@ -145,6 +145,18 @@ def test_a_message_of_no_channel_is_counted(tmp_path):
     assert _read(path) == (_RIG[1:], [f"1 message {_STRAYS}"])
 
 
+@pytest.mark.parametrize("length", [2**20, 2**40, 2**64 - 1])
+def test_an_mcap_record_that_is_no_message_and_ends_behind_its_chunk_is_said(length, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False, compression=CompressionType.NONE)
+    content = bytearray(path.read_bytes())
+    first = content.index(struct.pack("<BQH", Opcode.MESSAGE, 22 + len(_RIG[0].payload), 1))
+    content[first : first + 9] = struct.pack("<BQ", Opcode.ATTACHMENT, length)
+    path.write_bytes(content)
+    frames, (fault,) = _read(path)
+    assert frames == []
+    assert fault.endswith("is damaged and left out: a record in it ends behind it")
+
+
 @pytest.mark.parametrize("lie", [0, 9, 2**40, 2**63, 2**64 - 1])
 def test_an_mcap_file_whose_index_lies_is_gone_through(lie, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
