@@ -5,9 +5,9 @@ import gzip
 import os
 import shutil
 import sqlite3
-import tempfile
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -256,7 +256,7 @@ def test_what_is_no_recording_is_said(name, content, said, tmp_path):
 
 def test_a_path_that_the_system_refuses_is_said(tmp_path):
     for path in ("x" * 300, str(tmp_path / ("x" * 300) / "metadata.yaml")):
-        with pytest.raises(BagError, match="x: cannot be read: File name too long|yaml: cannot be read: File name too"):
+        with pytest.raises(BagError, match="cannot be read: File name too long"):
             open_recording([path])
 
 
