@@ -13,6 +13,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from syncrelay.bag.plain_definitions import plain_idl, plain_msg
 from syncrelay.bag.recording import Channel, Definition
 from syncrelay.errors import BagError
 
@@ -20,9 +21,7 @@ Convert: TypeAlias = Callable[[bytes], bytes | None]
 """From a ROS 1 payload to the same message as CDR; None where it is malformed."""
 
 _HEADER: Final = "std_msgs/msg/Header"
-_IDL_RULE: Final = "=" * 80 + "\n"
-# Far beyond the definitions of real messages, and what is done with them takes seconds.
-_LONGEST: Final = 1_000_000
+# Far beyond the definitions of real messages; what is done with them takes seconds.
 _MOST_FIELDS: Final = 20_000
 _DEEPEST: Final = 50
 # rosidl's words for the primitives of .msg files, as its Python classes tell them.
@@ -95,7 +94,7 @@ def jazzy_definition(type_name: str) -> tuple[Definition, str]:
 @lru_cache(maxsize=256)
 def _store_of(type_name: str, definition: Definition | None) -> Typestore:
     """A store of what a definition holds: the type and all that it is made of; Jazzy's where that is of no use."""
-    if definition is None or len(definition.text) > _LONGEST:
+    if definition is None:
         return _jazzy()
     store = get_typestore(Stores.EMPTY)
     try:
@@ -141,12 +140,10 @@ def _require_bearable(types: Mapping[str, Any]) -> None:
 
 def _parsed(type_name: str, definition: Definition) -> dict[str, Any]:
     if definition.format != "ros2idl":
-        return dict(get_types_from_msg(definition.text, type_name))
+        return dict(get_types_from_msg(plain_msg(definition.text), type_name))
     types: dict[str, Any] = {}
-    for part in definition.text.split(_IDL_RULE):
-        text = part.partition("\n")[2] if part.startswith(("IDL: ", "MSG: ")) else part
-        if text.strip():
-            types |= get_types_from_idl(text)
+    for text in plain_idl(definition.text):
+        types |= get_types_from_idl(text)
     return types
 
 

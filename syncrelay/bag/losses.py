@@ -38,6 +38,10 @@ class Losses:
         """Take in that nothing can be read from a byte on."""
         self.say(f"cut off or damaged at byte {place} of {size}, what is before it is read")
 
+    def not_closed(self) -> None:
+        """Take in that the file ends where more could follow."""
+        self.say("was not closed or is cut off, what it holds is read")
+
     def damaged(self, what: str, fault: BaseException, *, read: int = 0) -> None:
         """Take in that of something, named with its article, only so many messages could be read."""
         why = "there is not enough memory for it" if isinstance(fault, MemoryError) else fault

@@ -35,6 +35,8 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 # Where the summary begins, where its offsets do, the checksum of all from the summary up to here.
 _FOOTER: Final = Struct("<QQI")
 _CHECKSUM_SIZE: Final = 4
+# DATA_END holds a checksum alone.
+_DATA_END_SIZE: Final = 4
 # Messages outside of chunks are read by the piece.
 _PIECE: Final = 4_000_000
 # No text of a schema or a channel is so long.
@@ -197,10 +199,12 @@ class McapFile:
         place = len(MAGIC)
         try:
             for opcode, begin, end in self._walk(place, self.size):
-                if opcode == Opcode.DATA_END:
+                if opcode == Opcode.DATA_END and end - begin == _DATA_END_SIZE:
                     break
                 self._note(opcode, begin, end, loose)
                 place = end
+            else:
+                self._losses.not_closed()
         except UNREADABLE:
             self._losses.cut_off(place, self.size)
         self._segments += loose.segments()

@@ -27,6 +27,7 @@ MESSAGE_FIELDS: Final = _MESSAGE.size - RECORD.size
 UNREADABLE: Final = (McapError, ZstdError, RuntimeError, error, ValueError, EOFError, OSError, MemoryError)
 """What bytes raise that are not what they should be."""
 
+_BEHIND: Final = "a record in it ends behind it"
 _UNPACKERS: Final[Mapping[str, Callable[[bytes], bytes]]] = {"": bytes, "lz4": unlz4, "zstd": zstd_unpacker()}
 _Parsed_co = TypeVar("_Parsed_co", covariant=True)
 
@@ -83,7 +84,7 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
         begin = place + RECORD.size
         place = begin + length
         if place > len(content):
-            raise ValueError("a record in it ends behind it")
+            raise ValueError(_BEHIND)
         yield opcode, begin, place
 
 
@@ -108,3 +109,5 @@ def messages(content: bytes, channels: Mapping[int, Channel | None]) -> Iterator
         elif (channel := channels[number]) is not None:
             yield channel, time, content[place + begin_payload : end]
         place = end
+    if place > size:
+        raise ValueError(_BEHIND)

@@ -104,15 +104,20 @@ class Files:
 
 def _files(named: Sequence[str]) -> Iterator[Path]:
     for name in named:
-        path = Path(name)
-        if path.name == _METADATA and path.is_file():
-            path = path.parent
-        if path.is_dir():
-            yield from _files_in(path)
-        elif path.exists():
-            yield path
-        else:
-            raise BagError(f"{name}: no such file or folder{_similar(path)}")
+        try:
+            yield from _files_of(Path(name))
+        except OSError as error:
+            raise BagError(f"{name}: cannot be read: {error.strerror}") from error
+
+
+def _files_of(path: Path) -> list[Path]:
+    if path.name == _METADATA and path.is_file():
+        path = path.parent
+    if path.is_dir():
+        return _files_in(path)
+    if path.exists():
+        return [path]
+    raise BagError(f"{path}: no such file or folder{_similar(path)}")
 
 
 def _files_in(folder: Path) -> list[Path]:
@@ -164,9 +169,9 @@ def _open_plain(path: Path, magic: bytes, name: str) -> Recording:
 
 
 def _magic(path: Path) -> bytes:
-    if not path.is_file():
-        raise BagError(f"{path}: is not a file that can be read from any place, as a recording has to be")
     try:
+        if not path.is_file():
+            raise BagError(f"{path}: is not a file that can be read from any place, as a recording has to be")
         with path.open("rb") as file:
             return file.read(_LONGEST_MAGIC)
     except OSError as error:
@@ -175,7 +180,12 @@ def _magic(path: Path) -> bytes:
 
 def _decompressed(path: Path, decompressor: Callable[[Path], Any], opened: ExitStack) -> tuple[Path, list[str]]:
     """Return a temporary file of the content, and what is wrong with it."""
-    folder = opened.enter_context(TemporaryDirectory(prefix="syncrelay-"))
+    try:
+        folder = opened.enter_context(TemporaryDirectory(prefix="syncrelay-"))
+    except OSError as error:
+        raise BagError(
+            f"{path}: no temporary folder to decompress it in, set TMPDIR to one that can be written: {error.strerror}"
+        ) from error
     content = Path(folder) / path.stem
     with decompressor(path) as packed, content.open("wb") as plain:
         try:

@@ -23,6 +23,7 @@ _NAMES: Final[Mapping[str, Sequence[str]]] = {
 }
 # A list of profiles, each of which has durations.
 _DEEPEST: Final = 5
+_LONGEST: Final = 100_000
 _DURATIONS: Final = ("deadline", "lifespan", "liveliness_lease_duration")
 
 
@@ -80,7 +81,7 @@ def read_profiles(recorded: str) -> tuple[Profile, ...]:
     """Return the profiles of `offered_qos_profiles`, a YAML text; none where it makes no sense."""
     try:
         listed = yaml.load(recorded, Loader=LOADER) if _is_plain(recorded) else None  # noqa: S506  a safe one
-    except (yaml.YAMLError, ValueError):
+    except (yaml.YAMLError, ValueError, OverflowError):
         return ()
     if not isinstance(listed, list):
         return ()
@@ -88,10 +89,15 @@ def read_profiles(recorded: str) -> tuple[Profile, ...]:
 
 
 def _is_plain(text: str) -> bool:
-    """Tell whether a text nests no deeper than profiles do, and has no aliases, which can stand for gigabytes."""
+    """Tell whether a text is no longer and nests no deeper than profiles do, and has neither aliases nor tags.
+
+    Aliases can stand for gigabytes; of a value that is not what its tag says, PyYAML raises anything.
+    """
+    if len(text) > _LONGEST:
+        return False
     depth = 0
     for event in yaml.parse(text, Loader=LOADER):
-        if isinstance(event, yaml.AliasEvent):
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
             return False
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > _DEEPEST:

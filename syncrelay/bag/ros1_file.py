@@ -118,6 +118,15 @@ class Ros1File:
                 return
             self._note(place, record)
             place = record.end
+        if not self._has_index_place():
+            self._losses.not_closed()
+
+    def _has_index_place(self) -> bool:
+        """Tell whether the file goes as far as its header says that the index is; that is 0 until it is closed."""
+        with suppress(*UNREADABLE):
+            (place,) = _PLACE.unpack(field_of(self._record_at(len(MAGIC)).fields, b"index_pos"))
+            return bool(0 < place <= self.size)
+        return False
 
     def _note(self, place: int, record: Record) -> None:
         """Take in what a record of the file says."""

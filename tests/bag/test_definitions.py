@@ -37,6 +37,9 @@ _USELESS = {
     "a constant without an end": f"{_HEADER}float64 X=1e999\nuint32 n\n",
     "no definition": "\0\x1b[31m",
     "more than any text": "uint8 x\n" * 200_000,
+    "more lines than any message has": f"{_HEADER}uint32 n\n" + "uint8 A=1\n" * 9_000,
+    "lines of nothing": "\n" * 900_000 + "?",
+    "comments": "# hm\n" * 190_000 + "?",
 }
 
 
@@ -52,7 +55,46 @@ def test_a_definition_of_no_use_leaves_the_type_unknown(text, encoding, form):
         converter(channel)
 
 
-@pytest.mark.parametrize("text", ["module a { " * 5000, f"struct Blip {{ {'sequence<' * 5000} uint8 x; }};", "\xff"])
+def _idl(fields: str, constants: str = "") -> str:
+    return f"module rig_msgs {{ module msg {{ {constants} struct Blip {{ {fields} }}; }}; }};"
+
+
+_USELESS_IDL = {
+    "modules in modules": "module a { " * 5000,
+    "sequences of sequences": _idl("sequence<" * 24 + " x;"),
+    "many sequences of sequences": _idl("sequence<" * 5000 + " x;"),
+    "a constant in brackets": _idl("uint8 x;", "const uint8 A = (((1)));"),
+    "an annotation in brackets": _idl("@x(v=(((1)))) uint8 x;"),
+    "a constant of gigabytes": _idl("uint8 x;", "const uint64 A = 1 << 99999999999;"),
+    "more constants than any": _idl("uint8 x;", "const uint8 A = 1;" * 5000),
+    "a constant of many texts": _idl("uint8 x;", "const string A = " + '"b" ' * 24_000 + ";"),
+    "values of sums": _idl("uint8 x;", "enum E { " + f"@value(1{'|1' * 100}) A, " * 200 + "B };"),
+    "annotations of nothing": "@x " * 300_000,
+    "annotations without an end": '@x("a" ' * 140_000,
+    "texts without an end": '"\\' * 300_000,
+    "comments without an end": "/*a" * 300_000,
+    "no definition": "\xff",
+}
+
+
+def test_annotations_and_comments_of_idl_do_not_matter():
+    verbatim = '@verbatim (language="comment", text=\n  "Of (all) \\"blips\\"" "\\n" // hm\n)'
+    enum = "enum Kind { @value(1) ONE, @value (2) TWO };"
+    members = "".join(f"{verbatim} @unit(value='m') uint8 x{n}; /* ( */ // (\n" for n in range(1000))
+    fields = fields_of(_channel(_idl(members, enum), form="ros2idl"))
+    assert fields is not None
+    assert fields("rig_msgs/Blip") == {f"x{n}": "uint8" for n in range(1000)}
+
+
+def test_comments_of_a_message_do_not_matter():
+    text = "# what for\n \t\r\n" * 30_000 + "uint8 n # the number\n\n"
+    fields = fields_of(_channel(text))
+    assert fields is not None
+    assert fields("rig_msgs/Blip") == {"n": "uint8"}
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("text", _USELESS_IDL.values(), ids=_USELESS_IDL)
 def test_an_idl_that_nests_without_end_leaves_the_type_unknown(text):
     assert begins_with_header(_channel(text, form="ros2idl")) is None
 

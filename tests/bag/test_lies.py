@@ -68,6 +68,7 @@ def test_a_row_of_a_time_that_no_clock_shows_is_left_out(value, tmp_path):
 
 
 _NO_CLOCK = "1 message left out: received at a time that no clock shows, before 1970 or after 2116"
+_NOT_CLOSED = "was not closed or is cut off, what it holds is read"
 _STRAYS = "left out: of a channel that the file does not describe"
 
 
@@ -143,6 +144,38 @@ def test_a_message_of_no_channel_is_counted(tmp_path):
     content[content.index(head) + 9] = 77
     path.write_bytes(content)
     assert _read(path) == (_RIG[1:], [f"1 message {_STRAYS}"])
+
+
+@pytest.mark.parametrize("length", [2**20, 2**40, 2**64 - 1])
+def test_an_mcap_record_that_is_no_message_and_ends_behind_its_chunk_is_said(length, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False, compression=CompressionType.NONE)
+    content = bytearray(path.read_bytes())
+    first = content.index(struct.pack("<BQH", Opcode.MESSAGE, 22 + len(_RIG[0].payload), 1))
+    content[first : first + 9] = struct.pack("<BQ", Opcode.ATTACHMENT, length)
+    path.write_bytes(content)
+    frames, (fault,) = _read(path)
+    assert frames == []
+    assert fault.endswith("is damaged and left out: a record in it ends behind it")
+
+
+def test_an_mcap_file_that_ends_between_two_records_is_said(tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, use_chunking=False)
+    content = path.read_bytes()
+    last = struct.pack("<BQ", Opcode.MESSAGE, 22 + len(_RIG[-1].payload))
+    path.write_bytes(content[: content.rindex(last)])
+    assert _read(path) == (_RIG[:-1], [_NOT_CLOSED])
+
+
+def test_a_ros1_bag_that_ends_between_two_records_is_said(tmp_path):
+    path = write_ros1(tmp_path / "rig.bag", _RIG, chunk=300)
+    content = path.read_bytes()
+    with closing(open_recording([str(path)])) as recording:
+        (file,) = recording._files  # noqa: SLF001  where its chunks are
+        second = sorted(each.offset for each in file._segments)[1]  # noqa: SLF001
+    path.write_bytes(content[:second])
+    frames, faults = _read(path)
+    assert 0 < len(frames) < len(_RIG)
+    assert faults == [_NOT_CLOSED]
 
 
 @pytest.mark.parametrize("lie", [0, 9, 2**40, 2**63, 2**64 - 1])
@@ -250,7 +283,8 @@ def test_a_damaged_connection_of_a_ros1_bag_is_said_and_the_others_are_read(fiel
     frames, faults = _read(path)
     assert {frame.topic for frame in frames} <= {"/lidar", "/camera"}
     assert frames
-    assert all(" is damaged and left out" in fault or _STRAYS in fault for fault in faults)
+    assert _NOT_CLOSED in faults
+    assert all(" is damaged and left out" in fault or _STRAYS in fault for fault in faults if fault != _NOT_CLOSED)
 
 
 def _other_connection(content: bytes) -> bytes:

@@ -2,10 +2,12 @@
 
 import bz2
 import gzip
+import os
 import shutil
 import sqlite3
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -250,6 +252,31 @@ def test_what_is_no_recording_is_said(name, content, said, tmp_path):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(BagError, match=said):
         open_recording([str(tmp_path / name)])
+
+
+def test_a_path_that_the_system_refuses_is_said(tmp_path):
+    for path in ("x" * 300, str(tmp_path / ("x" * 300) / "metadata.yaml")):
+        with pytest.raises(BagError, match="cannot be read: File name too long"):
+            open_recording([path])
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root reads everything")
+@pytest.mark.parametrize("mode", [0o000, 0o400])
+def test_a_folder_that_cannot_be_read_is_said(mode, tmp_path):
+    folder = tmp_path / "locked"
+    folder.mkdir()
+    (folder / "rig.mcap").touch()
+    folder.chmod(mode)
+    with pytest.raises(BagError, match="cannot be read: Permission denied"):
+        open_recording([str(folder)])
+
+
+def test_no_folder_to_decompress_in_is_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    path = tmp_path / "rig.mcap.gz"
+    path.write_bytes(gzip.compress(b"\x89MCAP0\r\n"))
+    with pytest.raises(BagError, match=r"rig\.mcap\.gz: no temporary folder to decompress it in, set TMPDIR to one"):
+        open_recording([str(path)])
 
 
 def test_a_name_that_is_not_there_gets_the_nearest(tmp_path):

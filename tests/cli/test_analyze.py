@@ -177,6 +177,7 @@ def test_keys_that_no_two_inputs_have_in_common_are_found(folder):
         (["rig.mcap", "/camera"], 2, "name 2 topics or more"),
         (["rig.mcap", "/camera", "/lidr"], 1, "/lidr is not in the recording, did you mean `/lidar`?"),
         (["none.mcap", "/camera", "/lidar"], 1, "none.mcap: no such file or folder"),
+        (["x" * 300, "/camera", "/lidar"], 1, f"{'x' * 300}: cannot be read: File name too long"),
     ],
 )
 def test_what_is_wrong_is_said(words, code, said, folder):

@@ -58,6 +58,7 @@ def test_what_it_writes_for_packages_that_are_not_installed_is_in_order_too(fold
         (["--from-bag", "rig.mcap", "--seconds", "3"], 2, "--seconds N is for how long --from-graph listens"),
         (["--from-graph", "--seconds", "0"], 2, "argument --seconds: expected a number above 0, found 0"),
         (["--from-bag", "none.mcap"], 1, "none.mcap: no such file or folder"),
+        (["--from-bag", "x" * 300], 1, f"{'x' * 300}: cannot be read: File name too long"),
         (["--from-bag", "rig.mcap", "-o", "rig.mcap"], 1, "rig.mcap: exists already, and is not overwritten"),
     ],
 )

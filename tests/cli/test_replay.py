@@ -116,6 +116,7 @@ def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
     ("words", "code", "said"),
     [
         (["none.mcap", "--config", "f.yaml"], 1, "syncrelay: none.mcap: no such file or folder"),
+        (["x" * 300, "--config", "f.yaml"], 1, f"syncrelay: {'x' * 300}: cannot be read: File name too long"),
         (["f.yaml", "--config", "f.yaml"], 1, "syncrelay: f.yaml: is no recording"),
         (["rig.mcap", "--config", "g.yaml"], 1, "g.yaml: no such file"),
         (["rig.mcap"], 2, "syncrelay: the following arguments are required: --config"),

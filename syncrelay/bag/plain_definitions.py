@@ -1,0 +1,56 @@
+"""Definitions without what tells no types, and within bounds: rosbags' parser tries all that can stand at a place."""
+
+import re
+from collections.abc import Iterator
+from typing import Final
+
+# Far beyond the definitions of real messages: of each the parser makes a second's work.
+_LONGEST_RECORDED: Final = 1_000_000
+_LONGEST: Final = 100_000
+_MOST_LINES: Final = 5_000
+_MOST_EXPRESSIONS: Final = 500
+
+_IDL_RULE: Final = "=" * 80 + "\n"
+_NO_LINE: Final = re.compile(r"^[ \t\r]*(?:#[^\n]*)?(?:\n|\Z)", re.MULTILINE)
+_STRING: Final = r'"(?:\\[\s\S]?|[^"\\])*(?:"|\Z)'
+# Of the annotations, an enumerator's value alone tells something.
+_TOKEN: Final = re.compile(
+    rf"""  # What has no end goes to the end: nothing is gone through twice.
+    (?P<kept>{_STRING}|@value\s*\(\s*-?\w+\s*\))
+    |(?P<gap>(?:\s|//[^\n]*|/\*[\s\S]*?(?:\*/|\Z)|@(?!value\b)[\w:]+(?:\s*\((?:{_STRING}|[^"()])*\))?)+)""",
+    re.VERBOSE,
+)
+# Each bracket of a constant takes the parser 50 times longer, and a number may be shifted by gigabytes.
+_UNBEARABLE: Final = re.compile(r"\(|<<|(?:sequence\s*<\s*){3}")
+_EXPRESSION: Final = re.compile(r'["=@\[|^&+*/%~-]|>>')
+
+
+def plain_msg(text: str) -> str:
+    """Return .msg text without comments and lines of nothing; raises ValueError where no message is so large."""
+    _require(len(text) <= _LONGEST_RECORDED)
+    plain = _NO_LINE.sub("", text)
+    _require(len(plain) <= _LONGEST and plain.count("\n") <= _MOST_LINES)
+    return plain
+
+
+def plain_idl(text: str) -> Iterator[str]:
+    """Yield what IDL text has of each type, without comments and annotations.
+
+    Raises ValueError where no message is so large, or nests what the parser takes exponential time for.
+    """
+    _require(len(text) <= _LONGEST_RECORDED)
+    expressions = 0
+    for part in text.split(_IDL_RULE):
+        body = part.partition("\n")[2] if part.startswith(("IDL: ", "MSG: ")) else part
+        plain = _TOKEN.sub(lambda token: token["kept"] or " ", body).strip()
+        code = _TOKEN.sub(lambda token: token["kept"][0] if token["kept"] else " ", plain)
+        expressions += len(_EXPRESSION.findall(code))
+        _require(len(plain) <= _LONGEST and expressions <= _MOST_EXPRESSIONS)
+        _require(_UNBEARABLE.search(code) is None)
+        if plain:
+            yield plain
+
+
+def _require(is_bearable: bool) -> None:  # noqa: FBT001  as assert's
+    if not is_bearable:
+        raise ValueError("no message is defined so")
