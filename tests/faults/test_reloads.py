@@ -8,7 +8,7 @@ import pytest
 
 from tests.faults.changes import change
 from tests.faults.extent import chosen
-from tests.faults.flow import MS, Report, Rig, accounts
+from tests.faults.flow import MS, Report, Rig, Witness, accounts
 from tests.faults.vitals import descriptors, memory_mb
 from tests.ros.cdr_messages import NS_PER_SECOND, VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
@@ -35,13 +35,8 @@ _FRONT = {
 @pytest.mark.timeout(chosen(short=300, long=3600))
 @both_paths
 def test_a_group_that_stays_loses_and_doubles_nothing_whatever_files_come(stage: Stage, figures):
-    rig = Rig(stage, topics=_TOPICS)
-    file = ReloadedFile(stage, front=_FRONT)
+    file, witness, began = _begun(stage)
     relay = file.relay
-    witness, source = rig.witness(), rig.source()
-    source.match()
-    source.pace(_HZ)
-    began = witness.wait_for_sets(_HZ)
     chance = random.Random(3)
     taken = refused = 0
     vitals = {}
@@ -71,13 +66,8 @@ def test_a_group_that_stays_loses_and_doubles_nothing_whatever_files_come(stage:
 
 @pytest.mark.timeout(chosen(short=300, long=900))
 def test_files_that_come_faster_than_they_are_read_cost_it_nothing_either(stage: Stage, figures):
-    rig = Rig(stage, topics=_TOPICS)
-    file = ReloadedFile(stage, front=_FRONT)
+    file, witness, began = _begun(stage)
     relay = file.relay
-    witness, source = rig.witness(), rig.source()
-    source.match()
-    source.pace(_HZ)
-    began = witness.wait_for_sets(_HZ)
     chance = random.Random(4)
     start = time.monotonic()
     for number in range(_STORM):
@@ -98,6 +88,15 @@ def test_files_that_come_faster_than_they_are_read_cost_it_nothing_either(stage:
         f"{_STORM} files and signals at {_HZ} a second: {told['reloads']} taken, {told['refused_reloads']} refused, the"
         f" others replaced before they were read; {n_sets} sets of the group that stayed, none lost or doubled"
     )
+
+
+def _begun(stage: Stage) -> tuple[ReloadedFile, Witness, Report]:
+    """A relay whose group gives sets: its file, who watches them, and what that has seen by now."""
+    rig, file = Rig(stage, topics=_TOPICS), ReloadedFile(stage, front=_FRONT)
+    witness, source = rig.witness(), rig.source()
+    source.match()
+    source.pace(_HZ)
+    return file, witness, witness.wait_for_sets(_HZ)
 
 
 def _number(seen: Report) -> int:
