@@ -149,10 +149,13 @@ class Monitor:
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
         for wiring, gathered in zip(wirings, seen, strict=True):
-            # What was found before would stand for ever where a bug keeps it from being looked at.
-            self._reports.pop(wiring.group, None)
             with self._bugs.contained(f"looking at {wiring.group.config.name}"):
-                self._look_at(wiring, gathered, now, stopped)
+                try:
+                    self._look_at(wiring, gathered, now, stopped)
+                except Exception:
+                    # Else what was found before would stand for ever.
+                    self._reports.pop(wiring.group, None)
+                    raise
 
     def _look_at(self, wiring: Wiring, gathered: _Seen, now: int, stopped: int | None) -> None:
         watch, silence = self._watched[wiring.group]
