@@ -92,3 +92,21 @@ def test_groups_that_a_reload_brings_are_looked_at_at_once(relay_of, tmp_path):
     relay.reload(_loaded(tmp_path, names))
     assert "new" in _after_a_look(relay)
     assert list(_seen(relay)) == names
+
+
+def test_a_report_stands_until_the_next_one_is_there(relay_of, monkeypatch):
+    relay = relay_of(3)
+    _after_a_look(relay)
+    look_at, there = relay.monitor._look_at, []  # noqa: SLF001  no other moment is within a look
+    monkeypatch.setattr(relay.monitor, "_look_at", lambda *of: there.append(len(_seen(relay))) or look_at(*of))
+    _after_a_look(relay)
+    assert there == [3] * 3
+
+
+def test_a_group_that_cannot_be_looked_at_is_named_and_its_last_report_is_gone(relay_of, monkeypatch):
+    relay = relay_of(2)
+    _after_a_look(relay)
+    assert relay.state().unjudged == ()
+    monkeypatch.setattr(relay.monitor, "_look_at", lambda *_: {}["no such"])
+    relay.look()
+    assert (relay.state().unjudged, _seen(relay)) == (("g0", "g1"), {})
