@@ -28,10 +28,16 @@ _FILE = config(
 def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(stage: Stage, monkeypatch):
     for name, value in stage.environment.items():
         monkeypatch.setenv(name, value)
-    may_turn = Event()
+    may_turn, is_held = Event(), Event()
     may_turn.set()
+
+    def turn() -> None:
+        if not may_turn.is_set():
+            is_held.set()
+            may_turn.wait(DEADLINE_S)
+
     player = stage.player(_FRONT | _REAR)
-    with Relay(load_text(_FILE), beat=lambda: may_turn.wait(DEADLINE_S)) as relay:
+    with Relay(load_text(_FILE), beat=turn) as relay:
 
         def sets_of(*counts: int) -> bool:
             relay.step(0)
@@ -50,6 +56,8 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
         # On a busy machine they may have waited too.
         wait_until(lambda: told() == {"front": False, "rear": False}, "nothing that waited to be told")
         may_turn.clear()
+        # A loop that still rests takes both messages before it comes to hold still.
+        assert is_held.wait(DEADLINE_S)
         player.play(merged(at("/a", 10), at("/b", 10)))
         played = time.monotonic()
         wait_until(lambda: time.monotonic() > played + 0.7, "the messages to have waited")
