@@ -129,7 +129,7 @@ def replay(recording: Recording, wirings: Sequence[Wiring], *, listeners: Sequen
     Raises BagError for a stamp or key that a recorded type does not have.
     """
     groups = [GroupReplay(wiring, listeners) for wiring in wirings]
-    limited = [group for group in groups if group.wiring.group.keys.max_wait is not None]
+    limited = [group for group in groups if group.wiring.group.options.max_wait is not None]
     feeds: dict[Channel, list[_Feed]] = {}
     for group in groups:
         for channel, feed in group.feeds():

@@ -26,7 +26,7 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
     suggestion = each.suggestion
     return {
         "name": each.group.name,
-        "policy": each.group.keys.policy,
+        "policy": each.group.options.policy,
         "sets": len(each.trial.sets),
         "inputs": [
             {
@@ -63,9 +63,9 @@ def _curves(each: GroupAnalysis) -> dict[str, Any]:
     found = each.tightest
     if found is None:
         return {"by_slop": [], "by_queue_size": []}
-    slop = getattr(each.group.keys, "slop", None)
+    slop = getattr(each.group.options, "slop", None)
     points = slop_curve(found, marks=() if slop is None else (slop,), shares=_SHARES)
-    sizes = queue_curve(found, each.slop, marks=(each.group.keys.queue_size,), shares=_SHARES)
+    sizes = queue_curve(found, each.slop, marks=(each.group.options.queue_size,), shares=_SHARES)
     return {
         "by_slop": [{"slop": at, "matched": share, "median_span": span} for at, share, span in points],
         "by_queue_size": [{"queue_size": size, "matched": share} for size, share in sizes],

@@ -76,7 +76,7 @@ def _long(nanoseconds: int) -> str:
 def _group(each: GroupAnalysis) -> Iterator[str]:
     name = each.group.name
     suggestion = each.suggestion
-    yield f"group {name}, {each.group.keys.policy}"
+    yield f"group {name}, {each.group.options.policy}"
     for pair in each.pairs:
         yield f"  {pair_line(pair)}"
     yield from (f"  {line}" for line in _curves(each))
@@ -116,8 +116,8 @@ def _curves(each: GroupAnalysis) -> Iterator[str]:
     found = each.tightest
     if found is None:
         return
-    slop = getattr(each.group.keys, "slop", None)
+    slop = getattr(each.group.options, "slop", None)
     points = slop_curve(found, marks=() if slop is None else (slop,))
     yield f"by slop: {', '.join(f'{words.duration(at)} {words.share(share)}' for at, share, _ in points)}"
-    sizes = queue_curve(found, each.slop, marks=(each.group.keys.queue_size,))
+    sizes = queue_curve(found, each.slop, marks=(each.group.options.queue_size,))
     yield f"by queue_size: {', '.join(f'{size} {words.share(share)}' for size, share in sizes)}"

@@ -122,8 +122,8 @@ def _relay(
 
 def _plan(group: GroupConfig) -> GroupPlan:
     return GroupPlan(
-        policy=group.keys.policy,
-        slop=group.keys.slop if isinstance(group.keys, ApproximateTimeGroup) else 0,
+        policy=group.options.policy,
+        slop=group.options.slop if isinstance(group.options, ApproximateTimeGroup) else 0,
         offsets=tuple(topic.offset_ns for topic in group.topics),
     )
 

@@ -47,19 +47,19 @@ class GroupConfig:
     name: str
     topics: tuple[TopicConfig, ...]
     restamp: Restamp | int | None
-    keys: AnyGroup
+    options: AnyGroup
     inputs: Inputs
 
     def engine(self) -> SyncGroup:
         """Return a new, empty engine of this group."""
         return SyncGroup(
-            self.keys.matcher(self.inputs),
+            self.options.matcher(self.inputs),
             required=tuple(topic.required for topic in self.topics),
-            max_wait_ns=self.keys.max_wait,
+            max_wait_ns=self.options.max_wait,
             offsets_ns=tuple(topic.offset_ns for topic in self.topics),
             restamp=self.restamp,
-            every=self.keys.every,
-            min_set_period_ns=self.keys.max_rate,
+            every=self.options.every,
+            min_set_period_ns=self.options.max_rate,
         )
 
 
@@ -100,7 +100,7 @@ def _group(name: str, group: AnyGroup, node: NodeConfig) -> GroupConfig:
         name=name,
         topics=tuple(_topic(topic, group, prefix=prefix) for topic in group.topics),
         restamp=_restamp(group.restamp, inputs),
-        keys=group,
+        options=group,
         inputs=inputs,
     )
 

@@ -4,22 +4,36 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 """
 
 from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.facts import Endpoint, GroupFacts, InputFacts, Mismatch, Refusal, Standstill, Tolerance
+from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
+from syncrelay.explain.facts import (
+    Endpoint,
+    GroupFacts,
+    InputFacts,
+    InputGraph,
+    Mismatch,
+    Refusal,
+    Standstill,
+    Tolerance,
+)
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.find import explanation, find, remarkable
+from syncrelay.explain.find import explanation, find, problems
+from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.histogram import BOUNDS_NS, Histogram
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
-from syncrelay.explain.silence import Silence, in_words
-from syncrelay.explain.watch import GroupWatch, InputGraph
+from syncrelay.explain.watch import GroupWatch
 
 __all__ = [
     "BOUNDS_NS",
+    "Arrival",
     "Code",
     "Distribution",
+    "DryRun",
     "Endpoint",
+    "EngineDriver",
     "Finding",
+    "FindingLog",
     "GroupFacts",
     "GroupFigures",
     "GroupReport",
@@ -35,12 +49,12 @@ __all__ = [
     "Refusal",
     "SentSets",
     "Severity",
-    "Silence",
     "Standstill",
     "Tolerance",
+    "dry_run",
     "explanation",
     "find",
     "in_words",
+    "problems",
     "recent",
-    "remarkable",
 ]

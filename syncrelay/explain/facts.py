@@ -59,21 +59,17 @@ class Tolerance:
 
 
 @dataclass(frozen=True, slots=True)
-class InputFacts:
-    """An input and its output.
+class InputGraph:
+    """What the graph shows around an input; a recording shows no more than that it was published.
 
-    `name` is the topic's in the graph, `not_importable` says why its type cannot be used here, `refusal` what DDS does
-    not make for it, `alike` are topics of the graph that may have been meant, `lost` counts what DDS lost on the way of
-    late. `rivals` are others that publish its output, seen so without a break since `rivals_since`. `key` is the newest
-    message's. `offset` is added to stamps for matching, in nanoseconds.
+    `name` is the topic's in the graph, `output` that under which its messages leave, `not_importable` says why its type
+    cannot be used here, `refusal` what DDS does not make for it, `alike` are topics of the graph that may have been
+    meant, `lost` counts what DDS lost on the way of late. `rivals` are others that publish its output, seen so without
+    a break since `rivals_since`.
     """
 
     name: str
-    type: str
     output: str
-    required: bool
-    counts: InputCounts
-    figures: InputFigures
     publishers: tuple[Endpoint, ...] = ()
     subscribers: tuple[Endpoint, ...] = ()
     alike: tuple[str, ...] = ()
@@ -82,8 +78,32 @@ class InputFacts:
     lost: int = 0
     rivals: tuple[Endpoint, ...] = ()
     rivals_since: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class InputFacts:
+    """An input and its output.
+
+    `key` is the newest message's. `offset` is added to stamps for matching, in nanoseconds.
+    """
+
+    graph: InputGraph
+    type: str
+    required: bool
+    counts: InputCounts
+    figures: InputFigures
     key: Hashable = None
     offset: int = 0
+
+    @property
+    def name(self) -> str:
+        """Its topic's name in the graph."""
+        return self.graph.name
+
+    @property
+    def output(self) -> str:
+        """The topic on which its messages leave."""
+        return self.graph.output
 
 
 class Standstill(NamedTuple):

@@ -38,10 +38,10 @@ _RULES: Final[tuple[Rule, ...]] = (
 
 def find(facts: GroupFacts) -> tuple[Finding, ...]:
     """Return all findings, one at least; see `explanation` for the one that matters most."""
-    return with_wellbeing(facts, remarkable(facts))
+    return with_ok(facts, problems(facts))
 
 
-def remarkable(facts: GroupFacts) -> tuple[Finding, ...]:
+def problems(facts: GroupFacts) -> tuple[Finding, ...]:
     """Return what is not as ever, an error at least of a silent group; nothing to mend where a group is well."""
     found = [finding for rule in _RULES for finding in rule(facts)]
     if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
@@ -52,7 +52,7 @@ def remarkable(facts: GroupFacts) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-def with_wellbeing(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
+def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Add to what is remarkable that a group is well, or starts; in figures that cost more than all rules."""
     if not _is_well(found):
         return found

@@ -92,4 +92,4 @@ def counted(count: int, fed: int) -> str:
 
 def nodes(an_input: InputFacts) -> str:
     """Return the names of those who publish an input."""
-    return " and ".join(dict.fromkeys(each.node for each in an_input.publishers)) or "its publisher"
+    return " and ".join(dict.fromkeys(each.node for each in an_input.graph.publishers)) or "its publisher"

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.find import with_wellbeing
+from syncrelay.explain.find import with_ok
 from syncrelay.explain.findings import Finding
 from syncrelay.sync.messages import DropReason
 
@@ -44,13 +44,13 @@ class GroupReport:
     """What there is to say of a group, in words only for those who ask; what left `last`, oldest first."""
 
     facts: GroupFacts
-    remarkable: tuple[Finding, ...]
+    problems: tuple[Finding, ...]
     last: Sequence[tuple[int | None, ...] | RecentDrop] = ()
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
         """All findings, one at least."""
-        return with_wellbeing(self.facts, self.remarkable)
+        return with_ok(self.facts, self.problems)
 
     @cached_property
     def recent(self) -> tuple[RecentSet | RecentDrop, ...]:

@@ -141,8 +141,8 @@ def _behind(facts: GroupFacts, an_input: InputFacts) -> int:
 
 def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that DDS itself lost before they came here."""
-    if an_input.lost:
-        messages = "1 message" if an_input.lost == 1 else f"{an_input.lost} messages"
+    if an_input.graph.lost:
+        messages = "1 message" if an_input.graph.lost == 1 else f"{an_input.graph.lost} messages"
         yield Finding(
             Code.MESSAGES_LOST,
             Severity.WARN,

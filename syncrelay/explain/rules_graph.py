@@ -30,7 +30,7 @@ def internal_error(facts: GroupFacts) -> Found:
 
 def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find a topic that DDS lets the group not subscribe to or publish."""
-    if (refusal := an_input.refusal) is not None:
+    if (refusal := an_input.graph.refusal) is not None:
         yield Finding(
             Code.REFUSED_BY_DDS,
             Severity.ERROR if an_input.required else Severity.WARN,
@@ -44,11 +44,11 @@ def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Foun
 
 def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find a type that cannot be used here."""
-    if an_input.not_importable:
+    if an_input.graph.not_importable:
         yield Finding(
             Code.TYPE_NOT_IMPORTABLE,
             Severity.ERROR if an_input.required else Severity.WARN,
-            f"{an_input.name}: {an_input.not_importable.splitlines()[0]}",
+            f"{an_input.name}: {an_input.graph.not_importable.splitlines()[0]}",
             "install the package where the relay runs, or source the workspace that has it",
             index,
         )
@@ -56,8 +56,8 @@ def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) ->
 
 def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find publishers of another type than the file's."""
-    alone = all(each.type != an_input.type for each in an_input.publishers)
-    for publisher in an_input.publishers:
+    alone = all(each.type != an_input.type for each in an_input.graph.publishers)
+    for publisher in an_input.graph.publishers:
         if publisher.type != an_input.type:
             yield Finding(
                 Code.OTHER_TYPE,
@@ -70,14 +70,14 @@ def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 def no_publisher(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find a topic that nobody publishes, or nobody any more."""
-    if an_input.publishers or facts.figures.now - facts.figures.began < _GRACE:
+    if an_input.graph.publishers or facts.figures.now - facts.figures.began < _GRACE:
         return
     last = an_input.figures.last_received
     gone = "" if last is None else f" any more, since {words.seconds(facts.figures.now - last)}"
     if gone:
         suggestion = f"restart the node that published {an_input.name}"
-    elif an_input.alike:
-        suggestion = f"did you mean `topic: {an_input.alike[0]}`? It is published as {an_input.type}"
+    elif an_input.graph.alike:
+        suggestion = f"did you mean `topic: {an_input.graph.alike[0]}`? It is published as {an_input.type}"
     else:
         suggestion = f"start the node that publishes {an_input.name}, or correct the topic's name"
     text = f"nobody publishes {an_input.name} ({an_input.type}){gone}"
@@ -86,7 +86,7 @@ def no_publisher(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find publishers that cannot serve the QoS that the group requests."""
-    of_type = [each for each in an_input.publishers if each.type == an_input.type]
+    of_type = [each for each in an_input.graph.publishers if each.type == an_input.type]
     alone = all(each.mismatch for each in of_type)
     for publisher in of_type:
         if (why := publisher.mismatch) is not None:
@@ -113,7 +113,7 @@ def clock_stopped(facts: GroupFacts) -> Found:
 
 def silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find publishers that send nothing, or nothing any more."""
-    fitting = [each for each in an_input.publishers if each.type == an_input.type and not each.mismatch]
+    fitting = [each for each in an_input.graph.publishers if each.type == an_input.type and not each.mismatch]
     now, figures = facts.figures.now, an_input.figures
     if not fitting or facts.clock_stopped is not None:
         return
@@ -160,7 +160,7 @@ def _or_hold_longer(facts: GroupFacts, index: int) -> str:
 
 def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find subscribers of an output that the relay's QoS cannot serve."""
-    for subscriber in an_input.subscribers:
+    for subscriber in an_input.graph.subscribers:
         if (why := subscriber.mismatch) is not None:
             yield Finding(
                 Code.SUBSCRIBER_QOS,
@@ -174,9 +174,9 @@ def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Foun
 
 def output_taken(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find others that publish an output, as a second relay of the same file does."""
-    if an_input.rivals and facts.figures.now - an_input.rivals_since >= _ENDING:
-        they = " and ".join(dict.fromkeys(each.node for each in an_input.rivals))
-        verb, whose = ("publishes", "both") if len(an_input.rivals) == 1 else ("publish", "all")
+    if an_input.graph.rivals and facts.figures.now - an_input.graph.rivals_since >= _ENDING:
+        they = " and ".join(dict.fromkeys(each.node for each in an_input.graph.rivals))
+        verb, whose = ("publishes", "both") if len(an_input.graph.rivals) == 1 else ("publish", "all")
         yield Finding(
             Code.OUTPUT_TAKEN,
             Severity.WARN,

@@ -182,8 +182,8 @@ def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 
 
 def _who_disorders(an_input: InputFacts) -> str:
-    if len(an_input.publishers) > 1:
-        return f"{len(an_input.publishers)} publish it, {nodes(an_input)}: give each a topic of its own"
+    if len(an_input.graph.publishers) > 1:
+        return f"{len(an_input.graph.publishers)} publish it, {nodes(an_input)}: give each a topic of its own"
     return f"see how {nodes(an_input)} stamps its messages"
 
 

@@ -10,14 +10,14 @@ from typing import Any, Final, NamedTuple
 
 from syncrelay.explain import (
     Endpoint,
+    FindingLog,
     GroupReport,
     GroupWatch,
     InputGraph,
     RecentDrop,
     Severity,
-    Silence,
     Standstill,
-    remarkable,
+    problems,
 )
 from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.graph import topics_alike, topics_in
@@ -56,7 +56,7 @@ class _Seen:
 
 class _Watched(NamedTuple):
     watch: GroupWatch
-    silence: Silence
+    silence: FindingLog
 
 
 class _Ends(NamedTuple):
@@ -105,7 +105,7 @@ class Monitor:
         self._wirings = wirings
         self._watched = {
             wiring.group: self._watched.get(wiring.group)
-            or _Watched(GroupWatch(wiring.group.config, began=now), Silence())
+            or _Watched(GroupWatch(wiring.group.config, began=now), FindingLog())
             for wiring in wirings
         }
         inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
@@ -172,7 +172,7 @@ class Monitor:
             standstill=max(filter(None, self._standstills), key=lambda each: each.ns, default=None),
             failure=failure,
         )
-        found = remarkable(facts)
+        found = problems(facts)
         self._reports[wiring.group] = GroupReport(facts, found, gathered.last)
         for remark in silence.look(facts, found):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}

@@ -194,7 +194,7 @@ class Relay:
         self._wirings.wire(
             [group or GroupRelay(each, now=self._now) for group, each in zip(as_before, chosen, strict=True)]
         )
-        limited = [group for group in self._wirings.groups if group.config.keys.max_wait is not None]
+        limited = [group for group in self._wirings.groups if group.config.options.max_wait is not None]
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         self._loop.deadline = None if self._sim_time or not limited else lambda: _next_deadline(limited)
         self._loop.wake()
@@ -329,7 +329,7 @@ class Relay:
         def changed(jump: Any) -> None:
             if jump.delta <= _CLOCK_JUMP:
                 self._loop.call(self._flush_jump)
-            elif any(group.config.keys.max_wait is not None for group in self._wirings.groups):
+            elif any(group.config.options.max_wait is not None for group in self._wirings.groups):
                 self._loop.call(lambda: self._expire(self._now()))
 
         self._jump_handle = clock.create_jump_callback(threshold, post_callback=changed)

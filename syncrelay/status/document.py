@@ -88,10 +88,10 @@ def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
         "buffered": counts.buffered,
         "dropped": {reason.value: count for reason, count in counts.dropped.items()},
         "dropped_lately": {reason.value: count for reason, count in figures.dropped.items()},
-        "lost": each.lost,
+        "lost": each.graph.lost,
         "missing": round(facts.figures.missing[index], 3),
-        "publishers": [_endpoint(publisher) for publisher in each.publishers],
-        "subscribers": [_endpoint(subscriber) for subscriber in each.subscribers],
+        "publishers": [_endpoint(publisher) for publisher in each.graph.publishers],
+        "subscribers": [_endpoint(subscriber) for subscriber in each.graph.subscribers],
     }
 
 

@@ -66,7 +66,7 @@ def is_ready(state: RelayState) -> bool:
 
 
 def _is_served(an_input: InputFacts) -> bool:
-    return an_input.refusal is None and any(_serves(each, an_input.type) for each in an_input.publishers)
+    return an_input.graph.refusal is None and any(_serves(each, an_input.type) for each in an_input.graph.publishers)
 
 
 def _serves(publisher: Endpoint, type_name: str) -> bool:

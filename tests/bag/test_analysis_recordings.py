@@ -70,8 +70,8 @@ def test_the_mtig_stamps_one_epoch_some_microseconds_apart_and_exact_time_matche
         assert pair.distance.median <= 14 * _US
     assert group.tightest.share_within(0) == 0
     assert group.tightest.share_within(30 * _US) == 1
-    assert group.group.keys.policy == "approximate_time"
-    assert group.group.keys.slop <= 30 * _US
+    assert group.group.options.policy == "approximate_time"
+    assert group.group.options.slop <= 30 * _US
     assert _topic(analysis, "/imu_data").delay.median == pytest.approx(81 * _MS, abs=_MS)
     assert _topic(analysis, "/imu_data").delay.greatest == pytest.approx(681 * _MS, abs=_MS)
 
@@ -167,7 +167,7 @@ def test_suggested_values_reach_99_percent_of_the_possible_sets(name, real_data:
     assert len(group.possible) > 9
     assert len(group.trial.sets) >= 0.99 * len(group.possible)
     if name in _EXACT:
-        assert (group.group.keys.policy, len(group.trial.sets)) == ("exact_time", _EXACT[name])
+        assert (group.group.options.policy, len(group.trial.sets)) == ("exact_time", _EXACT[name])
 
 
 def test_suggested_values_reach_99_percent_of_what_boreas_and_tum_have(real_data: Path, boreas: Path, tmp_path):

@@ -49,7 +49,7 @@ def test_topics_of_one_epoch_become_a_group_and_one_of_each_another(tmp_path):
         "epoch_1": {"/left", "/right"},
         "fused": {"/lidar", "/left"},
     }
-    assert groups["epoch_1"].keys.policy == "exact_time"
+    assert groups["epoch_1"].options.policy == "exact_time"
     assert sets["epoch_1"] == 100
     assert sets["fused"] >= 49
 
@@ -137,7 +137,7 @@ def test_queues_are_as_long_as_the_rule_of_the_readme_asks(fast_ms, latency_ms, 
     lidar = [each._replace(time=each.time + latency_ms * MS) for each in at("/lidar", *range(0, 9000, 100))]
     text, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(at("/imu", *range(0, 9000, fast_ms)), lidar)))
     (group,) = load_text(text).groups
-    assert group.keys.queue_size == (size or 10)
+    assert group.options.queue_size == (size or 10)
     assert ("queue_size" in text) == (size is not None)
     if size is not None:
         (line,) = (line for line in text.splitlines() if "queue_size" in line)

@@ -18,7 +18,7 @@ groups:
 
 def queue_size(written, environ, **variables):
     text = FILE.format(queue_size=written, namespace="/r")
-    return load_text(text, environ={**environ, **variables}).groups[0].keys.queue_size
+    return load_text(text, environ={**environ, **variables}).groups[0].options.queue_size
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_defaults_are_for_the_groups_of_their_own_file(environ):
         two=file(group("rear", "/a", "/b"), top="defaults: {queue_size: 7}\n"),
         three=file(group("left", "/a", "/b")),
     )
-    assert [each.keys.queue_size for each in config.groups] == [5, 7, 10]
+    assert [each.options.queue_size for each in config.groups] == [5, 7, 10]
 
 
 def test_a_file_may_have_the_node_alone(environ):

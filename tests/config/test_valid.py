@@ -73,7 +73,7 @@ def test_outputs_are_named_by_prefix_and_input_unless_they_have_a_name(environ):
 def test_an_optional_input_that_nothing_waits_for_needs_no_max_wait(environ):
     group = load(str(FOLDER / "optional_state.yaml"), environ=environ).groups[0]
     assert [topic.required for topic in group.topics] == [True, False]
-    assert group.keys.max_wait is None
+    assert group.options.max_wait is None
     assert group.engine().next_deadline() is None
 
 

@@ -12,7 +12,7 @@ from cases import (
 )
 from groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Finding, Severity, explanation, find, remarkable
+from syncrelay.explain import Code, Finding, Severity, explanation, find, problems
 from syncrelay.sync.messages import DropReason
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND
@@ -53,12 +53,12 @@ def test_findings_explain_a_silence_in_the_order_of_the_codes():
 
 @pytest.mark.parametrize("facts", [a_silent_group(), *(case[2] for case in FOUND.values() if case[2].is_silent)])
 def test_what_is_remarkable_of_a_silent_group_is_an_error_at_least(facts):
-    assert Severity.ERROR in {finding.severity for finding in remarkable(facts)}
+    assert Severity.ERROR in {finding.severity for finding in problems(facts)}
 
 
 def test_nothing_is_remarkable_of_a_healthy_group_but_what_is_well():
-    assert remarkable(a_group()) == ()
-    assert [each.code for each in remarkable(FOUND["stamps that fell"][2])] == [Code.TIME_JUMP]
+    assert problems(a_group()) == ()
+    assert [each.code for each in problems(FOUND["stamps that fell"][2])] == [Code.TIME_JUMP]
 
 
 def test_a_required_input_is_blamed_before_an_optional_one():

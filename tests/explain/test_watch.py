@@ -80,13 +80,13 @@ def test_the_keys_of_the_file_become_facts():
 
 def test_the_graph_becomes_facts():
     camera, lidar = facts("policy: exact_time").inputs
-    assert (camera.output, camera.publishers, camera.alike, camera.lost) == (
+    assert (camera.output, camera.graph.publishers, camera.graph.alike, camera.graph.lost) == (
         "/front/camera",
         (Endpoint("/usb_cam", IMAGE),),
         ("/cam",),
         3,
     )
-    assert (lidar.not_importable, lidar.refusal) == ("no such package", REFUSAL)
+    assert (lidar.graph.not_importable, lidar.graph.refusal) == ("no such package", REFUSAL)
 
 
 def test_what_came_becomes_facts_with_the_newest_keys():

@@ -49,7 +49,7 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
 
     (group,) = load(str(written)).groups
     assert {topic.topic for topic in group.topics} == {"/camera", "/lidar", "/imu"}
-    assert group.keys.policy == "approximate_time"
+    assert group.options.policy == "approximate_time"
     text = written.read_text()
     assert "possible sets of 5 s of the graph" in text
     (imu,) = (line for line in text.splitlines() if "topic: /imu" in line)

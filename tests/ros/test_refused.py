@@ -141,7 +141,7 @@ import syncrelay.explain as explain
 from syncrelay.config import GroupConfig
 from syncrelay.sync.group import SyncGroup
 
-add, engine, judge, made = SyncGroup.add, GroupConfig.engine, explain.remarkable, {}
+add, engine, judge, made = SyncGroup.add, GroupConfig.engine, explain.problems, {}
 
 def failing_add(self, message, *, now):
     if message.stamp % 1000 == 7 and self._is_limited:
@@ -161,7 +161,7 @@ def failing_judge(facts):
     return judge(facts)
 
 SyncGroup.add, GroupConfig.engine = failing_add, failing_engine
-explain.remarkable = failing_judge
+explain.problems = failing_judge
 """
 
 

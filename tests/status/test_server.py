@@ -22,7 +22,9 @@ REFUSED = replace(
     facts=replace(
         working().facts,
         inputs=tuple(
-            replace(each, refusal=Refusal("publish", each.output, each.type, why="no memory"))
+            replace(
+                each, graph=replace(each.graph, refusal=Refusal("publish", each.output, each.type, why="no memory"))
+            )
             for each in working().facts.inputs
         ),
     ),

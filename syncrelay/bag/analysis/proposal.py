@@ -117,7 +117,7 @@ def _with_room(name: str, members: Sequence[Topic], changes: Sequence[Change], t
     come = ceil(wait * fastest.rate_hz / _SECOND)
     size = min(2 * come, LARGEST_QUEUE)
     narrow = group_of(with_changes(text, changes), name)
-    if size <= narrow.keys.queue_size:
+    if size <= narrow.options.queue_size:
         return changes
     reason = f"twice the {come} messages of {fastest.topic} that may come before one of {slowest.topic} does"
     others = [change for change in changes if change.key != _QUEUE_SIZE]

@@ -65,8 +65,8 @@ def suggest(
     group: GroupConfig, streams: Sequence[Stream], trial: Trial, changed: Callable[[Sequence[Change]], GroupConfig]
 ) -> Suggestion:
     """Return better values for a group; `changed` gives the group with changes made."""
-    if group.keys.policy not in _MEASURED:
-        return Suggestion((), (_NOT_MEASURED[group.keys.policy],), 0, 0, 0, None)
+    if group.options.policy not in _MEASURED:
+        return Suggestion((), (_NOT_MEASURED[group.options.policy],), 0, 0, 0, None)
     stamping = list(_stamping(group, streams))
     base = changed(stamping)
     streams = stamped(base, streams)
@@ -109,12 +109,12 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | 
 
     None where one of them has no stamps, and for a policy by which messages need not be near to belong together.
     """
-    if group.keys.policy not in _MEASURED:
+    if group.options.policy not in _MEASURED:
         return None
     required = [index for index, topic in enumerate(group.topics) if topic.required]
     chosen, offsets = [streams[index] for index in required], [group.topics[index].offset_ns for index in required]
     # The best match is certain only when what comes next is there, unless it may not wait so long.
-    waits = group.keys.policy == "approximate_time" and group.keys.max_wait is None
+    waits = group.options.policy == "approximate_time" and group.options.max_wait is None
     found = tightest(chosen, offsets, successors=int(waits))
     if found is None:
         return None
@@ -165,7 +165,7 @@ def _does(group: GroupConfig, trial: Trial, possible: _Possible) -> bool:
     """Tell whether a group's values give enough, and no slop is far wider than what is needed."""
     if completed(trial, possible.tightest.pivot) < ENOUGH * len(possible.spans):
         return False
-    slop = getattr(group.keys, "slop", 0)
+    slop = getattr(group.options, "slop", 0)
     return bool(possible.is_exact and not slop) or (
         not possible.is_exact and bool(possible.spans) and slop <= _TOO_WIDE * possible.spans[-1]
     )
@@ -180,7 +180,7 @@ def _ladder(group: GroupConfig, possible: _Possible) -> Iterator[list[Change]]:
     spans = possible.spans
     if not spans:
         return
-    policy = "approximate_time" if group.keys.policy == "exact_time" else group.keys.policy
+    policy = "approximate_time" if group.options.policy == "exact_time" else group.options.policy
     for slop in dict.fromkeys((spans[ceil(0.995 * len(spans)) - 1], spans[-1])):
         text = words.at_least(slop)
         reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
@@ -193,7 +193,7 @@ def _ladder(group: GroupConfig, possible: _Possible) -> Iterator[list[Change]]:
 
 
 def _policy(group: GroupConfig, policy: str, reason: str) -> list[Change]:
-    return [] if group.keys.policy == policy else [Change(group.name, None, "policy", policy, reason)]
+    return [] if group.options.policy == policy else [Change(group.name, None, "policy", policy, reason)]
 
 
 def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list[Change]]:
@@ -203,8 +203,8 @@ def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list
     queues = found.queues[found.spans <= slop]
     need = int(np.quantile(queues, 0.995, method="inverted_cdf")) if len(queues) else 1
     size = need + ceil(need / 4) + 1
-    while size <= 4 * max(need, group.keys.queue_size) and size <= LARGEST_QUEUE:
-        if size > group.keys.queue_size:
+    while size <= 4 * max(need, group.options.queue_size) and size <= LARGEST_QUEUE:
+        if size > group.options.queue_size:
             reason = f"up to {need} messages of one input come before a set that it is in can leave"
             yield [Change(group.name, None, "queue_size", size, reason)]
         size *= 2
@@ -212,7 +212,7 @@ def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list
 
 def _periods(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
     """Tell the policy that can use it the least time between messages, where a topic keeps one."""
-    if group.keys.policy != "approximate_time":
+    if group.options.policy != "approximate_time":
         return
     for index, (topic, stream) in enumerate(zip(group.topics, streams, strict=True)):
         figures = figures_of(stream)

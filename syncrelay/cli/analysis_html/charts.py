@@ -39,7 +39,7 @@ def slop_marks(now: GroupConfig, then: GroupConfig) -> Marks:
 
 def queue_marks(now: GroupConfig, then: GroupConfig) -> Marks:
     """Return the queue sizes of a group as it is and as it is suggested."""
-    return _marks(now.keys.queue_size, then.keys.queue_size)
+    return _marks(now.options.queue_size, then.options.queue_size)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ def by_queue_size(group: GroupAnalysis, sizes: Marks, shares: Sequence[float] = 
 
 
 def _slop(group: GroupConfig) -> int | None:
-    return 0 if group.keys.policy == "exact_time" else getattr(group.keys, "slop", None)
+    return 0 if group.options.policy == "exact_time" else getattr(group.options, "slop", None)
 
 
 def _marks(now: int | None, then: int | None) -> Marks:

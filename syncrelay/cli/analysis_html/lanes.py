@@ -69,7 +69,9 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
     lanes, places, astray = [], [], int(np.count_nonzero(is_astray[:, None] & ~missing))
     for index, stream in enumerate(group.streams):
         there = ~missing[:, index]
-        is_new = _is_new(stamps[there, index]) if group.group.keys.policy == _REPEATING else np.ones(there.sum(), bool)
+        is_new = (
+            _is_new(stamps[there, index]) if group.group.options.policy == _REPEATING else np.ones(there.sum(), bool)
+        )
         first, which = np.flatnonzero(is_new), np.cumsum(is_new) - 1
         matched = times[there, index][first]
         dropped, codes, n_astray = _dropped(group, index, origin - offsets[index], begin)

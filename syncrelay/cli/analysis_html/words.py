@@ -113,7 +113,7 @@ def group_words(group: GroupAnalysis, drawings: Drawings) -> GroupWords:
     verdict, tone = _verdict(group)
     return GroupWords(
         name=config.name,
-        policy=config.keys.policy,
+        policy=config.options.policy,
         sets=len(group.trial.sets),
         verdict=verdict,
         tone=tone,

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from syncrelay.explain import Distribution, Endpoint, GroupFacts, InputFacts, Tolerance
+from syncrelay.explain import Distribution, Endpoint, GroupFacts, InputFacts, InputGraph, Tolerance
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.sync.counts import InputCounts
 
@@ -15,15 +15,15 @@ IMAGE = "sensor_msgs/msg/Image"
 
 def an_input(name="/camera", *, node="/driver", counts=None, figures=None, **facts):
     """An input at 10 Hz, all of whose messages go into sets; `figures` changes some, of the last messages too."""
+    graph = {"name": name, "output": f"/front{name}", "publishers": (Endpoint(node, IMAGE),)}
+    graph |= {key: facts.pop(key) for key in InputGraph.__slots__ if key in facts}
     return InputFacts(
         **{
-            "name": name,
+            "graph": InputGraph(**graph),
             "type": IMAGE,
-            "output": f"/front{name}",
             "required": True,
             "counts": counts or InputCounts(600, 600, {}, 0),
             "figures": _input_figures(**(figures or {})),
-            "publishers": (Endpoint(node, IMAGE),),
             **facts,
         }
     )

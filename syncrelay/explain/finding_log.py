@@ -25,7 +25,7 @@ class Remark(NamedTuple):
     code: Code | None
 
 
-class Silence:
+class FindingLog:
     """Turns the findings of one group, look by look, into what is worth saying."""
 
     def __init__(self) -> None:

@@ -3,8 +3,8 @@
 import pytest
 from groups import BEGAN, NOW, S, a_group, an_input
 
-from syncrelay.explain import Code, Finding, GroupFacts, Severity, Silence, in_words, remarkable
-from syncrelay.explain.silence import Remark
+from syncrelay.explain import Code, Finding, FindingLog, GroupFacts, Severity, in_words, problems
+from syncrelay.explain.finding_log import Remark
 
 DEAD = {"publishers": (), "figures": {"last_received": None, "rate_hz": 0.0}}
 WHO = "nobody publishes /camera (sensor_msgs/msg/Image)"
@@ -18,7 +18,7 @@ def at(second: float, *, last_set: float | None, **facts) -> GroupFacts:
 
 
 def looked(silence, facts):
-    return list(silence.look(facts, remarkable(facts)))
+    return list(silence.look(facts, problems(facts)))
 
 
 def told(silence, seconds, *, last_set):
@@ -27,48 +27,48 @@ def told(silence, seconds, *, last_set):
 
 
 def test_a_silence_is_said_after_five_seconds_and_then_at_growing_pauses():
-    assert told(Silence(), range(1, 200), last_set=lambda _: None) == [5, 10, 20, 40, 80, 160]
+    assert told(FindingLog(), range(1, 200), last_set=lambda _: None) == [5, 10, 20, 40, 80, 160]
 
 
 def test_no_pause_is_longer_than_ten_minutes():
-    seconds = told(Silence(), range(5, 4000, 5), last_set=lambda _: None)
+    seconds = told(FindingLog(), range(5, 4000, 5), last_set=lambda _: None)
     assert seconds[-4:] == [1840, 2440, 3040, 3640]
 
 
 def test_a_silence_is_said_with_its_reason_and_what_to_do():
-    assert looked(Silence(), at(7, last_set=None)) == [
+    assert looked(FindingLog(), at(7, last_set=None)) == [
         Remark(Severity.WARN, f"no set for 7 s: {WHY}", Code.NO_PUBLISHER)
     ]
-    assert looked(Silence(), at(17, last_set=10))[0].text == f"no more sets for 7 s: {WHY}"
+    assert looked(FindingLog(), at(17, last_set=10))[0].text == f"no more sets for 7 s: {WHY}"
 
 
 def test_its_end_is_said_once():
-    silence = Silence()
+    silence = FindingLog()
     looked(silence, at(5, last_set=None))
     assert looked(silence, at(9, last_set=8.9)) == [Remark(Severity.OK, "sets leave again, after 9 s", None)]
     assert looked(silence, at(10, last_set=9.9)) == []
 
 
 def test_what_was_not_said_has_no_end_to_say():
-    silence = Silence()
+    silence = FindingLog()
     assert told(silence, [1, 2, 3, 4], last_set=lambda _: None) == []
     assert looked(silence, at(4.5, last_set=4.4)) == []
 
 
 def test_a_group_that_comes_and_goes_is_not_told_each_time():
-    every_eight = told(Silence(), range(1, 200), last_set=lambda second: second // 8 * 8)
+    every_eight = told(FindingLog(), range(1, 200), last_set=lambda second: second // 8 * 8)
     assert len(every_eight) <= 12
 
 
 def test_after_a_minute_of_health_a_silence_is_new():
-    silence = Silence()
+    silence = FindingLog()
     told(silence, range(1, 50), last_set=lambda _: None)
     told(silence, range(50, 120), last_set=lambda second: second)
     assert told(silence, range(120, 150), last_set=lambda _: 119) == [124, 129, 139]
 
 
 def test_a_slow_group_is_given_three_periods():
-    silence = Silence()
+    silence = FindingLog()
     lines = {second: looked(silence, at(second, last_set=0, best_hz=0.1)) for second in range(1, 40)}
     assert [second for second, said in lines.items() if said and said[0].text.startswith("no more sets")] == [30]
 
@@ -85,43 +85,43 @@ REPEATS = Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat", "look there",
 
 
 def test_a_warning_is_said_once_it_has_lasted():
-    assert warned(Silence(), range(100), REPEATS) == [(5, "stamps repeat; look there")]
+    assert warned(FindingLog(), range(100), REPEATS) == [(5, "stamps repeat; look there")]
 
 
 def test_a_warning_of_each_input_is_said():
     other = Finding(Code.DUPLICATES, Severity.WARN, "others repeat", None, 1)
-    assert warned(Silence(), range(100), REPEATS, other) == [(5, "stamps repeat; look there"), (5, "others repeat")]
+    assert warned(FindingLog(), range(100), REPEATS, other) == [(5, "stamps repeat; look there"), (5, "others repeat")]
 
 
 def test_a_warning_that_comes_back_within_a_minute_is_not_said_again():
-    silence = Silence()
+    silence = FindingLog()
     assert len(warned(silence, range(10), REPEATS)) == 1
     assert warned(silence, range(10, 60)) == [(19, "over for 10 s: stamps repeat")]
     assert warned(silence, range(60, 100), REPEATS) == []
 
 
 def test_the_end_of_a_warning_is_said_once_in_its_last_words():
-    silence = Silence()
+    silence = FindingLog()
     warned(silence, range(10), REPEATS)
     warned(silence, [10], Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat still", None, 0))
     assert warned(silence, range(11, 40)) == [(20, "over for 10 s: stamps repeat still")]
 
 
 def test_what_did_not_last_has_no_end_to_say():
-    silence = Silence()
+    silence = FindingLog()
     warned(silence, range(3), REPEATS)
     assert warned(silence, range(3, 40)) == []
 
 
 def test_a_warning_is_forgotten_after_a_minute():
-    silence = Silence()
+    silence = FindingLog()
     assert len(warned(silence, range(10), REPEATS)) == 1
     assert len(warned(silence, range(10, 71))) == 1
     assert warned(silence, range(71, 100), REPEATS) == [(76, "stamps repeat; look there")]
 
 
 def test_what_is_no_warning_is_never_said():
-    assert warned(Silence(), range(100), Finding(Code.TIME_JUMP, Severity.OK, "fell")) == []
+    assert warned(FindingLog(), range(100), Finding(Code.TIME_JUMP, Severity.OK, "fell")) == []
 
 
 @pytest.mark.parametrize(("suggestion", "line"), [(None, "so it is"), ("do this", "so it is; do this")])
