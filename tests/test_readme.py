@@ -95,7 +95,7 @@ def test_every_drawing_of_a_policy_is_what_the_policy_does(text):
     policy, *options = keys.split(", ")
     group = {"policy": policy, **dict(option.split(": ") for option in options), "topics": topics}
     (resolved,) = load_text(json.dumps({"version": 1, "groups": {"drawn": group}})).groups
-    left, drawn = play_policy(resolved.options.matcher(resolved.inputs), drawing)
+    left, drawn = play_policy(resolved.options.build_policy(resolved.inputs), drawing)
     assert drawn
     assert left == drawn
 

@@ -54,7 +54,7 @@ class ExactTimeGroup(Group):
     policy: Literal["exact_time"] = Field(description="Sets of equal stamps.")
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ExactTime:
+    def build_policy(self, _inputs: Inputs) -> ExactTime:
         """Return a new policy of the engine."""
         return ExactTime(n_inputs=len(self.topics), queue_size=self.queue_size)
 
@@ -78,7 +78,7 @@ class ApproximateTimeGroup(Group):
     )
     topics: tuple[PacedTopic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ApproximateTime:
+    def build_policy(self, _inputs: Inputs) -> ApproximateTime:
         """Return a new policy of the engine."""
         return ApproximateTime(
             n_inputs=len(self.topics),
@@ -98,7 +98,7 @@ class ApproximateTimeEagerGroup(Group):
     slop: Duration = Slop
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ApproximateTimeEager:
+    def build_policy(self, _inputs: Inputs) -> ApproximateTimeEager:
         """Return a new policy of the engine."""
         return ApproximateTimeEager(n_inputs=len(self.topics), queue_size=self.queue_size, slop_ns=self.slop)
 
@@ -112,7 +112,7 @@ class ApproximateEpsilonTimeGroup(Group):
     slop: Duration = Slop
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ApproximateEpsilonTime:
+    def build_policy(self, _inputs: Inputs) -> ApproximateEpsilonTime:
         """Return a new policy of the engine."""
         return ApproximateEpsilonTime(n_inputs=len(self.topics), queue_size=self.queue_size, epsilon_ns=self.slop)
 
@@ -134,7 +134,7 @@ class LatestTimeGroup(Group):
     )
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, inputs: Inputs) -> LatestTime:
+    def build_policy(self, inputs: Inputs) -> LatestTime:
         """Return a new policy of the engine."""
         return LatestTime(
             n_inputs=len(self.topics),
@@ -158,7 +158,7 @@ class EqualKeyGroup(Group):
     )
     topics: tuple[KeyedTopic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> EqualKey:
+    def build_policy(self, _inputs: Inputs) -> EqualKey:
         """Return a new policy of the engine."""
         return EqualKey(n_inputs=len(self.topics), queue_size=self.queue_size)
 

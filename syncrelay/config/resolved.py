@@ -53,7 +53,7 @@ class GroupConfig:
     def engine(self) -> SyncGroup:
         """Return a new, empty engine of this group."""
         return SyncGroup(
-            self.options.matcher(self.inputs),
+            self.options.build_policy(self.inputs),
             required=tuple(topic.required for topic in self.topics),
             max_wait_ns=self.options.max_wait,
             offsets_ns=tuple(topic.offset_ns for topic in self.topics),
