@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.config.file import GROUP_MODEL_OF
+from syncrelay.config.file import file_format
 from syncrelay.explain import Code
 from syncrelay.sync import DropReason
 from tests.sync.support.timeline import play_policy
@@ -101,7 +101,7 @@ def test_every_drawing_of_a_policy_is_what_the_policy_does(text):
 
 
 def test_every_policy_has_a_drawing_and_a_row():
-    for policy in GROUP_MODEL_OF:
+    for policy in file_format().groups:
         assert any(text.startswith(policy) for text in _TIMELINES)
         assert f"| `{policy}` |" in _README
 

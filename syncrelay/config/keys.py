@@ -7,12 +7,13 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Wit
 from syncrelay.config.listen import check_listen, parse_host
 from syncrelay.config.names import (
     LONGEST_TOPIC,
+    check_field_path,
     check_namespace,
     check_node_name,
     check_output_prefix,
     check_topic_name,
+    check_type_name,
 )
-from syncrelay.config.typenames import check_field_path, check_type_name
 from syncrelay.config.units import parse_duration, parse_rate
 from syncrelay.config.wording import describe
 

@@ -1,6 +1,8 @@
 """What a file may say. The JSON Schema and the errors come from these models and nowhere else."""
 
-from typing import Annotated, Any, Literal, TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
@@ -21,8 +23,10 @@ from syncrelay.config.keys import (
     TypeName,
     tag_of_mapping,
 )
+from syncrelay.config.names import expand
 from syncrelay.config.qos import AUTO, Qos
 from syncrelay.config.wording import describe
+from syncrelay.sync import Policy
 
 Transport: TypeAlias = Literal["default", "large_messages"]
 
@@ -51,6 +55,10 @@ class NodeConfig(Keys):
         ),
         examples=["default", "large_messages"],
     )
+
+    def absolute(self, name: str) -> str:
+        """Return the absolute name of a topic that the file names, before any remapping."""
+        return expand(name, node=self.name, namespace=self.namespace)
 
 
 class MetricsConfig(Keys):
@@ -177,8 +185,58 @@ def _restamp(value: Any) -> str:
     return value
 
 
+Topics = Field(
+    description="Inputs in the order in which the messages of a set leave, 2 or more.",
+    json_schema_extra={"minItems": 2},
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """The absolute names of a group's inputs, and the node in whose namespace the file's names stand."""
+
+    names: tuple[str, ...]
+    node: NodeConfig
+
+    @classmethod
+    def of(cls, topics: Sequence[Topic], node: NodeConfig) -> Self:
+        """Return the names of these topics."""
+        return cls(tuple(node.absolute(each.topic) for each in topics), node)
+
+    def index_of(self, topic: str) -> int:
+        """Return the index of an input that the file calls by this name. Raises ValueError where it is none."""
+        return self.names.index(self.node.absolute(topic))
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """How far apart the stamps of a set may be, in nanoseconds, and the key that says so.
+
+    `wider_policy` is the policy that has this key, where the group's own allows no distance.
+    """
+
+    key: str
+    ns: int
+    wider_policy: str | None = None
+
+
 class Group(Keys):
-    """Keys that the groups of every policy have."""
+    """Keys that the groups of every policy have, and what the rest of the program asks of a policy."""
+
+    by_stamp: ClassVar[bool] = True
+    """Whether stamps are what is matched, as the engine's policy says."""
+
+    repeats: ClassVar[bool] = False
+    """Whether a message may be in more than one set, as the engine's policy says."""
+
+    waits_for_optional: ClassVar[bool] = True
+    """Whether a set that lacks an optional message waits for it, up to `max_wait`."""
+
+    waits_for_next: ClassVar[bool] = False
+    """Whether a set waits for the next messages, which may be nearer; a topic's `min_period` can shorten that."""
+
+    matched_by: ClassVar[tuple[str, ...]] = ()
+    """Keys that say which messages belong together; none where it is how near their stamps are."""
 
     policy: str
     queue_size: int = Field(
@@ -225,3 +283,22 @@ class Group(Keys):
         description="What default output names begin with. Default: / and the group's name.",
         examples=["/fused"],
     )
+    topics: tuple[Topic, ...] = Topics
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """How far apart the stamps of a set may be; None where any distance will do."""
+        return None
+
+    @property
+    def trigger_topic(self) -> str | None:
+        """The input whose every message makes a set; None where all inputs are alike."""
+        return None
+
+    def key_of(self, _topic: Topic) -> str | None:
+        """Return the path of the field that a topic's messages are matched by; None where it is their stamps."""
+        return None
+
+    def build_policy(self, _inputs: Inputs) -> Policy:
+        """Return a new policy of the engine."""
+        raise NotImplementedError

@@ -1,4 +1,7 @@
-"""The rules of ROS for names, as rcl and rmw check them (rcl_validate_topic_name, rmw_validate_full_topic_name)."""
+"""The form of names: of topics, nodes and namespaces as rcl and rmw check them, of message types and their fields.
+
+The rules are those of rcl_validate_topic_name and rmw_validate_full_topic_name.
+"""
 
 import re
 from typing import Final
@@ -10,6 +13,12 @@ LONGEST_TOPIC: Final = 247
 _LONGEST_NODE: Final = 255
 _TOKEN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_/]")
+_FULL: Final = re.compile(r"[A-Za-z]\w*/(msg|srv|action)/[A-Za-z]\w*", re.ASCII)
+_SHORT: Final = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)", re.ASCII)
+# As Python and C++ write it.
+_FOREIGN: Final = re.compile(r"([A-Za-z]\w*)(?:\.|::)msg(?:\.|::)([A-Za-z]\w*)", re.ASCII)
+_PATH: Final = re.compile(r"[A-Za-z]\w*(\.[A-Za-z]\w*)*", re.ASCII)
+_KINDS: Final = {"srv": "a service", "action": "an action"}
 
 
 def check_topic_name(name: object) -> str:
@@ -105,3 +114,26 @@ def _check_name(name: str, *, kind: str) -> None:
     _check_tokens(name.removeprefix("~/" if name.startswith("~") else "/"), whole=name, kind=kind)
     if len(name) > LONGEST_TOPIC:
         raise ValueError(f"a {kind} of {len(name)} characters, at most {LONGEST_TOPIC} are allowed")
+
+
+def check_type_name(name: object) -> str:
+    """Return a type's name if it has the form of a message's; raises ValueError saying what is wrong."""
+    if not isinstance(name, str):
+        raise ValueError(f"expected a message type such as sensor_msgs/msg/Image, found {describe(name)}")  # noqa: TRY004
+    full = _FULL.fullmatch(name)
+    if full is not None:
+        kind = _KINDS.get(full[1])
+        if kind is None:
+            return name
+        raise ValueError(f"{quoted(name)} is {kind} type, expected a message type (package/msg/Name)")
+    other = _SHORT.fullmatch(name) or _FOREIGN.fullmatch(name)
+    if other is not None:
+        raise ValueError(f"{quoted(name)} is not the full name, write `{other[1]}/msg/{other[2]}`")
+    raise ValueError(f"{quoted(name)} is no message type, expected package/msg/Name such as sensor_msgs/msg/Image")
+
+
+def check_field_path(path: str) -> str:
+    """Return a path of fields if it has the form of one; raises ValueError saying what is wrong."""
+    if not _PATH.fullmatch(path):
+        raise ValueError(f"expected names of fields joined by dots, such as header.stamp, found {describe(path)}")
+    return path

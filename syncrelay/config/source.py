@@ -11,8 +11,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Final
 
-from syncrelay.config.errors import ConfigError
-from syncrelay.config.problems import Problem, Severity, Span
+from syncrelay.config.problems import ConfigError, Problem, Severity, Span
 from syncrelay.config.wording import nearest
 
 STDIN: Final = "-"
@@ -48,10 +47,17 @@ class Source:
         return self.lines[number - 1] if number <= len(self.lines) else ""
 
     def problem(
-        self, text: str, *, code: str, span: Span | None, path: str = "", severity: Severity = Severity.ERROR
+        self,
+        text: str,
+        *,
+        code: str,
+        span: Span | None,
+        path: str = "",
+        severity: Severity = Severity.ERROR,
+        subject: str = "",
     ) -> Problem:
         """Return a problem of this file."""
-        return Problem(self.name, path, text, code, span, self.line(span.line) if span else "", severity)
+        return Problem(self.name, path, text, code, span, self.line(span.line) if span else "", severity, subject)
 
 
 def shown_name(path: str) -> str:

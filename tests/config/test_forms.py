@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-import syncrelay.config.compose
+import syncrelay.config.yaml_tree
 from syncrelay.config import ConfigError, load, load_text
 
 GOOD = """\
@@ -164,12 +164,12 @@ def test_a_damaged_file_is_a_config_or_a_config_error(start, length, inserted):
 @given(st.integers(0, len(GOOD)), st.integers(0, 12), st.text(alphabet="ab:- \n[]{}\"'&*|,", max_size=6))
 def test_without_libyaml_a_file_is_judged_alike(start, length, inserted):
     text = GOOD[:start] + inserted + GOOD[start + length :]
-    assert verdict(text, yaml.SafeLoader) == verdict(text, syncrelay.config.compose.LOADER)
+    assert verdict(text, yaml.SafeLoader) == verdict(text, syncrelay.config.yaml_tree.LOADER)
 
 
 def verdict(text, loader):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(syncrelay.config.compose, "LOADER", loader)
+        patch.setattr(syncrelay.config.yaml_tree, "LOADER", loader)
         try:
             return load_text(text, environ={}).groups
         except ConfigError as error:

@@ -40,9 +40,9 @@ class GroupAnalysis:
     @property
     def slop(self) -> int:
         """The slop of the file if it matches anything, else the one that would match all that belongs together."""
-        slop = 0 if self.group.options.policy == "exact_time" else getattr(self.group.options, "slop", None)
-        if slop is not None and self.tightest is not None and self.tightest.share_within(slop):
-            return int(slop)
+        tolerance = self.group.options.tolerance
+        if tolerance is not None and self.tightest is not None and self.tightest.share_within(tolerance.ns):
+            return tolerance.ns
         return self.possible[-1] if self.possible else 0
 
 

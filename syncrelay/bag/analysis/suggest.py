@@ -14,6 +14,7 @@ from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.analysis.topics import TopicFigures, figures_of
 from syncrelay.bag.analysis.trial import Trial, try_group
 from syncrelay.config import GroupConfig
+from syncrelay.config.wording import all_of
 from syncrelay.explain import words
 from syncrelay.sync import DropReason
 
@@ -33,7 +34,6 @@ LARGEST_QUEUE: Final = 1000
 """More messages than that are not suggested to be kept, whatever would come of it."""
 _SAME_SPAN: Final = 1.02
 _UNSET: Final = 0.5
-_MEASURED: Final = ("exact_time", "approximate_time", "approximate_time_eager", "approximate_epsilon_time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +65,8 @@ def suggest(
     group: GroupConfig, streams: Sequence[Stream], trial: Trial, changed: Callable[[Sequence[Change]], GroupConfig]
 ) -> Suggestion:
     """Return better values for a group; `changed` gives the group with changes made."""
-    if group.options.policy not in _MEASURED:
-        return Suggestion((), (_NOT_MEASURED[group.options.policy],), 0, 0, 0, None)
+    if group.options.matched_by:
+        return Suggestion((), (_not_measured(group.options.matched_by),), 0, 0, 0, None)
     stamping = list(_stamping(group, streams))
     base = changed(stamping)
     streams = stamped(base, streams)
@@ -98,10 +98,9 @@ def suggest(
     return Suggestion(tuple(changes), hints, max(most, now, then), now, then, best)
 
 
-_NOT_MEASURED: Final = {
-    "latest_time": "which messages belong together is what `trigger` and `max_age` say: no measure can tell",
-    "equal_key": "which messages belong together is what `key` says: no measure can tell",
-}
+def _not_measured(keys: Sequence[str]) -> str:
+    said = f"{all_of(f'`{key}`' for key in keys)} {'say' if len(keys) > 1 else 'says'}"
+    return f"which messages belong together is what {said}: no measure can tell"
 
 
 def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | None:
@@ -109,12 +108,12 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | 
 
     None where one of them has no stamps, and for a policy by which messages need not be near to belong together.
     """
-    if group.options.policy not in _MEASURED:
+    if group.options.matched_by:
         return None
     required = [index for index, topic in enumerate(group.topics) if topic.required]
     chosen, offsets = [streams[index] for index in required], [group.topics[index].offset_ns for index in required]
     # The best match is certain only when what comes next is there, unless it may not wait so long.
-    waits = group.options.policy == "approximate_time" and group.options.max_wait is None
+    waits = group.options.waits_for_next and group.options.max_wait is None
     found = tightest(chosen, offsets, successors=int(waits))
     if found is None:
         return None
@@ -180,7 +179,8 @@ def _ladder(group: GroupConfig, possible: _Possible) -> Iterator[list[Change]]:
     spans = possible.spans
     if not spans:
         return
-    policy = "approximate_time" if group.options.policy == "exact_time" else group.options.policy
+    tolerance = group.options.tolerance
+    policy = (tolerance and tolerance.wider_policy) or group.options.policy
     for slop in dict.fromkeys((spans[ceil(0.995 * len(spans)) - 1], spans[-1])):
         text = words.at_least(slop)
         reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
@@ -212,7 +212,7 @@ def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list
 
 def _periods(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
     """Tell the policy that can use it the least time between messages, where a topic keeps one."""
-    if group.options.policy != "approximate_time":
+    if not group.options.waits_for_next:
         return
     for index, (topic, stream) in enumerate(zip(group.topics, streams, strict=True)):
         figures = figures_of(stream)

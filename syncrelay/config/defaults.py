@@ -1,15 +1,50 @@
-"""Several files as one: the groups of all, and what there can be only one of from the file that has it."""
+"""Keys from elsewhere: `defaults` in every group that is silent, and what each of several files says in one."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from syncrelay.config.document import Document, Entry, MappingNode
-from syncrelay.config.file import FileKeys
-from syncrelay.config.problems import Path, Problem
+from syncrelay.config.document import MOST_VALUES, Document, Entry, MappingNode, ScalarNode
+from syncrelay.config.file import FileKeys, file_format
+from syncrelay.config.problems import ConfigError, Path, Problem
 from syncrelay.config.wording import quoted
 from syncrelay.printable import printable
 
 _ONE_FOR_ALL = ("node", "metrics", "diagnostics")
+
+
+def with_defaults(document: Document) -> Document:
+    """Return the document with the keys of `defaults` in every group that is silent and whose policy has them.
+
+    The keys keep their place, so a fault in one is shown where it was written. Raises ConfigError where they come to
+    more than can be looked at.
+    """
+    root, defaults, groups = document.root, document.find(("defaults",)), document.find(("groups",))
+    if not (isinstance(root, MappingNode) and isinstance(defaults, MappingNode) and isinstance(groups, MappingNode)):
+        return document
+    filled = MappingNode(
+        groups.span,
+        {
+            name: Entry(group.key, _filled(group.value, defaults)) if isinstance(group.value, MappingNode) else group
+            for name, group in groups.entries.items()
+        },
+    )
+    if sum(group.value.size for group in filled.entries.values()) > MOST_VALUES:
+        text = f"filled into every group they make over {MOST_VALUES} values"
+        raise ConfigError([document.problem(("defaults",), text, code="yaml", span=document.key_span(("defaults",)))])
+    entries = root.entries | {"groups": Entry(root.entries["groups"].key, filled)}
+    return replace(document, root=MappingNode(root.span, entries))
+
+
+def _filled(group: MappingNode, defaults: MappingNode) -> MappingNode:
+    policy = (group.entries.get("policy") or defaults.entries.get("policy") or (None, None))[1]
+    model = file_format().group(policy.value if isinstance(policy, ScalarNode) else None)
+    own = {
+        key: entry
+        for key, entry in defaults.entries.items()
+        if key in model.model_fields and key != "topics" and key not in group.entries
+    }
+    return MappingNode(group.span, own | group.entries, group.size + sum(entry.value.size for entry in own.values()))
 
 
 def merged_documents(documents: Sequence[Document]) -> tuple[Document, list[Problem]]:
@@ -21,6 +56,7 @@ def merged_documents(documents: Sequence[Document]) -> tuple[Document, list[Prob
     merged = Document(
         {index: source for document in documents for index, source in document.sources.items()},
         MappingNode(first.root.span, {"groups": Entry(first.root.span, groups)}),
+        frozenset(path for document in documents for path in document.faulty),
     )
     problems: list[Problem] = []
     for document in documents:
@@ -33,8 +69,10 @@ def merged_documents(documents: Sequence[Document]) -> tuple[Document, list[Prob
 
 
 def merged_files(files: Sequence[FileKeys]) -> FileKeys:
-    """Return the keys of all files in one. What only one may have is in one only."""
-    merged: dict[str, Any] = {"groups": {name: group for file in files for name, group in file.groups.items()}}
+    """Return the keys of all files in one. What two have of what only one may is the first one's."""
+    merged: dict[str, Any] = {"groups": {}}
+    for name, group in (each for file in files for each in file.groups.items()):
+        merged["groups"].setdefault(name, group)
     for key in _ONE_FOR_ALL:
         owner = next((file for file in files if key in file.model_fields_set), files[0])
         merged[key] = getattr(owner, key)
