@@ -63,8 +63,8 @@ def _curves(each: GroupAnalysis) -> dict[str, Any]:
     found = each.tightest
     if found is None:
         return {"by_slop": [], "by_queue_size": []}
-    slop = getattr(each.group.options, "slop", None)
-    points = slop_curve(found, marks=() if slop is None else (slop,), shares=_SHARES)
+    tolerance = each.group.options.tolerance
+    points = slop_curve(found, marks=(tolerance.ns,) if tolerance and tolerance.ns else (), shares=_SHARES)
     sizes = queue_curve(found, each.slop, marks=(each.group.options.queue_size,), shares=_SHARES)
     return {
         "by_slop": [{"slop": at, "matched": share, "median_span": span} for at, share, span in points],

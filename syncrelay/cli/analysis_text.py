@@ -116,8 +116,8 @@ def _curves(each: GroupAnalysis) -> Iterator[str]:
     found = each.tightest
     if found is None:
         return
-    slop = getattr(each.group.options, "slop", None)
-    points = slop_curve(found, marks=() if slop is None else (slop,))
+    tolerance = each.group.options.tolerance
+    points = slop_curve(found, marks=(tolerance.ns,) if tolerance and tolerance.ns else ())
     yield f"by slop: {', '.join(f'{words.duration(at)} {words.share(share)}' for at, share, _ in points)}"
     sizes = queue_curve(found, each.slop, marks=(each.group.options.queue_size,))
     yield f"by queue_size: {', '.join(f'{size} {words.share(share)}' for size, share in sizes)}"

@@ -143,7 +143,7 @@ def _too_wide(tolerance: Tolerance, nearest: Distribution) -> str:
         return f"no stamps are equal: the nearest sets span {widths}"
     if tolerance.key == "max_age":
         return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
-    return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
+    return f"the nearest sets span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}"
 
 
 def _wide_enough(tolerance: Tolerance, nearest: Distribution) -> str:

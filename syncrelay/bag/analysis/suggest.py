@@ -164,7 +164,7 @@ def _does(group: GroupConfig, trial: Trial, possible: _Possible) -> bool:
     """Tell whether a group's values give enough, and no slop is far wider than what is needed."""
     if completed(trial, possible.tightest.pivot) < ENOUGH * len(possible.spans):
         return False
-    slop = getattr(group.options, "slop", 0)
+    slop = group.options.tolerance.ns if group.options.tolerance else 0
     return bool(possible.is_exact and not slop) or (
         not possible.is_exact and bool(possible.spans) and slop <= _TOO_WIDE * possible.spans[-1]
     )
@@ -176,18 +176,17 @@ def _ladder(group: GroupConfig, possible: _Possible) -> Iterator[list[Change]]:
         for queue in _queues(group, possible, 0):
             yield [*_policy(group, "exact_time", "stamps of one set are equal"), *queue]
         return
-    spans = possible.spans
-    if not spans:
+    spans, tolerance = possible.spans, group.options.tolerance
+    if not spans or tolerance is None:
         return
-    tolerance = group.options.tolerance
-    policy = (tolerance and tolerance.wider_policy) or group.options.policy
+    policy = tolerance.wider_policy or group.options.policy
     for slop in dict.fromkeys((spans[ceil(0.995 * len(spans)) - 1], spans[-1])):
         text = words.at_least(slop)
         reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
         for queue in _queues(group, possible, slop):
             yield [
                 *_policy(group, policy, "stamps of one set differ"),
-                Change(group.name, None, "slop", text, reason),
+                Change(group.name, None, tolerance.key, text, reason),
                 *queue,
             ]
 
