@@ -55,7 +55,7 @@ def _restamp(group: GroupConfig, document: Document) -> Iterator[Problem]:
     restamp = group.options.restamp
     if restamp not in _RESTAMP_WORDS and group.restamp is None:
         hint = document.did_you_mean(restamp, (*_RESTAMP_WORDS, *_inputs(group)))
-        text = f"{quoted(restamp)} is not an input of this group, nor none, earliest or latest{hint}"
+        text = f"expected none, earliest, latest or an input of this group, found {quoted(restamp)}{hint}"
         yield document.problem((*group.path, "restamp"), text, code="bad_value")
 
 
@@ -92,7 +92,7 @@ def _optional_inputs(group: GroupConfig, document: Document) -> Iterator[Problem
     optional = [path for path, topic in group.paths() if not topic.required]
     if optional and len(optional) == len(group.topics):
         path = (*group.path, "topics")
-        text = "all inputs of this group are optional, expected one or more without `required: false`"
+        text = "all inputs of this group are optional, at least one must be required"
         yield document.problem(path, text, code="conflict", span=document.key_span(path))
     is_endless = group.options.max_wait is None and (*group.path, "max_wait") not in document.faulty
     if optional and group.options.waits_for_optional and is_endless:
@@ -107,5 +107,7 @@ def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:
     slop = node.value if isinstance(node, ScalarNode) else None
     if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop <= _LONGEST_S:
         number = f"{slop:.15g}"
-        text = f"{number} without a unit is {number} s; write {number}ms if milliseconds are meant, else {number}s"
+        text = (
+            f"{number} without a unit means {number} s: write {number}ms if you mean milliseconds, otherwise {number}s"
+        )
         yield document.problem(path, text, code="unit", severity=Severity.WARNING)

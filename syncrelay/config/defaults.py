@@ -30,7 +30,7 @@ def with_defaults(document: Document) -> Document:
         },
     )
     if sum(group.value.size for group in filled.entries.values()) > MOST_VALUES:
-        text = f"filled into every group they make over {MOST_VALUES} values"
+        text = f"copied into every group they come to more than {MOST_VALUES} values"
         raise ConfigError([document.problem(("defaults",), text, code="yaml", span=document.key_span(("defaults",)))])
     entries = root.entries | {"groups": Entry(root.entries["groups"].key, filled)}
     return replace(document, root=MappingNode(root.span, entries))
@@ -96,9 +96,9 @@ def _take(path: Path, document: Document, merged: Document) -> list[Problem]:
         return []
     place = f"line {there.key.line} of {printable(merged.sources[there.key.source].name)}"
     text = (
-        f"the group {quoted(str(key))} is in {place} too: give one of them another name"
+        f"the group {quoted(str(key))} is also in {place}: rename one of them"
         if parents
-        else f"`{key}` is in {place} too: files that run together have it once"
+        else f"`{key}` is also in {place}: files that run together may have it only once"
     )
     return [document.problem(path, text, code="duplicate_key", span=entry.key)]
 
@@ -106,5 +106,5 @@ def _take(path: Path, document: Document, merged: Document) -> list[Problem]:
 def _idle_defaults(document: Document) -> list[Problem]:
     if document.find(("defaults",)) is None or _names(document):
         return []
-    text = "`defaults` are for the groups of their own file, and this one has none"
+    text = "`defaults` apply to groups of the same file, and this file has none"
     return [document.problem(("defaults",), text, code="conflict", span=document.key_span(("defaults",)))]

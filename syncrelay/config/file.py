@@ -34,12 +34,12 @@ class FileKeys(Keys):
     node: NodeConfig = Field(default_factory=NodeConfig, description="The ROS node.")
     metrics: MetricsConfig | None = Field(
         default_factory=MetricsConfig,
-        description="HTTP for programs and people, null for none.",
+        description="HTTP server for status and metrics, null for none.",
         json_schema_extra={"nullable": True},
     )
     diagnostics: DiagnosticsConfig | None = Field(
         default_factory=DiagnosticsConfig,
-        description="What is published about the relay, null for nothing.",
+        description="What the relay publishes about itself, null for nothing.",
         json_schema_extra={"nullable": True},
     )
     defaults: Keys | None = None
@@ -92,7 +92,7 @@ def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
     defaults = create_model(
         "Defaults",
         __base__=Keys,
-        __doc__="Keys of a group, used where a group is silent. What a group's policy does not have is passed over.",
+        __doc__="Keys for all groups. What a group's policy does not have is ignored there.",
         policy=(policy, Field(default=None, description=about)),
         **keys,
     )
@@ -116,8 +116,8 @@ def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
 
 
 _DEFAULTS: Final = (
-    "Keys of a group, used where a group is silent. A key that the group's policy does not have is passed over there;"
-    " one that no policy has is an error."
+    "Keys for all groups, where a group does not have its own. A key that a group's policy does not have is ignored"
+    " there; one that no policy has is an error."
 )
 
 

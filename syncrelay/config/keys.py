@@ -38,7 +38,7 @@ def _not_negative(value: Any) -> int:
 
 def _refuse_null(value: Any) -> Any:
     if value is None:
-        raise ValueError("found nothing: give the key a value, or leave it out")
+        raise ValueError("no value: give the key a value, or remove it")
     return value
 
 

@@ -32,14 +32,14 @@ Transport: TypeAlias = Literal["default", "large_messages"]
 
 
 class NodeConfig(Keys):
-    """The ROS node. Remaps and parameters behind --ros-args still win."""
+    """The ROS node. Remaps and parameters after --ros-args take precedence."""
 
     name: NodeName = Field(
         default="syncrelay", description="Name of the node. Default: syncrelay.", examples=["syncrelay"]
     )
     namespace: Namespace = Field(
         default="",
-        description="Namespace of the node, in which relative and `~/` topic names stand. Default: empty, the root.",
+        description="Namespace of the node, for relative and `~/` topic names. Default: empty, the root.",
         examples=["/robot1"],
     )
     use_sim_time: bool = Field(
@@ -49,9 +49,9 @@ class NodeConfig(Keys):
     transport: Transport = Field(
         default="default",
         description=(
-            "How Fast DDS carries messages of this node: `large_messages` gives it shared memory for images and clouds"
-            " over 0.5 MB, which publishers and subscribers need too, see configs/large_messages.xml. Transports that"
-            " the environment names stand. Default: default."
+            "How Fast DDS carries messages of this node. `large_messages` uses shared memory for images and clouds"
+            " larger than 0.5 MB; publishers and subscribers need it too, see configs/large_messages.xml. Transports"
+            " set in the environment take precedence. Default: default."
         ),
         examples=["default", "large_messages"],
     )
@@ -75,9 +75,9 @@ class MetricsConfig(Keys):
     hosts: tuple[Host, ...] = Field(
         default=(),
         description=(
-            "Other names by which the relay is asked, such as that of a Kubernetes service: a page in a browser cannot"
-            " read the state under a name that is not here. Names of this machine and, where `listen` is open to"
-            " other machines, every address need not be listed. Default: none."
+            "Other host names that requests may use, such as that of a Kubernetes service: a page in a browser cannot"
+            " read the status under any other name. Names of this machine need not be listed; nor need addresses, where"
+            " `listen` is open to other machines. Default: none."
         ),
         examples=[["robot.lab.example"]],
     )
@@ -129,7 +129,7 @@ class Topic(Keys):
     required: bool = Field(
         default=True,
         description=(
-            "Whether every set has a message of this input. With false a set leaves without one after the group's"
+            "Whether every set needs a message of this input. If false, a set leaves without one after the group's"
             " max_wait, with latest_time at once. Default: true."
         ),
     )
@@ -147,8 +147,8 @@ class Topic(Keys):
     ] = Field(
         default="header",
         description=(
-            "Where a message's stamp is: `header` (the std_msgs/Header that the message begins with), `receive` (the"
-            " time of its arrival here) or a field, as in {field: status.stamp}. Default: header."
+            "Where to read a message's stamp: `header` (the std_msgs/Header that the message begins with), `receive`"
+            " (the time of its arrival here) or a field, as in {field: status.stamp}. Default: header."
         ),
         examples=["header", "receive", {"field": "status.stamp"}],
     )
@@ -159,7 +159,7 @@ class KeyedTopic(Topic):
 
     key: Annotated[FieldPath | None, NOT_NULL] = Field(
         default=None,
-        description="Path of the field to match by, where it is another than the group's `key`. Default: the group's.",
+        description="Path of the field to match by, if it differs from the group's `key`. Default: the group's.",
         examples=["image_header.frame_id"],
     )
 
@@ -170,7 +170,7 @@ class PacedTopic(Topic):
     min_period: Duration = Field(
         default=0,
         description=(
-            "Least time between two messages of this input: with it a set can leave before the next message comes."
+            "Least time between two messages of this input: it lets a set leave before the next message arrives."
             " Too large a value gives worse sets. A number is seconds, a text has a unit (ns, us, ms, s, min)."
             " Default: 0, nothing known."
         ),
@@ -250,7 +250,7 @@ class Group(Keys):
         default=None,
         description=(
             "How long a set may wait, once its required messages are there, for optional ones or for a closer match;"
-            " then it leaves as it is. Needed where an input is optional, but not by latest_time, which never waits for"
+            " then it leaves as it is. Needed if an input is optional, except with latest_time, which never waits for"
             " one. A number is seconds, a text has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["100ms"],
@@ -258,8 +258,8 @@ class Group(Keys):
     max_rate: Annotated[Rate | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "Most sets a second, evenly spaced by their stamps; the others are dropped whole, as `thinned`. A number"
-            " is Hz, a text has a unit (Hz, kHz). Default: no limit."
+            "Largest number of sets a second, evenly spaced by their stamps; the others are dropped whole, as"
+            " `thinned`. A number is Hz, a text has a unit (Hz, kHz). Default: no limit."
         ),
         examples=["10 Hz"],
     )
@@ -267,7 +267,7 @@ class Group(Keys):
         default=1,
         ge=1,
         le=MOST,
-        description="Only each n-th set leaves; the others are dropped whole, as `thinned`. Default: 1, every set.",
+        description="Only every n-th set leaves; the others are dropped whole, as `thinned`. Default: 1, every set.",
         examples=[2],
     )
     restamp: Annotated[str, BeforeValidator(_restamp)] = Field(

@@ -67,10 +67,10 @@ def check_node_name(name: str) -> str:
 def check_group_name(name: str) -> str:
     """Return a group's name: one token of a topic name; raises ValueError saying what is wrong."""
     if "$" in name:
-        raise ValueError(f"variables are filled in in values only, found {quoted(name)}")
+        raise ValueError(f"variables work in values only, found {quoted(name)}")
     if not _TOKEN.fullmatch(name):
         raise ValueError(
-            f"a group name has letters, digits and `_`, and no digit first, found {quoted(name)}:"
+            f"a group name may have only letters, digits and `_`, and no digit first, found {quoted(name)}:"
             " it becomes part of topic names"
         )
     return name
@@ -95,19 +95,19 @@ def _check_tokens(tokens: str, *, whole: str, kind: str) -> None:
     unallowed = _NOT_ALLOWED.search(tokens)
     if unallowed is not None:
         raise ValueError(
-            f"a {kind} has letters, digits, `_` and `/` only, found {quoted(unallowed.group())} in {quoted(whole)}"
+            f"a {kind} may have only letters, digits, `_` and `/`, found {quoted(unallowed.group())} in {quoted(whole)}"
         )
     for token in tokens.split("/"):
         if not token:
             raise ValueError(f"a {kind} has one `/` between its parts and none at the end, found {quoted(whole)}")
         if token[0].isdigit():
-            raise ValueError(f"no part of a {kind} begins with a digit, found {quoted(token)} in {quoted(whole)}")
+            raise ValueError(f"no part of a {kind} may begin with a digit, found {quoted(token)} in {quoted(whole)}")
 
 
 def _check_name(name: str, *, kind: str) -> None:
     if "{" in name or "}" in name:
         raise ValueError(
-            f"{quoted(name)}: substitutions such as {{ns}} are not filled in here, write a relative name instead"
+            f"{quoted(name)}: substitutions such as {{ns}} do not work here, write a relative name instead"
         )
     if name.startswith("~") and not name.startswith("~/"):
         raise ValueError(f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points")
@@ -129,7 +129,7 @@ def check_type_name(name: object) -> str:
     other = _SHORT.fullmatch(name) or _FOREIGN.fullmatch(name)
     if other is not None:
         raise ValueError(f"{quoted(name)} is not the full name, write `{other[1]}/msg/{other[2]}`")
-    raise ValueError(f"{quoted(name)} is no message type, expected package/msg/Name such as sensor_msgs/msg/Image")
+    raise ValueError(f"{quoted(name)} is not a message type, expected package/msg/Name such as sensor_msgs/msg/Image")
 
 
 def check_field_path(path: str) -> str:

@@ -148,13 +148,13 @@ def _shared_topics(topics: Sequence[_Topic], document: Document) -> Iterator[Pro
         if all(types) and types[0] != types[1]:
             path = (*topic.path, "type")
             line = document.line((*other.path, "type"), beside=path)
-            text = f"{topic.input.said} is {quoted(types[1])} in {line}, and one topic has one type"
+            text = f"{topic.input.said} is {quoted(types[1])} in {line}, but a topic has only one type"
             yield document.problem(path, text, code="conflict")
         qos, others = _qos(topic, document), _qos(other, document)
         if topic.config.qos != other.config.qos and not {qos, others} & document.faulty:
             text = (
-                f"{topic.input.said} has another `qos` in {document.line(others, beside=qos)}: it is subscribed once,"
-                " write the same in both"
+                f"{topic.input.said} has a different `qos` in {document.line(others, beside=qos)}: there is one"
+                " subscription for both, write the same `qos`"
             )
             yield document.problem(qos, text, code="conflict")
 
@@ -176,10 +176,10 @@ def _outputs(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
         other = first.setdefault(name.text, name)
         if name.text in inputs:
             line = inputs[name.text].line(document, beside=name.path)
-            text = f"{what} is an input too ({line}): its messages would come back, give it another `output`"
+            text = f"{what} is also an input ({line}), which makes a loop: choose another `output`"
             yield document.problem(name.path, text, code="loop")
         elif other is not name:
-            text = f"{what} is taken by {other.line(document, beside=name.path)}, give it another `output`"
+            text = f"{what} is already used in {other.line(document, beside=name.path)}: choose another `output`"
             yield document.problem(name.path, text, code="repeated_output")
 
 
@@ -187,7 +187,8 @@ def _too_long(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]
     """Yield names that only their namespace or prefix makes too long."""
     for name in (name for topic in topics for name in (topic.input, topic.output)):
         if len(name.text) > LONGEST_TOPIC:
-            text = f"{quoted(name.text)} has {len(name.text)} characters in full, at most {LONGEST_TOPIC} are allowed"
+            size = f"{len(name.text)} characters, at most {LONGEST_TOPIC} are allowed"
+            text = f"the full name {quoted(name.text)} has {size}"
             yield document.problem(name.path, text, code="bad_value")
 
 
@@ -223,14 +224,14 @@ def _meeting_own_topics(topics: Sequence[_Topic], own: dict[str, _OwnTopic], doc
         taken = own.get(topic.output.text)
         if taken is not None:
             text = (
-                f"the output {topic.output.said} is a topic of the node itself, for {taken.purpose}:"
-                " give it another `output`"
+                f"the output {topic.output.said} is a topic that the node itself uses for {taken.purpose}:"
+                " choose another `output`"
             )
             yield document.problem(topic.output.path, text, code="own_topic")
         taken = own.get(topic.input.text)
         if taken is not None and topic.config.type not in ("", taken.type):
             text = (
-                f"{topic.input.said} is a topic of the node itself, for {taken.purpose}, and of the type"
-                f" `{taken.type}`: one topic has one type"
+                f"{topic.input.said} is a topic that the node itself uses for {taken.purpose}, with the type"
+                f" `{taken.type}`: a topic has only one type"
             )
             yield document.problem((*topic.path, "type"), text, code="conflict")

@@ -73,7 +73,7 @@ def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) ->
     if path == STDIN:
         return replace(decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path)), index=index)
     if not path:
-        raise _unreadable(shown_name(path), "is no file name")
+        raise _unreadable(shown_name(path), "is not a file name")
     try:
         content = _content(path, patience_s)
     except TimeoutError as error:
@@ -82,7 +82,7 @@ def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) ->
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
     except ValueError as error:
-        raise _unreadable(path, "is no file name") from error
+        raise _unreadable(path, "is not a file name") from error
     return replace(decode(content, name=path), index=index)
 
 
@@ -115,7 +115,7 @@ def _read(file: FileIO, *, deadline: float) -> bytes:
 def decode(content: bytes, *, name: str) -> Source:
     """Return the source that bytes hold; raises ConfigError if they are no text or too much of it."""
     if len(content) > _MOST_BYTES:
-        raise _unreadable(name, f"over {_MOST_BYTES // 1_000_000} MB, is this the right file?")
+        raise _unreadable(name, f"larger than {_MOST_BYTES // 1_000_000} MB: is this the right file?")
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _unreadable(name, "the text is UTF-16, expected UTF-8")
     try:
@@ -131,7 +131,7 @@ def check_text(text: str, *, name: str) -> Source:
     """Return the source of a text; raises ConfigError for characters that YAML has no place for."""
     source = Source(name, text, _lines(text))
     if len(source.lines) > _MOST_LINES:
-        raise _unreadable(name, f"over {_MOST_LINES} lines, is this the right file?")
+        raise _unreadable(name, f"more than {_MOST_LINES} lines: is this the right file?")
     found = _UNPRINTABLE.search(text)
     if found is not None:
         span = _span_at(text[: found.start()])

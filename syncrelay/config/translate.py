@@ -116,7 +116,7 @@ def _found(value: object, kind: str) -> str:
     if not isinstance(value, str):
         return found
     if kind == "bool_type" and value.lower() in _TRUTH_WORDS:
-        return f"{found}, which is no truth value in YAML 1.2"
+        return f"{found}, which YAML 1.2 reads as text"
     if kind in ("int_type", "float_type") and isinstance(read_plain(value), int | float):
         return f"{found}: write it without quotes"
     return found
@@ -130,14 +130,14 @@ def _unknown_key(loc: Location, meant: str | None, document: Document) -> str:
             continue
         owners = [policy for policy, other in models.items() if key in other.model_fields]
         if owners:
-            return f"{_policy(loc)} has no `{key}`, only {all_of(owners)}"
+            return f"{_policy(loc)} has no `{key}`, only {all_of(owners)} {'does' if len(owners) == 1 else 'do'}"
     levels = [level for level, owner in _levels(form) if key in owner.model_fields]
     if levels and document.nearest(key, model.model_fields, likeness=_A_SLIP) is None:
-        return f"unknown key here, `{key}` is a key of {levels[0]}"
+        return f"`{key}` does not belong here, it is a key of {levels[0]}"
     if "$" in key:
-        return "unknown key; variables are filled in in values only"
+        return "unknown key; variables work in values only"
     if ":" in key:
-        return "unknown key, is a space missing behind the colon?"
+        return "unknown key: is a space missing after the colon?"
     return f"unknown key{or_nearest(meant)}" if meant else f"unknown key, expected {one_of(model.model_fields)}"
 
 

@@ -96,8 +96,8 @@ def _no_header(
     times = list(_time_paths(fields, interfaces))
     own = f", or `stamp: {{field: {times[0]}}}`" if times else ""
     text = (
-        f"{quoted(topic.type)} does not begin with a std_msgs/msg/Header, where the stamp is looked for:"
-        f" write `stamp: receive` to go by arrival{own}"
+        f"{quoted(topic.type)} does not begin with a std_msgs/msg/Header, so it has no stamp there:"
+        f" write `stamp: receive` to use the time of arrival{own}"
     )
     key = "stamp" if document.has((*path, "stamp")) else "type"
     return document.problem((*path, key), text, code="no_header", subject=topic.type)

@@ -114,7 +114,7 @@ class _Composer:
         self._check_tag(event)
         if self._awaits_key():
             what = "mapping" if isinstance(node, MappingNode) else "list"
-            raise self._refusal(f"a {what} cannot be a key; a text that begins with a bracket needs quotes", node.span)
+            raise self._refusal(f"a {what} cannot be a key: put text that begins with a bracket in quotes", node.span)
         if len(self._open) == _DEEPEST:
             raise self._refusal(f"more than {_DEEPEST} levels of nesting", node.span)
         self._open.append(_Open(node, event.anchor))
@@ -150,7 +150,7 @@ class _Composer:
             self._report(text, span, code="merge_key")
         elif key in top.node.entries:
             first = top.node.entries[key].key.line
-            self._report(f"the key is here twice, first in line {first}", span, code="duplicate_key")
+            self._report(f"duplicate key, first in line {first}", span, code="duplicate_key")
 
     def _value(self, event: yaml.ScalarEvent, span: Span) -> ScalarNode:
         try:
@@ -171,15 +171,15 @@ class _Composer:
     def _alias(self, event: yaml.AliasEvent) -> None:
         span, name = self._span(event), str(event.anchor)
         if any(container.anchor == name for container in self._open):
-            raise self._refusal(f"{quoted('*' + name)} stands inside what it repeats", span)
+            raise self._refusal(f"{quoted('*' + name)} refers to a block that contains it", span)
         target = self._anchors.get(name)
         if target is None:
-            raise self._refusal(f"{quoted('*' + name)} repeats nothing: no `&{name}` above", span)
+            raise self._refusal(f"{quoted('*' + name)} has no anchor: there is no `&{name}` above", span)
         if self._awaits_key():
             raise self._refusal("an alias cannot be a key", span)
         self._place(target, None)
         if sum(container.node.size for container in self._open) > MOST_VALUES:
-            raise self._refusal(f"with every alias followed the file has over {MOST_VALUES} values", span)
+            raise self._refusal(f"with all aliases expanded the file has more than {MOST_VALUES} values", span)
 
     def _place(self, node: Node, anchor: str | None) -> None:
         if anchor:
@@ -208,7 +208,7 @@ class _Composer:
 
     def _report(self, text: str, span: Span, *, code: str) -> None:
         if len(self.problems) == _MOST_PROBLEMS:
-            text = "the file was not read on from here: there are errors enough above"
+            text = "too many errors: the file was not read beyond this line"
             raise ConfigError([*self.problems, self._source.problem(text, span=span, code="yaml")])
         self.problems.append(self._source.problem(text, path=dotted(self._path()), span=span, code=code))
 
@@ -256,13 +256,11 @@ def _value(found: re.Match[str], environ: Mapping[str, str]) -> str:
     name, default = found["name"], found["default"]
     if name is None:
         raise ValueError(
-            f"{quoted(found.group())}: expected ${{NAME}} or ${{NAME:-default}}; a dollar sign itself is written $$"
+            f"{quoted(found.group())}: expected ${{NAME}} or ${{NAME:-default}}; write $$ for a dollar sign"
         )
     value = environ.get(name)
     if default is not None:
         return value or default.removeprefix(":-")
     if value is None:
-        raise ValueError(
-            f"the environment variable {name} is not set; ${{{name}:-default}} gives it a value for that case"
-        )
+        raise ValueError(f"the environment variable {name} is not set; write ${{{name}:-default}} to give it a default")
     return value

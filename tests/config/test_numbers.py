@@ -94,9 +94,9 @@ def test_no_limit_as_rosbag2_writes_it_is_the_longest_duration(environ):
 @pytest.mark.parametrize(
     ("slop", "said"),
     [
-        ("20", "20 without a unit is 20 s; write 20ms if milliseconds are meant, else 20s"),
-        ("1234567.5", "1234567.5 without a unit is 1234567.5 s; write 1234567.5ms if"),
-        ("9223372036", "9223372036 without a unit is 9223372036 s; write 9223372036ms if"),
+        ("20", "20 without a unit means 20 s: write 20ms if you mean milliseconds, otherwise 20s"),
+        ("1234567.5", "1234567.5 without a unit means 1234567.5 s: write 1234567.5ms if"),
+        ("9223372036", "9223372036 without a unit means 9223372036 s: write 9223372036ms if"),
     ],
 )
 def test_a_slop_of_whole_seconds_is_noted_with_what_was_written(slop: str, said: str, environ):
