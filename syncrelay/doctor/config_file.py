@@ -17,7 +17,8 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
     together = "--together " if len(files) > 1 else ""
     named = all_of(files) if files else ""
     errors = [problem for problem in problems if problem.severity is Severity.ERROR]
-    noted = [problem for problem in problems if problem not in errors]
+    warnings = [problem for problem in problems if problem.severity is Severity.WARNING]
+    noted = [problem for problem in problems if problem.severity is Severity.NOTE]
     missing = [replace(each, severity=Severity.ERROR) for each in noted if each.code == "package_missing"]
     unchecked = [problem for problem in noted if problem.code != "package_missing"]
     if errors:
@@ -25,22 +26,29 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
             "file",
             f"{counted(len(errors), 'error')} in {named}:\n{render(errors)}",
             so="the relay refuses it and ends at once",
-            do=f"mend what is marked; to check again: syncrelay validate {together}{' '.join(files)}",
+            do=f"correct what is marked, then check again: syncrelay validate {together}{' '.join(files)}",
+        )
+    if warnings:
+        yield know(
+            "file_doubtful",
+            f"{named} may not mean what it says:\n{render(warnings)}",
+            so="the relay does what it says",
+            do="write what you mean, with its unit",
         )
     if missing:
         yield mend(
             "package_missing",
-            f"types of packages that this environment does not have, in {named}:\n{render(missing)}",
-            so="the relay starts, but their groups wait until the packages are there",
+            f"{named} uses message types of packages that are not installed here:\n{render(missing)}",
+            so="the relay starts, but the groups with these types wait until the packages are there",
             do="build the packages with colcon for this Python, then in this shell: source install/setup.bash\n"
-            "(in the image: put them into docker/messages before it is built)",
+            "(for the image: put them into docker/messages before you build it)",
         )
     if unchecked:
         yield know(
             "not_checked",
-            f"{named} could not be checked in full:\n{render(unchecked)}",
-            so="a fault in these places shows only when the relay runs",
-            do="nothing, if you are sure of them",
+            f"{named} could not be checked completely:\n{render(unchecked)}",
+            so="an error in these places shows only when the relay runs",
+            do="nothing, if you are sure that they are right",
         )
 
 
@@ -54,8 +62,8 @@ def check_types(config: Config, unusable: Mapping[str, str]) -> Iterator[Diagnos
         yield mend(
             "type_unusable",
             f"{name} is installed but cannot be imported: {fault}",
-            so=f"nothing of {topics} is received: the group {groups} waits",
-            do=f"build {name.partition('/')[0]} anew for this Python and this ROS, and source it in this shell",
+            so=f"the relay receives nothing on {topics}, so the group {groups} waits",
+            do=f"rebuild {name.partition('/')[0]} for this Python and this ROS, and source it in this shell",
         )
 
 
@@ -65,10 +73,10 @@ def check_remaps(config: Config, names: Mapping[str, str]) -> Iterator[Diagnosis
     for code in dict.fromkeys(problem.code for problem in problems):
         yield mend(
             _REMAP_CODES.get(code, f"remap_{code}"),
-            f"remaps give topics of the file names that the relay refuses:\n"
+            f"remaps rename topics of the file in a way that the relay refuses:\n"
             f"{render([problem for problem in problems if problem.code == code])}",
-            so="the relay ends at once with exit code 1; on a reload it keeps the file that it runs",
-            do="take the remap away, or give the topic another name in the file",
+            so="the relay ends at once with exit code 1; on a reload it keeps the running configuration",
+            do="remove the remap, or give the topic another name in the file",
         )
 
 
