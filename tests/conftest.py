@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -23,6 +24,9 @@ settings.register_profile(
 
 def pytest_configure() -> None:
     settings.load_profile("repeatable")
+    # A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     named = os.environ.get(_REAL_DATA)
     if named and not Path(named).is_dir():
         raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")

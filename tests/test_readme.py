@@ -1,4 +1,4 @@
-"""What the README shows is true: its files are in order, its commands exist, its error is the one that comes."""
+"""What the README and the pages of docs/ show is true: files are in order, commands exist, the error is what comes."""
 
 import json
 import re
@@ -16,20 +16,23 @@ from tests.sync.support.timeline import play_policy
 
 _ROOT = Path(__file__).parents[1]
 _README = (_ROOT / "README.md").read_text()
-_BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", _README, re.DOTALL | re.MULTILINE)
-_FILES = [text for kind, text in _BLOCKS if kind == "yaml" and text.startswith("version:")]
-_SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
-_INLINE = re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", _README)
+_PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *sorted((_ROOT / "docs").glob("*.md"))]}
+_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+_BLOCKS = _BLOCK.findall(_README)
+_ALL_BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
+_FILES = [text for kind, text in _ALL_BLOCKS if kind == "yaml" and text.startswith("version:")]
+_SHOWN = [line.removeprefix("$ ") for kind, text in _ALL_BLOCKS if kind == "console" for line in text.splitlines()]
+_INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
 _COMMANDS = sorted({command for command in [*_SHOWN, *_INLINE] if command})
 
 
 @pytest.mark.parametrize("text", _FILES, ids=range(len(_FILES)))
-def test_every_file_that_the_readme_shows_is_in_order(text):
+def test_every_file_that_a_page_shows_is_in_order(text):
     assert load_text(text).groups
 
 
 @pytest.mark.parametrize("command", _COMMANDS)
-def test_every_command_that_the_readme_shows_exists(command):
+def test_every_command_that_a_page_shows_exists(command):
     program, *words = command.split(" > ", maxsplit=1)[0].split()
     check = {"make": _is_make_target, "pip": _is_known_install, "syncrelay": _is_syncrelay_command}[program]
     assert check(words), command
@@ -79,9 +82,10 @@ def test_the_error_that_the_readme_shows_is_the_one_that_comes(tmp_path):
     assert shown.strip() in run.stdout + run.stderr
 
 
-def test_every_link_to_a_file_of_ours_leads_somewhere():
-    targets = [target for target in re.findall(r"\]\(([^)#]+)\)", _README) if "://" not in target]
-    assert [target for target in targets if not (_ROOT / target).exists()] == []
+@pytest.mark.parametrize("page", _PAGES, ids=lambda page: page.name)
+def test_every_link_to_a_file_of_ours_leads_somewhere(page):
+    targets = [target for target in re.findall(r"\]\(([^)#]+)\)", _PAGES[page]) if "://" not in target]
+    assert [target for target in targets if not (page.parent / target).exists()] == []
 
 
 _TIMELINES = [text for kind, text in _BLOCKS if kind == "timeline"]
