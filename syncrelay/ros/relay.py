@@ -23,7 +23,7 @@ from syncrelay.ros.diagnostics import Telling
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.logs import RosoutHandler, name_after
-from syncrelay.ros.monitor import LOOK_S, Monitor
+from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
 from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
@@ -119,7 +119,7 @@ class Relay:
         self._config_path = config_path
         self._phase = Phase.STARTING
         self._asked = -_ASKED_S
-        self._next_look = time.monotonic() + LOOK_S
+        self._next_evaluation = time.monotonic() + EVALUATE_S
         # What each group was last said to wait for; None of one that runs.
         self._announced: dict[str, str | None] = {}
         self._started = time.monotonic()
@@ -168,7 +168,7 @@ class Relay:
         self._reloads += 1
         self._reload_error = None
         # What is new is to be told of at once.
-        self._next_look = time.monotonic()
+        self._next_evaluation = time.monotonic()
         begin = len(self._wirings.groups) - len(kept)
         go_on = f"{counted(len(kept), 'group')} {'goes' if len(kept) == 1 else 'go'} on"
         _LOG.info("the file was read again: %s, %d %s", go_on, begin, "begins" if begin == 1 else "begin")
@@ -212,14 +212,15 @@ class Relay:
         with self._bugs.contained("looking at the graph"):
             self._look_at_graph()
             self._announce()
-        if (now := time.monotonic()) >= self._next_look:
-            with self._bugs.contained("looking at the groups"):
-                self._look(self.monitor.look if self._is_watched(now) else self.monitor.look_in_turn)
+        if (now := time.monotonic()) >= self._next_evaluation:
+            with self._bugs.contained("evaluating the groups"):
+                self._evaluate(self.monitor.evaluate if self._is_watched(now) else self.monitor.evaluate_in_turn)
         is_waiting = any(wiring.waiting_for for wiring in self._wirings.all)
-        until_look = max(0.0, self._next_look - time.monotonic())
-        rest_s, began = min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
+        until_evaluation = max(0.0, self._next_evaluation - time.monotonic())
+        rest_s, began = min(timeout_s, until_evaluation, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
         self._wake.wait(rest_s)
-        self.monitor.overslept(time.monotonic() - began - rest_s)
+        too_long_s = time.monotonic() - began - rest_s
+        self.monitor.standstills.overslept(round(too_long_s * 1e9), now=time.time_ns())
 
     def _look_at_graph(self) -> None:
         has_changed = self._graph_changes.seen()
@@ -235,14 +236,14 @@ class Relay:
         plotted = self._config.diagnostics is not None and self._config.diagnostics.scalars
         return plotted or now - self._asked < _ASKED_S
 
-    def look(self) -> tuple[GroupReport, ...]:
-        """Look at all groups now, tell of it, and give what there is to say."""
-        return self._look(self.monitor.look)
+    def evaluate(self) -> tuple[GroupReport, ...]:
+        """Evaluate all groups now, and return and publish their reports."""
+        return self._evaluate(self.monitor.evaluate)
 
-    def _look(self, look: Callable[[], None]) -> tuple[GroupReport, ...]:
-        self._next_look = time.monotonic() + LOOK_S
+    def _evaluate(self, evaluate: Callable[[], None]) -> tuple[GroupReport, ...]:
+        self._next_evaluation = time.monotonic() + EVALUATE_S
         try:
-            look()
+            evaluate()
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
