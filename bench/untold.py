@@ -6,7 +6,7 @@ import sys
 from collections import deque
 
 from syncrelay.cli import main
-from syncrelay.ros.group import GroupRelay
+from syncrelay.dataflow.group import GroupRelay
 from syncrelay.ros.monitor import Monitor
 
 

@@ -71,7 +71,7 @@ def run(
             config_path=", ".join(config_paths),
             groups=groups or None,
             ros_args=ros_args,
-            beat=heartbeat.beat if heartbeat else None,
+            on_turn=heartbeat.beat if heartbeat else None,
             purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
         ) as relay,
         files,

@@ -10,15 +10,15 @@ from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.config import TopicConfig
+from syncrelay.dataflow.backend import Content, Deliver, RclBackend, Source
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint, Refusal
 from syncrelay.ros import graph
-from syncrelay.ros.direct.rcl import RclCallError
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
-from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.path import Content, Deliver, Path, Source
+from syncrelay.ros.librcl.rcl import RclCallError
 from syncrelay.ros.qos import input_profile, output_profile
-from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.takers import taker
 from syncrelay.ros.types import begins_with_header, import_type
 
@@ -56,7 +56,7 @@ class TopicInput:
     """
 
     def __init__(
-        self, config: TopicConfig, *, name: str, entities: Entities, node: Any, path: Path, loop: ReceiveLoop
+        self, config: TopicConfig, *, name: str, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop
     ) -> None:
         self._topic = config.topic
         self.type = config.type
@@ -65,7 +65,7 @@ class TopicInput:
         self._qos = config.qos
         self._entities = entities
         self._node = node
-        self._path = path
+        self._backend = backend
         self._loop = loop
         self.name = name
         self.missing: str | None = f"a publisher of {self.name} ({self.type})"
@@ -309,7 +309,7 @@ class TopicInput:
         lost = None
         try:
             lost = _losses(subscription)
-            source = self._path.source(subscription, self._deliver)
+            source = self._backend.source(subscription, self._deliver)
             old = self._loop.call(lambda: self._swap(source, publishers)).result()
         except BaseException as error:
             # It would hold on to the subscription.
@@ -357,7 +357,7 @@ class TopicInput:
         self._feed_users()
 
     def _connect(self, user: User) -> None:
-        outlet = self._path.outlet(user.publisher)
+        outlet = self._backend.outlet(user.publisher)
         user.group.connect(user.index, outlet, restamped=begins_with_header(self._message_type))
 
     def _feed_users(self) -> None:

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any, Final, NamedTuple
 
+from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.group import Batch, GroupRelay
 from syncrelay.dataflow.observers import Losses, SimulatedClock, Standstills, SystemClock, Waits
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.explain import (
     Endpoint,
     FindingLog,
@@ -18,11 +21,8 @@ from syncrelay.explain import (
     Severity,
     problems,
 )
-from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.graph import topics_alike, topics_in
-from syncrelay.ros.group import Batch, GroupRelay
 from syncrelay.ros.inputs import TopicInput
-from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.wirings import Wiring
 from syncrelay.sync.counts import InputCounts
 

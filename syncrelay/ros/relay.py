@@ -16,16 +16,16 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
 from syncrelay.config import Config, ConfigError, GroupConfig
 from syncrelay.config.wording import counted
+from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, recent
-from syncrelay.ros.bugs import Bugs
+from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.diagnostics import Telling
 from syncrelay.ros.entities import Entities, Purpose
-from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
-from syncrelay.ros.path_choice import VARIABLE, choose_path
-from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.ros.start import make_node, resolver, start
 from syncrelay.ros.transport import apply_transport
@@ -68,7 +68,7 @@ class Relay:
         config_path: str = "",
         groups: Collection[str] | None = None,
         ros_args: Sequence[str] = (),
-        beat: Callable[[], None] | None = None,
+        on_turn: Callable[[], None] | None = None,
         purpose: Purpose = Purpose.RELAY,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
@@ -76,7 +76,7 @@ class Relay:
         Whose purpose is to look has all but publishers: sets leave to nowhere.
 
         Raises ConfigError where remaps make the file's names meet, UsageError where ROS does not take `ros_args`.
-        `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
+        `config_path` is what `state` calls the file. `on_turn` is called on the receive thread for as long as that
         turns, once a second at least.
         """
         apply_transport(config.node.transport, os.environ)
@@ -97,19 +97,19 @@ class Relay:
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
         # Nanoseconds of a clock that only measures waiting: ROS time if simulated, else one that never jumps.
         self._now: Callable[[], int] = self._simulated_now if self._sim_time else time.monotonic_ns
-        path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
-        self.receive_path = path.name
+        backend = choose_backend(os.environ.get(VARIABLE), node=self.node, context=self._context)
+        self.backend = backend.name
         self._bugs = Bugs()
         self._loop = ReceiveLoop(
-            path.watch(),
+            backend.watch(),
             now=self._now,
             expire=self._expire,
-            beat=beat,
+            on_turn=on_turn,
             contain=lambda error: self._bugs.tell("receiving", error),
         )
-        self._graph_changes = path.graph_changes(self.node)
+        self._graph_changes = backend.graph_changes(self.node)
         entities = Entities(self.node, purpose)
-        self._wirings = Wirings(entities=entities, node=self.node, path=path, loop=self._loop)
+        self._wirings = Wirings(entities=entities, node=self.node, backend=backend, loop=self._loop)
         self._telling = Telling(self.node, entities)
         self.monitor = Monitor((), node=self.node, loop=self._loop, simulated=self._sim_time, bugs=self._bugs)
         self._take_on(config)
@@ -260,7 +260,7 @@ class Relay:
             phase=self._phase,
             uptime_s=now - self._started,
             turned_s=now - self._loop.turned,
-            receives_by=self.receive_path.value,
+            receives_by=self.backend.value,
             groups=self.monitor.reports,
             reloads=self._reloads,
             refused_reloads=self._refused_reloads,

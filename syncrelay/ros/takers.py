@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 from syncrelay.cdr import has_place_for_stamp
-from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.path import Content, Deliver
+from syncrelay.dataflow.backend import Content, Deliver
+from syncrelay.dataflow.group import GroupRelay
 from syncrelay.ros.types import StampReader, begins_with_header, stamp_reader, value_reader
 
 

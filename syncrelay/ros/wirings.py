@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from syncrelay.config import TopicConfig
+from syncrelay.dataflow.backend import RclBackend
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.ros.entities import Entities, RefusedError
-from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.inputs import TopicInput, User
-from syncrelay.ros.path import Path
-from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.sync import DropReason
 
 _Key: TypeAlias = tuple[str, str, str]
@@ -45,11 +45,11 @@ class Wiring:
 class Wirings:
     """All groups that run, in the file's order; one input per topic, however many use it and whatever they call it."""
 
-    def __init__(self, *, entities: Entities, node: Any, path: Path, loop: ReceiveLoop) -> None:
+    def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop) -> None:
         self.all: tuple[Wiring, ...] = ()
         self._entities = entities
         self._node = node
-        self._path = path
+        self._backend = backend
         self._loop = loop
         self._inputs: dict[_Key, TopicInput] = {}
 
@@ -161,7 +161,7 @@ class Wirings:
         key = (name, topic.type, repr(topic.qos))
         if key not in inputs:
             inputs[key] = TopicInput(
-                topic, name=name, entities=self._entities, node=self._node, path=self._path, loop=self._loop
+                topic, name=name, entities=self._entities, node=self._node, backend=self._backend, loop=self._loop
             )
         return inputs[key]
 

@@ -37,7 +37,7 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
             may_turn.wait(DEADLINE_S)
 
     player = stage.player(_FRONT | _REAR)
-    with Relay(load_text(_FILE), beat=turn) as relay:
+    with Relay(load_text(_FILE), on_turn=turn) as relay:
 
         def sets_of(*counts: int) -> bool:
             relay.step(0)

@@ -16,11 +16,11 @@ from tests.ros.processes import wait_until
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 entities = pytest.importorskip("syncrelay.ros.entities")
-choose_path = pytest.importorskip("syncrelay.ros.path_choice").choose_path
+choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
 Wirings = pytest.importorskip("syncrelay.ros.wirings").Wirings
-GroupRelay = pytest.importorskip("syncrelay.ros.group").GroupRelay
+GroupRelay = pytest.importorskip("syncrelay.dataflow.group").GroupRelay
 import_type = pytest.importorskip("syncrelay.ros.types").import_type
-ReceiveLoop = pytest.importorskip("syncrelay.ros.receive").ReceiveLoop
+ReceiveLoop = pytest.importorskip("syncrelay.dataflow.receive").ReceiveLoop
 
 pytestmark = pytest.mark.ros
 
@@ -48,14 +48,14 @@ def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
     context = rclpy.context.Context()
     rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
     node = rclpy.create_node("here", context=context)
-    path = choose_path(request.param, node=node, context=context)
-    loop = ReceiveLoop(path.watch(), now=lambda: 0, expire=lambda _: None)
+    backend = choose_backend(request.param, node=node, context=context)
+    loop = ReceiveLoop(backend.watch(), now=lambda: 0, expire=lambda _: None)
     refusing = _Refusing(node)
     thread = Thread(target=loop.run)
     thread.start()
-    wirings = Wirings(entities=refusing, node=node, path=path, loop=loop)
+    wirings = Wirings(entities=refusing, node=node, backend=backend, loop=loop)
     try:
-        yield SimpleNamespace(node=node, entities=refusing, wirings=wirings, path=path)
+        yield SimpleNamespace(node=node, entities=refusing, wirings=wirings, backend=backend)
     finally:
         loop.stop()
         thread.join()
@@ -172,8 +172,8 @@ def test_what_others_in_the_process_made_is_refused_in_the_words_of_dds(here):
 
 
 def test_a_topic_that_gives_no_messages_any_more_is_subscribed_anew_and_told(here):
-    sources, source = [], here.path.source
-    here.path.source = lambda *of: sources.append(source(*of)) or sources[-1]
+    sources, source = [], here.backend.source
+    here.backend.source = lambda *of: sources.append(source(*of)) or sources[-1]
     here.wirings.wire(_groups(**_ONE))
     _look(here)
     wiring = here.wirings.all[0]
