@@ -72,7 +72,7 @@ def run(
             groups=groups or None,
             ros_args=ros_args,
             on_turn=heartbeat.beat if heartbeat else None,
-            purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
+            purpose=Purpose.RELAY if explain_s is None else Purpose.OBSERVE,
         ) as relay,
         files,
     ):

@@ -30,7 +30,7 @@ messages = pytest.importorskip("syncrelay.ros.librcl.messages")
 rcl = pytest.importorskip("syncrelay.ros.librcl.rcl")
 buffers = pytest.importorskip("syncrelay.ros.librcl.buffers")
 choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
-taker = pytest.importorskip("syncrelay.ros.takers").taker
+handler = pytest.importorskip("syncrelay.ros.handlers").handler
 
 pytestmark = pytest.mark.ros
 
@@ -184,13 +184,13 @@ def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):
     kept = _source(here, topic, print)
     for index in range(2):
         group.connect(index, here.backend.outlet(topic.publisher), restamped=True)
-    takers = _takers(group)
+    handlers = _handlers(group)
     for stamp in [stamp for stamp in stamps for _ in range(2)]:
         topic.publisher.publish(with_stamp(payload, stamp))
     tracemalloc.start()
     for n in range(2 * len(stamps)):
         received, message, content = _take(kept)
-        takers[n % 2](message, content, received)
+        handlers[n % 2](message, content, received)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert group.engine.sets == len(stamps)
@@ -199,8 +199,8 @@ def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):
     assert sent == [with_stamp(payload, stamp) for stamp in stamps for _ in range(2)]
 
 
-def _takers(group):
-    return [taker(group, index, Vector3Stamped) for index in range(2)]
+def _handlers(group):
+    return [handler(group, index, Vector3Stamped) for index in range(2)]
 
 
 def test_a_watch_sees_what_came_before_it_what_comes_later_and_a_wake(here, topic):
@@ -293,7 +293,7 @@ def _drained(changes):
 
 def test_changes_of_the_graph_are_seen_once_each(here, ros_domain, monkeypatch):
     # Only what is told counts here, not what is looked for now and then in any case.
-    monkeypatch.setattr("syncrelay.ros.librcl.graph_changes._DOUBT_S", math.inf)
+    monkeypatch.setattr("syncrelay.ros.librcl.graph_changes._FORCE_S", math.inf)
     changes = here.backend.graph_changes(here.node)
     assert changes.seen()
     wait_until(lambda: _drained(changes), "the end of changes")
