@@ -102,7 +102,7 @@ class TopicInput:
             self.make_publisher(binding)
         except RefusedError as error:
             binding.publisher_refusal = error.refusal
-            self._put_off(error)
+            self._put_off(error.refusal)
 
     def attach(self, binding: InputBinding) -> None:
         """Feed it from now on. On the loop's thread, or before that runs."""
@@ -146,7 +146,7 @@ class TopicInput:
     def _end_failed(self, error: Exception) -> None:
         self._failure = None
         self.close()
-        self._refused(RefusedError(Refusal("receive", self.name, self.type, why=str(error) or type(error).__name__)))
+        self._refused(Refusal("receive", self.name, self.type, why=str(error) or type(error).__name__))
         if not isinstance(error, _OF_RCL):
             raise error
 
@@ -213,7 +213,7 @@ class TopicInput:
             if profile != self.profile:
                 self._exchange(profile)
         except RefusedError as error:
-            self._refused(error)
+            self._refused(error.refusal)
             return
         self.refusal = None
         lacking = [binding for binding in self.outputs.bindings if binding.publisher is None]
@@ -222,13 +222,13 @@ class TopicInput:
         if any(binding.publisher is not None for binding in lacking):
             self._loop.call(lambda: self.connect(lacking)).result()
 
-    def _refused(self, error: RefusedError) -> None:
-        self.refusal = error.refusal
-        self._put_off(error)
+    def _refused(self, refusal: Refusal) -> None:
+        self.refusal = refusal
+        self._put_off(refusal)
 
-    def _put_off(self, error: RefusedError) -> None:
+    def _put_off(self, refusal: Refusal) -> None:
         self._try_again = time.monotonic() + _TRY_AGAIN_S
-        self._say_once(logging.ERROR, str(error))
+        self._say_once(logging.ERROR, refusal.text)
 
     def _exchange(self, profile: Any) -> None:
         """Replace the subscription and its outputs by ones of another QoS; raises RefusedError, with nothing changed.

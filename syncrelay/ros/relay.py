@@ -177,9 +177,8 @@ class Relay:
         self._reload_error = None
         # What is new is to be told of at once.
         self._next_evaluation = time.monotonic()
-        begin = len(self._bindings.groups) - len(kept)
-        go_on = f"{counted(len(kept), 'group')} {'goes' if len(kept) == 1 else 'go'} on"
-        _LOG.info("the file was read again: %s, %d %s", go_on, begin, "begins" if begin == 1 else "begin")
+        started = len(self._bindings.groups) - len(kept)
+        _LOG.info("reloaded: %s unchanged, %s started", counted(len(kept), "group"), counted(started, "group"))
 
     def refuse_reload(self, reason: str) -> None:
         """Tell in `state` that a reload failed, and why."""
@@ -343,7 +342,7 @@ class Relay:
         self._jump_handle = clock.create_jump_callback(threshold, post_callback=changed)
 
     def _flush_jump(self) -> None:
-        _LOG.warning("the clock jumped back: everything buffered is dropped as time_jump")
+        _LOG.warning("the clock jumped back; buffered messages were dropped as time_jump")
         for group in self._bindings.groups:
             group.flush(DropReason.TIME_JUMP)
 
