@@ -15,23 +15,23 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from syncrelay.config import Config
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.environment.transport import apply_transport
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import GroupReport, recent
+from syncrelay.logs import name_after
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.bindings import GroupBinding, GroupBindings
 from syncrelay.ros.clock import WaitingClock
 from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
-from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
-from syncrelay.ros.start import make_node, resolver, start
+from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.ros.transport import apply_transport
-from syncrelay.ros.wakeup import Wakeup
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
+from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
 

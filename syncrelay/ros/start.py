@@ -1,5 +1,6 @@
-"""The relay's node: rclpy started with what the file and the command line say, and in words what ROS refuses of it."""
+"""The relay's node: rclpy started as the file and the command line say, and its log on /rosout."""
 
+import logging
 import os
 import re
 from collections.abc import Callable, Sequence
@@ -12,9 +13,9 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from syncrelay.config.wording import quoted
+from syncrelay.environment.domain import require_domain
 from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
-from syncrelay.printable import printable
-from syncrelay.ros.domain import require_domain
+from syncrelay.printable import one_entry, printable
 from syncrelay.ros.environment import keep_stdout, log_arguments
 
 # Where in rcl's sources it gave up: that tells its authors something, not whoever wrote the arguments.
@@ -75,6 +76,27 @@ def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:
             raise _not_taken(ros_args, f"of the topic {quoted(name)} they make none: {error}") from error
 
     return resolve
+
+
+class RosoutHandler(logging.Handler):
+    """Passes records on to a node's logger, which publishes them on /rosout and writes ROS's log file."""
+
+    def __init__(self, node_logger: Any) -> None:
+        super().__init__()
+        # rclpy refuses two severities from one line of code, hence a line for each.
+        self._emit_at = {
+            logging.DEBUG: lambda text: node_logger.debug(text),  # noqa: PLW0108
+            logging.INFO: lambda text: node_logger.info(text),  # noqa: PLW0108
+            logging.WARNING: lambda text: node_logger.warning(text),  # noqa: PLW0108
+            logging.ERROR: lambda text: node_logger.error(text),  # noqa: PLW0108
+            logging.CRITICAL: lambda text: node_logger.fatal(text),  # noqa: PLW0108
+        }
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(one_entry(record.getMessage()))
+        except Exception:  # noqa: BLE001  whoever logs goes on, as with every handler of logging
+            self.handleError(record)
 
 
 def _refused(words: str, ros_args: Sequence[str]) -> SyncRelayError:
