@@ -28,12 +28,16 @@ class Batch(NamedTuple):
     """What came and left since the last evaluation, oldest first.
 
     `arrivals` are stamps and times of receipt of each input, `sets` the sets' stamps and their latencies, `keys` what
-    the newest messages are matched by; times in nanoseconds.
+    the newest messages are matched by, `last` what left last of all; times in nanoseconds. `counts` and `n_sets` are
+    those since the group began.
     """
 
     arrivals: tuple[deque[tuple[int, int]], ...]
     sets: deque[tuple[tuple[int | None, ...], int]]
     keys: tuple[Hashable, ...]
+    counts: tuple[InputCounts, ...]
+    n_sets: int
+    last: tuple[tuple[int | None, ...] | RecentDrop, ...]
 
 
 class Unpublished(NamedTuple):
@@ -78,8 +82,8 @@ class _StoppedEngine:
 class GroupRelay:
     """Feeds a group's engine and publishes the sets that it gives.
 
-    An exception on the way stops the group and no other: `receive` and `receive_keyed` leave it to whoever feeds them
-    to call `fail`, the rest do so themselves.
+    An exception on the way stops the group and no other: `receive` leaves it to whoever feeds it to call `fail`, the
+    rest do so themselves.
     """
 
     def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
@@ -138,35 +142,24 @@ class GroupRelay:
             return (self.engine.reject(message, reason),)
         return self.engine.add(message, now=self._now())
 
-    def receive(self, index: int, payload: Any, received: int, stamp: int | None) -> None:
-        """Take in a message of one input by its stamp, None where none could be read; times in nanoseconds."""
+    def receive(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable = None) -> None:
+        """Take in a message of one input, whose stamp is None where it, or the key, cannot be read; times in ns."""
         if stamp is None:
-            self._reject(index, payload, received)
-            return
-        self._arrivals[index].append((stamp, received))
-        self._conclude(self.engine.add(Message(index, stamp, (payload, received)), now=self._now()))
-
-    def receive_keyed(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable) -> None:
-        """Take in a message that is matched by its key; None where none could be read."""
-        if stamp is None or key is None:
-            self._reject(index, payload, received)
+            self._conclude([self.engine.reject(Message(index, 0, (payload, received)), DropReason.MALFORMED)])
             return
         self._arrivals[index].append((stamp, received))
         self._keys[index] = key
         self._conclude(self.engine.add(Message(index, stamp, (payload, received), key), now=self._now()))
 
     def watched(self) -> Batch:
-        """Give what came and left since this was last asked for."""
-        batch = Batch(self._arrivals, self._sets, tuple(self._keys))
+        """Give what came and left since this was last asked for, and all counts."""
+        arrivals, sets = self._arrivals, self._sets
         self._watch()
-        return batch
+        return Batch(arrivals, sets, tuple(self._keys), self.counts(), self.engine.sets, tuple(self.last))
 
     def _watch(self) -> None:
         self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
         self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
-
-    def _reject(self, index: int, payload: Any, received: int) -> None:
-        self._conclude([self.engine.reject(Message(index, 0, (payload, received)), DropReason.MALFORMED)])
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""

@@ -254,15 +254,12 @@ class Relay:
         try:
             self.drain()
         finally:
-            self._leave_graph()
-
-    def _leave_graph(self) -> None:
-        self._clock.close()
-        self._services.shutdown()
-        self._threads.shutdown()
-        self._loop.close()
-        _LOG.removeHandler(self._rosout)
-        self._leave()
+            self._clock.close()
+            self._services.shutdown()
+            self._threads.shutdown()
+            self._loop.close()
+            _LOG.removeHandler(self._rosout)
+            self._leave()
 
     def _leave(self) -> None:
         self.node.destroy_node()
