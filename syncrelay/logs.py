@@ -41,7 +41,7 @@ class _JsonFormatter(logging.Formatter):
 
 
 def name_after(node_name: str) -> None:
-    """Have all lines from now on bear a node's name, which tells two relays of a launch apart."""
+    """Name the node in all lines from now on, to distinguish two relays of a launch."""
 
     def name(record: logging.LogRecord) -> bool:
         record.node = node_name

@@ -18,7 +18,7 @@ _LOG = logging.getLogger("syncrelay")
 
 # Enough for the widest terminal's strip of recent sets.
 _RECENT = 256
-# What is kept for whoever watches, between two of his looks: at 1 kHz they may be 10 s apart.
+# What is kept between two evaluations: at 1 kHz they may be 10 s apart.
 _WATCHED = 10_000
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
@@ -82,8 +82,7 @@ class _StoppedEngine:
 class GroupRelay:
     """Feeds a group's engine and publishes the sets that it gives.
 
-    An exception on the way stops the group and no other: `receive` leaves it to whoever feeds it to call `fail`, the
-    rest do so themselves.
+    An exception stops this group and no other: the caller of `receive` calls `fail`, all else does so itself.
     """
 
     def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
@@ -197,7 +196,8 @@ class GroupRelay:
             return
         self.failure = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         _LOG.error(
-            "%s: a bug in syncrelay stopped this group, others go on; please report it with these lines and your file",
+            "%s: a bug in syncrelay stopped this group; other groups keep running. "
+            "Please report it with these lines and your file",
             self.config.name,
             exc_info=error,
             extra={"group": self.config.name, "finding": Code.INTERNAL_ERROR.value},

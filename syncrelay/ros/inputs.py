@@ -120,7 +120,7 @@ class TopicInput:
         self._feed()
 
     def close(self) -> None:
-        """Receive no longer; if it is polled again, it begins anew. On the main thread."""
+        """Stop receiving; if it is polled again, it starts again. On the main thread."""
         self._force_poll = True
         source, self._source = self._source, None
         if source is not None:
@@ -135,7 +135,7 @@ class TopicInput:
         self._try_again, self._force_poll = 0.0, True
 
     def poll(self) -> None:
-        """Poll the graph; subscribe, anew where the publishers' QoS changed; `missing` says what is not there."""
+        """Poll the graph and subscribe, again where the publishers' QoS changed; `missing` says what is missing."""
         # Until all went well it is due again, though the graph is as before.
         self._force_poll = True
         if self._failure is not None:
@@ -233,10 +233,10 @@ class TopicInput:
     def _exchange(self, profile: Any) -> None:
         """Replace the subscription and its outputs by ones of another QoS; raises RefusedError, with nothing changed.
 
-        An output that DDS does not make anew goes on as it was.
+        An output that DDS does not make again stays as it was.
         """
         subscription = self._entities.subscription(self._message_type, self._topic, profile)
-        publishers, refused = self.outputs.make_anew(self._message_type, profile)
+        publishers, refused = self.outputs.remake(self._message_type, profile)
         for refusal in refused:
             self._put_off(refusal)
         lost = None
@@ -281,7 +281,7 @@ class TopicInput:
 
 
 def _loss_counter(subscription: Any) -> Any:
-    """What counts the messages that DDS loses, None where it does not tell. Raises RCLError."""
+    """What counts the messages that DDS loses; None where it does not count them. Raises RCLError."""
     try:
         return _rclpy.EventHandle(
             subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST

@@ -85,7 +85,7 @@ class Outputs:
             binding.publisher = self._made(binding, message_type, profile)
             binding.publisher_refusal = None
 
-    def make_anew(self, message_type: Any, profile: Any) -> tuple[dict[InputBinding, Any], list[Refusal]]:
+    def remake(self, message_type: Any, profile: Any) -> tuple[dict[InputBinding, Any], list[Refusal]]:
         """Make publishers of another QoS. What DDS refuses stays as it was."""
         made: dict[InputBinding, Any] = {}
         refused = []
