@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Final
 
-from syncrelay.explain import rules_flow, rules_graph, rules_stamps, words
+from syncrelay.explain import rules_flow, rules_graph, rules_matching, rules_stamps, words
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Code, Finding, Rule, Severity, of_each_input
 
@@ -21,9 +21,9 @@ _RULES: Final[tuple[Rule, ...]] = (
     rules_stamps.other_clock,
     rules_stamps.no_common_key,
     of_each_input(rules_flow.bursts),
-    rules_stamps.over_slop,
-    of_each_input(rules_flow.short_queue),
-    of_each_input(rules_flow.waiting_for_optional),
+    rules_matching.over_slop,
+    of_each_input(rules_matching.short_queue),
+    of_each_input(rules_matching.waiting_for_optional),
     of_each_input(rules_stamps.time_jump),
     of_each_input(rules_flow.messages_lost),
     rules_flow.too_slow,
@@ -48,7 +48,7 @@ def problems(facts: GroupFacts) -> tuple[Finding, ...]:
         found.append(_unexplained(facts))
     elif _is_well(found) and facts.figures.last_set is not None:
         # Few sets are what other findings come to: it is said where none of them is there.
-        found += rules_flow.few_sets(facts)
+        found += rules_matching.few_sets(facts)
     return tuple(found)
 
 

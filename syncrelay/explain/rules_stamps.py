@@ -1,23 +1,17 @@
-"""Findings about stamps: unset, of another clock, too far apart, falling, drifting."""
+"""Findings about stamps: unset, of another clock, falling, drifting."""
 
 from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.drift import apart
-from syncrelay.explain.facts import GroupFacts, InputFacts, Tolerance
+from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
 from syncrelay.sync.messages import DropReason
 
 # Stamps that are off by more come from another clock, or are older than a queue should hold.
 _OTHER_CLOCK: Final = SECOND
 _TOLD_JUMP: Final = 30 * SECOND
-# A share of the slowest input's messages that could have no set, and from how many on it means something.
-_MISSED: Final = 0.05
-_FEWEST: Final = 5
-# Where messages were held up, what is apart tells of slop only if it is most.
-_MOST: Final = 0.5
 # Below this drift is noise: so much apart since it was watched, so long watched, so much more than it bends.
 _DRIFTED: Final = 5_000_000
 _DRIFT_WATCHED: Final = 20 * SECOND
@@ -102,54 +96,6 @@ def no_common_key(facts: GroupFacts) -> Found:
         f"no key came on all inputs while it was buffered; the newest are {newest}",
         "correct `key`, or write a larger `queue_size` if one input's keys come much later",
     )
-
-
-def over_slop(facts: GroupFacts) -> Found:
-    """Find that the sets that could be had are too wide for the file."""
-    tolerance = facts.tolerance
-    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
-    if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
-        return
-    over = nearest.share_over(tolerance.ns)
-    if facts.is_silent and over > 1 - _MISSED:
-        text, suggestion = _too_wide(facts, tolerance, nearest), _wide_enough(facts, tolerance, nearest)
-        yield Finding(Code.OVER_SLOP, Severity.ERROR, text, suggestion)
-    elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
-        text, suggestion = _often_too_wide(facts, tolerance, nearest)
-        yield Finding(Code.OVER_SLOP, Severity.WARN, text, suggestion)
-
-
-def _come_at_once(facts: GroupFacts) -> bool:
-    """Whether what is measured as far apart may only have been held up: a wider slop would pair what came together."""
-    return any(each.required and each.figures.bursts for each in facts.inputs)
-
-
-def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> tuple[str, str]:
-    missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
-    name = facts.pacemaker.name
-    if facts.policy == "exact_time":
-        # Others do have equal stamps: a wider slop would pair what does not belong together.
-        lost = "look for messages that a driver leaves out or the network loses"
-        return f"{missed} {name} have no partner of an equal stamp", lost
-    farther = f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
-    return farther, _wide_enough(facts, tolerance, nearest)
-
-
-def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
-    least, most = words.duration(nearest.quantile(0)), words.duration(nearest.quantile(0.95))
-    widths = least if least == most else f"{least} to {most}"
-    if facts.policy == "exact_time":
-        return f"no stamps are equal: the nearest sets span {widths}"
-    if tolerance.key == "max_age":
-        return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
-    return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
-
-
-def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
-    most, nearly_all = words.at_least(nearest.quantile(0.95)), words.at_least(nearest.quantile(0.99))
-    policy = "`policy: approximate_time` and " if facts.policy == "exact_time" else ""
-    less = "" if most == nearly_all else f", `{tolerance.key}: {most}` would match 95 %"
-    return f"write {policy}`{tolerance.key}: {nearly_all}`, which would match 99 %{less}"
 
 
 def time_jump(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
