@@ -12,20 +12,23 @@ from syncrelay.explain.facts import (
     InputGraph,
     Mismatch,
     Refusal,
+    SimulatedClock,
     Standstill,
     Tolerance,
 )
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.find import explanation, find, problems
 from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.histogram import BOUNDS_NS, Histogram
+from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
+from syncrelay.explain.stamp_steps import STEP_NS, Step
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [
     "BOUNDS_NS",
+    "STEP_NS",
     "Arrival",
     "Code",
     "Distribution",
@@ -42,6 +45,7 @@ __all__ = [
     "InputFacts",
     "InputFigures",
     "InputGraph",
+    "Judge",
     "Mismatch",
     "Observation",
     "RecentDrop",
@@ -49,12 +53,14 @@ __all__ = [
     "Refusal",
     "SentSets",
     "Severity",
+    "SimulatedClock",
     "Standstill",
+    "Step",
     "Tolerance",
     "dry_run",
     "explanation",
-    "find",
     "in_words",
-    "problems",
+    "judge",
     "recent",
+    "with_ok",
 ]

@@ -5,7 +5,7 @@ from operator import mul, sub
 from statistics import fmean, median
 from typing import NamedTuple
 
-_FEWEST = 10
+_FEWEST = 6
 _PARTS = 4
 
 

@@ -1,7 +1,8 @@
 """What is seen of a group over its last seconds: rates, spans, latencies, delays, misses; fed every second or few."""
 
+from bisect import bisect_left
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import repeat
 from operator import add, sub
 from typing import Any, Final, NamedTuple, TypeAlias
@@ -20,6 +21,9 @@ SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
 _SECOND: Final = 1_000_000_000
 _LAST_SETS: Final = 500
 _SILENCE: Final = 5 * _SECOND
+# Of a slow input so many of the last messages tell, however long ago they came.
+_NEAREST_WINDOW: Final = 60 * _SECOND
+_FEWEST_NEAREST: Final = 20
 
 
 class Observation:
@@ -51,11 +55,19 @@ class Observation:
             for index, needed in enumerate(required)
             if not needed and trigger is None
         }
-        self._nearest, self._nearest_since = no_values(), no_values()
+        self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
+        self._paces: list[float | None] = [None] * len(offsets_ns)
         self._sets_since_without = [0] * len(offsets_ns)
 
     def add(
-        self, arrivals: Sequence[Arrivals], sets: SentSets, counts: Sequence[InputCounts], total_sets: int, *, now: int
+        self,
+        arrivals: Sequence[Arrivals],
+        sets: SentSets,
+        counts: Sequence[InputCounts],
+        total_sets: int,
+        *,
+        by_clock: Callable[[int], int] | None = None,
+        now: int,
     ) -> None:
         """Take what came and left since the last call, and the engine's counts as they are now."""
         if self._looks and now < self._looks[-1].at:
@@ -67,8 +79,13 @@ class Observation:
             self._sets_since_without = list(map(_since_without, self._sets_since_without, stamps))
         while len(self._looks) > 1 and self._looks[1].at <= now - WINDOW_NS:
             self._looks.popleft()
-        fallen = [each.add(new) for each, new in zip(self._inputs, arrivals, strict=True)]
-        self._measure_nearest(arrivals, has_jumped=any(fallen))
+        fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self._inputs, arrivals, strict=True)]
+        paces = [each.slowed_from_hz for each in self._inputs]
+        if paces != self._paces:
+            # What was measured before says nothing of how it is now.
+            self._paces = paces
+            self._forget_nearest()
+        self._measure_nearest(arrivals, now, has_jumped=any(fallen))
         if sets:
             spans = [self._span(stamps) for stamps, _ in sets] if any(missing) else self._spans_of_whole(stamps)
             self._take_sets(spans, [latency for _, latency in sets], now)
@@ -91,6 +108,7 @@ class Observation:
             latencies=Distribution(self._latencies[:]),
             nearest=Distribution(self._nearest[:]),
             nearest_since=Distribution(self._nearest_since[:]),
+            nearest_from=self._nearest_at[0] if self._nearest_at else now,
             missing=self._missing(now),
             sets_since_without=tuple(self._sets_since_without),
         )
@@ -99,11 +117,16 @@ class Observation:
     def _begin_anew(self, now: int) -> None:
         """Bear that this machine's clock was set back: what lies in the future now would count for ever."""
         self._looks.clear()
+        self._forget_nearest()
         self._began = min(self._began, now)
         self._last_set = None if self._last_set is None else now
         self._resumed = None if self._resumed is None else now
 
-    def _measure_nearest(self, arrivals: Sequence[Arrivals], *, has_jumped: bool) -> None:
+    def _forget_nearest(self) -> None:
+        for kept in (self._nearest, self._nearest_at, self._nearest_since):
+            del kept[:]
+
+    def _measure_nearest(self, arrivals: Sequence[Arrivals], now: int, *, has_jumped: bool) -> None:
         if has_jumped:
             del self._nearest_since[:]
             for spans in (self._nearest_spans, *self._with_optional.values()):
@@ -118,11 +141,18 @@ class Observation:
                 [shifted[index] for index in self._required], pivot=self._required.index(pivot)
             )
             keep_last(self._nearest, measured, _LAST_SETS)
+            keep_last(self._nearest_at, [now] * len(measured), _LAST_SETS)
+            self._forget_old_nearest(now)
             keep_last(self._nearest_since, measured, _LAST_SETS)
         for optional, spans in self._with_optional.items():
             among = [*self._required, optional]
             pivot = among.index(self._slowest(among))
             self._inputs[optional].add_nearest(spans.add([shifted[index] for index in among], pivot=pivot))
+
+    def _forget_old_nearest(self, now: int) -> None:
+        old = bisect_left(self._nearest_at, now - _NEAREST_WINDOW, 0, max(0, len(self._nearest_at) - _FEWEST_NEAREST))
+        if old:
+            del self._nearest[:old], self._nearest_at[:old]
 
     def _slowest(self, among: Sequence[int]) -> int:
         """Give the input of these of which the fewest came in the window."""

@@ -15,7 +15,9 @@ _FEWEST_LOOKS: Final = 10
 _STEADY: Final = 0.25
 # ... but for one look in so many at either end, in which a busy machine held messages up.
 _ODD: Final = 10
-_SLOWED: Final = 0.5
+# Slower than this share of its pace it has slowed down, until it is faster than the other.
+_SLOWED: Final = 0.7
+_RECOVERED: Final = 0.85
 
 
 class Pace:
@@ -25,7 +27,7 @@ class Pace:
         self.now_hz = 0.0
         """The pace of the last messages, 0 of too few to tell."""
         self.slowed_from: float | None = None
-        """The steady pace that it had before it fell to less than half of it, None if it has not."""
+        """The steady pace that it had before it slowed down, None if it has not."""
         self._looks: deque[float] = deque(maxlen=_LOOKS)
 
     def look(self, received: Sequence[int]) -> None:
@@ -42,11 +44,15 @@ class Pace:
             self._looks.append(self.now_hz)
 
     def _fell_from(self) -> float | None:
-        if not self.now_hz or len(self._looks) < _FEWEST_LOOKS or self.now_hz >= _SLOWED * max(self._looks):
+        if not self.now_hz:
+            return None
+        if self.slowed_from is not None:
+            return self.slowed_from if self.now_hz < _RECOVERED * self.slowed_from else None
+        if len(self._looks) < _FEWEST_LOOKS or self.now_hz >= _SLOWED * max(self._looks):
             return None
         usual = median(self._looks)
         odd = len(self._looks) // _ODD
         steady = sorted(self._looks)[odd : len(self._looks) - odd]
-        if steady[-1] - steady[0] > 2 * _STEADY * usual:
+        if steady[-1] - steady[0] > 2 * _STEADY * usual or self.now_hz >= _RECOVERED * steady[0]:
             return None
         return usual if self.now_hz < _SLOWED * usual else None

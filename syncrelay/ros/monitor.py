@@ -9,15 +9,18 @@ from math import ceil
 from typing import Any, Final, NamedTuple
 
 from syncrelay.explain import (
+    STEP_NS,
     Endpoint,
     FindingLog,
     GroupReport,
     GroupWatch,
     InputGraph,
+    Judge,
     RecentDrop,
     Severity,
+    SimulatedClock,
     Standstill,
-    problems,
+    Step,
 )
 from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.graph import topics_alike, topics_in
@@ -42,6 +45,7 @@ _LONGEST_TURN: Final = 4
 # What sets a clock right at once, and not by making it run faster or slower.
 _STEP_NS: Final = 100_000_000
 _READINGS: Final = 3
+_STEP_TOLD_NS: Final = 30_000_000_000
 # A /clock at 1 Hz stands still for a second between two ticks.
 _CLOCK_STOPPED_NS: Final = 2_500_000_000
 
@@ -56,7 +60,8 @@ class _Seen:
 
 class _Watched(NamedTuple):
     watch: GroupWatch
-    silence: FindingLog
+    judge: Judge
+    log: FindingLog
 
 
 class _Ends(NamedTuple):
@@ -105,7 +110,7 @@ class Monitor:
         self._wirings = wirings
         self._watched = {
             wiring.group: self._watched.get(wiring.group)
-            or _Watched(GroupWatch(wiring.group.config, began=now), FindingLog())
+            or _Watched(GroupWatch(wiring.group.config, began=now), Judge(), FindingLog())
             for wiring in wirings
         }
         inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
@@ -141,40 +146,45 @@ class Monitor:
         waits, seen = self._loop.call(lambda: self._gather(wirings)).result()
         now = time.time_ns()
         # Receipt is by the wall clock: a step of that is no wait.
-        has_stepped = self._wall_clock.has_stepped()
+        step = self._wall_clock.step(now)
         for lately, waited in zip(self._waits.values(), waits, strict=True):
-            lately.append(0 if has_stepped else waited)
+            lately.append(0 if step else waited)
         self._standstills.append(self._standstill)
         self._standstill = None
-        stopped = self._clock.stopped_for(now) if self._clock else None
+        if self._clock:
+            self._clock.look(now)
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
         for wiring, gathered in zip(wirings, seen, strict=True):
             with self._bugs.contained(f"looking at {wiring.group.config.name}"):
                 try:
-                    self._look_at(wiring, gathered, now, stopped)
+                    self._look_at(wiring, gathered, now)
                 except Exception:
                     # Else what was found before would stand for ever.
                     self._reports.pop(wiring.group, None)
                     raise
 
-    def _look_at(self, wiring: Wiring, gathered: _Seen, now: int, stopped: int | None) -> None:
-        watch, silence = self._watched[wiring.group]
-        batch = gathered.batch
-        watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
+    def _look_at(self, wiring: Wiring, gathered: _Seen, now: int) -> None:
+        watch, judge, log = self._watched[wiring.group]
+        batch, clock = gathered.batch, self._clock
+        by_clock = clock.at if clock and clock.state.received else None
+        watch.add(
+            batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, by_clock=by_clock, now=now
+        )
         shown = [self._graph(wiring.group, index, each) for index, each in enumerate(wiring.inputs)]
         failure = wiring.group.failure
         facts = watch.facts(
             shown,
             now=now,
-            clock_stopped=stopped,
+            clock=clock.state if clock else None,
+            clock_set=self._wall_clock.last_step(now),
             waited=max(waited for each in wiring.inputs for waited in self._waits[each]),
             standstill=max(filter(None, self._standstills), key=lambda each: each.ns, default=None),
             failure=failure,
         )
-        found = problems(facts)
+        found = judge.judge(facts)
         self._reports[wiring.group] = GroupReport(facts, found, gathered.last)
-        for remark in silence.look(facts, found):
+        for remark in log.look(facts, found):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 
@@ -235,11 +245,21 @@ class _WallClock:
 
     def __init__(self) -> None:
         self._offset = self._now()
+        self._step: Step | None = None
 
-    def has_stepped(self) -> bool:
-        """Whether it went otherwise than time does."""
+    def step(self, now: int) -> Step | None:
+        """Return by how much it was set, None if it went as time does."""
         before, self._offset = self._offset, self._now()
-        return abs(self._offset - before) > _STEP_NS
+        by = self._offset - before
+        if abs(by) <= _STEP_NS:
+            return None
+        self._step = Step(now, by)
+        return self._step
+
+    def last_step(self, now: int) -> Step | None:
+        """Return by how much it was last set, for half a minute; less than half a second is not told."""
+        step = self._step
+        return step if step and abs(step.by) >= STEP_NS and 0 <= now - step.at < _STEP_TOLD_NS else None
 
     @staticmethod
     def _now() -> int:
@@ -281,17 +301,28 @@ class _Losses:
 
 
 class _ClockWatch:
-    """Sees whether simulated time moves."""
+    """Sees whether simulated time moves, and knows what it was at a time of receipt."""
 
     def __init__(self, node: Any) -> None:
         self._clock = node.get_clock()
-        self._time = -1
         self._moved_at = time.time_ns()
+        self._now = (self._moved_at, 0)
+        self._rate = 1.0
+        self.state = SimulatedClock(received=False)
 
-    def stopped_for(self, now: int) -> int | None:
-        """Return for how many nanoseconds the simulated time has stood still, None if it moves."""
+    def look(self, now: int) -> None:
+        """Read the clock, at a time of this machine."""
         simulated = self._clock.now().nanoseconds
-        if simulated != self._time:
-            self._time, self._moved_at = simulated, now
+        before_at, before = self._now
+        if simulated != before:
+            self._moved_at = now
+            # Of a clock that was not there or went back, as of any other at first.
+            self._rate = (simulated - before) / (now - before_at) if 0 < before < simulated and before_at < now else 1.0
+        self._now = (now, simulated)
         still = now - self._moved_at
-        return still if still >= _CLOCK_STOPPED_NS else None
+        self.state = SimulatedClock(simulated != 0, still if still >= _CLOCK_STOPPED_NS else None)
+
+    def at(self, received: int) -> int:
+        """Return what it showed when a message was received, since the look before the last."""
+        now, simulated = self._now
+        return simulated - round((now - received) * self._rate)

@@ -24,9 +24,9 @@ from syncrelay.explain import (
     GroupFacts,
     GroupWatch,
     InputGraph,
+    Judge,
     Severity,
     Standstill,
-    problems,
 )
 from syncrelay.sync import Match, Message, Outcome
 
@@ -208,6 +208,7 @@ class _Relay:
         self._names = [(topic.topic, topic.output) for topic in config.topics]
         self._driver = EngineDriver(config, self._leave)
         self._watch = GroupWatch(config, began=BEGAN)
+        self._judge = Judge()
         self._log = FindingLog()
         self._arrived: tuple[list[tuple[int, int]], ...] = tuple([] for _ in config.topics)
         self._sent: list[tuple[tuple[int | None, ...], int]] = []
@@ -251,7 +252,7 @@ class _Relay:
         waited = max(self._waits[-10:])
         self._waits.append(0)
         self.facts = self._watch.facts(graph, now=now, **{"waited": waited, "standstill": worst, **more})
-        found = problems(self.facts)
+        found = self._judge.judge(self.facts)
         self.found.append((second, found))
         for remark in self._log.look(self.facts, found):
             code = remark.code and remark.code.value
