@@ -191,5 +191,9 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        last = self.figures.began if self.figures.last_set is None else self.figures.last_set
-        return self.figures.now - last >= self.silent_after
+        return self.silent_for >= self.silent_after
+
+    @property
+    def silent_for(self) -> int:
+        """For how long no set has left."""
+        return self.figures.now - (self.figures.began if self.figures.last_set is None else self.figures.last_set)

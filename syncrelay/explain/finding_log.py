@@ -62,7 +62,7 @@ class FindingLog:
         self._told = True
         # What explains a silence needs no line of its own when the silence is over.
         warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
-        warning.told, warning.holds, warning.seen, warning.text = True, True, now, finding.text
+        warning.told, warning.holds, warning.seen = True, False, now
         quiet = words.seconds(now - self._quiet_since)
         ever = "no set" if facts.figures.last_set is None else "no more sets"
         yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", finding.code)

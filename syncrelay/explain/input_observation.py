@@ -94,7 +94,12 @@ class InputObservation:
             self._faults.popleft()
         self._faults.append(_Faults(last, duplicates, out_of_order))
         keep_last(self._received, all_received, _LAST_MESSAGES)
+        before = self._pace.slowed_from
         self._pace.look(self._received)
+        if before != self._pace.slowed_from:
+            # The least delay of fewer messages is greater: that is no drift.
+            self._points.clear()
+            self._drift = None
         if delays:
             self._measure(stamped, stamps, delays)
         return fallen

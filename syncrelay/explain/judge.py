@@ -78,8 +78,14 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
         | {Code.OTHER_CLOCK}
     ),
     Code.SILENT: _Explained(_MATCHING),
+    Code.MALFORMED: _Explained(_MATCHING),
+    Code.UNSTAMPED: _Explained(_MATCHING),
     Code.SEVERAL_PUBLISHERS: _Explained(
         _MATCHING | {Code.OTHER_CLOCK}, _ORDER | {Code.CLOCK_STEP, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}
+    ),
+    Code.TIME_JUMP: _Explained(
+        _MATCHING | {Code.OTHER_CLOCK},
+        frozenset({Code.OUT_OF_ORDER, Code.DUPLICATES, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}),
     ),
     Code.CLOCK_STEP: _Explained(_MATCHING | {Code.OTHER_CLOCK, Code.CLOCK_DRIFT}, _ORDER | {Code.BURSTS}),
     Code.CLOCK_DRIFT: _Explained(_MATCHING | {Code.OTHER_CLOCK}),

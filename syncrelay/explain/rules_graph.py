@@ -13,6 +13,9 @@ _NO_MESSAGE: Final = 5 * SECOND
 _LEASE: Final = 20 * SECOND
 # A relay that ends in order while its successor starts is gone by then.
 _ENDING: Final = 3 * SECOND
+# What stopped so nearly as long ago as the sets did, and by more than a period or two, has stopped them.
+_AS_LONG: Final = 0.8
+_MISSED_PERIODS: Final = 2
 # Inputs that fell silent within this time did so together.
 _TOGETHER: Final = 2 * SECOND
 # A pause that is so many times the longest before it is news.
@@ -159,7 +162,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
             " --config FILE --live`",
             index,
         )
-    if quiet < _NO_MESSAGE or figures.rate_hz or (facts.is_held(index) and _is_enough(facts, an_input)):
+    if not _is_silent(facts, an_input, quiet) or (facts.is_held(index) and _is_enough(facts, an_input)):
         return None
     until_then = f"; until then it came at {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
     return Finding(
@@ -171,6 +174,18 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
         else f"check {node}, which {_is_there(quiet)}{_or_hold_longer(facts, index)}",
         index,
     )
+
+
+def _is_silent(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
+    """Whether nothing comes, by this input's rate, or for about as long as no set has left."""
+    usual = an_input.figures.usual_hz
+    if (
+        facts.is_silent
+        and quiet >= _AS_LONG * facts.silent_for
+        and (not usual or quiet * usual > _MISSED_PERIODS * SECOND)
+    ):
+        return True
+    return quiet >= _NO_MESSAGE and not an_input.figures.rate_hz
 
 
 def _is_there(quiet: int) -> str:

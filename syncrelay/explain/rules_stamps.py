@@ -19,6 +19,8 @@ _DRIFT_WATCHED: Final = 20 * SECOND
 _DRIFT_BENDS: Final = 8
 # A message in a hundred whose stamp repeats or comes late is no reason to call anyone.
 _FAULTY: Final = 0.01
+_SOME: Final = 0.02
+_MOST: Final = 0.5
 # What a computation may take; stamps that are older are those of another clock.
 _LATENCY: Final = 10 * SECOND
 # No machine runs for longer without a boot, nor has its clock been set before 1971.
@@ -26,7 +28,7 @@ _BOOT: Final = 365 * 86_400 * SECOND
 # How close, how far behind UTC, and what it is. GPS time began in 1980 and has no leap seconds, TAI has 37 more.
 _EPOCHS: Final = (
     (30 * SECOND, 315_964_800 * SECOND, "GPS time, which counts from 1980"),
-    (SECOND // 2, -37 * SECOND, "TAI, which is 37 s ahead of UTC, as PTP clocks tell it"),
+    (SECOND // 2, -37 * SECOND, "TAI, the time of PTP clocks, which is 37 s ahead of UTC"),
     (SECOND // 2, -18 * SECOND, "GPS time, which is 18 s ahead of UTC"),
 )
 _ZONE: Final = 1800 * SECOND
@@ -53,6 +55,7 @@ def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} are cut short, or not of its type",
             f"see that {nodes(an_input)} has the same version of {an_input.type} as is installed here",
             index,
+            explains=_matters(facts, an_input, count),
         )
 
 
@@ -65,7 +68,13 @@ def unstamped(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} have stamp 0",
             f"have {nodes(an_input)} set header.stamp, or write `stamp: receive` at {an_input.name}",
             index,
+            explains=_matters(facts, an_input, count),
         )
+
+
+def _matters(facts: GroupFacts, an_input: InputFacts, count: int) -> bool:
+    """Return whether so many messages of no use may explain others: most explain a silence, some explain losses."""
+    return count >= (_MOST if facts.is_silent else _SOME) * an_input.figures.fed
 
 
 def _blocks_if_most(facts: GroupFacts, an_input: InputFacts, count: int) -> Severity:
@@ -89,22 +98,21 @@ def other_clock(facts: GroupFacts) -> Found:
     behind = known[odd] - usual
     if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0):
         return
-    name, offset = facts.inputs[odd].name, facts.inputs[odd].offset
+    an_input, offset = facts.inputs[odd], facts.inputs[odd].offset
     others = [facts.inputs[index].name for index in known if index != odd]
-    side = "behind" if behind > 0 else "ahead of"
+    whose = others[0] if len(others) == 1 else "the other inputs"
+    apart_by = f"are {words.span_of_time(abs(behind))} {'behind' if behind > 0 else 'ahead of'} those of {whose}"
     shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
-    epoch = _epoch(facts.inputs[odd], behind)
-    yield Finding(
-        Code.OTHER_CLOCK,
-        Severity.ERROR,
-        f"stamps of {name}{shifted} are {words.duration(abs(behind))} {side} those of"
-        f" {others[0] if len(others) == 1 else 'the other inputs'}{epoch and f': {epoch}'}",
-        f"have {nodes(facts.inputs[odd])} stamp with the host's time, or write `stamp: receive` at {name}"
-        if epoch
-        else f"synchronize the clocks of their machines, or write `offset: {words.exactly(behind + offset)}` at {name}"
-        f"{_wait_for_it(facts, behind, name)}",
-        odd,
-    )
+    if epoch := _epoch(an_input, behind):
+        text = f"stamps of {an_input.name}{shifted} {apart_by}: they {epoch}"
+        suggestion = f"have {nodes(an_input)} stamp with the host's time, or write `stamp: receive` at {an_input.name}"
+    else:
+        text = f"stamps of {an_input.name}{shifted} {apart_by}"
+        suggestion = (
+            f"synchronize the clocks of their machines, or write `offset: {words.exactly(behind + offset)}` at"
+            f" {an_input.name}{_wait_for_it(facts, behind, an_input.name)}"
+        )
+    yield Finding(Code.OTHER_CLOCK, Severity.ERROR, text, suggestion, odd)
 
 
 def _wait_for_it(facts: GroupFacts, behind: int, name: str) -> str:
@@ -117,13 +125,13 @@ def _epoch(an_input: InputFacts, behind: int) -> str:
     """Say which time stamps seem to tell, that are so far behind those of others; nothing if it is no known one."""
     newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
     if 0 < newest < _BOOT and behind > _BOOT:
-        return "they count from boot, not from 1970"
+        return "count from boot or the start of a simulation, not from 1970"
     for epoch, off, what in _EPOCHS:
         if abs(behind - off) < epoch:
-            return f"they look like {what}"
+            return f"look like {what}"
     zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
     if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < SECOND:
-        return "they look like local time, not UTC"
+        return "look like local time, not UTC"
     return ""
 
 
@@ -161,6 +169,7 @@ def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> F
         f"{who} publish {an_input.name}: {conflict}",
         "give each publisher its own topic, or stop all but one",
         index,
+        explains=figures.swings >= _FEWEST_SWINGS or _matters(facts, an_input, disorder),
     )
 
 
@@ -220,6 +229,7 @@ def time_jump(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             f" {_ago(now, figures.fell_at)}; matching restarted",
             "a looped recording does this, or a clock that was reset",
             index,
+            explains=False,
         )
 
 

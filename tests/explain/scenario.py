@@ -150,7 +150,8 @@ def run(
     place = 0
     shown = publishers or (lambda topic, _: tuple(each.endpoint for each in sources if each.topic == topic))
     for second in range(1, seconds + 1):
-        if _until(stops, float(second)) > second:
+        # Who polls asks the thread that takes messages, and waits for it.
+        if _until([*stops, *starved], float(second)) > second:
             continue
         while place < len(taken) and taken[place][0] <= second:
             at, received, index, stamp = taken[place]

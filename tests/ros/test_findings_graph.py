@@ -67,7 +67,8 @@ def test_a_publisher_that_sends_nothing_is_named(stage: Stage):
     play(stage, stream("/lidar", hz=10))
     assert_logged(
         relay,
-        r"no set for [\d.]+ s: /usb_cam publishes /camera, but no message has arrived; check with `ros2 topic hz /camera`",
+        r"no set for [\d.]+ s: /usb_cam publishes /camera, but no message has arrived; check with"
+        r" `ros2 topic hz /camera`",
     )
 
 

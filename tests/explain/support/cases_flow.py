@@ -200,8 +200,8 @@ FOUND = {
             an_input("/lidar", figures={"fed": 0}),
         ),
         (
-            "messages arrive on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as too_far"
-            " and 3 were dropped as late; of /lidar none came lately"
+            "messages arrive on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as"
+            " too_far and 3 were dropped as late; of /lidar none came lately"
         ),
         "try a larger `queue_size`; `syncrelay doctor --live` checks the graph and the stamps",
     ),
