@@ -6,13 +6,13 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
+    ClockState,
     Endpoint,
     GroupFacts,
     InputFacts,
     InputGraph,
     Mismatch,
     Refusal,
-    SimulatedClock,
     Standstill,
     Tolerance,
 )
@@ -30,6 +30,7 @@ __all__ = [
     "BOUNDS_NS",
     "STEP_NS",
     "Arrival",
+    "ClockState",
     "Code",
     "Distribution",
     "DryRun",
@@ -53,7 +54,6 @@ __all__ = [
     "Refusal",
     "SentSets",
     "Severity",
-    "SimulatedClock",
     "Standstill",
     "Step",
     "Tolerance",

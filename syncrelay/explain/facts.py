@@ -114,7 +114,7 @@ class Standstill(NamedTuple):
     ns: int
 
 
-class SimulatedClock(NamedTuple):
+class ClockState(NamedTuple):
     """The clock of a node with use_sim_time: whether /clock was ever received, and for how long it has stood still.
 
     `stopped` is in nanoseconds, None while the clock moves.
@@ -147,7 +147,7 @@ class GroupFacts:
     max_wait: int | None = None
     every: int = 1
     least_period: int | None = None
-    clock: SimulatedClock | None = None
+    clock: ClockState | None = None
     clock_set: Step | None = None
     is_recorded: bool = False
     waited: int = 0

@@ -63,6 +63,7 @@ class InputObservation:
         self._newest: int | None = None
         self._fell: tuple[int, int] | None = None
         self._steps = StampSteps()
+        self._is_simulated = False
 
     def add(self, arrivals: Arrivals, *, by_clock: Callable[[int], int] | None = None) -> bool:
         """Take what came; whether its stamps have fallen back by more than a second.
@@ -73,7 +74,8 @@ class InputObservation:
             return False
         stamps, received = zip(*arrivals, strict=True)
         last = received[-1]
-        if self._received and last < self._received[-1]:
+        was_simulated, self._is_simulated = self._is_simulated, by_clock is not None
+        if (self._received and last < self._received[-1]) or was_simulated is not self._is_simulated:
             self._forget()
             self._steps.forget()
         if self._first is None or last < self._first:

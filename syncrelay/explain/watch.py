@@ -3,7 +3,7 @@
 from collections.abc import Callable, Hashable, Sequence
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.facts import GroupFacts, InputFacts, InputGraph, SimulatedClock, Standstill, Tolerance
+from syncrelay.explain.facts import ClockState, GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.stamp_steps import Step
@@ -52,7 +52,7 @@ class GroupWatch:
         graph: Sequence[InputGraph],
         *,
         now: int,
-        clock: SimulatedClock | None = None,
+        clock: ClockState | None = None,
         clock_set: Step | None = None,
         is_recorded: bool = False,
         waited: int = 0,

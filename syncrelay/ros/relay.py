@@ -16,21 +16,22 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
 from syncrelay.config import Config, ConfigError, GroupConfig
 from syncrelay.config.wording import counted
+from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport, recent
-from syncrelay.ros.bugs import Bugs
-from syncrelay.ros.diagnostics import Telling
+from syncrelay.ros.backend_choice import VARIABLE, choose_backend
+from syncrelay.ros.bindings import GroupBinding, GroupBindings
+from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
-from syncrelay.ros.group import GroupRelay
 from syncrelay.ros.logs import RosoutHandler, name_after
-from syncrelay.ros.monitor import LOOK_S, Monitor
-from syncrelay.ros.path_choice import VARIABLE, choose_path
-from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.ros.start import make_node, resolver, start
+from syncrelay.ros.surroundings import Surroundings
 from syncrelay.ros.transport import apply_transport
 from syncrelay.ros.wakeup import Wakeup
-from syncrelay.ros.wirings import Wiring, Wirings
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
 
@@ -38,9 +39,9 @@ _LOG = logging.getLogger("syncrelay")
 
 # Changes of the graph are looked for this often while something is missing, so that a rig that starts loses
 # little ...
-_EAGER_LOOK_S = 0.1
+_EAGER_POLL_S = 0.1
 # ... and this often when all is there.
-_LOOK_S = 1.0
+_POLL_S = 1.0
 # Whoever asks for the state every second or two sees all groups as of the last second.
 _ASKED_S = 3.0
 # Discovery takes a few tenths of a second: before that, everything would be reported as missing.
@@ -68,7 +69,7 @@ class Relay:
         config_path: str = "",
         groups: Collection[str] | None = None,
         ros_args: Sequence[str] = (),
-        beat: Callable[[], None] | None = None,
+        on_turn: Callable[[], None] | None = None,
         purpose: Purpose = Purpose.RELAY,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
@@ -76,7 +77,7 @@ class Relay:
         Whose purpose is to look has all but publishers: sets leave to nowhere.
 
         Raises ConfigError where remaps make the file's names meet, UsageError where ROS does not take `ros_args`.
-        `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
+        `config_path` is what `state` calls the file. `on_turn` is called on the receive thread for as long as that
         turns, once a second at least.
         """
         apply_transport(config.node.transport, os.environ)
@@ -97,29 +98,36 @@ class Relay:
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
         # Nanoseconds of a clock that only measures waiting: ROS time if simulated, else one that never jumps.
         self._now: Callable[[], int] = self._simulated_now if self._sim_time else time.monotonic_ns
-        path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
-        self.receive_path = path.name
+        backend = choose_backend(os.environ.get(VARIABLE), node=self.node, context=self._context)
+        self.backend = backend.name
         self._bugs = Bugs()
         self._loop = ReceiveLoop(
-            path.watch(),
+            backend.watch(),
             now=self._now,
             expire=self._expire,
-            beat=beat,
+            on_turn=on_turn,
             contain=lambda error: self._bugs.tell("receiving", error),
         )
-        self._graph_changes = path.graph_changes(self.node)
+        self._graph_changes = backend.graph_changes(self.node)
         entities = Entities(self.node, purpose)
-        self._wirings = Wirings(entities=entities, node=self.node, path=path, loop=self._loop)
-        self._telling = Telling(self.node, entities)
-        self.monitor = Monitor((), node=self.node, loop=self._loop, simulated=self._sim_time, bugs=self._bugs)
-        self._take_on(config)
+        self._bindings = GroupBindings(entities=entities, node=self.node, backend=backend, loop=self._loop)
+        self._reporters = Reporters(self.node, entities)
+        self._surroundings = Surroundings(self.node, purpose)
+        self.monitor = Monitor(
+            node=self.node,
+            loop=self._loop,
+            surroundings=self._surroundings,
+            simulated=self._sim_time,
+            bugs=self._bugs,
+        )
+        self._run_groups(config)
         self._reloads = 0
         self._refused_reloads = 0
         self._reload_error: str | None = None
         self._config_path = config_path
         self._phase = Phase.STARTING
         self._asked = -_ASKED_S
-        self._next_look = time.monotonic() + LOOK_S
+        self._next_evaluation = time.monotonic() + EVALUATE_S
         # What each group was last said to wait for; None of one that runs.
         self._announced: dict[str, str | None] = {}
         self._started = time.monotonic()
@@ -155,21 +163,21 @@ class Relay:
         """
         _require_same_node(self._config, config)
         self._require_distinct_names(config)
-        before = self._wirings.groups
+        before = self._bindings.groups
         try:
-            self._take_on(config)
+            self._run_groups(config)
         except BaseException:
-            if self._wirings.groups != before:
-                self._take_on(self._config)
+            if self._bindings.groups != before:
+                self._run_groups(self._config)
             raise
         self._config = config
-        kept = {group.config.name for group in self._wirings.groups if group in before}
+        kept = {group.config.name for group in self._bindings.groups if group in before}
         self._announced = {name: said for name, said in self._announced.items() if name in kept}
         self._reloads += 1
         self._reload_error = None
         # What is new is to be told of at once.
-        self._next_look = time.monotonic()
-        begin = len(self._wirings.groups) - len(kept)
+        self._next_evaluation = time.monotonic()
+        begin = len(self._bindings.groups) - len(kept)
         go_on = f"{counted(len(kept), 'group')} {'goes' if len(kept) == 1 else 'go'} on"
         _LOG.info("the file was read again: %s, %d %s", go_on, begin, "begins" if begin == 1 else "begin")
 
@@ -187,67 +195,68 @@ class Relay:
         if problems:
             raise ConfigError(problems)
 
-    def _take_on(self, config: Config) -> None:
-        running = [group for group in self._wirings.groups if group.failure is None]
+    def _run_groups(self, config: Config) -> None:
+        running = [group for group in self._bindings.groups if group.failure is None]
         chosen = self._chosen(config)
         as_before = [next((group for group in running if group.config == each), None) for each in chosen]
-        self._wirings.wire(
+        self._bindings.run(
             [group or GroupRelay(each, now=self._now) for group, each in zip(as_before, chosen, strict=True)]
         )
-        limited = [group for group in self._wirings.groups if group.config.options.max_wait is not None]
+        limited = [group for group in self._bindings.groups if group.config.options.max_wait is not None]
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         self._loop.deadline = None if self._sim_time or not limited else lambda: _next_deadline(limited)
         self._loop.wake()
-        self.monitor.watch(self._wirings.all)
-        self._telling.adopt(config, [group.config.name for group in self._wirings.groups])
+        self.monitor.watch(self._bindings.all)
+        self._reporters.configure(config, [group.config.name for group in self._bindings.groups])
 
     def wake(self) -> None:
         """Have `step` return at once. Safe in a signal handler."""
         self._wake.set()
 
-    def step(self, timeout_s: float = _LOOK_S) -> None:
+    def step(self, timeout_s: float = _POLL_S) -> None:
         """Look at the graph, then rest until the next look is due, `timeout_s` at most, or until `wake`."""
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
-        with self._bugs.contained("looking at the graph"):
-            self._look_at_graph()
+        with self._bugs.contained("polling the graph"):
+            self._poll_graph()
             self._announce()
-        if (now := time.monotonic()) >= self._next_look:
-            with self._bugs.contained("looking at the groups"):
-                self._look(self.monitor.look if self._is_watched(now) else self.monitor.look_in_turn)
-        is_waiting = any(wiring.waiting_for for wiring in self._wirings.all)
-        until_look = max(0.0, self._next_look - time.monotonic())
-        rest_s, began = min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
+        if (now := time.monotonic()) >= self._next_evaluation:
+            with self._bugs.contained("evaluating the groups"):
+                self._evaluate(self.monitor.evaluate if self._is_watched(now) else self.monitor.evaluate_in_turn)
+        is_waiting = any(binding.waiting_for for binding in self._bindings.all)
+        until_evaluation = max(0.0, self._next_evaluation - time.monotonic())
+        rest_s, began = min(timeout_s, until_evaluation, _EAGER_POLL_S if is_waiting else _POLL_S), time.monotonic()
         self._wake.wait(rest_s)
-        self.monitor.overslept(time.monotonic() - began - rest_s)
+        too_long_s = time.monotonic() - began - rest_s
+        self.monitor.standstills.overslept(round(too_long_s * 1e9), now=time.time_ns())
 
-    def _look_at_graph(self) -> None:
+    def _poll_graph(self) -> None:
         has_changed = self._graph_changes.seen()
-        for topic_input in self._wirings.inputs:
-            if has_changed or topic_input.is_due:
-                with self._bugs.contained(f"looking at {topic_input.name}"):
-                    topic_input.look()
+        for topic in self._bindings.topics:
+            if has_changed or topic.is_due:
+                with self._bugs.contained(f"polling {topic.name}"):
+                    topic.poll()
         if has_changed:
-            self.monitor.graph_changed()
+            self._surroundings.forget()
 
     def _is_watched(self, now: float) -> bool:
         """Whether somebody wants all groups every second: who plots them, or asks for the state."""
         plotted = self._config.diagnostics is not None and self._config.diagnostics.scalars
         return plotted or now - self._asked < _ASKED_S
 
-    def look(self) -> tuple[GroupReport, ...]:
-        """Look at all groups now, tell of it, and give what there is to say."""
-        return self._look(self.monitor.look)
+    def evaluate(self) -> tuple[GroupReport, ...]:
+        """Evaluate all groups now, and return and publish their reports."""
+        return self._evaluate(self.monitor.evaluate)
 
-    def _look(self, look: Callable[[], None]) -> tuple[GroupReport, ...]:
-        self._next_look = time.monotonic() + LOOK_S
+    def _evaluate(self, evaluate: Callable[[], None]) -> tuple[GroupReport, ...]:
+        self._next_evaluation = time.monotonic() + EVALUATE_S
         try:
-            look()
+            evaluate()
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
         self._phase = Phase.RUNNING
-        self._telling.publish(self.monitor.reports)
+        self._reporters.publish(self.monitor.reports)
         return self.monitor.reports
 
     def state(self) -> RelayState:
@@ -259,7 +268,7 @@ class Relay:
             phase=self._phase,
             uptime_s=now - self._started,
             turned_s=now - self._loop.turned,
-            receives_by=self.receive_path.value,
+            receives_by=self.backend.value,
             groups=self.monitor.reports,
             reloads=self._reloads,
             refused_reloads=self._refused_reloads,
@@ -281,12 +290,12 @@ class Relay:
         if receiving is not None:
             self._loop.stop()
             receiving.result()
-            for group in self._wirings.groups:
+            for group in self._bindings.groups:
                 group.flush(DropReason.SHUTDOWN)
             deadline = time.monotonic_ns() + _ACKNOWLEDGE_NS
-            for topic_input in self._wirings.inputs:
-                with self._bugs.contained(f"ending {topic_input.name}"):
-                    topic_input.wait_until_acknowledged(deadline)
+            for topic in self._bindings.topics:
+                with self._bugs.contained(f"ending {topic.name}"):
+                    topic.outputs.wait_until_acknowledged(deadline)
         return self._snapshot()
 
     def close(self) -> None:
@@ -309,10 +318,9 @@ class Relay:
         self.node.destroy_node()
         self._context.try_shutdown()
 
-    def _flow(self, wiring: Wiring) -> str:
+    def _flow(self, binding: GroupBinding) -> str:
         """The names after all remaps: those that the graph shows."""
-        topics = zip(wiring.inputs, wiring.group.config.topics, strict=True)
-        return ", ".join(f"{each.name} -> {self.node.resolve_topic_name(topic.output)}" for each, topic in topics)
+        return ", ".join(f"{each.topic.name} -> {self.node.resolve_topic_name(each.output)}" for each in binding.inputs)
 
     def _serve(self) -> None:
         while self._context.ok():
@@ -329,36 +337,36 @@ class Relay:
         def changed(jump: Any) -> None:
             if jump.delta <= _CLOCK_JUMP:
                 self._loop.call(self._flush_jump)
-            elif any(group.config.options.max_wait is not None for group in self._wirings.groups):
+            elif any(group.config.options.max_wait is not None for group in self._bindings.groups):
                 self._loop.call(lambda: self._expire(self._now()))
 
         self._jump_handle = clock.create_jump_callback(threshold, post_callback=changed)
 
     def _flush_jump(self) -> None:
         _LOG.warning("the clock jumped back: everything buffered is dropped as time_jump")
-        for group in self._wirings.groups:
+        for group in self._bindings.groups:
             group.flush(DropReason.TIME_JUMP)
 
     def _simulated_now(self) -> int:
         return int(self.node.get_clock().now().nanoseconds)
 
     def _expire(self, now: int) -> None:
-        for group in self._wirings.groups:
+        for group in self._bindings.groups:
             group.expire(now)
 
     def _snapshot(self) -> RelaySnapshot:
-        return RelaySnapshot(tuple(_describe(wiring) for wiring in self._wirings.all))
+        return RelaySnapshot(tuple(_describe(binding) for binding in self._bindings.all))
 
     def _announce(self) -> None:
         """Say once what each group waits for, and once that it runs."""
-        for wiring in self._wirings.all:
-            name, waiting_for = wiring.group.config.name, wiring.waiting_for
+        for binding in self._bindings.all:
+            name, waiting_for = binding.group.config.name, binding.waiting_for
             if waiting_for and time.monotonic() - self._started < _GRACE_S:
                 continue
             if name in self._announced and self._announced[name] == waiting_for:
                 continue
             self._announced[name] = waiting_for
-            text = f"waiting for {waiting_for}" if waiting_for else f"running: {self._flow(wiring)}"
+            text = f"waiting for {waiting_for}" if waiting_for else f"running: {self._flow(binding)}"
             _LOG.info("%s: %s", name, text, extra={"group": name})
 
 
@@ -380,9 +388,9 @@ def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:
     return min((deadline for deadline in deadlines if deadline is not None), default=None)
 
 
-def _describe(wiring: Wiring) -> GroupSnapshot:
-    group = wiring.group
-    inputs = zip(group.config.topics, wiring.inputs, group.counts(), strict=True)
+def _describe(binding: GroupBinding) -> GroupSnapshot:
+    group = binding.group
+    inputs = zip(group.config.topics, binding.inputs, group.counts(), strict=True)
     return GroupSnapshot(
         name=group.config.name,
         inputs=tuple(
@@ -390,12 +398,12 @@ def _describe(wiring: Wiring) -> GroupSnapshot:
                 topic=topic.topic,
                 output=topic.output,
                 counts=counts,
-                publishers=topic_input.publisher_count,
-                subscribed=topic_input.subscribed,
+                publishers=sum(publisher.type == topic.type for publisher in each.topic.publishers),
+                subscribed=each.topic.profile is not None,
             )
-            for topic, topic_input, counts in inputs
+            for topic, each, counts in inputs
         ),
         sets=group.engine.sets,
         recent=recent(group.last),
-        waiting_for=wiring.waiting_for,
+        waiting_for=binding.waiting_for,
     )

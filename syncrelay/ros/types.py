@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 from syncrelay.cdr import read_stamp
 from syncrelay.cdr_fields import UnreadableFieldError, field_reader
 from syncrelay.config import StampField, StampSource
+from syncrelay.dataflow.backend import Content
 from syncrelay.errors import TypeImportError
-from syncrelay.ros.path import Content
 
 StampReader: TypeAlias = Callable[[Content], int | None]
 """From a payload to its stamp in nanoseconds; None where none can be read."""

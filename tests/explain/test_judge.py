@@ -12,7 +12,7 @@ from cases import (
 )
 from groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Finding, Severity, SimulatedClock, explanation, judge, with_ok
+from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
 from syncrelay.sync.messages import DropReason
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND
@@ -53,7 +53,7 @@ def test_findings_explain_a_silence_in_the_order_of_the_codes():
     codes = [
         finding.code
         for finding in found_in(
-            a_silent_group(ill, an_input("/lidar", publishers=()), clock=SimulatedClock(received=True, stopped=S))
+            a_silent_group(ill, an_input("/lidar", publishers=()), clock=ClockState(received=True, stopped=S))
         )
     ]
     assert codes == sorted(codes, key=list(Code).index)

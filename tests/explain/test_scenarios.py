@@ -6,7 +6,7 @@ import re
 import pytest
 from groups import S
 
-from syncrelay.explain import Endpoint, SimulatedClock, Standstill, Step
+from syncrelay.explain import ClockState, Endpoint, Standstill, Step
 from tests.explain.scenario import IMU, Source, Told, run
 
 REAL = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
@@ -185,7 +185,7 @@ def test_a_recording_in_bursts_has_no_network():
 
 
 def test_without_any_clock_only_that_is_said():
-    more = {"facts": lambda second: {"clock": SimulatedClock(received=False, stopped=round(second * S))}}
+    more = {"facts": lambda second: {"clock": ClockState(received=False, stopped=round(second * S))}}
     told = a_pair(more=more, seconds=30)
     says_only(told, "no_clock", "no /clock has been received for")
 
@@ -194,7 +194,7 @@ def test_a_simulation_that_is_paused_is_one_line():
     paused = {"sends": lambda second: second < 20}
     more = {
         "facts": lambda second: {
-            "clock": SimulatedClock(received=True, stopped=round((second - 20) * S) if second > 23 else None)
+            "clock": ClockState(received=True, stopped=round((second - 20) * S) if second > 23 else None)
         }
     }
     told = run(*(Source(topic, 10, **(REAL | paused)) for topic in ("/a", "/b")), seconds=60, options=SLOP, **more)

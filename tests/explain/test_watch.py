@@ -4,7 +4,7 @@ import pytest
 from groups import BEGAN, IMAGE, MS, S
 
 from syncrelay.config import load_text
-from syncrelay.explain import Endpoint, GroupWatch, InputGraph, Refusal, SimulatedClock, Tolerance
+from syncrelay.explain import ClockState, Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
 from syncrelay.sync.counts import InputCounts
 
 REFUSAL = Refusal("publish", "/front/lidar", IMAGE, held_as="std_msgs/msg/Int64")
@@ -94,7 +94,7 @@ def test_what_came_becomes_facts_with_the_newest_keys():
     counts = (InputCounts(1, 0, {}, 1), InputCounts(0, 0, {}, 0))
     group.add([[(BEGAN, BEGAN + MS)], []], [], counts, 0, keys=("k7", None), now=BEGAN + S)
     found = group.facts(
-        GRAPH, now=BEGAN + S, clock=SimulatedClock(received=True, stopped=4 * S), waited=5, failure="KeyError: 7"
+        GRAPH, now=BEGAN + S, clock=ClockState(received=True, stopped=4 * S), waited=5, failure="KeyError: 7"
     )
     assert [each.counts for each in found.inputs] == list(counts)
     assert [each.key for each in found.inputs] == ["k7", None]

@@ -10,7 +10,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.reloaded import ReloadedFile
-from tests.ros.stage import Collector, Stage, both_paths
+from tests.ros.stage import Collector, Stage, both_backends
 from tests.ros.status import ANY_PORT, findings, wait_for_finding
 from tests.ros.streams import at, jittery, merged
 
@@ -45,7 +45,7 @@ def _wait_for_outputs(collector: Collector, outputs: dict[str, str]) -> None:
     wait_until(lambda: all(seen(output) == [name] for output, name in outputs.items()), f"{outputs}")
 
 
-@both_paths
+@both_backends
 def test_a_reload_exchanges_the_outputs_of_two_types_and_other_groups_lose_nothing(stage: Stage):
     recording = merged(*(jittery(topic, period_ms=10, jitter_ms=0, count=600, seed=1) for topic in _PAIR))
     file = ReloadedFile(stage, front=_FRONT, swap=_SWAP)
@@ -88,7 +88,7 @@ rclpy.create_node = create_node_with_others
 """
 
 
-@both_paths
+@both_backends
 def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stage):
     recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
     stage.before_each_relay(_OTHERS)
@@ -165,7 +165,7 @@ explain.Judge.judge = failing_judge
 """
 
 
-@both_paths
+@both_backends
 def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_on(stage: Stage):
     stage.before_each_relay(_FAILING)
     recording = merged(*(at(topic, 0, 10, 20.000007, 30) for topic in _PAIR))
@@ -219,5 +219,5 @@ def test_a_group_that_cannot_be_judged_is_relayed_and_others_are_judged(stage: S
     relaying.conclude(player, collector, recording, aligned)
     assert len(relaying.sets_within(recording, collector, aligned)) == 3
     wait_for_finding(relay, "healthy")
-    relay.wait_for_log("a bug in syncrelay while looking at unjudged; the relay goes on")
+    relay.wait_for_log("a bug in syncrelay while evaluating unjudged; the relay goes on")
     assert relay.stderr.count("ZeroDivisionError: no rate") == 1

@@ -20,7 +20,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import Process, wait_until
 from tests.ros.reloaded import ReloadedFile
-from tests.ros.stage import Stage, both_paths
+from tests.ros.stage import Stage, both_backends
 from tests.ros.status import ANY_PORT, status
 from tests.ros.streams import at, jittery, merged
 
@@ -34,7 +34,7 @@ def _rear(*, topics: tuple[str, ...] = ("/camera", "/lidar"), **keys: Any) -> di
     return {"policy": "exact_time", "topics": inputs(dict.fromkeys(topics, VECTOR), qos=LOSSLESS), **keys}
 
 
-@both_paths
+@both_backends
 def test_an_unchanged_group_loses_and_doubles_nothing_while_others_come_change_and_go(stage: Stage):
     camera = jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1)
     recording = merged(camera, jittery("/lidar", period_ms=10, jitter_ms=2, count=2000, seed=2))

@@ -3,7 +3,7 @@
 from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
 from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Endpoint, Mismatch, Refusal, Severity, SimulatedClock
+from syncrelay.explain import ClockState, Code, Endpoint, Mismatch, Refusal, Severity
 from syncrelay.sync.counts import InputCounts
 
 # Code, severity, facts, sentence, suggestion.
@@ -88,7 +88,7 @@ FOUND = {
     "a clock that stands still": (
         Code.CLOCK_STOPPED,
         Severity.ERROR,
-        a_silent_group(clock=SimulatedClock(received=True, stopped=4 * S)),
+        a_silent_group(clock=ClockState(received=True, stopped=4 * S)),
         "/clock has stood still for 4 s: nothing that waits expires",
         "start or resume what publishes /clock, or run without use_sim_time",
     ),
@@ -183,7 +183,7 @@ FOUND |= {
     "no clock at all": (
         Code.NO_CLOCK,
         Severity.ERROR,
-        a_silent_group(clock=SimulatedClock(received=False, stopped=7 * S)),
+        a_silent_group(clock=ClockState(received=False, stopped=7 * S)),
         "no /clock has been received for 7 s, and the relay runs with use_sim_time: nothing that waits expires",
         "start what publishes /clock, such as `ros2 bag play --clock`, or run without use_sim_time",
     ),
@@ -204,7 +204,7 @@ QUIETLY = {
     "what does not fit is not silent": (Code.SILENT, a_silent_group(camera(publishers=(UNFIT,), figures=QUIET), LIDAR)),
     "silence while /clock stands": (
         Code.SILENT,
-        a_silent_group(camera(figures=QUIET), LIDAR, clock=SimulatedClock(received=True, stopped=4 * S)),
+        a_silent_group(camera(figures=QUIET), LIDAR, clock=ClockState(received=True, stopped=4 * S)),
     ),
     "a slow input between two messages": (
         Code.SILENT,

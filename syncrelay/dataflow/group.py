@@ -8,8 +8,8 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 from syncrelay.config import GroupConfig
+from syncrelay.dataflow.backend import Outlet
 from syncrelay.explain import Code, RecentDrop
-from syncrelay.ros.path import Outlet
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
@@ -24,7 +24,7 @@ _HELD = 10_000
 
 
 class Batch(NamedTuple):
-    """What came and left since the last look, oldest first.
+    """What came and left since the last evaluation, oldest first.
 
     `arrivals` are stamps and times of receipt of each input, `sets` the sets' stamps and their latencies, `keys` what
     the newest messages are matched by; times in nanoseconds.

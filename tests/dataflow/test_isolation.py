@@ -8,8 +8,8 @@ from threading import Thread
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -138,7 +138,7 @@ class _Source:
             raise message
         return 0, message, message
 
-    def doubt(self) -> None:
+    def force_poll(self) -> None:
         pass
 
 
@@ -181,7 +181,7 @@ def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
         now=lambda: 0,
         expire=lambda _: _fail_at_times(chance),
         deadline=lambda: _fail_at_times(chance) or chance.choice([None, 0]),
-        beat=lambda: _fail_at_times(chance),
+        on_turn=lambda: _fail_at_times(chance),
         contain=told.append,
     )
     sound = [_Source(*(b"%d" % n for n in range(200))) for _ in range(3)]
