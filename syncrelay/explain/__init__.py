@@ -3,7 +3,8 @@
 Pure: values in, values out. The running relay and the analysis of recordings both ask here.
 """
 
-from syncrelay.explain.distribution import Distribution
+from syncrelay.explain.clocks import STEP_NS, Step
+from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
     ClockState,
@@ -19,11 +20,9 @@ from syncrelay.explain.facts import (
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Code, Finding, Severity
-from syncrelay.explain.histogram import BOUNDS_NS, Histogram
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
-from syncrelay.explain.stamp_steps import STEP_NS, Step
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [

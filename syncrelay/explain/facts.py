@@ -4,8 +4,8 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.stamp_steps import Step
 from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000

@@ -6,10 +6,8 @@ from operator import sub
 from statistics import median_low
 from typing import Final
 
-from syncrelay.explain.distribution import NOTHING, Distribution
-from syncrelay.explain.drift import Drift
-from syncrelay.explain.histogram import EMPTY, Histogram
-from syncrelay.explain.stamp_steps import Step
+from syncrelay.explain.clocks import Drift, Step
+from syncrelay.explain.distribution import EMPTY, NOTHING, Distribution, Histogram
 from syncrelay.sync.messages import DropReason
 
 _SHOWN_SETS: Final = 100

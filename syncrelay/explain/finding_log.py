@@ -1,4 +1,4 @@
-"""When to say that a group is silent: not at once, not at every look, and once when it is over."""
+"""When to say that a group is silent: not at once, not at every poll, and once when it is over."""
 
 from collections.abc import Iterator
 from typing import Final, NamedTuple
@@ -26,7 +26,7 @@ class Remark(NamedTuple):
 
 
 class FindingLog:
-    """Turns the findings of one group, look by look, into what is worth saying."""
+    """Turns the findings of one group, poll by poll, into what is worth saying."""
 
     def __init__(self) -> None:
         self._quiet_since: int | None = None
@@ -36,8 +36,8 @@ class FindingLog:
         self._well_since = 0
         self._warned: dict[tuple[Code, int | None], _Warning] = {}
 
-    def look(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
-        """Yield what is to be said now; of findings, what is remarkable is enough."""
+    def remarks(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
+        """Yield what is to be said now; findings that all is well may be left out."""
         now = facts.figures.now
         if facts.is_silent:
             yield from self._silent(facts, explanation(findings), now)

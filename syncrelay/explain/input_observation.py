@@ -6,13 +6,10 @@ from operator import lt, sub
 from statistics import median
 from typing import Final, NamedTuple, TypeAlias
 
-from syncrelay.explain.bursts import AT_ONCE, LEAST_HELD_NS, Burst, bursts
-from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.drift import Drift, drift
+from syncrelay.explain.clocks import Drift, StampSteps, drift
+from syncrelay.explain.distribution import Distribution, keep_last, no_values
 from syncrelay.explain.figures import InputFigures
-from syncrelay.explain.last import keep_last, no_values
-from syncrelay.explain.pace import Pace
-from syncrelay.explain.stamp_steps import StampSteps
+from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, Pace, bursts
 from syncrelay.sync.messages import DropReason
 
 Arrivals: TypeAlias = Sequence[tuple[int, int]]
@@ -31,7 +28,7 @@ _RATE_FROM: Final = 5
 _DRIFT_POINTS: Final = 300
 # It costs more than all the rest, and of many points it changes slowly.
 _DRIFT_EVERY: Final = 5
-_FEW_POINTS: Final = 40
+_FEW_POINTS: Final = 12
 _PERIODS: Final = 20
 
 
@@ -97,7 +94,7 @@ class InputObservation:
         self._faults.append(_Faults(last, duplicates, out_of_order))
         keep_last(self._received, all_received, _LAST_MESSAGES)
         before = self._pace.slowed_from
-        self._pace.look(self._received)
+        self._pace.observe(self._received)
         if before != self._pace.slowed_from:
             # The least delay of fewer messages is greater: that is no drift.
             self._points.clear()

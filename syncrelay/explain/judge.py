@@ -96,6 +96,13 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
 }
 """Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
 
+
+def explained_by(code: Code) -> frozenset[Code]:
+    """Return what a finding of this code may explain."""
+    explained = EXPLAINS.get(code)
+    return explained.in_group | explained.of_input if explained else frozenset()
+
+
 _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     # That an input is silent is seen of now alone.
     Code.SILENT: lambda facts: facts.figures.now,

@@ -5,7 +5,7 @@ from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.explain.drift import Drift, apart
+from syncrelay.explain.clocks import Drift, apart
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
 from syncrelay.sync.messages import DropReason

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Hashable, Sequence
 
 from syncrelay.config import GroupConfig
+from syncrelay.explain.clocks import Step
 from syncrelay.explain.facts import ClockState, GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
-from syncrelay.explain.stamp_steps import Step
 from syncrelay.sync.counts import InputCounts
 
 

@@ -148,7 +148,7 @@ class Monitor:
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, gathered.last)
-        for remark in log.look(facts, found):
+        for remark in log.remarks(facts, found):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 

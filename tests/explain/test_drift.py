@@ -5,7 +5,7 @@ import random
 import pytest
 from groups import BEGAN, MS, S
 
-from syncrelay.explain.drift import Drift, apart, drift
+from syncrelay.explain.clocks import Drift, apart, drift
 
 
 def points(delay, *, n=120, noise=0.0):

@@ -18,7 +18,7 @@ def at(second: float, *, last_set: float | None, **facts) -> GroupFacts:
 
 
 def looked(silence, facts):
-    return list(silence.look(facts, judge(facts)))
+    return list(silence.remarks(facts, judge(facts)))
 
 
 def told(silence, seconds, *, last_set):
@@ -77,7 +77,7 @@ def warned(silence, seconds, *findings):
     facts = [a_group(figures={"now": NOW + second * S, "last_set": NOW + second * S}) for second in seconds]
     lines = []
     for second, each in zip(seconds, facts, strict=True):
-        lines += [(second, remark.text) for remark in silence.look(each, findings)]
+        lines += [(second, remark.text) for remark in silence.remarks(each, findings)]
     return lines
 
 

@@ -100,3 +100,13 @@ def test_what_came_becomes_facts_with_the_newest_keys():
     assert [each.key for each in found.inputs] == ["k7", None]
     assert found.inputs[0].figures.delay == MS
     assert (found.clock and found.clock.stopped, found.waited, found.failure) == (4 * S, 5, "KeyError: 7")
+
+
+def test_how_late_messages_are_is_told_by_one_clock():
+    group = watch("policy: exact_time")
+    came = [(5 * S + n * 100 * MS, BEGAN + n * 100 * MS + 7 * MS) for n in range(10)]
+    counts = group.config.engine().counts()
+    group.add([came, came], [], counts, 0, by_clock=lambda received: received - BEGAN + 5 * S, now=BEGAN + S)
+    simulated = ClockState(received=True)
+    assert group.facts(GRAPH, now=BEGAN + S, clock=simulated).lag(0) == 7 * MS
+    assert group.facts(GRAPH, now=BEGAN + S, clock=ClockState(received=False)).lag(0) is None

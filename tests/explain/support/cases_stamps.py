@@ -4,7 +4,7 @@ from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, STEADY, camera, drifting, dr
 from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
 from syncrelay.explain import Code, Distribution, Endpoint, Severity, Step, Tolerance
-from syncrelay.explain.drift import Drift
+from syncrelay.explain.clocks import Drift
 from syncrelay.sync.messages import DropReason
 
 TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
