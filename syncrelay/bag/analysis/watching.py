@@ -7,7 +7,7 @@ from typing import Final
 from syncrelay.bag.analysis.evaluation import Outcomes
 from syncrelay.bag.analysis.streams import Stream, arrivals
 from syncrelay.config import GroupConfig
-from syncrelay.explain import Arrival, Code, Endpoint, EngineDriver, Finding, GroupWatch, InputGraph, Severity, find
+from syncrelay.explain import Arrival, Code, Endpoint, EngineDriver, Finding, GroupWatch, InputGraph, Judge, Severity
 
 _SECOND: Final = 1_000_000_000
 # The start and the end of a recording bring findings that last less long.
@@ -56,6 +56,7 @@ class _Watch:
         self._outcomes = Outcomes(group)
         self._driver = EngineDriver(group, self._outcomes.take)
         self._watch = GroupWatch(group, began=began)
+        self._judge_of = Judge()
         self._due = began + _SECOND
         self._arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]
         self._keys: list[Hashable] = [None] * len(streams)
@@ -96,7 +97,7 @@ class _Watch:
         self._arrivals = [[] for _ in self._arrivals]
         sets.clear()
         self._outcomes.drops.clear()
-        for finding in find(self._watch.facts(self._graph, now=now)):
+        for finding in self._judge_of.judge(self._watch.facts(self._graph, now=now, is_recorded=True)):
             key = (finding.code, finding.input)
             before = self._found[key].seconds if key in self._found else 0
             self._found[key] = LastingFinding(finding, before + lasting)
