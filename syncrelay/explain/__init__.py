@@ -22,6 +22,7 @@ from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.histogram import BOUNDS_NS, Histogram
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
+from syncrelay.explain.suggestions import TryBudget
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [
@@ -51,6 +52,7 @@ __all__ = [
     "Severity",
     "Standstill",
     "Tolerance",
+    "TryBudget",
     "dry_run",
     "explanation",
     "find",

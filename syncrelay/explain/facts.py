@@ -1,10 +1,11 @@
 """What is known of a group at one moment: the file's values, what was observed, what the graph shows."""
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from syncrelay.explain.figures import GroupFigures, InputFigures
+from syncrelay.explain.suggestions import Evaluator
 from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
@@ -121,7 +122,8 @@ class GroupFacts:
     what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
     others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it does
     not; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
-    late; `failure` what stopped the group for good.
+    late; `failure` what stopped the group for good. `evaluator` tries other values of the file on the last messages,
+    None where they cannot be run again.
     """
 
     name: str
@@ -139,6 +141,7 @@ class GroupFacts:
     waited: int = 0
     standstill: Standstill | None = None
     failure: str | None = None
+    evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
 
     @property
     def required_first(self) -> Sequence[int]:

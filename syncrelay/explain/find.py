@@ -31,6 +31,7 @@ _RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.out_of_order),
     of_each_input(rules_stamps.duplicates),
     rules_stamps.clock_drift,
+    rules_matching.constant_offset,
     of_each_input(rules_graph.subscriber_qos),
     of_each_input(rules_graph.output_taken),
 )

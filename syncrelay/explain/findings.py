@@ -44,6 +44,7 @@ class Code(Enum):
     OUT_OF_ORDER = "out_of_order"
     DUPLICATES = "duplicates"
     CLOCK_DRIFT = "clock_drift"
+    CONSTANT_OFFSET = "constant_offset"
     FEW_SETS = "few_sets"
     SUBSCRIBER_QOS = "subscriber_qos"
     OUTPUT_TAKEN = "output_taken"

@@ -17,6 +17,7 @@ from syncrelay.explain import (
     RecentDrop,
     Severity,
     Standstill,
+    TryBudget,
     problems,
 )
 from syncrelay.ros.bugs import Bugs
@@ -86,6 +87,7 @@ class Monitor:
         self._standstills: deque[Standstill | None] = deque(maxlen=_LAST_LOOKS)
         self._standstill: Standstill | None = None
         self._wall_clock = _WallClock()
+        self._try_budget = TryBudget()
         self.watch(wirings)
 
     @property
@@ -105,7 +107,7 @@ class Monitor:
         self._wirings = wirings
         self._watched = {
             wiring.group: self._watched.get(wiring.group)
-            or _Watched(GroupWatch(wiring.group.config, began=now), FindingLog())
+            or _Watched(GroupWatch(wiring.group.config, began=now, budget=self._try_budget), FindingLog())
             for wiring in wirings
         }
         inputs = dict.fromkeys(each for wiring in wirings for each in wiring.inputs)
@@ -146,6 +148,7 @@ class Monitor:
             lately.append(0 if has_stepped else waited)
         self._standstills.append(self._standstill)
         self._standstill = None
+        self._try_budget.refill()
         stopped = self._clock.stopped_for(now) if self._clock else None
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
