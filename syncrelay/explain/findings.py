@@ -48,6 +48,7 @@ class Code(Enum):
     MESSAGES_LOST = "messages_lost"
     OUT_OF_ORDER = "out_of_order"
     DUPLICATES = "duplicates"
+    CONSTANT_OFFSET = "constant_offset"
     FEW_SETS = "few_sets"
     SUBSCRIBER_QOS = "subscriber_qos"
     OUTPUT_TAKEN = "output_taken"

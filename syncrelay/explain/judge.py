@@ -47,6 +47,7 @@ _RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_flow.messages_lost),
     of_each_input(rules_stamps.out_of_order),
     of_each_input(rules_stamps.duplicates),
+    rules_matching.constant_offset,
     of_each_input(rules_graph.subscriber_qos),
     of_each_input(rules_graph.output_taken),
 )
@@ -60,7 +61,14 @@ class _Explained(NamedTuple):
 
 
 _MATCHING: Final = frozenset(
-    {Code.OVER_SLOP, Code.SHORT_QUEUE, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED}
+    {
+        Code.OVER_SLOP,
+        Code.SHORT_QUEUE,
+        Code.WAITING_FOR_OPTIONAL,
+        Code.CONSTANT_OFFSET,
+        Code.FEW_SETS,
+        Code.UNEXPLAINED,
+    }
 )
 _ORDER: Final = frozenset({Code.TIME_JUMP, Code.OUT_OF_ORDER, Code.DUPLICATES})
 

@@ -16,6 +16,7 @@ from syncrelay.explain import (
     GroupWatch,
     Judge,
     Severity,
+    TryBudget,
 )
 from syncrelay.ros.bindings import GroupBinding
 from syncrelay.ros.surroundings import Surroundings
@@ -57,6 +58,7 @@ class Monitor:
         self._waits: dict[TopicInput, Waits] = {}
         self.standstills = Standstills()
         self._system_clock = SystemClock()
+        self._try_budget = TryBudget()
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -75,7 +77,7 @@ class Monitor:
         self._bindings = bindings
         self._watched = {
             binding.group: self._watched.get(binding.group)
-            or _Watched(GroupWatch(binding.group.config, began=now), Judge(), FindingLog())
+            or _Watched(GroupWatch(binding.group.config, began=now, budget=self._try_budget), Judge(), FindingLog())
             for binding in bindings
         }
         topics = dict.fromkeys(each.topic for binding in bindings for each in binding.inputs)
@@ -104,6 +106,7 @@ class Monitor:
         for recent, waited in zip(self._waits.values(), waits, strict=True):
             recent.observe(0 if has_stepped else waited)
         self.standstills.observe()
+        self._try_budget.refill()
         if self._clock is not None:
             self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
         for topic, losses in self._losses.items():
