@@ -7,6 +7,7 @@ from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
     Endpoint,
+    GraphSnapshot,
     GroupFacts,
     InputFacts,
     InputGraph,
@@ -22,6 +23,7 @@ from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.histogram import BOUNDS_NS, Histogram
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
+from syncrelay.explain.rules_graph import no_other_node
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [
@@ -34,6 +36,7 @@ __all__ = [
     "EngineDriver",
     "Finding",
     "FindingLog",
+    "GraphSnapshot",
     "GroupFacts",
     "GroupFigures",
     "GroupReport",
@@ -55,6 +58,7 @@ __all__ = [
     "explanation",
     "find",
     "in_words",
+    "no_other_node",
     "problems",
     "recent",
 ]

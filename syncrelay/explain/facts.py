@@ -22,11 +22,31 @@ class Mismatch:
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher of an input or a subscriber of an output: its node, its type, why it does not connect to us."""
+    """A publisher of an input or a subscriber of an output: its node, its type, why it does not connect to us.
+
+    `is_named` is False where DDS has found the endpoint but not yet its node; `node` then says so.
+    """
 
     node: str
     type: str
     mismatch: Mismatch | None = None
+    is_named: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class GraphSnapshot:
+    """The whole graph at one moment. `nodes` are the full names of all other nodes, each as often as it is there.
+
+    `discovery_range` is ROS_AUTOMATIC_DISCOVERY_RANGE as rcl reads it. `n_topics` counts the topics with publishers,
+    `n_unreached` those of them with a publisher whose node is not known.
+    """
+
+    domain: int
+    discovery_range: str
+    nodes: tuple[str, ...] = ()
+    n_topics: int = 0
+    n_unreached: int = 0
+    has_clock: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +85,7 @@ class InputGraph:
     `name` is the topic's in the graph, `output` that under which its messages leave, `not_importable` says why its type
     cannot be used here, `refusal` what DDS does not make for it, `alike` are topics of the graph that may have been
     meant, `lost` counts what DDS lost on the way of late. `rivals` are others that publish its output, seen so without
-    a break since `rivals_since`.
+    a break since `rivals_since`. `largest` is the size of the largest message in bytes, 0 where nobody measures it.
     """
 
     name: str
@@ -78,6 +98,7 @@ class InputGraph:
     lost: int = 0
     rivals: tuple[Endpoint, ...] = ()
     rivals_since: int = 0
+    largest: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +142,7 @@ class GroupFacts:
     what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
     others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it does
     not; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
-    late; `failure` what stopped the group for good.
+    late; `failure` what stopped the group for good; `empty_graph` the graph, where it holds no node but our own.
     """
 
     name: str
@@ -139,6 +160,7 @@ class GroupFacts:
     waited: int = 0
     standstill: Standstill | None = None
     failure: str | None = None
+    empty_graph: GraphSnapshot | None = None
 
     @property
     def required_first(self) -> Sequence[int]:

@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Sequence
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.facts import GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
+from syncrelay.explain.facts import GraphSnapshot, GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.sync.counts import InputCounts
@@ -51,6 +51,7 @@ class GroupWatch:
         waited: int = 0,
         standstill: Standstill | None = None,
         failure: str | None = None,
+        empty_graph: GraphSnapshot | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
         options = self.config.options
@@ -83,6 +84,7 @@ class GroupWatch:
             waited=waited,
             standstill=standstill,
             failure=failure,
+            empty_graph=empty_graph,
         )
 
 

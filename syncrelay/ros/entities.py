@@ -50,10 +50,12 @@ class Entities:
     need not be the true one: so what would be refused for that is not asked for.
     """
 
-    def __init__(self, node: Any, purpose: Purpose) -> None:
+    def __init__(self, node: Any, purpose: Purpose, *, relay_name: str) -> None:
         self._node = node
         self.purpose = purpose
         """Where it is to look, nobody asks for publishers."""
+        self.relay_name = relay_name
+        """The full name of the relay's node, which is another's where it is to look."""
         self._left_to_the_loop = _LeftToTheReceiveLoop()
         # An entity of the node itself, which never ends, stands for itself.
         self._holders: dict[str, dict[Any, str]] = {}
@@ -69,7 +71,7 @@ class Entities:
             return self._node.create_subscription(
                 message_type,
                 topic,
-                _never_called,
+                never_called,
                 profile,
                 raw=True,
                 callback_group=self._left_to_the_loop,
@@ -117,5 +119,5 @@ class Entities:
         self._holders.setdefault(name, {})[entity] = type_name
 
 
-def _never_called(_: bytes) -> None:
+def never_called(_: bytes) -> None:
     """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""

@@ -81,6 +81,8 @@ class TopicInput:
         self._failure: Exception | None = None
         self._lost: Any = None
         self._said: set[str] = set()
+        self.largest = 0
+        """The size of its largest message in bytes; measured only where nothing is relayed."""
 
     @property
     def subscribed(self) -> bool:
@@ -89,11 +91,12 @@ class TopicInput:
 
     @property
     def is_due(self) -> bool:
-        """Whether it is to be looked at though the graph be as before: for its type, or for what DDS did not make."""
+        """Whether to look at it though the graph is as before: for its type, a node's name, what DDS did not make."""
         return (
             self._wants_look
             or self._failure is not None
             or self._message_type is None
+            or not all(each.is_named for each in self.publishers)
             or (self._lacks and self._may_try)
         )
 
@@ -250,9 +253,7 @@ class TopicInput:
         output = self._node.resolve_topic_name(group.config.topics[index].output)
         ours = sum(user.publisher is not None for user in self._users if user.group is group and user.index == index)
         endpoints = self._node.get_publishers_info_by_topic(output)
-        return graph.others(
-            endpoints, than=self._node.get_fully_qualified_name(), own=ours if self._publishes else len(endpoints)
-        )
+        return graph.others(endpoints, than=self._entities.relay_name, own=ours if self._publishes else len(endpoints))
 
     def take_wait(self) -> int:
         """How long a message at most lay unread since this was last asked, in nanoseconds. On the loop's thread."""
@@ -363,7 +364,12 @@ class TopicInput:
     def _feed_users(self) -> None:
         self._takers = [user.take for user in self._users if user.take is not None and user.refusal is None]
         if self._source is not None:
-            self._source.deliver = self._takers[0] if len(self._takers) == 1 else self._deliver
+            only = self._takers[0] if len(self._takers) == 1 and self._publishes else None
+            self._source.deliver = only or (self._deliver if self._publishes else self._measure)
+
+    def _measure(self, payload: Any, content: Content, received: int) -> None:
+        self.largest = max(self.largest, len(content))
+        self._deliver(payload, content, received)
 
     def _deliver(self, payload: Any, content: Content, received: int) -> None:
         for take in self._takers:

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 from syncrelay.explain import (
     Endpoint,
     FindingLog,
+    GraphSnapshot,
     GroupReport,
     GroupWatch,
     InputGraph,
@@ -20,7 +21,7 @@ from syncrelay.explain import (
     problems,
 )
 from syncrelay.ros.bugs import Bugs
-from syncrelay.ros.graph import topics_alike, topics_in
+from syncrelay.ros.graph import other_nodes, published_topics, snapshot, topics_alike
 from syncrelay.ros.group import Batch, GroupRelay
 from syncrelay.ros.inputs import TopicInput
 from syncrelay.ros.receive import ReceiveLoop
@@ -86,6 +87,7 @@ class Monitor:
         self._standstills: deque[Standstill | None] = deque(maxlen=_LAST_LOOKS)
         self._standstill: Standstill | None = None
         self._wall_clock = _WallClock()
+        self._empty_graph: GraphSnapshot | None = None
         self.watch(wirings)
 
     @property
@@ -149,6 +151,8 @@ class Monitor:
         stopped = self._clock.stopped_for(now) if self._clock else None
         for topic_input, losses in self._losses.items():
             losses.look(topic_input)
+        is_missing = any(not topic_input.publishers for topic_input in self._losses)
+        self._empty_graph = snapshot(self._node) if is_missing and not other_nodes(self._node) else None
         for wiring, gathered in zip(wirings, seen, strict=True):
             with self._bugs.contained(f"looking at {wiring.group.config.name}"):
                 try:
@@ -171,6 +175,7 @@ class Monitor:
             waited=max(waited for each in wiring.inputs for waited in self._waits[each]),
             standstill=max(filter(None, self._standstills), key=lambda each: each.ns, default=None),
             failure=failure,
+            empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
         )
         found = problems(facts)
         self._reports[wiring.group] = GroupReport(facts, found, gathered.last)
@@ -200,6 +205,7 @@ class Monitor:
             not_importable=topic_input.not_importable,
             refusal=topic_input.refusal(group, index),
             lost=self._losses[topic_input].lately,
+            largest=topic_input.largest,
         )
 
     def _ends_of(self, group: GroupRelay, index: int, topic_input: TopicInput) -> _Ends:
@@ -222,12 +228,9 @@ class Monitor:
             for wiring in self._wirings
             for topic in wiring.group.config.topics
         }
-        published = [
-            (name, types)
-            for name, types in topics_in(self._node).items()
-            if name not in outputs and self._node.count_publishers(name)
-        ]
-        return topics_alike(topic_input.name, topic_input.type, published)
+        published = published_topics(self._node).items()
+        others = [(name, types) for name, types in published if name not in outputs]
+        return topics_alike(topic_input.name, topic_input.type, others)
 
 
 class _WallClock:

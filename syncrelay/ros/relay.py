@@ -22,6 +22,7 @@ from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.diagnostics import Telling
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.group import GroupRelay
+from syncrelay.ros.hidden_node import join_hidden
 from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
@@ -73,17 +74,21 @@ class Relay:
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
 
-        Whose purpose is to look has all but publishers: sets leave to nowhere.
+        One that only looks is hidden from lists of nodes, and publishes nothing.
 
         Raises ConfigError where remaps make the file's names meet, UsageError where ROS does not take `ros_args`.
         `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
         turns, once a second at least.
         """
         apply_transport(config.node.transport, os.environ)
-        self._context = start(ros_args, simulated=config.node.use_sim_time)
-        self.node = make_node(
-            config.node.name, namespace=config.node.namespace, context=self._context, ros_args=ros_args
-        )
+        if purpose is Purpose.LOOK:
+            self._context, self.node, relay_name = join_hidden(config, ros_args)
+        else:
+            self._context = start(ros_args, simulated=config.node.use_sim_time)
+            self.node = make_node(
+                config.node.name, namespace=config.node.namespace, context=self._context, ros_args=ros_args
+            )
+            relay_name = self.node.get_fully_qualified_name()
         self._resolve = resolver(self.node, ros_args)
         self._config, self._names = config, groups
         try:
@@ -91,7 +96,7 @@ class Relay:
         except SyncRelayError:
             self._leave()
             raise
-        name_after(self.node.get_logger().name)
+        name_after(relay_name.removeprefix("/").replace("/", "."))
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
@@ -108,7 +113,7 @@ class Relay:
             contain=lambda error: self._bugs.tell("receiving", error),
         )
         self._graph_changes = path.graph_changes(self.node)
-        entities = Entities(self.node, purpose)
+        entities = Entities(self.node, purpose, relay_name=relay_name)
         self._wirings = Wirings(entities=entities, node=self.node, path=path, loop=self._loop)
         self._telling = Telling(self.node, entities)
         self.monitor = Monitor((), node=self.node, loop=self._loop, simulated=self._sim_time, bugs=self._bugs)
