@@ -71,8 +71,8 @@ def run(
             config_path=", ".join(config_paths),
             groups=groups or None,
             ros_args=ros_args,
-            beat=heartbeat.beat if heartbeat else None,
-            purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
+            on_turn=heartbeat.beat if heartbeat else None,
+            purpose=Purpose.RELAY if explain_s is None else Purpose.OBSERVE,
         ) as relay,
         files,
     ):

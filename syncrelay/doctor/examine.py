@@ -168,14 +168,14 @@ def _observe(config: Config | None, ros_args: Sequence[str], *, seconds: float) 
     if config is None:
         return Observed(seconds, watch_graph(seconds=seconds))
     try:
-        relay = Relay(config, ros_args=ros_args, purpose=Purpose.LOOK)
+        relay = Relay(config, ros_args=ros_args, purpose=Purpose.OBSERVE)
     except ConfigError:
         return None
     with relay:
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             relay.step(left)
-        reports = relay.look()
+        reports = relay.evaluate()
         return Observed(seconds, snapshot(relay.node), reports, relay.monitor.unjudged)
 
 

@@ -23,6 +23,6 @@ def apply_transport(transport: Transport, environ: MutableMapping[str, str]) -> 
         return
     chosen = [f"{name}={environ[name]}" for name in _CHOICES if environ.get(name)]
     if chosen:
-        _LOG.warning("`transport: %s` is left aside: %s stands", transport, " ".join(chosen))
+        _LOG.warning("`transport: %s` has no effect: the environment has %s", transport, " ".join(chosen))
         return
     environ[_PROFILES] = str(LARGE_MESSAGES)

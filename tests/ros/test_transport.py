@@ -30,7 +30,7 @@ def test_what_the_environment_names_stands(variable, caplog):
     environ = {variable: "mine"}
     apply_transport("large_messages", environ)
     assert environ == {variable: "mine"}
-    assert f"`transport: large_messages` is left aside: {variable}=mine stands" in caplog.text
+    assert f"`transport: large_messages` has no effect: the environment has {variable}=mine" in caplog.text
 
 
 @pytest.mark.ros

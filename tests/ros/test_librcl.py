@@ -1,4 +1,4 @@
-"""The direct path from within: whose memory a message is, and what of it Python gets to see."""
+"""The librcl backend from within: whose memory a message is, and what of it Python gets to see."""
 
 import ctypes
 import gc
@@ -12,9 +12,9 @@ from types import SimpleNamespace
 import pytest
 
 from syncrelay.config import load
+from syncrelay.dataflow.backend import BackendName
+from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import RosUnavailableError, UsageError
-from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.path import PathName
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR, padded, stamp_of, vector, with_stamp
 from tests.ros.configs import config, inputs
@@ -24,13 +24,13 @@ from tests.ros.streams import BEGIN, MS
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 qos = pytest.importorskip("rclpy.qos")
 Vector3Stamped = pytest.importorskip("geometry_msgs.msg").Vector3Stamped
-check = pytest.importorskip("syncrelay.ros.direct.check")
-DirectPath = pytest.importorskip("syncrelay.ros.direct.path").DirectPath
-messages = pytest.importorskip("syncrelay.ros.direct.messages")
-rcl = pytest.importorskip("syncrelay.ros.direct.rcl")
-buffers = pytest.importorskip("syncrelay.ros.direct.buffers")
-choose_path = pytest.importorskip("syncrelay.ros.path_choice").choose_path
-taker = pytest.importorskip("syncrelay.ros.takers").taker
+check = pytest.importorskip("syncrelay.ros.librcl.check")
+LibrclBackend = pytest.importorskip("syncrelay.ros.librcl.backend").LibrclBackend
+messages = pytest.importorskip("syncrelay.ros.librcl.messages")
+rcl = pytest.importorskip("syncrelay.ros.librcl.rcl")
+buffers = pytest.importorskip("syncrelay.ros.librcl.buffers")
+choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
+handler = pytest.importorskip("syncrelay.ros.handlers").handler
 
 pytestmark = pytest.mark.ros
 
@@ -42,14 +42,14 @@ _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 
 @pytest.fixture
 def here(ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
-    """A node of this process, and the direct path as it proved itself on it."""
+    """A node of this process, and the librcl backend as it proved itself on it."""
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
     context = rclpy.context.Context()
     rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
     node = rclpy.create_node("here", context=context)
     try:
-        yield SimpleNamespace(node=node, context=context, path=check.checked_path(node), rcl=rcl.Rcl())
+        yield SimpleNamespace(node=node, context=context, backend=check.checked_backend(node), rcl=rcl.Rcl())
     finally:
         node.destroy_node()
         context.try_shutdown()
@@ -94,17 +94,17 @@ class _CountingPool(buffers.Pool):
 
 
 def _source(here, topic, deliver, pool=None):
-    return messages.DirectSource(here.rcl, pool or buffers.Pool(here.rcl), topic.subscription, deliver)
+    return messages.LibrclSource(here.rcl, pool or buffers.Pool(here.rcl), topic.subscription, deliver)
 
 
 def _take(source):
     """Its oldest message, whether anybody told it or not."""
-    source.doubt()
+    source.force_poll()
     return source.take()
 
 
 def test_a_message_comes_out_as_it_went_in(here, topic):
-    source = here.path.source(topic.subscription, print)
+    source = here.backend.source(topic.subscription, print)
     payload = vector(BEGIN, frame_id="a frame")
     topic.publisher.publish(payload)
     received, _, content = _take(source)
@@ -119,7 +119,7 @@ def test_every_memory_comes_back_once_whatever_became_of_its_message(here, topic
     groups = [_group(tmp_path, queue_size=5), _group(tmp_path, queue_size=20)]
     for group in groups:
         for index in range(2):
-            group.connect(index, here.path.outlet(topic.publisher), restamped=True)
+            group.connect(index, here.backend.outlet(topic.publisher), restamped=True)
 
     def deliver(payload, content, received):
         stamp = stamp_of(bytes(content))
@@ -144,7 +144,7 @@ def test_every_memory_comes_back_once_whatever_became_of_its_message(here, topic
 
 def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, topic):
     source = _source(here, topic, print)
-    outlet = here.path.outlet(topic.publisher)
+    outlet = here.backend.outlet(topic.publisher)
     original = padded(vector(BEGIN))
     topic.publisher.publish(original)
     _, payload, content = _take(source)
@@ -183,14 +183,14 @@ def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):
     group = _group(tmp_path, restamp="latest")
     kept = _source(here, topic, print)
     for index in range(2):
-        group.connect(index, here.path.outlet(topic.publisher), restamped=True)
-    takers = _takers(group)
+        group.connect(index, here.backend.outlet(topic.publisher), restamped=True)
+    handlers = _handlers(group)
     for stamp in [stamp for stamp in stamps for _ in range(2)]:
         topic.publisher.publish(with_stamp(payload, stamp))
     tracemalloc.start()
     for n in range(2 * len(stamps)):
         received, message, content = _take(kept)
-        takers[n % 2](message, content, received)
+        handlers[n % 2](message, content, received)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert group.engine.sets == len(stamps)
@@ -199,12 +199,12 @@ def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):
     assert sent == [with_stamp(payload, stamp) for stamp in stamps for _ in range(2)]
 
 
-def _takers(group):
-    return [taker(group, index, Vector3Stamped) for index in range(2)]
+def _handlers(group):
+    return [handler(group, index, Vector3Stamped) for index in range(2)]
 
 
 def test_a_watch_sees_what_came_before_it_what_comes_later_and_a_wake(here, topic):
-    source, watch = here.path.source(topic.subscription, print), here.path.watch()
+    source, watch = here.backend.source(topic.subscription, print), here.backend.watch()
     topic.publisher.publish(vector(BEGIN))
     watch.add(source)
     assert watch.wait(_LONG_NS)[0] == [source]
@@ -227,8 +227,8 @@ def test_a_watch_sees_what_came_before_it_what_comes_later_and_a_wake(here, topi
 def test_a_look_knows_of_all_that_came_before_it(here, topic, monkeypatch):
     other = here.node.create_subscription(Vector3Stamped, "/u", print, _KEEP_ALL, raw=True)
     publisher = here.node.create_publisher(Vector3Stamped, "/u", _KEEP_ALL)
-    sources = [_source(here, topic, print), messages.DirectSource(here.rcl, buffers.Pool(here.rcl), other, print)]
-    watch = here.path.watch()
+    sources = [_source(here, topic, print), messages.LibrclSource(here.rcl, buffers.Pool(here.rcl), other, print)]
+    watch = here.backend.watch()
     for source in sources:
         watch.add(source)
     while any(source.take() for source in watch.wait(0)[0]):
@@ -252,7 +252,7 @@ def test_a_look_knows_of_all_that_came_before_it(here, topic, monkeypatch):
 
 
 def test_a_message_that_dds_never_told_of_is_found_within_a_second(here, topic, monkeypatch):
-    source, watch = here.path.source(topic.subscription, print), here.path.watch()
+    source, watch = here.backend.source(topic.subscription, print), here.backend.watch()
     watch.add(source)
     while watch.wait(0)[0]:
         assert source.take() is None
@@ -268,18 +268,18 @@ def test_a_message_that_dds_never_told_of_is_found_within_a_second(here, topic, 
     watch.close()
 
 
-def test_what_it_has_heard_of_is_taken_without_asking_once_more(here, topic, monkeypatch):
+def test_what_is_pending_is_taken_without_asking_once_more(here, topic, monkeypatch):
     asked = []
     take = here.rcl.take
     monkeypatch.setattr(here.rcl, "take", lambda *words: asked.append(words) or take(*words))
-    source, watch = _source(here, topic, print), here.path.watch()
+    source, watch = _source(here, topic, print), here.backend.watch()
     watch.add(source)
     while watch.wait(0)[0]:
         assert source.take() is None
     asked.clear()
     for n in range(3):
         topic.publisher.publish(vector(BEGIN + n * MS))
-    while source.heard_of < 3:
+    while source.pending < 3:
         watch.wait(_LONG_NS)
     assert [source.take() is None for _ in range(5)] == [False] * 3 + [True] * 2
     assert len(asked) == 3
@@ -293,8 +293,8 @@ def _drained(changes):
 
 def test_changes_of_the_graph_are_seen_once_each(here, ros_domain, monkeypatch):
     # Only what is told counts here, not what is looked for now and then in any case.
-    monkeypatch.setattr("syncrelay.ros.direct.graph_changes._DOUBT_S", math.inf)
-    changes = here.path.graph_changes(here.node)
+    monkeypatch.setattr("syncrelay.ros.librcl.graph_changes._FORCE_S", math.inf)
+    changes = here.backend.graph_changes(here.node)
     assert changes.seen()
     wait_until(lambda: _drained(changes), "the end of changes")
     publisher = here.node.create_publisher(Vector3Stamped, "/new", 10)
@@ -314,7 +314,7 @@ def test_changes_of_the_graph_are_seen_once_each(here, ros_domain, monkeypatch):
 
 
 def test_a_change_of_the_graph_that_was_never_told_is_looked_for_every_minute(here, monkeypatch):
-    changes = here.path.graph_changes(here.node)
+    changes = here.backend.graph_changes(here.node)
     changes.seen()
     wait_until(lambda: _drained(changes), "the end of changes")
     later = time.monotonic() + 60
@@ -324,9 +324,9 @@ def test_a_change_of_the_graph_that_was_never_told_is_looked_for_every_minute(he
 
 
 def test_without_word_of_changes_in_the_graph_rclpy_is_used(here, monkeypatch):
-    monkeypatch.setattr(DirectPath, "graph_changes", lambda *_: SimpleNamespace(seen=lambda: False))
-    with pytest.raises(check.DirectPathUnusableError, match="does not tell of changes in the graph"):
-        check.checked_path(here.node)
+    monkeypatch.setattr(LibrclBackend, "graph_changes", lambda *_: SimpleNamespace(seen=lambda: False))
+    with pytest.raises(check.LibrclUnusableError, match="does not tell of changes in the graph"):
+        check.checked_backend(here.node)
 
 
 def _structure(*fields):
@@ -346,30 +346,30 @@ def test_structures_that_are_not_as_expected_are_found_out(here, monkeypatch, st
     name, fields = other
     inner = _structure(*((field, ctypes.c_uint64) for field in fields.split()))
     monkeypatch.setattr(check, structure, _structure((name, inner), ("margin", ctypes.c_uint8 * 256)))
-    with pytest.raises(check.DirectPathUnusableError, match=reason):
-        check.checked_path(here.node)
+    with pytest.raises(check.LibrclUnusableError, match=reason):
+        check.checked_backend(here.node)
 
 
 def test_where_librcl_is_not_as_expected_rclpy_is_used_and_the_log_says_so(here, monkeypatch, caplog):
-    assert choose_path(None, node=here.node, context=here.context).name is PathName.DIRECT
+    assert choose_backend(None, node=here.node, context=here.context).name is BackendName.LIBRCL
     empty = _structure(("info", _structure()), ("margin", ctypes.c_uint8 * 256))
     monkeypatch.setattr(check, "_RoomyInfo", empty)
-    assert choose_path(None, node=here.node, context=here.context).name is PathName.RCLPY
+    assert choose_backend(None, node=here.node, context=here.context).name is BackendName.RCLPY
     assert "messages pass through rclpy, at a higher cost" in caplog.text
     with pytest.raises(RosUnavailableError, match="SYNCRELAY_RECEIVE=direct: librcl is not as expected here"):
-        choose_path("direct", node=here.node, context=here.context)
+        choose_backend("direct", node=here.node, context=here.context)
 
 
-def test_the_path_can_be_chosen(here, caplog):
+def test_the_backend_can_be_chosen(here, caplog):
     caplog.set_level("INFO")
-    assert choose_path("rclpy", node=here.node, context=here.context).name is PathName.RCLPY
+    assert choose_backend("rclpy", node=here.node, context=here.context).name is BackendName.RCLPY
     assert "as SYNCRELAY_RECEIVE asks" in caplog.text
     with pytest.raises(UsageError, match="SYNCRELAY_RECEIVE=dds: expected direct or rclpy"):
-        choose_path("dds", node=here.node, context=here.context)
+        choose_backend("dds", node=here.node, context=here.context)
 
 
 def test_a_call_that_rcl_refuses_says_why(here, topic):
-    outlet = here.path.outlet(topic.publisher)
+    outlet = here.backend.outlet(topic.publisher)
     _, payload, _ = _published_and_taken(here, topic)
     here.context.try_shutdown()
     with pytest.raises(rcl.RclCallError, match="rcl_publish_serialized_message failed with"):

@@ -5,10 +5,10 @@ from typing import Any, Final
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
-from syncrelay.ros.direct.rcl import Rcl
+from syncrelay.ros.librcl.rcl import Rcl
 
-# A change that was never told must not hide a publisher for ever.
-_DOUBT_S: Final = 60.0
+# A change that was never told of must not hide a publisher for ever.
+_FORCE_S: Final = 60.0
 
 
 class GraphChanges:
@@ -20,7 +20,7 @@ class GraphChanges:
         self._node = node.handle
         self._condition: Final[int] = rcl.graph_guard_condition(node.handle.pointer)
         self._wait_set = _rclpy.WaitSet(0, 1, 0, 0, 0, 0, node.context.handle)
-        self._doubted = -_DOUBT_S
+        self._forced_at = -_FORCE_S
 
     def seen(self) -> bool:
         """Whether anything may have changed since this was last asked. Raises RclCallError."""
@@ -30,7 +30,7 @@ class GraphChanges:
         self._wait_set.wait(0)
         has_changed = bool(self._wait_set.is_ready("guard_condition", 0))
         now = time.monotonic()
-        if now - self._doubted < _DOUBT_S:
+        if now - self._forced_at < _FORCE_S:
             return has_changed
-        self._doubted = now
+        self._forced_at = now
         return True

@@ -1,4 +1,4 @@
-"""Whether the direct path may be used here: its structures held to what librcl does with them.
+"""Whether librcl may be called here: our structures compared with what it does with them.
 
 No version number is trusted. Each structure stands before a margin that must stay as it is, and two messages go
 there and back within this process, one taken by librcl and one by rclpy, which must tell the same of them.
@@ -12,9 +12,9 @@ from typing import Any, ClassVar, Final
 
 from builtin_interfaces.msg import Time
 
-from syncrelay.ros.direct.buffers import Memory, Payload, Pool
-from syncrelay.ros.direct.path import DirectPath
-from syncrelay.ros.direct.rcl import Allocator, MessageInfo, Rcl, RclCallError, SerializedMessage, pointer
+from syncrelay.ros.librcl.backend import LibrclBackend
+from syncrelay.ros.librcl.buffers import Memory, Payload, Pool
+from syncrelay.ros.librcl.rcl import Allocator, MessageInfo, Rcl, RclCallError, SerializedMessage, pointer
 
 _MARGIN: Final = 256
 _UNTOUCHED: Final = 0xA5
@@ -24,7 +24,7 @@ _ROOM: Final = 17
 _PAYLOAD: Final = bytes([0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0])
 
 
-class DirectPathUnusableError(Exception):
+class LibrclUnusableError(Exception):
     """Why messages are not taken and published in librcl here."""
 
 
@@ -40,20 +40,20 @@ class _RoomyInfo(Structure):
     _fields_: ClassVar = [("info", MessageInfo), ("margin", c_uint8 * _MARGIN)]
 
 
-def checked_path(node: Any) -> DirectPath:
-    """Return the direct path, proven on topics of the node's own; raises DirectPathUnusableError."""
+def checked_backend(node: Any) -> LibrclBackend:
+    """Return the librcl backend, proven on topics of the node's own; raises LibrclUnusableError."""
     try:
         rcl = Rcl()
         _check_serialized_message(rcl)
         _check_there_and_back(rcl, node)
     except (OSError, AttributeError, RclCallError) as error:
-        raise DirectPathUnusableError(str(error)) from error
-    return DirectPath(rcl)
+        raise LibrclUnusableError(str(error)) from error
+    return LibrclBackend(rcl)
 
 
 def _require(holds: bool, what: str) -> None:  # noqa: FBT001  an assertion
     if not holds:
-        raise DirectPathUnusableError(what)
+        raise LibrclUnusableError(what)
 
 
 def _require_margin(roomy: Any, name: str) -> None:
@@ -76,12 +76,12 @@ def _check_serialized_message(rcl: Rcl) -> None:
 
 
 def _check_there_and_back(rcl: Rcl, node: Any) -> None:
-    path = DirectPath(rcl)
-    changes = path.graph_changes(node)
+    backend = LibrclBackend(rcl)
+    changes = backend.graph_changes(node)
     changes.seen()
     with _endpoints(node) as (subscription, publisher):
         _require(changes.seen(), "librcl does not tell of changes in the graph")
-        source, watch = path.source(subscription, _never_called), path.watch()
+        source, watch = backend.source(subscription, _never_called), backend.watch()
         try:
             watch.add(source)
             watch.wait(0)
@@ -90,7 +90,7 @@ def _check_there_and_back(rcl: Rcl, node: Any) -> None:
             pool = Pool(rcl)
             memory = pool.lend()
             ours = _take_with_margin(rcl, source.address, memory)
-            path.outlet(publisher).send(Payload(memory, pool))
+            backend.outlet(publisher).send(Payload(memory, pool))
             _require(source in watch.wait(_PATIENCE_NS)[0], "DDS does not get what is published in librcl")
             theirs = subscription.handle.take_message(Time, True)  # noqa: FBT003  rclpy's signature
         finally:

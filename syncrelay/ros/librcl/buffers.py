@@ -3,7 +3,7 @@
 from ctypes import byref, c_uint8
 from typing import Final
 
-from syncrelay.ros.direct.rcl import Rcl, SerializedMessage
+from syncrelay.ros.librcl.rcl import Rcl, SerializedMessage
 
 # A queue gives back one memory for each that it takes in, so a few keep a steady stream from allocating. What a
 # burst took beyond them is freed.

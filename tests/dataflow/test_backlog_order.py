@@ -5,7 +5,7 @@ from collections import deque
 
 import pytest
 
-from syncrelay.ros.backlog import Backlog
+from syncrelay.dataflow.backlog import Backlog
 
 
 class _Source:
@@ -22,7 +22,7 @@ class _Source:
         received, payload = self.messages.popleft()
         return received, payload, b""
 
-    def doubt(self):
+    def force_poll(self):
         pass
 
 

@@ -10,22 +10,22 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
-from syncrelay.ros.backlog import Backlog
-from syncrelay.ros.path import Source, Watch
+from syncrelay.dataflow.backend import Source, Watch
+from syncrelay.dataflow.backlog import Backlog
 
 _Result = TypeVar("_Result")
 
-# An idle loop turns as often as this.
-_BEAT_NS = 1_000_000_000
+# An idle loop turns at least this often.
+_LONGEST_REST_NS = 1_000_000_000
 # A turn that fails and is repeated at once must not take all of a core.
 _AFTER_FAILURE_S = 0.01
 
 
 class ReceiveLoop:
-    """Drains sources of one path on the thread that calls `run`.
+    """Drains sources of one backend on the thread that calls `run`.
 
     Only `call`, `wake`, `stop` and the attributes may be used from other threads. `expire` is called with the time of
-    `now`, in nanoseconds, when that is due. `beat` is called at every turn, once a second at least. `contain` takes an
+    `now`, in nanoseconds, when that is due, and `on_turn` at every turn, at least once a second. `contain` takes an
     exception that nobody else did, and the loop goes on; without it, the loop ends and `run` raises it.
     """
 
@@ -36,7 +36,7 @@ class ReceiveLoop:
         now: Callable[[], int],
         expire: Callable[[int], None],
         deadline: Callable[[], int | None] | None = None,
-        beat: Callable[[], None] | None = None,
+        on_turn: Callable[[], None] | None = None,
         contain: Callable[[Exception], None] | None = None,
     ) -> None:
         self._watch = watch
@@ -49,7 +49,7 @@ class ReceiveLoop:
         self.turned = time.monotonic()
         """When the loop last turned."""
         self._expire = expire
-        self._beat = beat
+        self._on_turn = on_turn
         self._contain = contain
         self._sources: dict[Source, Callable[[Exception], None]] = {}
         self._backlog = Backlog()
@@ -80,7 +80,7 @@ class ReceiveLoop:
         return future
 
     def wake(self) -> None:
-        """Have the loop look at its calls and deadlines now."""
+        """Have the loop check its calls and deadlines now."""
         self._watch.wake()
 
     def stop(self) -> None:
@@ -132,13 +132,13 @@ class ReceiveLoop:
             if self._calls:
                 self._carry_out_calls()
             deadline = self.deadline
-            longest = _BEAT_NS if deadline is None else self._expire_due(deadline)
+            longest = _LONGEST_REST_NS if deadline is None else self._expire_due(deadline)
             self._backlog.deliver(self._watch.wait(0 if self._backlog.held else longest))
             if self._backlog.failed:
                 self._end_failed()
             self.turned = time.monotonic()
-            if self._beat is not None:
-                self._beat()
+            if self._on_turn is not None:
+                self._on_turn()
 
     def _take_what_came(self) -> None:
         self._backlog.deliver_until(time.time_ns(), self._sources)
@@ -165,9 +165,9 @@ class ReceiveLoop:
             self._calls.popleft()[0].cancel()
 
     def _expire_due(self, deadline: Callable[[], int | None]) -> int:
-        """Let go what is due; give the nanoseconds until the next deadline, a beat at most."""
+        """Let go what is due; give the nanoseconds until the next deadline, a on_turn at most."""
         due, now = deadline(), self._now()
         if due is not None and now >= due:
             self._expire(now)
             due, now = deadline(), self._now()
-        return _BEAT_NS if due is None else min(max(0, due - now), _BEAT_NS)
+        return _LONGEST_REST_NS if due is None else min(max(0, due - now), _LONGEST_REST_NS)

@@ -2,13 +2,14 @@
 
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 from threading import Thread
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from syncrelay.config import load_text
+from syncrelay.config import StampField, load_text
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Refusal
 from tests.ros.configs import config
@@ -16,11 +17,11 @@ from tests.ros.processes import wait_until
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 entities = pytest.importorskip("syncrelay.ros.entities")
-choose_path = pytest.importorskip("syncrelay.ros.path_choice").choose_path
-Wirings = pytest.importorskip("syncrelay.ros.wirings").Wirings
-GroupRelay = pytest.importorskip("syncrelay.ros.group").GroupRelay
+choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
+GroupBindings = pytest.importorskip("syncrelay.ros.bindings").GroupBindings
+GroupRelay = pytest.importorskip("syncrelay.dataflow.group").GroupRelay
 import_type = pytest.importorskip("syncrelay.ros.types").import_type
-ReceiveLoop = pytest.importorskip("syncrelay.ros.receive").ReceiveLoop
+ReceiveLoop = pytest.importorskip("syncrelay.dataflow.receive").ReceiveLoop
 
 pytestmark = pytest.mark.ros
 
@@ -44,18 +45,18 @@ class _Refusing(entities.Entities):
 
 @pytest.fixture(params=["direct", "rclpy"])
 def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
-    """Wirings of a node of this process, with a loop that runs."""
+    """GroupBindings of a node of this process, with a loop that runs."""
     context = rclpy.context.Context()
     rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
     node = rclpy.create_node("here", context=context)
-    path = choose_path(request.param, node=node, context=context)
-    loop = ReceiveLoop(path.watch(), now=lambda: 0, expire=lambda _: None)
+    backend = choose_backend(request.param, node=node, context=context)
+    loop = ReceiveLoop(backend.watch(), now=lambda: 0, expire=lambda _: None)
     refusing = _Refusing(node)
     thread = Thread(target=loop.run)
     thread.start()
-    wirings = Wirings(entities=refusing, node=node, path=path, loop=loop)
+    bindings = GroupBindings(entities=refusing, node=node, backend=backend, loop=loop)
     try:
-        yield SimpleNamespace(node=node, entities=refusing, wirings=wirings, path=path)
+        yield SimpleNamespace(node=node, entities=refusing, bindings=bindings, backend=backend)
     finally:
         loop.stop()
         thread.join()
@@ -76,9 +77,9 @@ def _groups(**topics: list[tuple[str, str, str]]) -> list[Any]:
     return [GroupRelay(each, now=lambda: 0) for each in load_text(config(named)).groups]
 
 
-def _look(here: SimpleNamespace) -> None:
-    for each in here.wirings.inputs:
-        each.look()
+def _poll(here: SimpleNamespace) -> None:
+    for each in here.bindings.topics:
+        each.poll()
 
 
 def _published(here: SimpleNamespace) -> dict[str, str]:
@@ -95,7 +96,7 @@ def _subscribed(here: SimpleNamespace) -> dict[str, str]:
 
 def _asked(here: SimpleNamespace) -> tuple[dict[str, str], dict[str, str]]:
     """What the groups that run are to publish and to subscribe to."""
-    topics = [topic for group in here.wirings.groups for topic in group.config.topics]
+    topics = [topic for group in here.bindings.groups for topic in group.config.topics]
     types = [topic.type.split("/")[-1] for topic in topics]
     return (
         dict(zip([topic.output for topic in topics], types, strict=True)),
@@ -109,91 +110,115 @@ _OTHER = {"swap": [("/x", _IMU, "/b"), ("/y", _FIELD, "/a")]}
 
 
 def test_what_cannot_be_made_after_the_old_ended_leaves_all_as_it_was(here):
-    here.wirings.wire(_groups(**_ONE, rear=[("/x", _IMU, "/c"), ("/z", _IMU, "/d")]))
-    _look(here)
-    before, groups = _published(here), here.wirings.groups
+    here.bindings.run(_groups(**_ONE, rear=[("/x", _IMU, "/c"), ("/z", _IMU, "/d")]))
+    _poll(here)
+    before, groups = _published(here), here.bindings.groups
     answers = iter([False, False, False, True, False, False])
     here.entities.refuses = lambda: next(answers)
     with pytest.raises(ReloadError, match="the relay cannot publish /a as any: no more memory"):
-        here.wirings.wire([groups[1], *_groups(**_OTHER)])
+        here.bindings.run([groups[1], *_groups(**_OTHER)])
     assert _published(here) == before
-    assert here.wirings.groups == groups
+    assert here.bindings.groups == groups
     here.entities.refuses = lambda: False
-    here.wirings.wire([groups[1], *_groups(**_OTHER)])
+    here.bindings.run([groups[1], *_groups(**_OTHER)])
     assert _published(here) == {"/b": "Imu", "/a": "MagneticField", "/c": "Imu", "/d": "Imu"}
 
 
-def test_what_could_be_made_neither_anew_nor_again_is_told_and_made_at_a_later_look(here):
-    here.wirings.wire(_groups(**_ONE))
-    _look(here)
-    wiring = here.wirings.all[0]
+def test_what_could_be_made_neither_anew_nor_again_is_told_and_made_at_a_later_poll(here):
+    here.bindings.run(_groups(**_ONE))
+    _poll(here)
+    binding = here.bindings.all[0]
     answers = iter([False, False, True, True, True])
     here.entities.refuses = lambda: next(answers)
     with pytest.raises(ReloadError):
-        here.wirings.wire(_groups(**_OTHER))
-    assert here.wirings.all == (wiring,)
-    assert [each.refusal(wiring.group, index) is not None for index, each in enumerate(wiring.inputs)] == [True, True]
-    assert wiring.waiting_for is not None
+        here.bindings.run(_groups(**_OTHER))
+    assert here.bindings.all == (binding,)
+    assert [each.refusal is not None for each in binding.inputs] == [True, True]
+    assert binding.waiting_for is not None
     here.entities.refuses = lambda: False
-    for each in here.wirings.inputs:
+    for each in here.bindings.topics:
         each.try_again()
         assert each.is_due
-    _look(here)
+    _poll(here)
     assert _published(here) == {"/a": "Imu", "/b": "MagneticField"}
-    assert not any(each.refusal(wiring.group, index) for index, each in enumerate(wiring.inputs))
+    assert not any(each.refusal for each in binding.inputs)
 
 
 def test_a_subscription_is_made_when_what_held_its_topic_has_ended(here):
-    imu = here.wirings
-    imu.wire(_groups(**_ONE))
-    _look(here)
+    imu = here.bindings
+    imu.run(_groups(**_ONE))
+    _poll(here)
     holder = here.entities.publisher(next(iter(here.node.publishers)).msg_type, "/later", 10)
-    imu.wire([*imu.groups, *_groups(late=[("/later", _IMU, "/c"), ("/z", _IMU, "/d")])])
-    _look(here)
+    imu.run([*imu.groups, *_groups(late=[("/later", _IMU, "/c"), ("/z", _IMU, "/d")])])
+    _poll(here)
     late = imu.all[1]
-    assert late.inputs[0].refusal(late.group, 0).held_as == "rcl_interfaces/msg/ParameterEvent"
+    assert late.inputs[0].refusal.held_as == "rcl_interfaces/msg/ParameterEvent"
     assert "/later" not in _subscribed(here)
     here.entities.end(holder)
-    late.inputs[0].try_again()
-    _look(here)
-    assert late.inputs[0].refusal(late.group, 0) is None
+    late.inputs[0].topic.try_again()
+    _poll(here)
+    assert late.inputs[0].refusal is None
     assert _subscribed(here)["/later"] == "Imu"
 
 
 def test_what_others_in_the_process_made_is_refused_in_the_words_of_dds(here):
     here.node.create_publisher(import_type(_FIELD), "/a", 10)
-    here.wirings.wire(_groups(**_ONE))
-    _look(here)
-    wiring = here.wirings.all[0]
-    refusal = wiring.inputs[0].refusal(wiring.group, 0)
+    here.bindings.run(_groups(**_ONE))
+    _poll(here)
+    binding = here.bindings.all[0]
+    refusal = binding.inputs[0].refusal
     assert refusal.held_as is None
     assert "incompatible type" in refusal.why
-    assert wiring.inputs[1].refusal(wiring.group, 1) is None
+    assert binding.inputs[1].refusal is None
 
 
 def test_a_topic_that_gives_no_messages_any_more_is_subscribed_anew_and_told(here):
-    sources, source = [], here.path.source
-    here.path.source = lambda *of: sources.append(source(*of)) or sources[-1]
-    here.wirings.wire(_groups(**_ONE))
-    _look(here)
-    wiring = here.wirings.all[0]
-    failing = wiring.inputs[0]
+    sources, source = [], here.backend.source
+    here.backend.source = lambda *of: sources.append(source(*of)) or sources[-1]
+    here.bindings.run(_groups(**_ONE))
+    _poll(here)
+    binding = here.bindings.all[0]
+    failing = binding.inputs[0].topic
     publisher = here.node.create_publisher(import_type(_IMU), "/x", 10)
     sources[0].take = lambda: {}["no such"]
     wait_until(lambda: publisher.publish(import_type(_IMU)()) or failing.is_due, "the source to fail")
     # No refusal of rcl's: it is a bug, which whoever looks tells with its traceback.
     with pytest.raises(KeyError):
-        failing.look()
-    assert failing.refusal(wiring.group, 0).why == "'no such'"
-    assert failing.refusal(wiring.group, 1) == failing.refusal(wiring.group, 0)
-    assert wiring.inputs[1].refusal(wiring.group, 1) is None
+        failing.poll()
+    assert failing.refusal.why == "'no such'"
+    assert binding.inputs[1].refusal is None
     assert "/x" not in _subscribed(here)
     failing.try_again()
-    failing.look()
-    assert failing.refusal(wiring.group, 0) is None
+    failing.poll()
+    assert failing.refusal is None
     wait_until(
-        lambda: publisher.publish(import_type(_IMU)()) or wiring.group.counts()[0].fed > 0, "messages of the new source"
+        lambda: publisher.publish(import_type(_IMU)()) or binding.group.counts()[0].fed > 0,
+        "messages of the new source",
     )
+
+
+def test_a_field_that_a_type_does_not_have_stops_the_one_input_that_asks_for_it(here):
+    groups = {"right": [("/x", _IMU, "/a"), ("/y", _IMU, "/b")], "wrong": [("/x", _IMU, "/c"), ("/y", _IMU, "/d")]}
+    right, wrong = _groups(**groups)
+    first, second = wrong.config.topics
+    # As where the type is installed only after the file was checked.
+    unread = replace(first, stamp=StampField(field="no.such"))
+    wrong = GroupRelay(replace(wrong.config, topics=(unread, second)), now=lambda: 0)
+    here.bindings.run([right, wrong])
+    publishers = [here.node.create_publisher(import_type(_IMU), name, 10) for name in ("/x", "/y")]
+    _poll(here)
+    first, second = here.bindings.all
+    assert first.waiting_for is None
+    assert second.waiting_for == "the field of /x that the file names"
+    assert second.inputs[0].not_readable.startswith(f"{_IMU} has no usable field no.such: ")
+    assert second.inputs[0].topic.is_due
+    sent = import_type(_IMU)()
+
+    def fed(group: Any) -> list[bool]:
+        return [each.fed > 0 for each in group.counts()]
+
+    wait_until(lambda: [each.publish(sent) for each in publishers] and all(fed(right)), "messages")
+    wait_until(lambda: publishers[1].publish(sent) or fed(wrong) == [False, True], "messages of the other input")
 
 
 def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:
@@ -219,28 +244,28 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
     chance = random.Random(seed)
     # It keeps its topics, and so its publishers and subscriptions.
     staying = _groups(stays=[("/s", _IMU, "/so"), ("/t", _FIELD, "/to")])
-    here.wirings.wire(staying)
-    _look(here)
+    here.bindings.run(staying)
+    _poll(here)
     kept = {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
     refused = 0
     for _ in range(40):
-        before = here.wirings.groups
+        before = here.bindings.groups
         likelihood = chance.choice([0, 0, 0.1, 0.5])
         here.entities.refuses = lambda likelihood=likelihood: chance.random() < likelihood
         asked = [*staying, *_groups(**_any_groups(chance))]
         try:
-            here.wirings.wire(asked)
+            here.bindings.run(asked)
         except ReloadError:
             refused += 1
-            assert here.wirings.groups == before
+            assert here.bindings.groups == before
         else:
-            assert here.wirings.groups == asked
-        _look(here)
+            assert here.bindings.groups == asked
+        _poll(here)
         here.entities.refuses = lambda: False
-        for each in here.wirings.inputs:
+        for each in here.bindings.topics:
             each.try_again()
-        _look(here)
+        _poll(here)
         assert (_published(here), _subscribed(here)) == _asked(here)
-        assert not any(each.missing and "DDS" in each.missing for each in here.wirings.inputs)
+        assert not any(each.missing and "DDS" in each.missing for each in here.bindings.topics)
         assert kept <= {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
     assert refused

@@ -12,9 +12,9 @@ from contextlib import suppress
 from ctypes import c_void_p, cast
 from typing import Final
 
-from syncrelay.ros.direct.messages import DirectSource
-from syncrelay.ros.direct.rcl import Rcl, RclCallError
-from syncrelay.ros.path import Look
+from syncrelay.dataflow.backend import Ready
+from syncrelay.ros.librcl.messages import LibrclSource
+from syncrelay.ros.librcl.rcl import Rcl, RclCallError
 
 _NS_PER_SECOND: Final = 1_000_000_000
 _EDGE: Final = select.EPOLLIN | select.EPOLLET
@@ -28,12 +28,12 @@ class EventWatch:
         self._rcl = rcl
         self._notify = cast(rcl.eventfd_write, c_void_p)
         self._epoll = select.epoll()
-        self._sources: dict[int, DirectSource] = {}
+        self._sources: dict[int, LibrclSource] = {}
         self._wake = os.eventfd(0, _FLAGS)
         self._epoll.register(self._wake, _EDGE)
-        self._doubted = time.time_ns()
+        self._forced_at = time.time_ns()
 
-    def add(self, source: DirectSource) -> None:
+    def add(self, source: LibrclSource) -> None:
         """Watch one more source; what it has already is found by the next wait. Raises RclCallError."""
         event = os.eventfd(0, _FLAGS)
         self._epoll.register(event, _EDGE)
@@ -44,10 +44,10 @@ class EventWatch:
         except RclCallError:
             self._forget(event)
             raise
-        source.doubt()
+        source.force_poll()
         os.eventfd_write(event, 1)
 
-    def remove(self, source: DirectSource) -> None:
+    def remove(self, source: LibrclSource) -> None:
         """Watch it no longer; it is to be destroyed next."""
         event = next(event for event, each in self._sources.items() if each is source)
         # Before the number of the eventfd may stand for another file. Whatever librcl says, the source is left: who
@@ -62,32 +62,32 @@ class EventWatch:
         self._epoll.unregister(event)
         os.close(event)
 
-    def wait(self, timeout_ns: int) -> Look:
+    def wait(self, timeout_ns: int) -> Ready:
         """Wait until a source gets messages, for the timeout at most, or until a wake."""
         ready = self._heard(self._epoll.poll(timeout_ns / _NS_PER_SECOND))
         seen_until = time.time_ns()
-        if seen_until - self._doubted >= _NS_PER_SECOND or seen_until < self._doubted:
-            return self._doubt(seen_until)
+        if seen_until - self._forced_at >= _NS_PER_SECOND or seen_until < self._forced_at:
+            return self._poll_all(seen_until)
         # What woke us says nothing of the sources that were written to a moment later. That does no harm where it is
         # a single message, as nearly always: of what came before, DDS has told, or is just about to.
-        if len(ready) > 1 or (ready and ready[0].heard_of > 1):
+        if len(ready) > 1 or (ready and ready[0].pending > 1):
             ready += [source for source in self._heard(self._epoll.poll(0)) if source not in ready]
         return ready, seen_until
 
-    def _heard(self, events: Sequence[tuple[int, int]]) -> list[DirectSource]:
-        """Let each source that was written to know of how many messages."""
+    def _heard(self, events: Sequence[tuple[int, int]]) -> list[LibrclSource]:
+        """Add to each source how many messages it was told of."""
         ready = []
         for event, _ in events:
             if (source := self._sources.get(event)) is not None:
-                source.heard_of += os.eventfd_read(event)
+                source.pending += os.eventfd_read(event)
                 ready.append(source)
         return ready
 
-    def _doubt(self, now: int) -> Look:
-        """Look into all sources, once a second: an event that was never written must not silence a topic."""
-        self._doubted = now
+    def _poll_all(self, now: int) -> Ready:
+        """Poll all sources, once a second: an event that was never written must not silence a topic."""
+        self._forced_at = now
         for source in self._sources.values():
-            source.doubt()
+            source.force_poll()
         return list(self._sources.values()), now
 
     def wake(self) -> None:

@@ -4,22 +4,22 @@ from ctypes import byref
 from typing import Any, Final
 
 from syncrelay.cdr import STAMP_BYTES, write_stamp
-from syncrelay.ros.direct.buffers import Payload, Pool
-from syncrelay.ros.direct.rcl import NOTHING_TAKEN, MessageInfo, Rcl, pointer
-from syncrelay.ros.path import Deliver, Taken
+from syncrelay.dataflow.backend import Deliver, PublishError, Taken
+from syncrelay.ros.librcl.buffers import Payload, Pool
+from syncrelay.ros.librcl.rcl import NOTHING_TAKEN, MessageInfo, Rcl, RclCallError, pointer
 
 # More than any history holds.
 _ALL: Final = 2**62
 
 
-class DirectSource:
+class LibrclSource:
     """A subscription drained by librcl."""
 
     def __init__(self, rcl: Rcl, pool: Pool, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver
         self.waited = 0
-        self.heard_of = 0
-        """How many messages are to be taken: asking librcl once more costs nearly as much as a message."""
+        self.pending = 0
+        """How many messages DDS has told of: asking librcl once more costs nearly as much as a message."""
         self._pool = pool
         self.address: Final[int] = subscription.handle.pointer
         # It owns what the address points to.
@@ -32,41 +32,45 @@ class DirectSource:
         self._next = self._pool.lend()
 
     def take(self) -> Taken | None:
-        """Take its oldest message; None if there is none that it has heard of. Raises RclCallError."""
-        if not self.heard_of:
+        """Take its oldest message; None if none is pending. Raises RclCallError."""
+        if not self.pending:
             return None
         memory = self._next
         code = self._call(self._pointer, memory.pointer, self._info_pointer, None)
         if code:
             if code != NOTHING_TAKEN:
                 self._rcl.require(code, "rcl_take_serialized_message")
-            # Of those it heard of, a full history has replaced some.
-            self.heard_of = 0
+            # A full history has replaced some of those that were pending.
+            self.pending = 0
             return None
-        self.heard_of -= 1
+        self.pending -= 1
         self._next = self._pool.lend()
         return self._info.received_timestamp, Payload(memory, self._pool), memory.content()
 
-    def doubt(self) -> None:
+    def force_poll(self) -> None:
         """Have `take` ask librcl until there are no more."""
-        self.heard_of = _ALL
+        self.pending = _ALL
 
 
-class DirectOutlet:
+class LibrclOutlet:
     """A publisher that librcl sends through."""
 
     def __init__(self, rcl: Rcl, publisher: Any) -> None:
         self._rcl = rcl
         self._call = rcl.publish
+        self.topic: str = publisher.topic_name
         # It owns what the address points to.
         self._publisher = publisher
         self._pointer = pointer(publisher.handle.pointer)
 
     def send(self, payload: Payload) -> None:
-        """Publish a payload unchanged. Raises RclCallError."""
+        """Publish a payload unchanged. Raises PublishError."""
         code = self._call(self._pointer, payload.memory.pointer, None)
         if code:
-            self._rcl.require(code, "rcl_publish_serialized_message")
+            try:
+                self._rcl.require(code, "rcl_publish_serialized_message")
+            except RclCallError as error:
+                raise PublishError(str(error)) from error
 
     def send_stamped(self, payload: Payload, stamp: int) -> None:
         """Publish a payload with this stamp, and put its own back: another set may hold it too."""

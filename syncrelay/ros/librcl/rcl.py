@@ -1,4 +1,4 @@
-"""What the direct path calls in librcl, through ctypes.
+"""What is called in librcl, through ctypes.
 
 Structures after rcutils/types/uint8_array.h, rcutils/allocator.h and rmw/types.h of Jazzy. check.py holds them to
 what the libraries do before any of them carries a message.

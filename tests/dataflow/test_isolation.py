@@ -8,8 +8,9 @@ from threading import Thread
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -122,6 +123,40 @@ def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in
     assert [(each.fed, each.dropped) for each in group.counts()] == [(1, {DropReason.SHUTDOWN: 1})] * 2
 
 
+class _FailingOutlet(_Outlet):
+    """Fails for one message."""
+
+    topic = "/front/lidar"
+
+    def __init__(self, payload: object) -> None:
+        super().__init__()
+        self._refused = payload
+
+    def send(self, payload: object) -> None:
+        if payload == self._refused:
+            raise PublishError("no memory")
+        super().send(payload)
+
+
+def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_goes_on(caplog):
+    caplog.set_level("INFO")
+    group, outlets = _group(), [_Outlet(), _FailingOutlet(b"2")]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+    told = []
+    for n in range(4):
+        for index in range(2):
+            group.receive(index, b"%d" % n, 0, BEGIN + n * MS)
+        told.append(dict(group.unpublished))
+    assert told == [{}, {}, {1: (1, "no memory")}, {}]
+    assert [outlet.sent for outlet in outlets] == [[b"0", b"1", b"2", b"3"], [b"0", b"1", b"3"]]
+    assert group.failure is None
+    assert [record.message for record in caplog.records] == [
+        "front: a message could not be published on /front/lidar: no memory; trying again with the next one",
+        "front: publishing on /front/lidar again; 1 message was not published",
+    ]
+
+
 class _Source:
     """Gives messages, and fails where an exception stands in the place of one."""
 
@@ -138,7 +173,7 @@ class _Source:
             raise message
         return 0, message, message
 
-    def doubt(self) -> None:
+    def force_poll(self) -> None:
         pass
 
 
@@ -181,7 +216,7 @@ def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
         now=lambda: 0,
         expire=lambda _: _fail_at_times(chance),
         deadline=lambda: _fail_at_times(chance) or chance.choice([None, 0]),
-        beat=lambda: _fail_at_times(chance),
+        on_turn=lambda: _fail_at_times(chance),
         contain=told.append,
     )
     sound = [_Source(*(b"%d" % n for n in range(200))) for _ in range(3)]

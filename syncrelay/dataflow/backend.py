@@ -1,4 +1,4 @@
-"""How serialized messages come out of rcl and go back into it: what every path offers to the receive loop."""
+"""How serialized messages come out of rcl and go back into it: what each backend offers to the receive loop."""
 
 from collections.abc import Callable, Sequence
 from enum import Enum
@@ -12,10 +12,10 @@ Taken: TypeAlias = tuple[int, Any, Content]
 """The time of receipt, the payload as the engine carries it, and its content."""
 
 
-class PathName(Enum):
-    """The paths there are, by the names that users give them."""
+class BackendName(Enum):
+    """The backends, by the names that users give them."""
 
-    DIRECT = "direct"
+    LIBRCL = "direct"
     RCLPY = "rclpy"
 
 
@@ -24,22 +24,28 @@ class Source(Protocol):
 
     deliver: Deliver
     waited: int
-    """How long a message at most has lain there, from its receipt to the look that found it; the reader sets it back.
-
-    In nanoseconds.
-    """
+    """The longest that a message waited from its receipt to the poll that found it, in ns; the reader resets it."""
 
     def take(self) -> Taken | None:
-        """Take its oldest message; None if there is none that it has heard of."""
+        """Take its oldest message; None if none is pending."""
         ...
 
-    def doubt(self) -> None:
-        """Have `take` look for messages that it has not heard of, too, until there are none."""
+    def force_poll(self) -> None:
+        """Have `take` ask DDS until it has no more messages, whatever was reported as pending."""
         ...
+
+
+class PublishError(Exception):
+    """A message that rcl did not publish, and why."""
 
 
 class Outlet(Protocol):
-    """A publisher of payloads as they came."""
+    """A publisher of payloads as they came. Raises PublishError."""
+
+    @property
+    def topic(self) -> str:
+        """Where it publishes, after all remaps."""
+        ...
 
     def send(self, payload: Any) -> None:
         """Publish a payload unchanged."""
@@ -50,11 +56,11 @@ class Outlet(Protocol):
         ...
 
 
-Look: TypeAlias = tuple[Sequence[Source], int]
-"""Sources that may have got messages since they were drained, and the time of the look.
+Ready: TypeAlias = tuple[Sequence[Source], int]
+"""Sources that may have got messages since they were drained, and the time of the poll.
 
 Whatever was received up to that time, in nanoseconds of the system clock, is in one of them, or in one that was not
-drained, but for what DDS was just about to tell of. A source is drained when `take` gave None.
+drained, but for what DDS was just about to report. A source is drained when `take` gave None.
 """
 
 
@@ -62,14 +68,14 @@ class Watch(Protocol):
     """Tells which sources have messages."""
 
     def add(self, source: Any) -> None:
-        """Watch one more source, of the same path."""
+        """Watch one more source, of the same backend."""
         ...
 
     def remove(self, source: Any) -> None:
         """Watch it no longer."""
         ...
 
-    def wait(self, timeout_ns: int) -> Look:
+    def wait(self, timeout_ns: int) -> Ready:
         """Wait until a source gets messages, for the timeout at most, or until a wake."""
         ...
 
@@ -83,17 +89,17 @@ class Watch(Protocol):
 
 
 class GraphChanges(Protocol):
-    """Tells when the graph is worth another look. Used on one thread."""
+    """Tells when the graph is worth another poll. Used on one thread."""
 
     def seen(self) -> bool:
         """Whether anything may have changed since this was last asked; the first time it has."""
         ...
 
 
-class Path(Protocol):
-    """One way through rcl. What its sources give, its outlets take."""
+class RclBackend(Protocol):
+    """One way through rcl. Its outlets take what its sources give."""
 
-    name: PathName
+    name: BackendName
 
     def source(self, subscription: Any, deliver: Deliver) -> Any:
         """Drain a raw rclpy subscription from now on."""

@@ -1,4 +1,4 @@
-"""The path through rclpy's own raw take and publish: payloads are bytes, copied in and out."""
+"""rclpy's own raw take and publish: payloads are bytes, copied in and out."""
 
 import time
 from typing import Any
@@ -7,7 +7,7 @@ from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.cdr import patch_stamp
-from syncrelay.ros.path import Deliver, Look, PathName, Taken
+from syncrelay.dataflow.backend import BackendName, Deliver, PublishError, Ready, Taken
 
 
 class RclpySource:
@@ -27,15 +27,23 @@ class RclpySource:
         payload, meta = taken
         return meta["received_timestamp"], payload, payload
 
-    def doubt(self) -> None:
-        """Change nothing: it always looks."""
+    def force_poll(self) -> None:
+        """Change nothing: it always polls."""
 
 
 class RclpyOutlet:
     """A publisher of bytes."""
 
     def __init__(self, publisher: Any) -> None:
-        self.send = publisher.handle.publish_raw
+        self.topic = publisher.topic_name
+        self._publish = publisher.handle.publish_raw
+
+    def send(self, payload: bytes) -> None:
+        """Publish a payload unchanged. Raises PublishError."""
+        try:
+            self._publish(payload)
+        except _rclpy.RCLError as error:
+            raise PublishError(str(error)) from error
 
     def send_stamped(self, payload: bytes, stamp: int) -> None:
         """Publish a copy of the payload with this stamp."""
@@ -61,7 +69,7 @@ class WaitSetWatch:
         self._sources.remove(source)
         self._wait_set = None
 
-    def wait(self, timeout_ns: int) -> Look:
+    def wait(self, timeout_ns: int) -> Ready:
         """Wait until a source has messages, for the timeout at most, or until a wake."""
         if self._wait_set is None:
             self._wait_set = _rclpy.WaitSet(len(self._sources), 1, 0, 0, 0, 0, self._context.handle)
@@ -71,7 +79,7 @@ class WaitSetWatch:
         wait_set.add_guard_condition(self._guard.handle)
         for source in self._sources:
             wait_set.add_subscription(source.handle)
-        # Of what comes while it waits, only one source's may be seen: the next look is sure of it.
+        # Of what comes while it waits, only one source's may be seen: the next poll is sure of it.
         seen_until = time.time_ns()
         wait_set.wait(timeout_ns)
         ready = [source for index, source in enumerate(self._sources) if wait_set.is_ready("subscription", index)]
@@ -95,10 +103,10 @@ class NoGraphEvents:
         return True
 
 
-class RclpyPath:
+class RclpyBackend:
     """Takes and publishes bytes through rclpy: what works wherever rclpy does."""
 
-    name = PathName.RCLPY
+    name = BackendName.RCLPY
 
     def __init__(self, context: Any) -> None:
         self._context = context

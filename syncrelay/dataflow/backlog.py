@@ -9,7 +9,7 @@ from heapq import heappop, heappush
 from itertools import count
 from typing import Any, Final, TypeAlias
 
-from syncrelay.ros.path import Content, Look, Source, Taken
+from syncrelay.dataflow.backend import Content, Ready, Source, Taken
 
 _Head: TypeAlias = tuple[int, int, Any, Content, Source]
 
@@ -28,13 +28,13 @@ class Backlog:
         """The sources that could not be drained, and why; the reader empties it."""
         self._ties = count()
 
-    def deliver(self, look: Look) -> None:
-        """Deliver what is the oldest as far as the look tells, a batch at most.
+    def deliver(self, ready: Ready) -> None:
+        """Deliver what is the oldest as far as the poll can tell, a batch at most.
 
-        What came after the look is held: an older message may lie in a source that had none at the time. A
+        What came after the poll is held: an older message may be in a source that had none at the time. A
         source of which nothing is held is drained.
         """
-        sources, until = look
+        sources, until = ready
         if len(sources) == 1 and not self.held:
             self._deliver_alone(sources[0], until)
             return
@@ -49,7 +49,7 @@ class Backlog:
     def deliver_until(self, until: int, sources: Iterable[Source]) -> None:
         """Deliver what these sources received up to a time, in nanoseconds of the system clock, however much it is."""
         for source in sources:
-            source.doubt()
+            source.force_poll()
             if source not in self.held:
                 self._take(source)
         while self._heads and self._heads[0][0] <= until:

@@ -1,25 +1,25 @@
-"""What feeds an input of a group from the messages of a topic: the stamp and the key are read from the bytes."""
+"""What handles the messages of a topic for an input of a group: it reads the stamp and the key from the bytes."""
 
 from collections.abc import Callable
 from typing import Any
 
 from syncrelay.cdr import has_place_for_stamp
-from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.path import Content, Deliver
+from syncrelay.dataflow.backend import Content, Deliver
+from syncrelay.dataflow.group import GroupRelay
 from syncrelay.ros.types import StampReader, begins_with_header, stamp_reader, value_reader
 
 
-def taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
-    """What feeds one input of a group from messages of a type; raises TypeImportError where a field is not there.
+def handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
+    """What handles messages of a type for an input of a group; raises TypeImportError where a field is not there.
 
     It raises nothing itself: an exception stops the group, and nobody else on the topic.
     """
-    take = _taker(group, index, message_type)
+    handle = _handler(group, index, message_type)
     topic = group.config.topics[index]
     if group.config.restamp is None or topic.stamp == "header" or not begins_with_header(message_type):
-        return take
+        return handle
 
-    def take_if_it_can_be_restamped(payload: Any, content: Content, received: int) -> None:
+    def handle_if_it_can_be_restamped(payload: Any, content: Content, received: int) -> None:
         try:
             if not has_place_for_stamp(content):
                 group.receive(index, payload, received, None)
@@ -27,12 +27,12 @@ def taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
         except Exception as error:  # noqa: BLE001  see above
             group.fail(error)
             return
-        take(payload, content, received)
+        handle(payload, content, received)
 
-    return take_if_it_can_be_restamped
+    return handle_if_it_can_be_restamped
 
 
-def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
+def _handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
     topic = group.config.topics[index]
     read_stamp = stamp_reader(topic.stamp, message_type)
     if topic.key is not None:
@@ -44,33 +44,33 @@ def _taker(group: GroupRelay, index: int, message_type: Any) -> Deliver:
 
 
 def _by_stamp(group: GroupRelay, index: int, read_stamp: StampReader) -> Deliver:
-    def take(payload: Any, content: Content, received: int) -> None:
+    def handle(payload: Any, content: Content, received: int) -> None:
         try:
             group.receive(index, payload, received, read_stamp(content))
-        except Exception as error:  # noqa: BLE001  see `taker`
+        except Exception as error:  # noqa: BLE001  see `handler`
             group.fail(error)
 
-    return take
+    return handle
 
 
 def _by_receipt(group: GroupRelay, index: int) -> Deliver:
-    def take(payload: Any, _: Content, received: int) -> None:
+    def handle(payload: Any, _: Content, received: int) -> None:
         try:
             group.receive(index, payload, received, received)
-        except Exception as error:  # noqa: BLE001  see `taker`
+        except Exception as error:  # noqa: BLE001  see `handler`
             group.fail(error)
 
-    return take
+    return handle
 
 
 def _by_key(
     group: GroupRelay, index: int, read_stamp: StampReader | None, read_key: Callable[[Content], Any]
 ) -> Deliver:
-    def take(payload: Any, content: Content, received: int) -> None:
+    def handle(payload: Any, content: Content, received: int) -> None:
         try:
             stamp = read_stamp(content) if read_stamp else received
             group.receive_keyed(index, payload, received, stamp, read_key(content))
-        except Exception as error:  # noqa: BLE001  see `taker`
+        except Exception as error:  # noqa: BLE001  see `handler`
             group.fail(error)
 
-    return take
+    return handle
