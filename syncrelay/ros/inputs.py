@@ -67,11 +67,12 @@ class TopicInput:
 
     @property
     def is_due(self) -> bool:
-        """Whether it is to be polled though the graph is as before: for its type, or for what DDS did not make."""
+        """Whether to poll it though the graph is as before: for its type, a node's name, what DDS did not make."""
         return (
             self._force_poll
             or self._failure is not None
             or self._message_type is None
+            or not all(each.is_named for each in self.publishers)
             or any(binding.not_readable for binding in self.outputs.bindings)
             or (self._is_refused and self._may_try)
         )

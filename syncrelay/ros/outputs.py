@@ -69,6 +69,8 @@ class Outputs:
         self.bindings: list[InputBinding] = []
         self.deliver: Deliver = self._deliver
         """Feeds them all a message."""
+        self.largest = 0
+        """The size of the largest message in bytes; measured only where nothing is published."""
         self._handlers: list[Deliver] = []
         self._entities = entities
         self._backend = backend
@@ -140,7 +142,14 @@ class Outputs:
     def feed(self) -> None:
         """Feed those that have a handler, and whose messages can leave."""
         self._handlers = [each.handler for each in self.bindings if each.handler and not each.publisher_refusal]
-        self.deliver = self._handlers[0] if len(self._handlers) == 1 else self._deliver
+        if self._publishes:
+            self.deliver = self._handlers[0] if len(self._handlers) == 1 else self._deliver
+        else:
+            self.deliver = self._measure
+
+    def _measure(self, payload: Any, content: Content, received: int) -> None:
+        self.largest = max(self.largest, len(content))
+        self._deliver(payload, content, received)
 
     def _deliver(self, payload: Any, content: Content, received: int) -> None:
         for handle in self._handlers:

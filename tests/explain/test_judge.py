@@ -71,8 +71,8 @@ def test_nothing_is_remarkable_of_a_healthy_group_but_what_is_well():
 
 
 def test_a_required_input_is_blamed_before_an_optional_one():
-    nobody = {"publishers": (), "figures": {"last_received": None}}
-    group = a_silent_group(camera(required=False, **nobody), an_input("/lidar", **nobody))
+    stranger = {"publishers": (STRANGER,)}
+    group = a_silent_group(camera(required=False, **stranger), an_input("/lidar", **stranger))
     first, second = found_in(group)[:2]
     assert (first.input, first.severity) == (1, Severity.ERROR)
     assert (second.input, second.severity) == (0, Severity.WARN)
