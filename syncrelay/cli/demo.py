@@ -4,7 +4,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.resources import files
 from logging.handlers import MemoryHandler
@@ -16,6 +16,7 @@ from rich.text import Text
 
 from syncrelay.cli.digest import plain_line, summary
 from syncrelay.cli.live import Moment, frame
+from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.tally import GroupPlan, Tally
 from syncrelay.config import GroupConfig, load_text
@@ -38,6 +39,30 @@ _MOST_HELD = 1000
 def shipped_config() -> str:
     """Return the text of the file that the demo relays."""
     return (files("syncrelay.cli") / "demo.yaml").read_text(encoding="utf-8")
+
+
+def command(words: Sequence[str], stop: StopRequest) -> int:
+    """Run `syncrelay demo`."""
+    parser = Parser(
+        "syncrelay demo",
+        description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it. "
+        "Exit code 1 if a group gave no set.",
+    )
+    parser.add_argument("--seconds", metavar="N", type=positive, help="end N seconds after the sensors are up")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
+    parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays, and exit")
+    parser.add_argument(
+        "--record",
+        metavar="OUT",
+        help="write what the sensors send in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT"
+        " as a rosbag2 folder",
+    )
+    arguments = parser.read(words)
+    if arguments.record is not None:
+        from syncrelay.cli.demo_recording import record
+
+        return record(arguments.record, arguments.seconds, arguments.seed)
+    return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)
 
 
 def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopRequest) -> int:  # noqa: FBT001 - as parsed

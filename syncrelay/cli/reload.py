@@ -3,11 +3,14 @@
 import os
 import signal
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find_one
+from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
 from syncrelay.printable import one_entry, printable
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask
@@ -17,6 +20,17 @@ from syncrelay.top.state import Relay
 _PATIENCE_S: Final = 10.0
 _POLL_S: Final = 0.1
 _OTHERWISE: Final = "  Where the relay's file says `metrics: null`, send SIGHUP to its process"
+
+
+def command(words: Sequence[str], _stop: StopRequest) -> int:
+    """Run `syncrelay reload`."""
+    parser = Parser(
+        "syncrelay reload",
+        description="Has the relay on this machine read its file again. Groups that did not change keep running and "
+        "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
+    )
+    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host:port or URL")
+    return reload(parser.read(words).url)
 
 
 def reload(named: str | None) -> int:
