@@ -6,7 +6,6 @@ from syncrelay.bag.analysis import Analysis, GroupAnalysis, patch
 from syncrelay.bag.analysis.curves import queue_curve, slop_curve
 from syncrelay.bag.analysis.nearest import Pair
 from syncrelay.bag.analysis.topics import TopicFigures
-from syncrelay.bag.replay import GroupResult, InputResult
 from syncrelay.cli.summary import summarize
 from syncrelay.explain import in_words, words
 from syncrelay.printable import printable
@@ -81,8 +80,8 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
         yield f"  {pair_line(pair)}"
     yield from (f"  {line}" for line in _curves(each))
     topics = [topic.topic for topic in each.group.topics]
-    inputs = tuple(InputResult(*row) for row in zip(topics, each.trial.counts, strict=True))
-    yield from (f"  {line}" for line in summarize(GroupResult(name, inputs, len(each.trial.sets))))
+    counts = zip(topics, each.trial.counts, strict=True)
+    yield from (f"  {line}" for line in summarize(name, len(each.trial.sets), counts))
     for lasting in each.findings:
         yield f"  {lasting.finding.severity.name.lower()}, {lasting.seconds} s: {in_words(lasting.finding)}"
     for hint in suggestion.hints:

@@ -80,7 +80,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         remark(f"{wanted.output} is written: {counted(written.count, 'message')} of {counted(sets, 'set')}")
     tell = say if wanted.sets or wanted.drops else put
     for result in results:
-        for line in summarize(result):
+        for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):
             tell(line)
     return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
 

@@ -153,9 +153,10 @@ def run(
                 files.read_again()
             if (read := files.take()) is not None:
                 _reload(relay, read, config_paths, groups)
-        for group in relay.drain().groups:
-            for line in summarize(group):
-                LOGGER.info(line, extra={"group": group.name})
+        for report in relay.drain():
+            facts = report.facts
+            for line in summarize(facts.name, facts.figures.sets, [(each.name, each.counts) for each in facts.inputs]):
+                LOGGER.info(line, extra={"group": facts.name})
     return 0
 
 

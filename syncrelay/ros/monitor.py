@@ -138,7 +138,13 @@ class Monitor:
         self._look(longest_ago[: max(_IN_TURN, ceil(len(longest_ago) / _LONGEST_TURN))])
 
     def _look(self, wirings: Sequence[Wiring]) -> None:
-        waits, seen = self._loop.call(lambda: self._gather(wirings)).result()
+        self._judge(wirings, *self._loop.call(lambda: self._gather(wirings)).result())
+
+    def conclude(self) -> None:
+        """Look at all groups a last time, after the receive loop has ended."""
+        self._judge(self._wirings, *self._gather(self._wirings))
+
+    def _judge(self, wirings: Sequence[Wiring], waits: Sequence[int], seen: Sequence[_Seen]) -> None:
         now = time.time_ns()
         # Receipt is by the wall clock: a step of that is no wait.
         has_stepped = self._wall_clock.has_stepped()

@@ -17,7 +17,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from syncrelay.config import Config, ConfigError, GroupConfig
 from syncrelay.config.wording import counted
 from syncrelay.errors import ReloadError, SyncRelayError
-from syncrelay.explain import GroupReport, recent
+from syncrelay.explain import GroupReport
 from syncrelay.ros.bugs import Bugs
 from syncrelay.ros.diagnostics import Telling
 from syncrelay.ros.entities import Entities, Purpose
@@ -26,7 +26,6 @@ from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import LOOK_S, Monitor
 from syncrelay.ros.path_choice import VARIABLE, choose_path
 from syncrelay.ros.receive import ReceiveLoop
-from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.ros.start import make_node, resolver, start
 from syncrelay.ros.transport import apply_transport
 from syncrelay.ros.wakeup import Wakeup
@@ -267,15 +266,8 @@ class Relay:
             unjudged=self.monitor.unjudged,
         )
 
-    def snapshot(self) -> RelaySnapshot:
-        """What is known of all groups, taken between two messages. Any thread."""
-        try:
-            return self._loop.call(self._snapshot).result()
-        except CancelledError:
-            return self._snapshot()
-
-    def drain(self) -> RelaySnapshot:
-        """Take in what has arrived, let go of what is buffered, stop receiving; what became of it all."""
+    def drain(self) -> tuple[GroupReport, ...]:
+        """Take in what has arrived, let go of what is buffered, stop receiving; report on each group a last time."""
         receiving, self._receiving = self._receiving, None
         self._phase = Phase.DRAINING
         if receiving is not None:
@@ -287,7 +279,8 @@ class Relay:
             for topic_input in self._wirings.inputs:
                 with self._bugs.contained(f"ending {topic_input.name}"):
                     topic_input.wait_until_acknowledged(deadline)
-        return self._snapshot()
+            self.monitor.conclude()
+        return self.monitor.reports
 
     def close(self) -> None:
         """Drain, then leave the ROS graph, also when draining fails."""
@@ -346,9 +339,6 @@ class Relay:
         for group in self._wirings.groups:
             group.expire(now)
 
-    def _snapshot(self) -> RelaySnapshot:
-        return RelaySnapshot(tuple(_describe(wiring) for wiring in self._wirings.all))
-
     def _announce(self) -> None:
         """Say once what each group waits for, and once that it runs."""
         for wiring in self._wirings.all:
@@ -378,24 +368,3 @@ def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:
     except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
         deadlines = [group.next_deadline() for group in groups]
     return min((deadline for deadline in deadlines if deadline is not None), default=None)
-
-
-def _describe(wiring: Wiring) -> GroupSnapshot:
-    group = wiring.group
-    inputs = zip(group.config.topics, wiring.inputs, group.counts(), strict=True)
-    return GroupSnapshot(
-        name=group.config.name,
-        inputs=tuple(
-            InputSnapshot(
-                topic=topic.topic,
-                output=topic.output,
-                counts=counts,
-                publishers=topic_input.publisher_count,
-                subscribed=topic_input.subscribed,
-            )
-            for topic, topic_input, counts in inputs
-        ),
-        sets=group.engine.sets,
-        recent=recent(group.last),
-        waiting_for=wiring.waiting_for,
-    )
