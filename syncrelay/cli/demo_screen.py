@@ -55,8 +55,8 @@ def frame(moment: Moment, *, width: int, height: int) -> Lines:
         spare = height - sum(map(len, blocks))
         if spare >= 0:
             break
-    # A blank line above each block, the last one first, as far as there is room.
-    above = [max(0, min(1, spare - index)) for index in reversed(range(len(blocks)))]
+    # A blank line above each block but the title, above the last ones first, as far as there is room.
+    above = [0, *(max(0, min(1, spare - index)) for index in reversed(range(len(blocks) - 1)))]
     lines = [each for blank, block in zip(above, blocks, strict=True) for each in (*[Text("")] * blank, *block)]
     return Lines(*lines[:height])
 

@@ -143,7 +143,7 @@ def run(
         if server is not None:
             server.serve(relay.state)
             LOGGER.info(
-                "status and metrics: http://%s/, `syncrelay top --url %s` shows them", server.place, server.place.url
+                "status and metrics: http://%s/; watch with `syncrelay top --url %s`", server.place, server.place.url
             )
         if explain_s is not None:
             return explain(relay, explain_s, stop=stop)
@@ -203,7 +203,7 @@ def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]
     except ListenError as error:
         if listen.is_asked_for:
             raise
-        LOGGER.warning("no /status and no /metrics: %s", error)
+        LOGGER.warning("not serving /status and /metrics: %s", error)
         return nullcontext()
 
 

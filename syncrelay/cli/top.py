@@ -77,20 +77,20 @@ def _require_terminal() -> None:
     # Keys come from stdin and the screen goes to stderr; who redirects stdout wants text.
     streams = (sys.stdin, sys.stdout, sys.stderr)
     if not all(stream.isatty() for stream in streams):
-        raise SyncRelayError("top draws on a terminal, and here is none\n  `syncrelay top --once` prints text")
+        raise SyncRelayError("top needs a terminal, and there is none here\n  `syncrelay top --once` prints text")
     if os.environ.get("TERM", "dumb") in {"dumb", "unknown"} or not sys.stderr.encoding.lower().startswith("utf"):
         raise SyncRelayError(
-            "this terminal cannot be drawn on: see TERM and LANG\n  `syncrelay top --once` prints text"
+            "top cannot draw on this terminal: check TERM and LANG\n  `syncrelay top --once` prints text"
         )
 
 
 def _otherwise(named: str | None) -> str:
     if named is None:
         return (
-            "  Start one with `syncrelay --config FILE`, whose file must not say "
+            "  Start one with `syncrelay --config FILE`, whose file must not say\n"
             "  `metrics: null`, or say where it is: `syncrelay top --url robot:9464`."
         )
     return (
-        "  From other machines a relay can be asked if its file says "
+        "  From other machines a relay can be asked if its file says\n"
         "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between."
     )

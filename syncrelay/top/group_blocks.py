@@ -26,7 +26,7 @@ _LINES_OF_SPARKS: Final = 44
 
 def title(group: Group, width: int) -> Text:
     """Draw the group's name and what the file says of it, as a rule across the screen."""
-    text = f"── {group.name}: {phrases.keys(group)} "
+    text = f"── {group.name}: {phrases.options(group)} "
     return line((text + "─" * max(0, width - len(text)), "bold"))
 
 

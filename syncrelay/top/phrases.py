@@ -67,7 +67,7 @@ def last_set(group: Group) -> str:
     return f"{group.sets} {'set' if group.sets == 1 else 'sets'}, last {ago(group.since_last_set_ms)}"
 
 
-def keys(group: Group) -> str:
+def options(group: Group) -> str:
     """Say what the file says of a group."""
     tolerance = [f"{group.tolerance.key} {duration(group.tolerance.ms)}"] if group.tolerance else []
     waits = [] if group.max_wait_ms is None else [f"max_wait {duration(group.max_wait_ms)}"]

@@ -32,7 +32,7 @@ def group_lines(group: Group) -> Iterator[str]:
     """Say all of a group."""
     rate = f"{phrases.sets_of_possible(group)} possible sets a second, {phrases.last_set(group)}"
     yield from _wrapped(f"{group.name}: {phrases.LEVELS[group.level]}, {rate}", indent="")
-    yield from _wrapped(phrases.keys(group), indent="  ")
+    yield from _wrapped(phrases.options(group), indent="  ")
     for name, sample in (("span", group.span_ms), ("latency", group.latency_ms)):
         if sample is not None:
             values = (("p50", sample.p50), ("p95", sample.p95), ("max", sample.max))
