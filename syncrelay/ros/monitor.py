@@ -101,7 +101,13 @@ class Monitor:
         self._evaluate(longest_ago[: max(_IN_TURN, ceil(len(longest_ago) / _LONGEST_TURN))])
 
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
-        waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
+        self._judge(bindings, *self._loop.call(lambda: self._gather(bindings)).result())
+
+    def conclude(self) -> None:
+        """Evaluate all groups a last time, after the receive loop has ended."""
+        self._judge(self._bindings, *self._gather(self._bindings))
+
+    def _judge(self, bindings: Sequence[GroupBinding], waits: Sequence[int], batches: Sequence[Batch]) -> None:
         now = time.time_ns()
         # Messages are received by the system's clock: a step of it is no wait.
         has_stepped = self._system_clock.has_stepped(now)

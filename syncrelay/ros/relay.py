@@ -17,17 +17,16 @@ from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.environment.transport import apply_transport
 from syncrelay.errors import SyncRelayError
-from syncrelay.explain import GroupReport, recent
+from syncrelay.explain import GroupReport
 from syncrelay.logs import name_after
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
-from syncrelay.ros.bindings import GroupBinding, GroupBindings
+from syncrelay.ros.bindings import GroupBindings
 from syncrelay.ros.clock import WaitingClock
 from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
-from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
 from syncrelay.status import Phase, RelayState
@@ -232,15 +231,8 @@ class Relay:
             unjudged=self.monitor.unjudged,
         )
 
-    def snapshot(self) -> RelaySnapshot:
-        """What is known of all groups, taken between two messages. Any thread."""
-        try:
-            return self._loop.call(self._snapshot).result()
-        except CancelledError:
-            return self._snapshot()
-
-    def drain(self) -> RelaySnapshot:
-        """Take in what has arrived, let go of what is buffered, stop receiving; what became of it all."""
+    def drain(self) -> tuple[GroupReport, ...]:
+        """Take in what has arrived, let go of what is buffered, stop receiving; report on each group a last time."""
         receiving, self._receiving = self._receiving, None
         self._phase = Phase.DRAINING
         if receiving is not None:
@@ -251,7 +243,8 @@ class Relay:
             for topic in self._groups.bindings.topics:
                 with self._bugs.contained(f"ending {topic.name}"):
                     topic.outputs.wait_until_acknowledged(deadline)
-        return self._snapshot()
+            self.monitor.conclude()
+        return self.monitor.reports
 
     def close(self) -> None:
         """Drain, then leave the ROS graph, also when draining fails."""
@@ -275,27 +268,3 @@ class Relay:
                 self._services.spin()
                 return
             time.sleep(_AFTER_FAILURE_S)
-
-    def _snapshot(self) -> RelaySnapshot:
-        return RelaySnapshot(tuple(_describe(binding) for binding in self._groups.bindings.all))
-
-
-def _describe(binding: GroupBinding) -> GroupSnapshot:
-    group = binding.group
-    inputs = zip(group.config.topics, binding.inputs, group.counts(), strict=True)
-    return GroupSnapshot(
-        name=group.config.name,
-        inputs=tuple(
-            InputSnapshot(
-                topic=topic.topic,
-                output=topic.output,
-                counts=counts,
-                publishers=sum(publisher.type == topic.type for publisher in each.topic.publishers),
-                subscribed=each.topic.profile is not None,
-            )
-            for topic, each, counts in inputs
-        ),
-        sets=group.engine.sets,
-        recent=recent(group.last),
-        waiting_for=binding.waiting_for,
-    )

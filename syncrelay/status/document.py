@@ -13,6 +13,7 @@ from syncrelay.explain import (
     InputFacts,
     RecentDrop,
     RecentSet,
+    explanation,
 )
 from syncrelay.status.state import RelayState, is_ready, level
 
@@ -62,11 +63,12 @@ def group_document(report: GroupReport) -> dict[str, Any]:
         "possible_hz": round(facts.possible_hz, 3),
         "since_last_set_ms": _ms(None if figures.last_set is None else figures.now - figures.last_set),
         "span_ms": _percentiles(figures.spans),
+        "span_without_offsets_ms": _ms(report.span_without_offsets),
         "latency_ms": _percentiles(figures.latencies),
         "nearest_ms": _percentiles(figures.nearest),
         "last_sets": [{"span_ms": _ms(span), "latency_ms": _ms(late)} for span, late in reversed(figures.last_sets)],
         "inputs": [_input(facts, index, each) for index, each in enumerate(facts.inputs)],
-        "findings": [_finding(facts, finding) for finding in report.findings],
+        "findings": [_finding(facts, finding) for finding in _explanation_first(report.findings)],
         "recent": [_recent(outcome) for outcome in report.recent],
     }
 
@@ -100,6 +102,11 @@ def _endpoint(endpoint: Endpoint) -> dict[str, Any]:
     why = endpoint.mismatch
     mismatch = why and {"policy": why.policy, "offered": why.offered, "requested": why.requested}
     return {"node": endpoint.node, "type": endpoint.type, "mismatch": mismatch}
+
+
+def _explanation_first(findings: tuple[Finding, ...]) -> list[Finding]:
+    first = explanation(findings)
+    return [first, *(finding for finding in findings if finding is not first)]
 
 
 def _finding(facts: GroupFacts, finding: Finding) -> dict[str, Any]:

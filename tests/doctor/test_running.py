@@ -22,7 +22,7 @@ def test_a_port_that_is_taken_is_an_info_where_the_file_asks_for_it():
         ports = range(taken.getsockname()[1], taken.getsockname()[1] + 1)
         (found,) = check_listen(Listen("127.0.0.1", ports))
         assert (found.code, found.severity) == ("listen", Severity.INFO)
-        assert found.what.startswith(f"cannot listen on 127.0.0.1:{ports[0]}: another process does")
+        assert found.what.startswith(f"cannot listen on 127.0.0.1:{ports[0]}: another process uses it")
         assert list(check_listen(Listen("127.0.0.1", ports, is_asked_for=False))) == []
     assert list(check_listen(Listen("127.0.0.1", range(1)))) == []
     assert list(check_listen(None)) == []

@@ -109,8 +109,8 @@ def test_a_port_that_is_taken_is_an_error_that_says_so(stage: Stage):
         relay = stage.relay(front(top={"metrics": {"listen": address}}))
         assert relay.wait() == 1
     assert relay.said[-1] == (
-        f"syncrelay: cannot listen on {address}: another process does; give `metrics` another `listen`, or write"
-        " `metrics: null` to go without"
+        f"syncrelay: cannot listen on {address}: another process uses it; set another `listen` in `metrics`, or write"
+        " `metrics: null` to run without"
     )
 
 

@@ -155,7 +155,7 @@ def test_a_held_picture_stays_and_then_shows_what_came_meanwhile():
         with serving(states.healthy()) as server:
             async with terminal(server) as user:
                 await user.press("space")
-                assert " PAUSED: space goes on" in user.lines
+                assert " PAUSED: press space to resume" in user.lines
                 asked = server.asked
                 server.show(states.silent())
                 while server.asked < asked + 2:
@@ -245,7 +245,7 @@ def test_sixteen_inputs_are_told_apart_by_what_differs_in_their_names():
 
 
 def test_what_has_no_room_is_counted():
-    assert "… 4 more lines: enter" in at_terminal(states.sixteen_inputs())
+    assert "… 4 more lines: press enter" in at_terminal(states.sixteen_inputs())
 
 
 def test_a_bug_ends_it_and_is_handed_on():
