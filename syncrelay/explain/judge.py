@@ -131,7 +131,7 @@ class Judge:
             # Few sets are what other findings come to: they are said where there is none of those.
             found += rules_matching.few_sets(facts)
         self._remember(found, facts)
-        return self._unexplained(found, facts) if found and self._causes else tuple(found)
+        return self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
 
     def _remember(self, found: Iterable[Finding], facts: GroupFacts) -> None:
         now = facts.figures.now
@@ -142,7 +142,7 @@ class Judge:
             if finding.explains and finding.code in EXPLAINS:
                 self._causes[finding.code, finding.input] = _Cause(finding, now)
 
-    def _unexplained(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
+    def _unexplained_by_others(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
         """Return the findings that nothing explains; of a silent group an error, be it a cause that is over."""
         roots = [(finding, self._root(finding, facts)) for finding in found]
         said = [finding for finding, root in roots if finding is root]
@@ -172,8 +172,10 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     is_narrow = finding.code not in explained.in_group or (about is not None and not facts.inputs[about].required)
     if is_narrow and about is not None and about != finding.input:
         return False
-    seen_since = _SEEN_SINCE.get(finding.code)
-    return cause.at >= (facts.figures.now - WINDOW_NS if seen_since is None else seen_since(facts))
+    now, seen_since = facts.figures.now, _SEEN_SINCE.get(finding.code)
+    since = now - WINDOW_NS if seen_since is None else seen_since(facts)
+    # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
+    return cause.at >= (max(since, now - facts.silent_after) if finding.severity is Severity.ERROR else since)
 
 
 def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
