@@ -35,8 +35,17 @@ class Source(Protocol):
         ...
 
 
+class PublishError(Exception):
+    """A message that rcl did not publish, and why."""
+
+
 class Outlet(Protocol):
-    """A publisher of payloads as they came."""
+    """A publisher of payloads as they came. Raises PublishError."""
+
+    @property
+    def topic(self) -> str:
+        """Where it publishes, after all remaps."""
+        ...
 
     def send(self, payload: Any) -> None:
         """Publish a payload unchanged."""

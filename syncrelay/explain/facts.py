@@ -64,9 +64,10 @@ class InputGraph:
     """What the graph shows around an input; a recording shows no more than that it was published.
 
     `name` is the topic's in the graph, `output` that under which its messages leave, `not_importable` says why its type
-    cannot be used here, `refusal` what DDS does not make for it, `alike` are topics of the graph that may have been
-    meant, `lost` counts what DDS lost on the way of late. `rivals` are others that publish its output, seen so without
-    a break since `rivals_since`.
+    cannot be used here, `not_readable` why the stamp or key that the file names cannot be read from it, `refusal` what
+    DDS does not make or publish for it, `alike` are topics of the graph that may have been meant, `lost` counts what
+    DDS lost on the way of late. `rivals` are others that publish its output, seen so without a break since
+    `rivals_since`.
     """
 
     name: str
@@ -75,6 +76,7 @@ class InputGraph:
     subscribers: tuple[Endpoint, ...] = ()
     alike: tuple[str, ...] = ()
     not_importable: str | None = None
+    not_readable: str | None = None
     refusal: Refusal | None = None
     lost: int = 0
     rivals: tuple[Endpoint, ...] = ()

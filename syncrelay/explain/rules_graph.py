@@ -48,13 +48,21 @@ def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Foun
 
 
 def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find a type that cannot be used here."""
+    """Find a type that cannot be used here, or not as the file asks."""
     if an_input.graph.not_importable:
         yield Finding(
             Code.TYPE_NOT_IMPORTABLE,
             Severity.ERROR if an_input.required else Severity.WARN,
             f"{an_input.name}: {an_input.graph.not_importable.splitlines()[0]}",
             "install the package where the relay runs, or source the workspace that has it",
+            index,
+        )
+    elif an_input.graph.not_readable:
+        yield Finding(
+            Code.TYPE_NOT_IMPORTABLE,
+            Severity.ERROR if an_input.required else Severity.WARN,
+            f"{an_input.name}: {an_input.graph.not_readable.splitlines()[0]}",
+            "name another field at `stamp` or `key`, then `syncrelay reload`",
             index,
         )
 

@@ -102,7 +102,7 @@ class TopicInput:
             self.make_publisher(binding)
         except RefusedError as error:
             binding.publisher_refusal = error.refusal
-            self._put_off(error)
+            self._put_off(error.refusal)
 
     def attach(self, binding: InputBinding) -> None:
         """Feed it from now on. On the loop's thread, or before that runs."""
@@ -120,7 +120,7 @@ class TopicInput:
         self._feed()
 
     def close(self) -> None:
-        """Receive no longer; if it is polled again, it begins anew. On the main thread."""
+        """Stop receiving; if it is polled again, it starts again. On the main thread."""
         self._force_poll = True
         source, self._source = self._source, None
         if source is not None:
@@ -135,7 +135,7 @@ class TopicInput:
         self._try_again, self._force_poll = 0.0, True
 
     def poll(self) -> None:
-        """Poll the graph; subscribe, anew where the publishers' QoS changed; `missing` says what is not there."""
+        """Poll the graph and subscribe, again where the publishers' QoS changed; `missing` says what is missing."""
         # Until all went well it is due again, though the graph is as before.
         self._force_poll = True
         if self._failure is not None:
@@ -146,7 +146,7 @@ class TopicInput:
     def _end_failed(self, error: Exception) -> None:
         self._failure = None
         self.close()
-        self._refused(RefusedError(Refusal("receive", self.name, self.type, why=str(error) or type(error).__name__)))
+        self._refused(Refusal("receive", self.name, self.type, why=str(error) or type(error).__name__))
         if not isinstance(error, _OF_RCL):
             raise error
 
@@ -213,7 +213,7 @@ class TopicInput:
             if profile != self.profile:
                 self._exchange(profile)
         except RefusedError as error:
-            self._refused(error)
+            self._refused(error.refusal)
             return
         self.refusal = None
         lacking = [binding for binding in self.outputs.bindings if binding.publisher is None]
@@ -222,21 +222,21 @@ class TopicInput:
         if any(binding.publisher is not None for binding in lacking):
             self._loop.call(lambda: self.connect(lacking)).result()
 
-    def _refused(self, error: RefusedError) -> None:
-        self.refusal = error.refusal
-        self._put_off(error)
+    def _refused(self, refusal: Refusal) -> None:
+        self.refusal = refusal
+        self._put_off(refusal)
 
-    def _put_off(self, error: RefusedError) -> None:
+    def _put_off(self, refusal: Refusal) -> None:
         self._try_again = time.monotonic() + _TRY_AGAIN_S
-        self._say_once(logging.ERROR, str(error))
+        self._say_once(logging.ERROR, refusal.text)
 
     def _exchange(self, profile: Any) -> None:
         """Replace the subscription and its outputs by ones of another QoS; raises RefusedError, with nothing changed.
 
-        An output that DDS does not make anew goes on as it was.
+        An output that DDS does not make again stays as it was.
         """
         subscription = self._entities.subscription(self._message_type, self._topic, profile)
-        publishers, refused = self.outputs.make_anew(self._message_type, profile)
+        publishers, refused = self.outputs.remake(self._message_type, profile)
         for refusal in refused:
             self._put_off(refusal)
         lost = None
@@ -281,7 +281,7 @@ class TopicInput:
 
 
 def _loss_counter(subscription: Any) -> Any:
-    """What counts the messages that DDS loses, None where it does not tell. Raises RCLError."""
+    """What counts the messages that DDS loses; None where it does not count them. Raises RCLError."""
     try:
         return _rclpy.EventHandle(
             subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST

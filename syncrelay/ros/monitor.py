@@ -3,7 +3,6 @@
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -16,12 +15,10 @@ from syncrelay.explain import (
     GroupReport,
     GroupWatch,
     Judge,
-    RecentDrop,
     Severity,
 )
 from syncrelay.ros.bindings import GroupBinding
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.sync.counts import InputCounts
 
 if TYPE_CHECKING:
     from syncrelay.ros.inputs import TopicInput
@@ -34,14 +31,6 @@ EVALUATE_S: Final = 1.0
 _IN_TURN: Final = 10
 # ... and none waits for more than so many evaluations: a group is silent after 5 s.
 _LONGEST_TURN: Final = 4
-
-
-@dataclass(frozen=True, slots=True)
-class _Gathered:
-    batch: Batch
-    counts: tuple[InputCounts, ...]
-    sets: int
-    last: tuple[tuple[int | None, ...] | RecentDrop, ...]
 
 
 class _Watched(NamedTuple):
@@ -108,7 +97,7 @@ class Monitor:
         self._evaluate(longest_ago[: max(_IN_TURN, ceil(len(longest_ago) / _LONGEST_TURN))])
 
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
-        waits, seen = self._loop.call(lambda: self._gather(bindings)).result()
+        waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
         now = time.time_ns()
         # Messages are received by the system's clock: a step of it is no wait.
         has_stepped = self._system_clock.has_stepped(now)
@@ -119,42 +108,35 @@ class Monitor:
             self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
         for topic, losses in self._losses.items():
             losses.observe(topic.lost(), publishers=len(topic.publishers))
-        for binding, gathered in zip(bindings, seen, strict=True):
+        for binding, batch in zip(bindings, batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
                 try:
-                    self._evaluate_group(binding, gathered, now)
+                    self._evaluate_group(binding, batch, now)
                 except Exception:
                     # Else an old report would stand for ever.
                     self._reports.pop(binding.group, None)
                     raise
 
-    def _evaluate_group(self, binding: GroupBinding, gathered: _Gathered, now: int) -> None:
+    def _evaluate_group(self, binding: GroupBinding, batch: Batch, now: int) -> None:
         watch, judge, log = self._watched[binding.group]
-        batch, clock = gathered.batch, self._clock
-        by_clock = clock.at if clock and clock.is_steady else None
-        watch.add(
-            batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, by_clock=by_clock, now=now
-        )
+        by_clock = self._clock.at if self._clock and self._clock.is_steady else None
+        watch.add(batch.arrivals, batch.sets, batch.counts, batch.n_sets, keys=batch.keys, by_clock=by_clock, now=now)
         shown = [self._surroundings.of(each, lost=self._losses[each.topic].recent) for each in binding.inputs]
-        failure = binding.group.failure
         facts = watch.facts(
             shown,
             now=now,
-            clock=clock.state if clock else None,
+            clock=self._clock.state if self._clock else None,
             clock_set=self._system_clock.last_step(now),
             waited=max(self._waits[each.topic].longest for each in binding.inputs),
             standstill=self.standstills.longest,
-            failure=failure,
+            failure=binding.group.failure,
         )
         found = judge.judge(facts)
-        self._reports[binding.group] = GroupReport(facts, found, gathered.last)
+        self._reports[binding.group] = GroupReport(facts, found, batch.last)
         for remark in log.remarks(facts, found):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 
-    def _gather(self, bindings: Sequence[GroupBinding]) -> tuple[list[int], list[_Gathered]]:
-        """Take how long messages of each input waited, and what came and left. On the loop's thread."""
-        groups = [binding.group for binding in bindings]
-        return [each.take_wait() for each in self._waits], [
-            _Gathered(group.watched(), group.counts(), group.engine.sets, tuple(group.last)) for group in groups
-        ]
+    def _gather(self, bindings: Sequence[GroupBinding]) -> tuple[list[int], list[Batch]]:
+        """Take how long messages of each topic waited, and what came and left. On the loop's thread."""
+        return [each.take_wait() for each in self._waits], [binding.group.watched() for binding in bindings]

@@ -85,7 +85,7 @@ class Outputs:
             binding.publisher = self._made(binding, message_type, profile)
             binding.publisher_refusal = None
 
-    def make_anew(self, message_type: Any, profile: Any) -> tuple[dict[InputBinding, Any], list[RefusedError]]:
+    def remake(self, message_type: Any, profile: Any) -> tuple[dict[InputBinding, Any], list[Refusal]]:
         """Make publishers of another QoS. What DDS refuses stays as it was."""
         made: dict[InputBinding, Any] = {}
         refused = []
@@ -94,7 +94,8 @@ class Outputs:
                 made[binding] = self._made(binding, message_type, profile)
             except RefusedError as error:
                 binding.publisher_refusal = None if binding.publisher else error.refusal
-                refused.append(error)
+                # The error itself would hold on to its callers, and so to what they end.
+                refused.append(error.refusal)
         return made, refused
 
     def _made(self, binding: InputBinding, message_type: Any, profile: Any) -> Any:

@@ -7,7 +7,7 @@ from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.cdr import patch_stamp
-from syncrelay.dataflow.backend import BackendName, Deliver, Ready, Taken
+from syncrelay.dataflow.backend import BackendName, Deliver, PublishError, Ready, Taken
 
 
 class RclpySource:
@@ -35,7 +35,15 @@ class RclpyOutlet:
     """A publisher of bytes."""
 
     def __init__(self, publisher: Any) -> None:
-        self.send = publisher.handle.publish_raw
+        self.topic = publisher.topic_name
+        self._publish = publisher.handle.publish_raw
+
+    def send(self, payload: bytes) -> None:
+        """Publish a payload unchanged. Raises PublishError."""
+        try:
+            self._publish(payload)
+        except _rclpy.RCLError as error:
+            raise PublishError(str(error)) from error
 
     def send_stamped(self, payload: bytes, stamp: int) -> None:
         """Publish a copy of the payload with this stamp."""
@@ -88,7 +96,7 @@ class WaitSetWatch:
 
 
 class NoGraphEvents:
-    """What rclpy tells of changes in the graph: nothing, so there may always be some."""
+    """rclpy does not report changes of the graph, so there may always be some."""
 
     def seen(self) -> bool:
         """Whether anything may have changed: always."""

@@ -4,7 +4,8 @@ import time
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from syncrelay.explain import Endpoint, InputGraph
+from syncrelay.config.wording import counted
+from syncrelay.explain import Endpoint, InputGraph, Refusal
 from syncrelay.ros import graph
 from syncrelay.ros.entities import Purpose
 from syncrelay.ros.outputs import InputBinding
@@ -53,8 +54,9 @@ class Surroundings:
             rivals=around.rivals,
             rivals_since=self._rivals_since.get(binding, 0),
             alike=around.alike,
-            not_importable=topic.not_importable or binding.not_readable,
-            refusal=binding.refusal,
+            not_importable=topic.not_importable,
+            not_readable=binding.not_readable,
+            refusal=binding.refusal or _unpublished(binding, around.output),
             lost=lost,
         )
 
@@ -87,3 +89,12 @@ class Surroundings:
             if topic not in outputs and self._node.count_publishers(topic)
         ]
         return graph.topics_alike(name, type_name, published)
+
+
+def _unpublished(binding: InputBinding, output: str) -> Refusal | None:
+    """What rcl did not publish last."""
+    last = binding.group.unpublished.get(binding.index)
+    if last is None:
+        return None
+    why = f"{last.why} ({counted(last.messages, 'message')} so far)"
+    return Refusal("publish", output, binding.topic.type, why=why)

@@ -57,7 +57,7 @@ def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:
     try:
         return field_reader(_fields_of, name.replace("/msg/", "/"), path)
     except UnreadableFieldError as error:
-        raise TypeImportError(f"{name} has no field {path} to go by: {error}") from error
+        raise TypeImportError(f"{name} has no usable field {path}: {error}") from error
 
 
 def _fields_of(name: str) -> Mapping[str, str]:

@@ -8,6 +8,7 @@ from threading import Thread
 import pytest
 
 from syncrelay.config import load_text
+from syncrelay.dataflow.backend import PublishError
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.sync import DropReason
@@ -120,6 +121,40 @@ def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in
     group.resume()
     assert [outlet.sent for outlet in outlets] == [[], []]
     assert [(each.fed, each.dropped) for each in group.counts()] == [(1, {DropReason.SHUTDOWN: 1})] * 2
+
+
+class _FailingOutlet(_Outlet):
+    """Fails for one message."""
+
+    topic = "/front/lidar"
+
+    def __init__(self, payload: object) -> None:
+        super().__init__()
+        self._refused = payload
+
+    def send(self, payload: object) -> None:
+        if payload == self._refused:
+            raise PublishError("no memory")
+        super().send(payload)
+
+
+def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_goes_on(caplog):
+    caplog.set_level("INFO")
+    group, outlets = _group(), [_Outlet(), _FailingOutlet(b"2")]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+    told = []
+    for n in range(4):
+        for index in range(2):
+            group.receive(index, b"%d" % n, 0, BEGIN + n * MS)
+        told.append(dict(group.unpublished))
+    assert told == [{}, {}, {1: (1, "no memory")}, {}]
+    assert [outlet.sent for outlet in outlets] == [[b"0", b"1", b"2", b"3"], [b"0", b"1", b"3"]]
+    assert group.failure is None
+    assert [record.message for record in caplog.records] == [
+        "front: a message could not be published on /front/lidar: no memory; trying again with the next one",
+        "front: publishing on /front/lidar again; 1 message was not published",
+    ]
 
 
 class _Source:

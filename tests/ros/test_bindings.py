@@ -2,13 +2,14 @@
 
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 from threading import Thread
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from syncrelay.config import load_text
+from syncrelay.config import StampField, load_text
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Refusal
 from tests.ros.configs import config
@@ -194,6 +195,30 @@ def test_a_topic_that_gives_no_messages_any_more_is_subscribed_anew_and_told(her
         lambda: publisher.publish(import_type(_IMU)()) or binding.group.counts()[0].fed > 0,
         "messages of the new source",
     )
+
+
+def test_a_field_that_a_type_does_not_have_stops_the_one_input_that_asks_for_it(here):
+    groups = {"right": [("/x", _IMU, "/a"), ("/y", _IMU, "/b")], "wrong": [("/x", _IMU, "/c"), ("/y", _IMU, "/d")]}
+    right, wrong = _groups(**groups)
+    first, second = wrong.config.topics
+    # As where the type is installed only after the file was checked.
+    unread = replace(first, stamp=StampField(field="no.such"))
+    wrong = GroupRelay(replace(wrong.config, topics=(unread, second)), now=lambda: 0)
+    here.bindings.run([right, wrong])
+    publishers = [here.node.create_publisher(import_type(_IMU), name, 10) for name in ("/x", "/y")]
+    _poll(here)
+    first, second = here.bindings.all
+    assert first.waiting_for is None
+    assert second.waiting_for == "the field of /x that the file names"
+    assert second.inputs[0].not_readable.startswith(f"{_IMU} has no usable field no.such: ")
+    assert second.inputs[0].topic.is_due
+    sent = import_type(_IMU)()
+
+    def fed(group: Any) -> list[bool]:
+        return [each.fed > 0 for each in group.counts()]
+
+    wait_until(lambda: [each.publish(sent) for each in publishers] and all(fed(right)), "messages")
+    wait_until(lambda: publishers[1].publish(sent) or fed(wrong) == [False, True], "messages of the other input")
 
 
 def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:

@@ -58,7 +58,7 @@ def test_an_incompatible_qos_is_named_with_its_policy_and_its_node(
         rf"no set for [\d.]+ s: /usb_cam offers /camera with {policy} {offered}, the group requests {requested};"
         rf" write `qos: auto` at /camera, or have /usb_cam offer {requested}\n",
     )
-    assert "front: waiting for a publisher of /camera whose QoS fits" in relay.stderr
+    assert "front: waiting for a publisher of /camera with compatible QoS" in relay.stderr
 
 
 def test_a_publisher_that_sends_nothing_is_named(stage: Stage):

@@ -119,7 +119,7 @@ def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stag
     assert ">>> [rcutils" not in file.relay.stderr
 
 
-def test_a_file_with_an_output_that_dds_refuses_is_left_aside_and_all_goes_on(stage: Stage):
+def test_a_file_with_an_output_that_dds_refuses_is_refused_and_the_running_groups_stay(stage: Stage):
     recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
     stage.before_each_relay(_OTHERS)
     file = ReloadedFile(stage, front=_FRONT, swap=_SWAP)
@@ -184,8 +184,40 @@ def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_o
     assert "internal_error" not in findings(file.relay)
     assert file.relay.stderr.count("Traceback") == 1
     file.reload(front=_FRONT, failing=failing)
-    assert "the file was read again: 1 group goes on, 1 begins" in file.relay.stderr
+    assert "reloaded: 1 group unchanged, 1 group started" in file.relay.stderr
     relaying.conclude(player, collector, recording, of_failing)
+
+
+# The first set's second message. One more is published at the start, when librcl has to prove itself.
+_FAILING_PUBLISH = """
+from syncrelay.ros.librcl.rcl import Rcl
+
+init = Rcl.__init__
+
+def failing_init(self):
+    init(self)
+    publish, calls = self.publish, []
+    self.publish = lambda *words: calls.append(1) or (1 if len(calls) == 3 else publish(*words))
+
+Rcl.__init__ = failing_init
+"""
+
+
+def test_a_message_that_rcl_does_not_publish_is_told_and_the_next_ones_leave(stage: Stage):
+    stage.before_each_relay(_FAILING_PUBLISH)
+    recording = merged(*(at(topic, 0, 10, 20) for topic in _PAIR))
+    relay = stage.relay(config({"front": _FRONT}, metrics=ANY_PORT))
+    collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
+    player.match()
+    collector.process.wait_until(
+        lambda: all(collector.endpoints(each, kind="publisher", node="/syncrelay") for each in _ALIGNED), "outputs"
+    )
+    player.play(recording)
+    relay.wait_for_log("front: a message could not be published on /front/lidar: rcl_publish_serialized_message failed")
+    relay.wait_for_log("front: publishing on /front/lidar again; 1 message was not published")
+    assert "Traceback" not in relay.stderr
+    collector.wait_for("/front/camera", 3)
+    collector.wait_for("/front/lidar", 2)
 
 
 @pytest.mark.parametrize("name", ["impossible", "half_possible"])
@@ -219,5 +251,5 @@ def test_a_group_that_cannot_be_judged_is_relayed_and_others_are_judged(stage: S
     relaying.conclude(player, collector, recording, aligned)
     assert len(relaying.sets_within(recording, collector, aligned)) == 3
     wait_for_finding(relay, "healthy")
-    relay.wait_for_log("a bug in syncrelay while evaluating unjudged; the relay goes on")
+    relay.wait_for_log("a bug in syncrelay while evaluating unjudged; the relay keeps running")
     assert relay.stderr.count("ZeroDivisionError: no rate") == 1

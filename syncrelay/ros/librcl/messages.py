@@ -4,9 +4,9 @@ from ctypes import byref
 from typing import Any, Final
 
 from syncrelay.cdr import STAMP_BYTES, write_stamp
-from syncrelay.dataflow.backend import Deliver, Taken
+from syncrelay.dataflow.backend import Deliver, PublishError, Taken
 from syncrelay.ros.librcl.buffers import Payload, Pool
-from syncrelay.ros.librcl.rcl import NOTHING_TAKEN, MessageInfo, Rcl, pointer
+from syncrelay.ros.librcl.rcl import NOTHING_TAKEN, MessageInfo, Rcl, RclCallError, pointer
 
 # More than any history holds.
 _ALL: Final = 2**62
@@ -19,7 +19,7 @@ class LibrclSource:
         self.deliver = deliver
         self.waited = 0
         self.pending = 0
-        """How many messages DDS has told of: asking librcl once more costs nearly as much as a message."""
+        """How many messages DDS has reported: asking librcl once more costs nearly as much as a message."""
         self._pool = pool
         self.address: Final[int] = subscription.handle.pointer
         # It owns what the address points to.
@@ -58,15 +58,19 @@ class LibrclOutlet:
     def __init__(self, rcl: Rcl, publisher: Any) -> None:
         self._rcl = rcl
         self._call = rcl.publish
+        self.topic: str = publisher.topic_name
         # It owns what the address points to.
         self._publisher = publisher
         self._pointer = pointer(publisher.handle.pointer)
 
     def send(self, payload: Payload) -> None:
-        """Publish a payload unchanged. Raises RclCallError."""
+        """Publish a payload unchanged. Raises PublishError."""
         code = self._call(self._pointer, payload.memory.pointer, None)
         if code:
-            self._rcl.require(code, "rcl_publish_serialized_message")
+            try:
+                self._rcl.require(code, "rcl_publish_serialized_message")
+            except RclCallError as error:
+                raise PublishError(str(error)) from error
 
     def send_stamped(self, payload: Payload, stamp: int) -> None:
         """Publish a payload with this stamp, and put its own back: another set may hold it too."""

@@ -36,6 +36,13 @@ FOUND = {
         "/camera: no package fancy_msgs",
         "install the package where the relay runs, or source the workspace that has it",
     ),
+    "a field that the type does not have": (
+        Code.TYPE_NOT_IMPORTABLE,
+        Severity.ERROR,
+        a_group(camera(not_readable="sensor_msgs/msg/Image has no usable field trigger: no such field"), LIDAR),
+        "/camera: sensor_msgs/msg/Image has no usable field trigger: no such field",
+        "name another field at `stamp` or `key`, then `syncrelay reload`",
+    ),
     "a publisher of another type": (
         Code.OTHER_TYPE,
         Severity.ERROR,

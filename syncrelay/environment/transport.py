@@ -11,7 +11,7 @@ LARGE_MESSAGES: Final = Path(__file__).with_name("large_messages.xml")
 """The profiles file for messages over the 0.5 MB of Fast DDS's default shared-memory segment."""
 
 _PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
-# Whoever set one of these has chosen already, as our image does: shared memory may not reach the others.
+# With one of these the user has chosen already, as our image does: shared memory may not reach the others.
 _CHOICES: Final = (_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")
 
 _LOG = logging.getLogger("syncrelay")
@@ -23,6 +23,6 @@ def apply_transport(transport: Transport, environ: MutableMapping[str, str]) -> 
         return
     chosen = [f"{name}={environ[name]}" for name in _CHOICES if environ.get(name)]
     if chosen:
-        _LOG.warning("`transport: %s` is left aside: %s stands", transport, " ".join(chosen))
+        _LOG.warning("`transport: %s` has no effect: the environment has %s", transport, " ".join(chosen))
         return
     environ[_PROFILES] = str(LARGE_MESSAGES)
