@@ -23,6 +23,7 @@ from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
+from syncrelay.explain.suggestions import TryBudget
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [
@@ -56,6 +57,7 @@ __all__ = [
     "Standstill",
     "Step",
     "Tolerance",
+    "TryBudget",
     "dry_run",
     "explanation",
     "in_words",

@@ -1,11 +1,12 @@
 """What is known of a group at one moment: the file's values, what was observed, what the graph shows."""
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
+from syncrelay.explain.suggestions import Evaluator
 from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
@@ -135,7 +136,8 @@ class GroupFacts:
     others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
-    late; `failure` what stopped the group for good.
+    late; `failure` what stopped the group for good. `evaluator` tries other values of the file on the last messages,
+    None where they cannot be run again.
     """
 
     name: str
@@ -155,6 +157,7 @@ class GroupFacts:
     waited: int = 0
     standstill: Standstill | None = None
     failure: str | None = None
+    evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
 
     @property
     def required_first(self) -> Sequence[int]:

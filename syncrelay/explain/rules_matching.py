@@ -1,14 +1,18 @@
 """Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
 
+from collections.abc import Callable, Iterator, Sequence
 from statistics import median_low
 from typing import Final
 
+from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts, Tolerance
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted, nodes
+from syncrelay.explain.nearest import signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import other_clock
+from syncrelay.explain.suggestions import Change, Changes, Trials, Tried, constant_offsets, with_headroom
 from syncrelay.sync.messages import DropReason
 
 # A share of the slowest input's messages that could have no set, and from how many on it means something.
@@ -27,14 +31,12 @@ _FEW: Final = 0.8
 _NEARLY_ALL: Final = 0.95
 _POSSIBLE: Final = 10
 _WATCHED: Final = 10 * SECOND
-_WHAT_HELPS: Final = {
-    DropReason.OVERFLOW: "a larger `queue_size`",
-    DropReason.TOO_FAR: "a wider slop",
-    DropReason.EXPIRED: "a larger `max_wait`",
-    DropReason.LATE: "a policy or a `queue_size` that waits longer, such as `approximate_time`",
-    DropReason.DUPLICATE: "stamps that differ from message to message",
-    DropReason.UNSTAMPED: "`stamp: receive`",
-}
+# Stamps off by so much of a period, and so constantly, may pair the wrong messages; so near is a whole period.
+_ENOUGH: Final = 20
+_OFF: Final = 0.15
+_CONSTANT: Final = 0.05
+_WHOLE: Final = 0.1
+_OTHER_CLOCK: Final = SECOND
 
 
 def over_slop(facts: GroupFacts) -> Found:
@@ -45,11 +47,18 @@ def over_slop(facts: GroupFacts) -> Found:
         return
     over = nearest.share_over(tolerance.ns)
     if facts.is_silent and over > 1 - _MISSED:
-        text, suggestion = _too_wide(facts, tolerance, nearest), _wide_enough(facts, tolerance, nearest)
-        yield Finding(Code.OVER_SLOP, Severity.ERROR, text, suggestion)
+        text, severity = _too_wide(facts, tolerance, nearest), Severity.ERROR
     elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
-        text, suggestion = _often_too_wide(facts, tolerance, nearest)
-        yield Finding(Code.OVER_SLOP, Severity.WARN, text, suggestion)
+        text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
+    else:
+        return
+    found = _tried(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
+    yield Finding(
+        Code.OVER_SLOP,
+        severity,
+        text,
+        _advice(facts, found) or "check how these topics are stamped, and whether messages are missing",
+    )
 
 
 def _come_at_once(facts: GroupFacts) -> bool:
@@ -57,15 +66,12 @@ def _come_at_once(facts: GroupFacts) -> bool:
     return any(each.required and each.figures.bursts for each in facts.inputs)
 
 
-def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> tuple[str, str]:
+def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
     missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
     name = facts.pacemaker.name
     if facts.policy == "exact_time":
-        # Others do have equal stamps: a wider slop would pair what does not belong together.
-        lost = "look for messages that a driver leaves out or the network loses"
-        return f"{missed} {name} have no partner of an equal stamp", lost
-    farther = f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
-    return farther, _wide_enough(facts, tolerance, nearest)
+        return f"{missed} {name} have no partner of an equal stamp"
+    return f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
 
 
 def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
@@ -78,11 +84,72 @@ def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) ->
     return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
 
 
-def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
-    most, nearly_all = words.at_least(nearest.quantile(0.95)), words.at_least(nearest.quantile(0.99))
-    policy = "`policy: approximate_time` and " if facts.policy == "exact_time" else ""
-    less = "" if most == nearly_all else f", `{tolerance.key}: {most}` would match 95 %"
-    return f"write {policy}`{tolerance.key}: {nearly_all}`, which would match 99 %{less}"
+def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution, trials: Trials) -> Iterator[Tried]:
+    """Yield a wider tolerance and constant offsets that help."""
+    if not trials.spans:
+        return
+    wider = with_headroom(trials.spans)
+    # What is far apart although others are near has no partner: a wider slop would pair what does not belong together.
+    is_far = trials.spans.quantile(0.99) > tolerance.ns and not next(constant_offset(facts), None)
+    if is_far and nearest.share_over(parse_duration(wider)) <= _MISSED:
+        policy = (Change("policy", "approximate_time"),) if facts.policy == "exact_time" else ()
+        if tried := trials.try_out((*policy, Change(tolerance.key, wider))):
+            yield tried
+    if tolerance.key == "slop":
+        yield from filter(None, (trials.gives_enough((each,)) for each in constant_offsets(trials)))
+
+
+def constant_offset(facts: GroupFacts) -> Found:
+    """Find an input whose stamps lie a constant distance off, so that messages of different moments are paired.
+
+    Of two inputs of one rate, the messages that are nearest by their stamps come whole periods apart: those that come
+    together were made together. A delay alone does not show here, as it leaves the right stamps near each other.
+    """
+    if facts.tolerance is None or facts.trigger is not None or next(other_clock(facts), None):
+        return
+    first, *others = [index for index, each in enumerate(facts.inputs) if each.required]
+    for other in others:
+        if (off := _whole_periods_off(facts, first, other)) is None:
+            continue
+        # The one that is farther from this machine's time is odd.
+        delays = {index: facts.inputs[index].figures.delay or 0 for index in (first, other)}
+        odd, right = sorted(delays, key=lambda index: -abs(delays[index] - facts.inputs[index].offset))
+        off = off if odd == other else -off
+        name, offset = facts.inputs[odd].name, Change("offset", words.exactly(facts.inputs[odd].offset - off), odd)
+        yield Finding(
+            Code.CONSTANT_OFFSET,
+            Severity.WARN,
+            f"stamps of {name} are always {words.duration(abs(off))} {'ahead of' if off > 0 else 'behind'} those of"
+            f" {facts.inputs[right].name} received at the same time: sets may hold messages of different moments",
+            f"check how {nodes(facts.inputs[odd])} stamps; if both are measured at the same time, write"
+            f" {_written(facts, (offset,))}",
+            odd,
+        )
+
+
+def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
+    """Return how far the stamps of `other` are ahead of those of `first` that come with them, None if all is well."""
+    one, two = facts.inputs[first], facts.inputs[other]
+    if not one.figures.delays or not two.figures.delays or not two.figures.pace_hz:
+        return None
+    later = two.figures.delays[-1] - two.offset - one.figures.delays[-1] + one.offset
+    period = SECOND / two.figures.pace_hz
+    if abs(later) < period / 2 or abs(later) > _OTHER_CLOCK:
+        # As nearly always, and seen without measuring.
+        return None
+    if abs(one.figures.pace_hz * period / SECOND - 1) > _CONSTANT:
+        return None
+    shifted = [[stamp + each.offset for stamp in each.figures.stamps] for each in (one, two)]
+    signed = signed_distances(*shifted)
+    if len(signed) < _ENOUGH or signed.quantile(0.95) - signed.quantile(0.05) > _CONSTANT * period:
+        return None
+    distance = signed.quantile(0.5)
+    later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
+    apart = distance + later
+    whole = round(apart / period)
+    if not whole or abs(distance) < _OFF * period or abs(apart - whole * period) > _WHOLE * period:
+        return None
+    return round(distance - whole * period)
 
 
 def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -91,18 +158,30 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     overflowed = an_input.figures.dropped.get(DropReason.OVERFLOW, 0)
     if needed is None or not overflowed or needed <= facts.queue_size:
         return
-    if not facts.is_silent and facts.figures.rate_hz >= _NEARLY_ALL * facts.possible_hz:
+    missed_hz = facts.possible_hz - facts.figures.rate_hz
+    # A set that leaves a little later than the window ends was not missed.
+    if not facts.is_silent and missed_hz * _WATCHED <= max(
+        2 * SECOND, (1 - _NEARLY_ALL) * facts.possible_hz * _WATCHED
+    ):
         return
     if next(other_clock(facts), None):
         return  # what waits for a partner of another clock overflows any queue
+    within = facts.tolerance.ns if facts.tolerance else None
+    found = _tried(facts, (Code.SHORT_QUEUE, index), lambda trials: _long_enough(needed, trials), within=within)
     yield Finding(
         Code.SHORT_QUEUE,
         Severity.ERROR if facts.is_silent else Severity.WARN,
         f"{counted(overflowed, an_input.figures.fed)} messages of {an_input.name} overflowed its queue of"
         f" {facts.queue_size} before their partners came",
-        f"write `queue_size: {needed}`",
+        _advice(facts, found),
         index,
     )
+
+
+def _long_enough(needed: int, trials: Trials) -> Iterator[Tried]:
+    """Yield a longer queue that helps."""
+    if tried := trials.try_out((), need=needed):
+        yield tried
 
 
 def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -113,7 +192,7 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     if missing * facts.figures.sets_since_without[index] >= _BACK:
         return
     waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
-    why, what_helps = _why_without(facts, an_input)
+    why, what_helps = _why_without(facts, index, an_input)
     yield Finding(
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
@@ -123,39 +202,57 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     )
 
 
-def _why_without(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str]:
+def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[str, str]:
     """Tell an input that is away, stamps that fit no set, and messages that come after theirs has left."""
-    unknown = "", f"see whether {nodes(an_input)} sends it, and how late it comes"
+    unknown = "", f"check whether {nodes(an_input)} sends it, and how late it comes"
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
     if (away := _away(facts, an_input)) is not None:
         return away
     if tolerance is None or len(nearest) < _FEWEST:
         return unknown
     behind = _behind(facts, an_input)
+    about = (Code.WAITING_FOR_OPTIONAL, index)
     if abs(behind) > max(SECOND, tolerance.ns):
+        offset = Change("offset", words.exactly(behind + an_input.offset), index)
+        found = _tried(facts, about, lambda trials: filter(None, [trials.gives_enough((offset,))]), optional=index)
         side = "behind" if behind > 0 else "ahead of"
         return (
             f": its stamps are {words.duration(abs(behind))} {side} those of the others",
-            f"synchronize their clocks, or write `offset: {words.exactly(behind + an_input.offset)}` at {name}",
+            f"synchronize their clocks{_or(_advice(facts, found, name))}",
         )
     if nearest.quantile(0.5) > tolerance.ns:
         widths = f"{words.duration(nearest.quantile(0))} to {words.duration(nearest.quantile(0.95))}"
+        found = _tried(facts, about, lambda trials: _wide_enough(facts, tolerance, nearest, trials), optional=index)
         return (
             f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
-            f"write `{tolerance.key}: {words.at_least(nearest.quantile(0.99))}`, which would take in 99 %",
+            _advice(facts, found, name) or f"check how {nodes(an_input)} stamps its messages",
         )
     if facts.max_wait is not None and behind > facts.max_wait:
+        found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=tolerance.ns)
         return (
             f": it comes {words.duration(behind)} after the others, too late",
-            f"write a larger `max_wait`, or see what holds {name} up",
+            f"check what holds {name} up{_or(_advice(facts, found, name))}",
         )
     return unknown
+
+
+def _waits_enough(index: int, trials: Trials) -> Iterator[Tried]:
+    """Yield a wait for an optional input that helps: what it is later by, and what that scatters by."""
+    others = [median_low(each) for other, each in enumerate(trials.delays) if other != index and each]
+    if not others or not trials.delays[index]:
+        return
+    late = Distribution([delay - min(others) for delay in trials.delays[index]])
+    wait = parse_duration(with_headroom(late))
+    for times in (1, 2, 4):
+        if tried := trials.try_out((Change("max_wait", words.at_least(times * wait)),)):
+            yield tried
+            return
 
 
 def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
     """Say that an input does not come at all, or not any more; None if it comes."""
     figures = an_input.figures
-    look = f"look at {nodes(an_input)}"
+    look = f"check {nodes(an_input)}"
     if figures.last_received is None:
         return ": no message of it has come", look
     quiet = facts.figures.now - figures.last_received
@@ -183,11 +280,56 @@ def few_sets(facts: GroupFacts) -> Found:
     if facts.possible_hz * _WATCHED < _POSSIBLE * SECOND or figures.rate_hz >= _FEW * facts.possible_hz:
         return
     pacemaker = facts.pacemaker
-    reason = max(pacemaker.figures.dropped, key=lambda each: pacemaker.figures.dropped[each], default=None)
+    within = facts.tolerance.ns if facts.tolerance else None
+    found = _tried(facts, (Code.FEW_SETS, None), lambda trials: _more_sets(facts, trials), within=within)
     yield Finding(
         Code.FEW_SETS,
         Severity.WARN,
-        f"{words.figure(figures.rate_hz)} of {words.figure(facts.possible_hz)} possible sets a second leave;"
+        f"{words.figure(figures.rate_hz)} of {words.figure(facts.possible_hz)} possible sets leave per second;"
         f" {fates(pacemaker)}",
-        f"{_WHAT_HELPS[reason]} would give more" if reason in _WHAT_HELPS else None,
+        _advice(facts, found),
     )
+
+
+def _more_sets(facts: GroupFacts, trials: Trials) -> Iterator[Tried]:
+    """Yield the first that helps: a longer queue, a policy that waits for what comes late, a longer wait."""
+    patient = ((Change("policy", "approximate_time"),),) if facts.policy == "approximate_time_eager" else ()
+    waits = (2 * facts.max_wait, 4 * facts.max_wait) if facts.max_wait else ()
+    longer = tuple((Change("max_wait", words.at_least(wait)),) for wait in waits)
+    if tried := next(filter(None, (trials.try_out(each) for each in ((), *patient, *longer))), None):
+        yield tried
+
+
+def _tried(
+    facts: GroupFacts,
+    about: tuple[Code, int | None],
+    propose: Callable[[Trials], Iterator[Tried]],
+    *,
+    within: int | None = None,
+    optional: int | None = None,
+) -> tuple[Tried, ...]:
+    if facts.evaluator is None:
+        return ()
+    return facts.evaluator.best(about, propose, now=facts.figures.now, within=within, optional=optional)
+
+
+def _advice(facts: GroupFacts, found: Sequence[Tried], optional: str | None = None) -> str | None:
+    """Say what to write and what it would give: sets, or those with an optional input."""
+    if not found:
+        return None
+    sets = "possible sets" if optional is None else f"sets with {optional}"
+    first, *others = found
+    gives = f"which would give {first.given} of {first.possible} {sets} (now {first.now})"
+    more = "".join(f", or {_written(facts, each.changes)}, which would give {each.given}" for each in others)
+    return f"write {_written(facts, first.changes)}, {gives}{more}"
+
+
+def _written(facts: GroupFacts, changes: Changes) -> str:
+    return " and ".join(
+        f"`{each.key}: {each.value}`" + ("" if each.input is None else f" at {facts.inputs[each.input].name}")
+        for each in changes
+    )
+
+
+def _or(advice: str | None) -> str:
+    return f", or {advice}" if advice else ""

@@ -7,19 +7,25 @@ from syncrelay.explain.clocks import Step
 from syncrelay.explain.facts import ClockState, GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
+from syncrelay.explain.suggestions import Evaluator, TryBudget
 from syncrelay.sync.counts import InputCounts
 
 
 class GroupWatch:
-    """Gathers what is known of a group, from `began` on; times are nanoseconds of one clock."""
+    """Gathers what is known of a group, from `began` on; times are nanoseconds of one clock.
 
-    def __init__(self, config: GroupConfig, *, began: int) -> None:
+    `budget` bounds what is tried out for suggestions, together with other groups; without it each try is bounded alone.
+    """
+
+    def __init__(self, config: GroupConfig, *, began: int, budget: TryBudget | None = None) -> None:
         self.config = config
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
         self._trigger = (
             config.inputs.index_of(config.options.trigger) if config.options.policy == "latest_time" else None
         )
+        # Keys are not kept: what is matched by them cannot be run again.
+        self._evaluator = Evaluator(config, budget) if config.options.policy != "equal_key" else None
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
@@ -45,6 +51,8 @@ class GroupWatch:
         self._counts = tuple(counts)
         if keys is not None:
             self._keys = keys
+        if self._evaluator is not None:
+            self._evaluator.add(arrivals)
         self._observation.add(arrivals, sets, counts, total_sets, by_clock=by_clock, now=now)
 
     def facts(
@@ -92,6 +100,7 @@ class GroupWatch:
             waited=waited,
             standstill=standstill,
             failure=failure,
+            evaluator=self._evaluator,
         )
 
 

@@ -16,6 +16,7 @@ from syncrelay.explain import (
     GroupWatch,
     Judge,
     Severity,
+    TryBudget,
 )
 from syncrelay.ros.bindings import GroupBinding
 from syncrelay.ros.surroundings import Surroundings
@@ -57,6 +58,7 @@ class Monitor:
         self._waits: dict[TopicInput, Waits] = {}
         self.standstills = Standstills()
         self._system_clock = SystemClock()
+        self._try_budget = TryBudget()
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -75,7 +77,7 @@ class Monitor:
         self._bindings = bindings
         self._watched = {
             binding.group: self._watched.get(binding.group)
-            or _Watched(GroupWatch(binding.group.config, began=now), Judge(), FindingLog())
+            or _Watched(GroupWatch(binding.group.config, began=now, budget=self._try_budget), Judge(), FindingLog())
             for binding in bindings
         }
         topics = dict.fromkeys(each.topic for binding in bindings for each in binding.inputs)
@@ -99,6 +101,7 @@ class Monitor:
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
         waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
         now = time.time_ns()
+        self._try_budget.refill()
         # Messages are received by the system's clock: a step of it is no wait.
         has_stepped = self._system_clock.has_stepped(now)
         for recent, waited in zip(self._waits.values(), waits, strict=True):

@@ -44,6 +44,12 @@ def wide(*spans_ms, **figures):
     return {"nearest": spans, "nearest_since": spans, **figures}
 
 
+def stamped(shift, *, delay=5 * MS, pace_hz=10.0):
+    """The figures of the last stamps of an input at 10 Hz."""
+    stamps = tuple(NOW - S * (100 - number) // 10 + shift for number in range(100))
+    return {"stamps": stamps, "delay": None, "delays": (delay,) * 100, "pace_hz": pace_hz}
+
+
 def without_camera(**figures):
     inputs = camera(required=False, figures=figures), LIDAR, an_input("/imu")
     return a_group(*inputs, figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS)

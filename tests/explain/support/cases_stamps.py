@@ -1,6 +1,6 @@
 """What stamps tell: facts that come to a finding, and the nearest that do not."""
 
-from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, STEADY, camera, drifting, dropped, fed, wide
+from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, STEADY, camera, drifting, dropped, fed, stamped, wide
 from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
 from syncrelay.explain import Code, Distribution, Endpoint, Severity, Step, Tolerance
@@ -12,6 +12,9 @@ TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
 SWINGING = {"swings": 2, "swung_by": 3 * S}
 
 STEPPED = {"stepped": Step(NOW - 12 * S, -2 * S)}
+
+# Made-up facts have no messages to try values on: see test_suggestions.py for those.
+CHECK_STAMPS = "check how these topics are stamped, and whether messages are missing"
 
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
@@ -81,56 +84,56 @@ FOUND = {
         Severity.ERROR,
         a_silent_group(figures=wide(*[61] * 5, 63)),
         "the nearest sets span 61 ms to 63 ms, over slop 20 ms",
-        "write `slop: 65ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "sets wider than slop, of many widths": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(figures=wide(*range(21, 121))),
         "the nearest sets span 21 ms to 115 ms, over slop 20 ms",
-        "write `slop: 120ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "stamps that are never equal": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(figures=wide(*[0.014] * 5), policy="exact_time", tolerance=Tolerance("slop", 0)),
         "no stamps are equal: the nearest sets span 14 us",
-        "write `policy: approximate_time` and `slop: 14us`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "stamps that are equal mostly": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(figures=wide(*[0] * 90, *[33] * 10), policy="exact_time", tolerance=Tolerance("slop", 0)),
         "10 % of the last 100 messages of /camera have no partner of an equal stamp",
-        "look for messages that a driver leaves out or the network loses",
+        CHECK_STAMPS,
     ),
     "what is held is too old": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(figures=wide(*[700] * 5), **HALF_A_SECOND),
         "the latest messages are 700 ms older than the trigger's, over max_age 500 ms",
-        "write `max_age: 700ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "what is held is often too old": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(figures=wide(*[100] * 5, *[700] * 5), **HALF_A_SECOND),
         "50 % of the last 10 messages of /lidar were farther from their partners than max_age 500 ms",
-        "write `max_age: 700ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "sets wider than slop, whose messages were held up too": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(camera(figures={"bursts": 1, "held": S}), LIDAR, figures=wide(*[61] * 5, 63)),
         "the nearest sets span 61 ms to 63 ms, over slop 20 ms",
-        "write `slop: 65ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "most sets wider than slop, whose messages were held up too": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, figures=wide(*[5] * 40, *[30] * 60)),
         "60 % of the last 100 messages of /camera were farther from their partners than slop 20 ms",
-        "write `slop: 30ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "sets wider than slop, beside an optional input that was held up": (
         Code.OVER_SLOP,
@@ -142,14 +145,14 @@ FOUND = {
             figures=wide(*[5] * 90, *[30] * 10),
         ),
         "10 % of the last 100 messages of /lidar were farther from their partners than slop 20 ms",
-        "write `slop: 30ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "some sets wider than slop": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(figures=wide(*[5] * 90, *[30] * 10)),
         "10 % of the last 100 messages of /camera were farther from their partners than slop 20 ms",
-        "write `slop: 30ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "stamps that fell": (
         Code.TIME_JUMP,
@@ -256,10 +259,28 @@ FOUND = {
         "stamps of /camera lose 100 us a second against those of /lidar (100 ppm)",
         "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
     ),
+    "stamps that lie a constant distance off, nearer to the next message's": (
+        Code.CONSTANT_OFFSET,
+        Severity.WARN,
+        a_group(camera(figures=stamped(-80 * MS, delay=85 * MS)), an_input("/lidar", figures=stamped(0))),
+        (
+            "stamps of /camera are always 80 ms behind those of /lidar received at the same time: sets may hold"
+            " messages of different moments"
+        ),
+        "check how /usb_cam stamps; if both are measured at the same time, write `offset: 80ms` at /camera",
+    ),
 }
 
 # The code that must not be found, facts.
 QUIETLY = {
+    "a constant distance that its delay explains": (
+        Code.CONSTANT_OFFSET,
+        a_group(camera(figures=stamped(0, delay=80 * MS)), an_input("/lidar", figures=stamped(0))),
+    ),
+    "a constant distance of inputs of two rates": (
+        Code.CONSTANT_OFFSET,
+        a_group(camera(figures=stamped(-80 * MS, delay=85 * MS, pace_hz=12)), an_input("/lidar", figures=stamped(0))),
+    ),
     "another clock while sets leave": (Code.OTHER_CLOCK, a_group(camera(figures={"delay": 37_205 * MS}), LIDAR)),
     "another clock that its offset makes good": (
         Code.OTHER_CLOCK,
