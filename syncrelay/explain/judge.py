@@ -20,7 +20,7 @@ from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Code, Finding, Rule, Severity, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
 
-_RULES: Final[tuple[Rule, ...]] = (
+_CAUSE_RULES: Final[tuple[Rule, ...]] = (
     rules_graph.internal_error,
     of_each_input(rules_graph.refused_by_dds),
     of_each_input(rules_graph.type_not_importable),
@@ -41,11 +41,19 @@ _RULES: Final[tuple[Rule, ...]] = (
     rules_stamps.no_common_key,
     of_each_input(rules_flow.slowed),
     rules_flow.bursts,
-    rules_matching.over_slop,
-    of_each_input(rules_matching.short_queue),
-    of_each_input(rules_matching.waiting_for_optional),
     of_each_input(rules_stamps.time_jump),
     of_each_input(rules_flow.messages_lost),
+)
+
+_MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
+    (Code.OVER_SLOP, rules_matching.over_slop),
+    (Code.SHORT_QUEUE, of_each_input(rules_matching.short_queue)),
+    (Code.WAITING_FOR_OPTIONAL, of_each_input(rules_matching.waiting_for_optional)),
+    (Code.CONSTANT_OFFSET, rules_matching.constant_offset),
+)
+"""What they suggest they try, which costs: they are not asked for what a cause explains."""
+
+_OTHER_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.out_of_order),
     of_each_input(rules_stamps.duplicates),
     rules_matching.constant_offset,
@@ -100,7 +108,7 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.CLOCK_DRIFT: _Explained(_MATCHING | {Code.OTHER_CLOCK}),
     Code.OTHER_CLOCK: _Explained(_MATCHING),
     Code.SLOWED: _Explained(_MATCHING),
-    Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS})),
+    Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.MESSAGES_LOST: _Explained(frozenset(), frozenset({Code.BURSTS})),
 }
 """Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
@@ -133,14 +141,18 @@ class Judge:
 
     def judge(self, facts: GroupFacts) -> tuple[Finding, ...]:
         """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
-        found = [finding for rule in _RULES for finding in rule(facts)]
+        found = [finding for rule in _CAUSE_RULES for finding in rule(facts)]
+        self._remember(found, facts)
+        for code, rule in _MATCHING_RULES:
+            if not self._is_explained(code, facts):
+                found += rule(facts)
+        found += [finding for rule in _OTHER_RULES for finding in rule(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
             found.append(_unexplained(facts))
         elif _is_well(found) and facts.figures.last_set is not None:
             # Few sets are what other findings come to: they are said where there is none of those.
             found += rules_matching.few_sets(facts)
-        self._remember(found, facts)
-        return self._unexplained(found, facts) if found and self._causes else tuple(found)
+        return self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
 
     def _remember(self, found: Iterable[Finding], facts: GroupFacts) -> None:
         now = facts.figures.now
@@ -151,7 +163,16 @@ class Judge:
             if finding.explains and finding.code in EXPLAINS:
                 self._causes[finding.code, finding.input] = _Cause(finding, now)
 
-    def _unexplained(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
+    def _is_explained(self, code: Code, facts: GroupFacts) -> bool:
+        """Whether a cause that holds now explains all findings of a code."""
+        return any(
+            cause.at == facts.figures.now
+            and code in EXPLAINS[cause.finding.code].in_group
+            and (cause.finding.input is None or facts.inputs[cause.finding.input].required)
+            for cause in self._causes.values()
+        )
+
+    def _unexplained_by_others(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
         """Return the findings that nothing explains; of a silent group an error, be it a cause that is over."""
         roots = [(finding, self._root(finding, facts)) for finding in found]
         said = [finding for finding, root in roots if finding is root]
@@ -181,8 +202,10 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     is_narrow = finding.code not in explained.in_group or (about is not None and not facts.inputs[about].required)
     if is_narrow and about is not None and about != finding.input:
         return False
-    seen_since = _SEEN_SINCE.get(finding.code)
-    return cause.at >= (facts.figures.now - WINDOW_NS if seen_since is None else seen_since(facts))
+    now, seen_since = facts.figures.now, _SEEN_SINCE.get(finding.code)
+    since = now - WINDOW_NS if seen_since is None else seen_since(facts)
+    # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
+    return cause.at >= (max(since, now - facts.silent_after) if finding.severity is Severity.ERROR else since)
 
 
 def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:

@@ -109,12 +109,12 @@ class Monitor:
 
     def _judge(self, bindings: Sequence[GroupBinding], waits: Sequence[int], batches: Sequence[Batch]) -> None:
         now = time.time_ns()
+        self._try_budget.refill()
         # Messages are received by the system's clock: a step of it is no wait.
         has_stepped = self._system_clock.has_stepped(now)
         for recent, waited in zip(self._waits.values(), waits, strict=True):
             recent.observe(0 if has_stepped else waited)
         self.standstills.observe()
-        self._try_budget.refill()
         if self._clock is not None:
             self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
         for topic, losses in self._losses.items():
@@ -131,14 +131,13 @@ class Monitor:
 
     def _evaluate_group(self, binding: GroupBinding, batch: Batch, now: int) -> None:
         watch, judge, log = self._watched[binding.group]
-        clock = self._clock
-        by_clock = clock.at if clock and clock.is_steady else None
+        by_clock = self._clock.at if self._clock and self._clock.is_steady else None
         watch.add(batch.arrivals, batch.sets, batch.counts, batch.n_sets, keys=batch.keys, by_clock=by_clock, now=now)
         shown = [self._surroundings.of(each, lost=self._losses[each.topic].recent) for each in binding.inputs]
         facts = watch.facts(
             shown,
             now=now,
-            clock=clock.state if clock else None,
+            clock=self._clock.state if self._clock else None,
             clock_set=self._system_clock.last_step(now),
             waited=max(self._waits[each.topic].longest for each in binding.inputs),
             standstill=self.standstills.longest,

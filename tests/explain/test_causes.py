@@ -46,6 +46,15 @@ def test_a_cause_is_remembered_while_the_messages_of_its_time_are_judged_by():
     assert codes(a_judge.judge(a_group(figures=later))) == [Code.OVER_SLOP]
 
 
+def test_a_cause_that_is_over_does_not_explain_a_silence_for_long():
+    a_judge = Judge()
+    a_judge.judge(a_group(waited=3 * S))
+    silent = {**wide(*[30] * 9), "rate_hz": 0.0, "nearest_from": NOW - S, "last_set": NOW - 4 * S}
+    (soon,) = a_judge.judge(a_group(figures={**silent, "now": NOW + 4 * S}))
+    assert (soon.code, soon.severity) == (Code.TOO_SLOW, Severity.ERROR)
+    assert codes(a_judge.judge(a_group(figures={**silent, "now": NOW + 8 * S}))) == [Code.OVER_SLOP]
+
+
 def test_the_cause_of_all_errors_of_a_silent_group_is_the_error():
     (only,) = judge(a_silent_group(figures=wide(*[30] * 9), waited=3 * S))
     assert (only.code, only.severity) == (Code.TOO_SLOW, Severity.ERROR)

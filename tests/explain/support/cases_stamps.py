@@ -12,6 +12,7 @@ TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
 SWINGING = {"swings": 2, "swung_by": 3 * S}
 
 STEPPED = {"stepped": Step(NOW - 12 * S, -2 * S)}
+
 # Made-up facts have no messages to try values on: see test_suggestions.py for those.
 CHECK_STAMPS = "check how these topics are stamped, and whether messages are missing"
 
