@@ -56,6 +56,23 @@ RIGS = {
         says=r"`offset: (79|80|81)[\d.]*ms` at /lidar_80_ms_off/lidar.*`slop: 8\d[\d.]*ms`",
         cure=["offset"],
     ),
+    # What is not one: sensors that sample at other times than each other, and one whose messages take long.
+    "out_of_phase": Scenario(
+        streams=[Stream("camera", 10, wobble_ms=1), Stream("lidar", 10, phase_ms=40, wobble_ms=1)],
+        options={"slop": "60ms"},
+    ),
+    "lidar_comes_late": Scenario(
+        streams=[Stream("camera", 10, wobble_ms=1), Stream("lidar", 10, late_ms=80, wobble_ms=1)],
+        options={"slop": "30ms"},
+    ),
+    # A recording that begins again.
+    "looped": Scenario(
+        streams=[
+            Stream(topic, 10, acts, shift_ms=shift_ms)
+            for topic in ("camera", "lidar")
+            for acts, shift_ms in (("1", 0), ("23", -20_000))
+        ],
+    ),
     # Clocks of another epoch: GPS time is 18 s ahead of UTC, and a driver may count from the boot.
     "gps_time": Scenario(
         streams=[Stream("camera", 10, **CAMERA), Stream("lidar", 10, shift_ms=18_000, **LIDAR)],
