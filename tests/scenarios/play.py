@@ -6,6 +6,7 @@ source, or by what the relay has suggested, written into its file. An act lasts 
 
 import json
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -132,8 +133,7 @@ class Watch:
         self.look()
         self._act = act
 
-    def look(self) -> None:
-        """Read on what there is."""
+    def read_log(self) -> None:
         *said, _ = self._relay.stderr.split("\n")
         for text in said[self._read :]:
             line = json.loads(text) if text.startswith("{") else {}
@@ -141,6 +141,10 @@ class Watch:
                 about = Line(self._act, line["group"], line.get("finding", ""), line["message"])
                 self.lines.append((line["level"], about))
         self._read = len(said)
+
+    def look(self) -> None:
+        """Read on what there is."""
+        self.read_log()
         self.last = {each["name"]: each for each in status(self._relay)["groups"]}
         for name, group in self.last.items():
             codes = self.shown.setdefault(name, {}).setdefault(self._act, set())
@@ -178,7 +182,8 @@ class Watch:
         return any(finding["code"] == "healthy" for finding in self.last.get(name, {"findings": []})["findings"])
 
     def played(self, written: dict[str, dict[str, str]] | None = None) -> Played:
-        self.look()
+        """All that was seen, of a relay that may have ended."""
+        self.read_log()
         shown = {name: {act: sorted(codes) for act, codes in acts.items()} for name, acts in self.shown.items()}
         warnings = [line for level, line in self.lines if level not in ("info", "debug")]
         notes = [line for level, line in self.lines if level == "info"]
@@ -225,6 +230,9 @@ def play(stage: Stage, scenarios: Mapping[str, Scenario]) -> Played:
     theatre.begin("3")
     theatre.file.reload(**theatre.groups)
     watch.wait(lambda: all(watch.is_well(name) for name, each in scenarios.items() if each.heals))
+    # Its last words are of the groups, too.
+    theatre.file.relay.send(signal.SIGTERM)
+    theatre.file.relay.wait()
     return watch.played(written)
 
 

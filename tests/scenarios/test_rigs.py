@@ -81,3 +81,9 @@ def test_a_recording_that_is_looped_is_no_fault(played: Played):
 
 def test_nothing_that_fell_is_blamed_where_two_publish(played: Played):
     assert "time_jump" not in played.shown["two_cameras"]["2"]
+
+
+@pytest.mark.parametrize("name", ["gps_time", "time_since_boot", "clock_steps_on", "never_near", "lidar_80_ms_off"])
+def test_no_queue_is_promised_to_hold_what_never_fits(played: Played, name: str):
+    assert any(re.search(r": \d+ sets?$", line.message) for line in played.notes_of(name)), "no summary at the end"
+    assert not [line.message for line in played.notes_of(name) if "queue_size" in line.message]
