@@ -97,7 +97,7 @@ RIGS = {
         first="clock_step",
         says=r"/clock_steps_back/lidar.*\b(2|1\.9\d*|2\.0\d*) s",
         also=frozenset({"other_clock"}),
-        never_says=r"loop|queue_size|`slop",
+        never_says=r"loop|`slop",
         heals=False,
     ),
     "clock_steps_on": Scenario(
@@ -109,7 +109,7 @@ RIGS = {
         first="clock_step",
         says=r"/clock_steps_on/lidar.*\b(2|1\.9\d*|2\.0\d*) s",
         also=frozenset({"other_clock"}),
-        never_says=r"loop|queue_size|`slop",
+        never_says=r"loop|`slop",
         heals=False,
     ),
     "stamps_in_pairs": Scenario(
