@@ -3,6 +3,7 @@
 Pure: values in, values out. The running relay and the analysis of recordings both ask here.
 """
 
+from syncrelay.config import Tolerance
 from syncrelay.explain.clocks import STEP_NS, Step
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
@@ -16,7 +17,6 @@ from syncrelay.explain.facts import (
     Mismatch,
     Refusal,
     Standstill,
-    Tolerance,
 )
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.finding_log import FindingLog, in_words

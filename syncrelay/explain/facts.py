@@ -4,6 +4,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from syncrelay.config import Tolerance
 from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.suggestions import Evaluator
@@ -70,14 +71,6 @@ class Refusal:
         """The whole in words."""
         reason = f"this process has it as {self.held_as} already" if self.held_as else self.why
         return f"the relay cannot {self.verb} {self.topic} as {self.type}: {reason}"
-
-
-@dataclass(frozen=True, slots=True)
-class Tolerance:
-    """The key of the file that says how far apart the stamps of a set may be, and its value in nanoseconds."""
-
-    key: str
-    ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,9 +145,9 @@ class ClockState(NamedTuple):
 class GroupFacts:
     """A group. Durations in nanoseconds.
 
-    `tolerance` is None where stamps may be any distance apart, as with `equal_key`. `by_stamp` says whether stamps are
-    what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
-    others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
+    `tolerance` is None where stamps may be any distance apart, as where keys are matched. `by_stamp` says whether
+    stamps are what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest
+    of the others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
     late; `failure` what stopped the group for good; `empty_graph` the graph, where it holds no node but our own.

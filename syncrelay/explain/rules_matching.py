@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator, Sequence
 from statistics import median_low
 from typing import Final
 
+from syncrelay.config import Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.facts import GroupFacts, InputFacts, Tolerance
+from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted, nodes
 from syncrelay.explain.nearest import signed_distances
 from syncrelay.explain.rules_flow import fates
@@ -47,9 +48,9 @@ def over_slop(facts: GroupFacts) -> Found:
         return
     over = nearest.share_over(tolerance.ns)
     if facts.is_silent and over > 1 - _MISSED:
-        text, severity = _too_wide(facts, tolerance, nearest), Severity.ERROR
+        text, severity = _too_wide(tolerance, nearest), Severity.ERROR
     elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
-        text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
+        text, severity = _often_too_wide(tolerance, nearest), Severity.WARN
     else:
         return
     found = _tried(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
@@ -69,15 +70,15 @@ def _come_at_once(facts: GroupFacts) -> bool:
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
     missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
     name = facts.pacemaker.name
-    if facts.policy == "exact_time":
+    if tolerance.wider_policy:
         return f"{missed} {name} have no partner of an equal stamp"
     return f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
 
 
-def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
+def _too_wide(tolerance: Tolerance, nearest: Distribution) -> str:
     least, most = words.duration(nearest.quantile(0)), words.duration(nearest.quantile(0.95))
     widths = least if least == most else f"{least} to {most}"
-    if facts.policy == "exact_time":
+    if tolerance.wider_policy:
         return f"no stamps are equal: the nearest sets span {widths}"
     if tolerance.key == "max_age":
         return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
@@ -92,7 +93,7 @@ def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution,
     # What is far apart although others are near has no partner: a wider slop would pair what does not belong together.
     is_far = trials.spans.quantile(0.99) > tolerance.ns and not next(constant_offset(facts), None)
     if is_far and nearest.share_over(parse_duration(wider)) <= _MISSED:
-        policy = (Change("policy", "approximate_time"),) if facts.policy == "exact_time" else ()
+        policy = (Change("policy", tolerance.wider_policy),) if tolerance.wider_policy else ()
         if tried := trials.try_out((*policy, Change(tolerance.key, wider))):
             yield tried
     if tolerance.key == "slop":
@@ -293,7 +294,8 @@ def few_sets(facts: GroupFacts) -> Found:
 
 def _more_sets(facts: GroupFacts, trials: Trials) -> Iterator[Tried]:
     """Yield the first that helps: a longer queue, a policy that waits for what comes late, a longer wait."""
-    patient = ((Change("policy", "approximate_time"),),) if facts.policy == "approximate_time_eager" else ()
+    patient_policy = trials.config.options.patient_policy
+    patient = ((Change("policy", patient_policy),),) if patient_policy else ()
     waits = (2 * facts.max_wait, 4 * facts.max_wait) if facts.max_wait else ()
     longer = tuple((Change("max_wait", words.at_least(wait)),) for wait in waits)
     if tried := next(filter(None, (trials.try_out(each) for each in ((), *patient, *longer))), None):

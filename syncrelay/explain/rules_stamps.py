@@ -136,8 +136,8 @@ def _epoch(an_input: InputFacts, behind: int) -> str:
 
 
 def no_common_key(facts: GroupFacts) -> Found:
-    """Find that the inputs of `equal_key` have no key in common."""
-    if facts.policy != "equal_key" or not facts.is_silent or any(each.key is None for each in facts.inputs):
+    """Find that inputs that are matched by key have none in common."""
+    if facts.by_stamp or not facts.is_silent or any(each.key is None for each in facts.inputs):
         return
     newest = ", ".join(f"{each.key!r} of {each.name}" for each in facts.inputs)
     yield Finding(

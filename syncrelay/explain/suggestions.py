@@ -187,7 +187,7 @@ class Trials:
         self.config = config
         self._budget = budget
         options = config.options
-        self._trigger = config.inputs.index_of(options.trigger) if options.policy == "latest_time" else None
+        self._trigger = config.trigger
         required = [index for index, topic in enumerate(config.topics) if topic.required]
         pairs = [recent.of_input(index) for index in range(len(config.topics))]
         pacemaker = min(required, key=lambda index: _rate(pairs[index])) if self._trigger is None else self._trigger

@@ -130,11 +130,11 @@ def test_the_relay_ends_with_a_sentence(words, environ, code, said, tmp_path):
 def test_a_reload_that_remaps_turn_into_a_loop_is_refused_and_the_running_file_kept():
     running = load_text(GOOD)
     with Relay(running, ros_args=["-r", "/c:=/front/a"]) as relay:
-        before = names_of(relay.look())
+        before = names_of(relay.evaluate())
         with pytest.raises(ConfigError) as raised:
             relay.reload(load_text(GOOD.replace("topic: /b", "topic: /c")))
-        after = names_of(relay.look())
-    assert "`/front/a` is an input too (line 7, remapped from `/c`)" in str(raised.value)
+        after = names_of(relay.evaluate())
+    assert "`/front/a` is also an input (line 7, remapped from `/c`)" in str(raised.value)
     assert after == before == [("/a", "/front/a"), ("/b", "/front/b")]
 
 

@@ -41,7 +41,7 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
 
         def sets_of(*counts: int) -> bool:
             relay.step(0)
-            return [report.facts.figures.sets for report in relay.look()] == list(counts)
+            return [report.facts.figures.sets for report in relay.evaluate()] == list(counts)
 
         def told() -> dict[str, bool]:
             return {
