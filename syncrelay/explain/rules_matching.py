@@ -50,7 +50,7 @@ def over_slop(facts: GroupFacts) -> Found:
     if facts.is_silent and over > 1 - _MISSED:
         text, severity = _too_wide(tolerance, nearest), Severity.ERROR
     elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
-        text, severity = _often_too_wide(tolerance, nearest), Severity.WARN
+        text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
     found = _tried(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))

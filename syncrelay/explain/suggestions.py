@@ -186,7 +186,6 @@ class Trials:
     ) -> None:
         self.config = config
         self._budget = budget
-        options = config.options
         self._trigger = config.trigger
         required = [index for index, topic in enumerate(config.topics) if topic.required]
         pairs = [recent.of_input(index) for index in range(len(config.topics))]
