@@ -125,8 +125,8 @@ def _problem_as_json(problem: Problem) -> dict[str, Any]:
 
 
 def _workflow_command(problem: Problem) -> str:
-    """Return a command that GitHub turns into an annotation (workflow commands: ::error, ::notice)."""
-    command = "error" if problem.severity is Severity.ERROR else "notice"
+    """Return a command that GitHub turns into an annotation (workflow commands: ::error, ::warning, ::notice)."""
+    command = "notice" if problem.severity is Severity.NOTE else problem.severity.value
     properties = {"file": problem.file}
     if problem.span is not None:
         properties |= {

@@ -51,7 +51,7 @@ class FileFormat:
     """The models of a file. `groups` has those of groups by policy, `topics` those of their topics.
 
     `any_group` and `any_topic` have the keys of all policies, for a group whose policy is missing or misspelt.
-    `defaults` has every key of a group but its topics. `partial` is `file` without a key that is needed.
+    `defaults` has every key of a group but its topics. In `partial_file` no key is needed.
     """
 
     groups: dict[str, type[Group]]
@@ -76,49 +76,49 @@ def file_format() -> FileFormat:
 def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
     groups = {get_args(model.model_fields["policy"].annotation)[0]: model for model in models}
     topics = {policy: _topic_model(model) for policy, model in groups.items()}
-    policy: Any = Literal[tuple(groups)]
+    names: Any = Literal[tuple(groups)]
+    every_key = _every_key(models)
+    keys: dict[str, Any] = {name: _loose(every_key[name], None) for name in every_key if name not in _OWN}
     about = "How the messages of a group are matched."
-    every_key = {name: info for name, info in _every_key(models).items() if name not in ("policy", "topics")}
-    keys: dict[str, Any] = {name: _loose(info, None) for name, info in every_key.items()}
-    own = {name: key for name, key in keys.items() if name not in Group.model_fields}
     any_topic = create_model("TopicOfAnyPolicy", __base__=Topic, **_fields(_every_key(topics.values())))
     any_group = create_model(
         "GroupOfAnyPolicy",
         __base__=Group,
-        policy=(policy, Field(description=about)),
+        policy=(names, Field(description=about)),
         topics=(_tuple_of(any_topic), Topics),
-        **own,
+        **{name: key for name, key in keys.items() if name not in Group.model_fields},
     )
     defaults = create_model(
         "Defaults",
         __base__=Keys,
         __doc__="Keys for all groups. What a group's policy does not have is ignored there.",
-        policy=(policy, Field(default=None, description=about)),
+        policy=(names, Field(default=None, description=about)),
         **keys,
     )
-    file = create_model(
+    file = _file(defaults, _by_policy(groups, any_group))
+    return FileFormat(groups, topics, any_group, any_topic, defaults, file, _partial_file(groups, any_group))
+
+
+# What `defaults` can't hold, or holds in its own way.
+_OWN: Final = ("policy", "topics")
+
+
+def _file(defaults: type[Keys], group: Any) -> type[FileKeys]:
+    about_defaults = (
+        "Keys for all groups, where a group does not have its own. A key that a group's policy does not have is"
+        " ignored there; one that no policy has is an error."
+    )
+    about_groups: Any = Field(
+        description="Groups by name, 1 or more. The name stands in the log and in the names of outputs.",
+        json_schema_extra={"minProperties": 1, "propertyNames": {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}},
+    )
+    return create_model(
         "File",
         __base__=FileKeys,
         __doc__=FileKeys.__doc__,
-        defaults=(defaults, Field(default=None, description=_DEFAULTS)),
-        groups=(
-            _dict_of(Annotated[str, AfterValidator(check_group_name)], _by_policy(groups, any_group)),
-            Field(
-                description="Groups by name, 1 or more. The name stands in the log and in the names of outputs.",
-                json_schema_extra={"minProperties": 1, "propertyNames": {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}},
-            ),
-        ),
+        defaults=(defaults, Field(default=None, description=about_defaults)),
+        groups=(_dict_of(Annotated[str, AfterValidator(check_group_name)], group), about_groups),
     )
-    partial_groups = {name: _partial_group(model) for name, model in groups.items()}
-    partial_group = _by_policy(partial_groups, _partial_group(any_group))
-    partial_file = _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, partial_group), {}))
-    return FileFormat(groups, topics, any_group, any_topic, defaults, file, partial_file)
-
-
-_DEFAULTS: Final = (
-    "Keys for all groups, where a group does not have its own. A key that a group's policy does not have is ignored"
-    " there; one that no policy has is an error."
-)
 
 
 def _topic_model(group: type[Group]) -> type[Topic]:
@@ -169,6 +169,12 @@ def _partial(model: type[AnyKeys], **fields: Any) -> type[AnyKeys]:
     needed = {name: info for name, info in model.model_fields.items() if info.is_required() and name not in fields}
     loose: dict[str, Any] = {name: _loose(info, _UNKNOWN.get(name)) for name, info in needed.items()}
     return create_model(f"Partial{model.__name__}", __base__=model, **(loose | fields))
+
+
+def _partial_file(groups: Mapping[str, type[Group]], any_group: type[Group]) -> type[FileKeys]:
+    by_policy = {policy: _partial_group(model) for policy, model in groups.items()}
+    group = _by_policy(by_policy, _partial_group(any_group))
+    return _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, group), {}))
 
 
 def _partial_group(model: type[Group]) -> type[Group]:

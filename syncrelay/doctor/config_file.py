@@ -17,7 +17,8 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
     together = "--together " if len(files) > 1 else ""
     named = all_of(files) if files else ""
     errors = [problem for problem in problems if problem.severity is Severity.ERROR]
-    noted = [problem for problem in problems if problem not in errors]
+    warnings = [problem for problem in problems if problem.severity is Severity.WARNING]
+    noted = [problem for problem in problems if problem.severity is Severity.NOTE]
     missing = [replace(each, severity=Severity.ERROR) for each in noted if each.code == "package_missing"]
     unchecked = [problem for problem in noted if problem.code != "package_missing"]
     if errors:
@@ -27,20 +28,27 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
             impact="the relay refuses the file and exits at once",
             fix=f"fix what is marked, then check again: syncrelay validate {together}{' '.join(files)}",
         )
+    if warnings:
+        yield info(
+            "file_doubtful",
+            f"{named} may not mean what it says:\n{render(warnings)}",
+            impact="the relay does what it says",
+            fix="write what you mean, with its unit",
+        )
     if missing:
         yield error(
             "package_missing",
-            f"{named}: types of packages that are not installed here:\n{render(missing)}",
-            impact="the relay starts, but their groups wait until the packages are installed",
+            f"{named} uses message types of packages that are not installed here:\n{render(missing)}",
+            impact="the relay starts, but the groups with these types wait until the packages are there",
             fix="build the packages with colcon for this Python, then in this shell: source install/setup.bash\n"
-            "(in the image: put them into docker/messages before you build it)",
+            "(for the image: put them into docker/messages before you build it)",
         )
     if unchecked:
         yield info(
             "not_checked",
-            f"{named} could not be checked in full:\n{render(unchecked)}",
-            impact="an error there shows only when the relay runs",
-            fix="nothing, if you are sure of them",
+            f"{named} could not be checked completely:\n{render(unchecked)}",
+            impact="an error in these places shows only when the relay runs",
+            fix="nothing, if you are sure that they are right",
         )
 
 
@@ -54,7 +62,7 @@ def check_types(config: Config, unusable: Mapping[str, str]) -> Iterator[Diagnos
         yield error(
             "type_unusable",
             f"{name} is installed but cannot be imported: {fault}",
-            impact=f"no sets from {groups}: {topics} cannot be received",
+            impact=f"the relay receives nothing on {topics}, so the group {groups} waits",
             fix=f"rebuild {name.partition('/')[0]} for this Python and this ROS, and source it in this shell",
         )
 
@@ -68,7 +76,7 @@ def check_remaps(config: Config, names: Mapping[str, str]) -> Iterator[Diagnosis
             f"after remapping, the relay refuses these names of the file:\n"
             f"{render([problem for problem in problems if problem.code == code])}",
             impact="the relay exits at once with code 1; on a reload it keeps the running configuration",
-            fix="remove the remap, or rename the topic in the file",
+            fix="remove the remap, or give the topic another name in the file",
         )
 
 

@@ -222,7 +222,7 @@ def test_a_type_whose_library_does_not_load_is_named_with_its_topics(module, fau
     environ = {**base, "PYTHONPATH": f"{ROOT}:{tmp_path}", "AMENT_PREFIX_PATH": prefixes}
     _, found = examine(environ, "--config", str(tmp_path / "f.yaml"))
     assert fault in found["type_unusable"]["what"]
-    assert "no sets from front: /b cannot be received" in found["type_unusable"]["impact"]
+    assert "the relay receives nothing on /b, so the group front waits" in found["type_unusable"]["impact"]
 
 
 @pytest.mark.ros

@@ -55,7 +55,7 @@ def test_a_type_without_its_definition_is_a_note_if_its_stamp_matters(environ):
 
 def test_a_package_that_may_come_later_is_a_note(environ):
     (note,) = notes("my_msgs/msg/Mine", environ)
-    assert (note.severity, note.code) == (Severity.NOTE, "package_missing")
+    assert (note.severity, note.code, note.subject) == (Severity.NOTE, "package_missing", "my_msgs")
     assert note.text == "the package `my_msgs` is not installed here, or not sourced"
     (note,) = notes("sensor_msg/msg/Image", environ)
     assert note.text.endswith("not sourced, did you mean `sensor_msgs`?")

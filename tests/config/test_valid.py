@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.config import DiagnosticsConfig, Listen, QosOverrides, QosPreset, load, load_text
+from syncrelay.config import DiagnosticsConfig, Listen, QosOverrides, QosPreset, Severity, load, load_text
 from syncrelay.sync import Restamp
 
 FOLDER = Path(__file__).parent / "valid"
@@ -98,4 +98,4 @@ def test_a_slop_of_seconds_without_a_unit_is_doubted(slop, note, environ):
     topics = [{"topic": name, "type": "sensor_msgs/msg/Image"} for name in ("/a", "/b")]
     text = f"version: 1\ngroups: {{g: {{policy: approximate_time, slop: {slop}, topics: {json.dumps(topics)}}}}}"
     found = load_text(text, environ=environ).notes
-    assert [each.text for each in found] == ([note] if note else [])
+    assert [(each.text, each.severity) for each in found] == ([(note, Severity.WARNING)] if note else [])

@@ -115,7 +115,12 @@ def test_a_domain_that_is_none_is_refused_before_dds_ends_the_process(domain, mo
     [
         (["--ros-args", "-p", "use_sim_time:=maybe"], {}, 2, "syncrelay: ROS rejects --ros-args -p"),
         ([], {"ROS_DOMAIN_ID": "300"}, 69, "syncrelay: ROS_DOMAIN_ID=300 is not a domain"),
-        (["--ros-args", "-r", "/front/a:=/a"], {}, 1, "the default output `/a`, remapped from `/front/a`, is an input"),
+        (
+            ["--ros-args", "-r", "/front/a:=/a"],
+            {},
+            1,
+            "the default output `/a`, remapped from `/front/a`, is also an input",
+        ),
     ],
     ids=["parameter", "domain", "loop"],
 )

@@ -1,0 +1,153 @@
+"""A fault hides no other, nothing is said that only follows from one, and what is checked is what the relay uses."""
+
+import json
+import random
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import ConfigError, Problem, load_text
+
+_FILES = sorted((Path(__file__).parent / "invalid").glob("*.yaml"))
+# Where these are found, there is no tree in which more could be.
+_NO_TREE = ("yaml", "encoding", "empty")
+
+_BASE = """\
+version: 1
+node: {name: relay}
+defaults: {queue_size: 5}
+groups:
+  front:
+    policy: approximate_time
+    slop: 20ms
+    restamp: none
+    max_wait: 1s
+    topics:
+      - {topic: /a, type: sensor_msgs/msg/Image}
+      - {topic: /b, type: sensor_msgs/msg/Image, required: false}
+      - {topic: /c, type: sensor_msgs/msg/Image}
+      - {topic: /d, type: sensor_msgs/msg/Image}
+  rear:
+    policy: latest_time
+    trigger: /e
+    topics:
+      - {topic: /e, type: sensor_msgs/msg/Image}
+      - {topic: /f, type: sensor_msgs/msg/Image, output: /g}
+      - {topic: /h, type: sensor_msgs/msg/Image, qos: sensor_data}
+  keyed:
+    policy: equal_key
+    output_prefix: /keyed
+    topics:
+      - {topic: /i, type: sensor_msgs/msg/Image, key: header.frame_id}
+      - {topic: /j, type: sensor_msgs/msg/Image, key: header.frame_id}
+"""
+# Each is wrong by itself, whatever the others are.
+_FAULTS = (
+    ("version: 1", "version: 2"),
+    ("name: relay", "name: re-lay"),
+    ("queue_size: 5", "queue_size: 0"),
+    ("slop: 20ms", "slop: 20 parsecs"),
+    ("restamp: none", "restamp: /zzz"),
+    ("topic: /a, type: sensor_msgs/msg/Image", "topic: /a, type: sensor_msgs/msg/Imagg"),
+    ("topic: /c, type", "topic: /b, type"),
+    ("{topic: /d, type: sensor_msgs/msg/Image}", "nothing"),
+    ("trigger: /e", "trigger: /k"),
+    ("output: /g", "output: /rear/e"),
+    ("qos: sensor_data", "qos: sensor_dta"),
+    ("output_prefix: /keyed", "output_prefix: key-ed"),
+    ("topic: /j, type: sensor_msgs/msg/Image, key: header.frame_id", "topic: /j, type: sensor_msgs/msg/Image"),
+)
+
+
+def _problems(text: str, environ: dict[str, str]) -> list[Problem]:
+    try:
+        return list(load_text(text, environ=environ).notes)
+    except ConfigError as error:
+        return list(error.problems)
+
+
+def _told(problems: list[Problem]) -> set[tuple[str, int, str]]:
+    return {(each.code, each.span.line if each.span else 0, each.text) for each in problems}
+
+
+def test_faults_together_are_told_as_each_alone(environ):
+    assert _told(_problems(_BASE, environ)) == set()
+    alone = [_told(_problems(_BASE.replace(*fault), environ)) for fault in _FAULTS]
+    assert all(alone)
+    for seed in range(60):
+        chosen = random.Random(seed).sample(range(len(_FAULTS)), k=seed % len(_FAULTS) + 1)
+        text = _BASE
+        for index in chosen:
+            text = text.replace(*_FAULTS[index])
+        assert _told(_problems(text, environ)) == set().union(*(alone[index] for index in chosen)), text
+
+
+@pytest.mark.parametrize("file", _FILES, ids=lambda file: file.stem)
+def test_one_more_fault_at_the_end_of_a_file_hides_none_above(file: Path, environ):
+    text = file.read_text(encoding="utf-8")
+    before = _problems(text, environ)
+    if any(problem.code in _NO_TREE for problem in before) or all(problem.path == "" for problem in before):
+        return
+    more = f"{text.rstrip()}\none_more_fault: 1\n"
+    assert _told(before) <= _told(_problems(more, environ))
+
+
+_ABSENT = object()
+
+
+def _file(chance: random.Random) -> dict[str, object]:
+    names = ("/a", "/b", "b", "~/a", "/front/a", "/front/b", "/robot/b", "/x/a")
+
+    def maybe(key: str, *values: object) -> dict[str, object]:
+        value = chance.choice((_ABSENT, _ABSENT, *values))
+        return {} if value is _ABSENT else {key: value}
+
+    def group() -> dict[str, object]:
+        topics = [
+            {"topic": name, "type": "sensor_msgs/msg/Image", **maybe("output", *names)}
+            for name in chance.sample(names, 2)
+        ]
+        return {"policy": "exact_time", **maybe("output_prefix", "", "/", "~", "/x", "x", "/front"), "topics": topics}
+
+    groups = {name: group() for name in ("front", "rear")[: chance.randint(1, 2)]}
+    return {"version": 1, "diagnostics": None, "node": maybe("namespace", "/robot"), "groups": groups}
+
+
+def _names(file: dict, *, of: str) -> list[tuple[str, str]]:
+    """The inputs or outputs of a file as README says that they are named, each with its group."""
+    namespace = file["node"].get("namespace", "")
+    named = []
+    for group, keys in file["groups"].items():
+        prefix = keys.get("output_prefix", f"/{group}")
+        for topic in keys["topics"]:
+            below = topic["topic"].removeprefix("~").removeprefix("/")
+            default = topic["topic"] if prefix == "" else f"{prefix.rstrip('/')}/{below}"
+            name = topic["topic"] if of == "topic" else topic.get("output", default)
+            if name.startswith("~"):
+                name = f"{namespace}/syncrelay{name[1:]}"
+            named.append((group, name if name.startswith("/") else f"{namespace}/{name}"))
+    return named
+
+
+def test_a_file_is_refused_for_names_that_meet_in_the_relay_and_for_no_others():
+    refused = 0
+    for seed in range(400):
+        file = _file(random.Random(seed))
+        inputs, outputs = _names(file, of="topic"), [name for _, name in _names(file, of="output")]
+        meet = (
+            len(set(inputs)) < len(inputs)
+            or len(set(outputs)) < len(outputs)
+            or bool({name for _, name in inputs} & set(outputs))
+        )
+        config = None
+        with suppress(ConfigError):
+            config = load_text(json.dumps(file), environ={})
+        assert (config is None) == meet, file
+        if config is None:
+            refused += 1
+            continue
+        absolute = config.node.absolute
+        assert [absolute(topic.output) for group in config.groups for topic in group.topics] == outputs
+        assert [name for group in config.groups for name in group.inputs.names] == [name for _, name in inputs]
+    assert 40 < refused < 360
