@@ -175,8 +175,8 @@ class Watch:
                 return
             time.sleep(_POLL_S)
 
-    def has_warned_of(self, name: str) -> bool:
-        return any(line.group == name and level != "info" for level, line in self.lines)
+    def has_warned_of(self, name: str, finding: str) -> bool:
+        return any((line.group, line.finding) == (name, finding) and level != "info" for level, line in self.lines)
 
     def is_well(self, name: str) -> bool:
         return any(finding["code"] == "healthy" for finding in self.last.get(name, {"findings": []})["findings"])
@@ -223,7 +223,7 @@ def play(stage: Stage, scenarios: Mapping[str, Scenario]) -> Played:
     watch = theatre.watch
     watch.wait(lambda: all(watch.is_well(name) for name, each in scenarios.items() if each.begins_well))
     theatre.begin("2")
-    watch.wait(lambda: all(watch.has_warned_of(name) for name, each in scenarios.items() if each.first))
+    watch.wait(lambda: all(watch.has_warned_of(name, each.first) for name, each in scenarios.items() if each.first))
     written = {name: watch.suggested(name, each) for name, each in scenarios.items() if each.cure}
     for name, changes in written.items():
         _write(theatre.groups[name], changes)
