@@ -13,8 +13,8 @@ from syncrelay.cli.heartbeat import VARIABLE
 from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.examine import Examination, Observed, Request, examine
 from syncrelay.doctor.text import diagnosis_lines, observed_lines, verdict
+from syncrelay.logs import LOGGER
 from syncrelay.printable import printable
-from syncrelay.ros.logs import LOGGER
 
 _LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
 

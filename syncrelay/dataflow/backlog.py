@@ -84,7 +84,7 @@ class Backlog:
                 taken = source.take()
                 if taken is None:
                     return
-        except Exception as error:  # noqa: BLE001  it is told to who added the source
+        except Exception as error:  # noqa: BLE001  the loop hands it to who added the source
             self.failed[source] = error
             return
         self._hold(source, taken)

@@ -1,4 +1,4 @@
-"""Exceptions that should not be: told once, with their traceback, and nothing ends for them."""
+"""Unexpected exceptions: each is logged once with its traceback, and the relay keeps running."""
 
 import logging
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from typing import Final
 
 _LOG = logging.getLogger("syncrelay")
 
-# What fails in ever new words is told no more than so often.
+# An error whose text differs every time is logged no more often than this.
 _MOST: Final = 100
 
 
@@ -15,23 +15,23 @@ class Bugs:
     """Keeps the parts of the relay's work apart. Any thread."""
 
     def __init__(self) -> None:
-        self._told: set[tuple[str, str]] = set()
+        self._logged: set[tuple[str, str]] = set()
 
     @contextmanager
     def contained(self, what: str) -> Iterator[None]:
-        """Go on after a part of the work that fails; `what` it is, as a sentence says it after "while"."""
+        """Log an exception in a part of the work, and go on; `what` completes "a bug in syncrelay while"."""
         try:
             yield
-        except Exception as error:  # noqa: BLE001  told, and nothing else depends on it
-            self.tell(what, error)
+        except Exception as error:  # noqa: BLE001  it is logged, and nothing else depends on it
+            self.log(what, error)
 
-    def tell(self, what: str, error: Exception) -> None:
-        """Log it, the first time."""
+    def log(self, what: str, error: Exception) -> None:
+        """Log an exception, the first time."""
         key = (what, repr(error))
-        if key not in self._told and len(self._told) < _MOST:
-            self._told.add(key)
+        if key not in self._logged and len(self._logged) < _MOST:
+            self._logged.add(key)
             _LOG.error(
-                "a bug in syncrelay while %s; the relay goes on. Please report it with these lines and your file",
+                "a bug in syncrelay while %s; the relay keeps running. Please report it with these lines and your file",
                 what,
                 exc_info=error,
             )

@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
@@ -15,10 +15,11 @@ from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
+_Result = TypeVar("_Result")
 
 # Enough for the widest terminal's strip of recent sets.
 _RECENT = 256
-# What is kept for whoever watches, between two of his looks: at 1 kHz they may be 10 s apart.
+# What is kept between two evaluations: at 1 kHz they may be 10 s apart.
 _WATCHED = 10_000
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
@@ -28,12 +29,16 @@ class Batch(NamedTuple):
     """What came and left since the last evaluation, oldest first.
 
     `arrivals` are stamps and times of receipt of each input, `sets` the sets' stamps and their latencies, `keys` what
-    the newest messages are matched by; times in nanoseconds.
+    the newest messages are matched by, `last` what left last of all; times in nanoseconds. `counts` and `n_sets` are
+    those since the group began.
     """
 
     arrivals: tuple[deque[tuple[int, int]], ...]
     sets: deque[tuple[tuple[int | None, ...], int]]
     keys: tuple[Hashable, ...]
+    counts: tuple[InputCounts, ...]
+    n_sets: int
+    last: tuple[tuple[int | None, ...] | RecentDrop, ...]
 
 
 class Unpublished(NamedTuple):
@@ -78,8 +83,7 @@ class _StoppedEngine:
 class GroupRelay:
     """Feeds a group's engine and publishes the sets that it gives.
 
-    An exception on the way stops the group and no other: `receive` and `receive_keyed` leave it to whoever feeds them
-    to call `fail`, the rest do so themselves.
+    An exception stops this group and no other: the caller of `receive` calls `fail`, all else does so itself.
     """
 
     def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
@@ -138,65 +142,48 @@ class GroupRelay:
             return (self.engine.reject(message, reason),)
         return self.engine.add(message, now=self._now())
 
-    def receive(self, index: int, payload: Any, received: int, stamp: int | None) -> None:
-        """Take in a message of one input by its stamp, None where none could be read; times in nanoseconds."""
+    def receive(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable = None) -> None:
+        """Take in a message of one input, whose stamp is None where it, or the key, cannot be read; times in ns."""
         if stamp is None:
-            self._reject(index, payload, received)
-            return
-        self._arrivals[index].append((stamp, received))
-        self._conclude(self.engine.add(Message(index, stamp, (payload, received)), now=self._now()))
-
-    def receive_keyed(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable) -> None:
-        """Take in a message that is matched by its key; None where none could be read."""
-        if stamp is None or key is None:
-            self._reject(index, payload, received)
+            self._conclude([self.engine.reject(Message(index, 0, (payload, received)), DropReason.MALFORMED)])
             return
         self._arrivals[index].append((stamp, received))
         self._keys[index] = key
         self._conclude(self.engine.add(Message(index, stamp, (payload, received), key), now=self._now()))
 
     def watched(self) -> Batch:
-        """Give what came and left since this was last asked for."""
-        batch = Batch(self._arrivals, self._sets, tuple(self._keys))
+        """Give what came and left since this was last asked for, and all counts."""
+        arrivals, sets = self._arrivals, self._sets
         self._watch()
-        return batch
+        return Batch(arrivals, sets, tuple(self._keys), self.counts(), self.engine.sets, tuple(self.last))
 
     def _watch(self) -> None:
         self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
         self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
 
-    def _reject(self, index: int, payload: Any, received: int) -> None:
-        self._conclude([self.engine.reject(Message(index, 0, (payload, received)), DropReason.MALFORMED)])
-
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""
-        try:
-            self._conclude(self.engine.expire(now=now))
-        except Exception as error:  # noqa: BLE001  it is this group's alone
-            self.fail(error)
+        self._guarded(lambda: self._conclude(self.engine.expire(now=now)))
 
     def flush(self, reason: DropReason) -> None:
         """Drop all that is buffered."""
-        try:
-            self._conclude(self.engine.flush(reason))
-        except Exception as error:  # noqa: BLE001
-            self.fail(error)
+        self._guarded(lambda: self._conclude(self.engine.flush(reason)))
 
     def next_deadline(self) -> int | None:
         """When `expire` wants to be called next."""
-        try:
-            return self.engine.next_deadline()
-        except Exception as error:  # noqa: BLE001
-            self.fail(error)
-            return None
+        return self._guarded(lambda: self.engine.next_deadline())  # noqa: PLW0108  the engine of the second time
 
     def counts(self) -> tuple[InputCounts, ...]:
         """Where the messages of each input went."""
+        return self._guarded(lambda: self.engine.counts())  # noqa: PLW0108  as above
+
+    def _guarded(self, step: Callable[[], _Result]) -> _Result:
+        """Take a step; one that fails stops the group, and is taken again with the engine that gives nothing."""
         try:
-            return self.engine.counts()
-        except Exception as error:  # noqa: BLE001
+            return step()
+        except Exception as error:  # noqa: BLE001  it is this group's alone
             self.fail(error)
-            return self.engine.counts()
+            return step()
 
     def fail(self, error: Exception) -> None:
         """Stop for good, and say so once, with the traceback."""
@@ -204,7 +191,8 @@ class GroupRelay:
             return
         self.failure = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         _LOG.error(
-            "%s: a bug in syncrelay stopped this group, others go on; please report it with these lines and your file",
+            "%s: a bug in syncrelay stopped this group; other groups keep running. "
+            "Please report it with these lines and your file",
             self.config.name,
             exc_info=error,
             extra={"group": self.config.name, "finding": Code.INTERNAL_ERROR.value},

@@ -44,7 +44,7 @@ class ReceiveLoop:
         self.deadline = deadline
         """Says when `expire` wants to be called next, by the clock of `now`; None while it never does.
 
-        Asked at every turn: whoever replaces it wakes the loop.
+        Asked at every turn; wake the loop after replacing it.
         """
         self.turned = time.monotonic()
         """When the loop last turned."""
@@ -144,13 +144,13 @@ class ReceiveLoop:
         self._backlog.deliver_until(time.time_ns(), self._sources)
 
     def _end_failed(self) -> None:
-        """Drain no longer what could not be drained, and tell who added it."""
+        """Stop draining what failed, and pass the error to who added it."""
         failed, self._backlog.failed = self._backlog.failed, {}
         for source, error in failed.items():
-            tell = self._sources.get(source)
-            if tell is not None:
+            failed_of = self._sources.get(source)
+            if failed_of is not None:
                 self._leave(source)
-                tell(error)
+                failed_of(error)
 
     def close(self) -> None:
         """Free what the loop holds of rcl. After `run` has returned."""

@@ -6,7 +6,7 @@ from typing import Final
 
 from syncrelay.doctor.diagnosis import Diagnosis, error
 from syncrelay.doctor.transport import uses_shared_memory
-from syncrelay.ros.domain import range_of
+from syncrelay.environment.domain import range_of
 
 # Measured: rclpy with Fast DDS crashes at 10 threads and runs at 30.
 _FEWEST_TASKS: Final = 30

@@ -6,7 +6,7 @@ from typing import Final
 
 from syncrelay.config.wording import did_you_mean, quoted
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
-from syncrelay.ros.domain import DISCOVERY_RANGES, DOMAIN_ADVICE, domain_of, no_domain, range_of
+from syncrelay.environment.domain import DISCOVERY_RANGES, DOMAIN_ADVICE, domain_of, no_domain, range_of
 
 # DDS: 250 UDP ports for each domain, from 7400 on.
 _FIRST_PORT: Final = 7400

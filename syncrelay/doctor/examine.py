@@ -26,8 +26,8 @@ from syncrelay.doctor.shared_memory import check_shared_memory
 from syncrelay.doctor.start import check_start
 from syncrelay.doctor.start_check import Plan, StartResult, start_node
 from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
+from syncrelay.environment.domain import domain_of, range_of
 from syncrelay.explain import GraphSnapshot, GroupReport
-from syncrelay.ros.domain import domain_of, range_of
 
 
 @dataclass(frozen=True, slots=True)

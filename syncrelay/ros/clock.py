@@ -26,7 +26,7 @@ class WaitingClock:
         return int(self._clock.now().nanoseconds)
 
     def follow(self, *, jumped_back: Callable[[], None], ticked: Callable[[], None]) -> None:
-        """Tell of each change of simulated time, on the thread that serves the node, until `close`."""
+        """Call one of these at each change of simulated time, on the thread that serves the node, until `close`."""
         if not self.is_simulated:
             return
 
@@ -37,6 +37,6 @@ class WaitingClock:
         self._handle = self._clock.create_jump_callback(threshold, post_callback=changed)
 
     def close(self) -> None:
-        """Tell of no more changes."""
+        """Follow the clock no longer."""
         if self._handle is not None:
             self._handle.unregister()

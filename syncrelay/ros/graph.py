@@ -11,9 +11,9 @@ from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 
 from syncrelay.config.names import is_topic_name
+from syncrelay.environment.domain import range_of
 from syncrelay.explain import Endpoint, GraphSnapshot, Mismatch
 from syncrelay.printable import printable
-from syncrelay.ros.domain import range_of
 
 _RELIABILITY: Final = {QoSReliabilityPolicy.BEST_EFFORT: "best_effort", QoSReliabilityPolicy.RELIABLE: "reliable"}
 _DURABILITY: Final = {QoSDurabilityPolicy.VOLATILE: "volatile", QoSDurabilityPolicy.TRANSIENT_LOCAL: "transient_local"}

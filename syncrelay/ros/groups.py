@@ -128,7 +128,7 @@ class Groups:
             group.flush(reason)
 
     def clock_jumped_back(self) -> None:
-        """Begin anew with the clock. On any thread."""
+        """Drop what is buffered, as the clock starts again. On any thread."""
         self._loop.call(self._flush_jump)
 
     def _flush_jump(self) -> None:

@@ -37,26 +37,16 @@ def _handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
     read_stamp = stamp_reader(topic.stamp, message_type)
     if topic.key is not None:
         return _by_key(group, index, read_stamp, value_reader(message_type, topic.key))
-    return _by_receipt(group, index) if read_stamp is None else _by_stamp(group, index, read_stamp)
+    return _by_stamp(group, index, read_stamp)
 
 
 # A `try` costs nothing where nothing is raised; one more call for each message would.
 
 
-def _by_stamp(group: GroupRelay, index: int, read_stamp: StampReader) -> Deliver:
+def _by_stamp(group: GroupRelay, index: int, read_stamp: StampReader | None) -> Deliver:
     def handle(payload: Any, content: Content, received: int) -> None:
         try:
-            group.receive(index, payload, received, read_stamp(content))
-        except Exception as error:  # noqa: BLE001  see `handler`
-            group.fail(error)
-
-    return handle
-
-
-def _by_receipt(group: GroupRelay, index: int) -> Deliver:
-    def handle(payload: Any, _: Content, received: int) -> None:
-        try:
-            group.receive(index, payload, received, received)
+            group.receive(index, payload, received, read_stamp(content) if read_stamp else received)
         except Exception as error:  # noqa: BLE001  see `handler`
             group.fail(error)
 
@@ -68,8 +58,9 @@ def _by_key(
 ) -> Deliver:
     def handle(payload: Any, content: Content, received: int) -> None:
         try:
-            stamp = read_stamp(content) if read_stamp else received
-            group.receive_keyed(index, payload, received, stamp, read_key(content))
+            key = read_key(content)
+            stamp = None if key is None else read_stamp(content) if read_stamp else received
+            group.receive(index, payload, received, stamp, key)
         except Exception as error:  # noqa: BLE001  see `handler`
             group.fail(error)
 

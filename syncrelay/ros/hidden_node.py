@@ -12,9 +12,9 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from syncrelay.config import Config
+from syncrelay.environment.domain import require_domain
 from syncrelay.errors import RosUnavailableError
 from syncrelay.explain import GraphSnapshot
-from syncrelay.ros.domain import require_domain
 from syncrelay.ros.environment import keep_stdout, log_arguments
 from syncrelay.ros.graph import snapshot
 from syncrelay.ros.start import make_node, resolver, start

@@ -3,7 +3,6 @@
 import logging
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -16,13 +15,11 @@ from syncrelay.explain import (
     GraphSnapshot,
     GroupReport,
     GroupWatch,
-    RecentDrop,
     Severity,
     problems,
 )
 from syncrelay.ros.bindings import GroupBinding
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.sync.counts import InputCounts
 
 if TYPE_CHECKING:
     from syncrelay.ros.inputs import TopicInput
@@ -35,14 +32,6 @@ EVALUATE_S: Final = 1.0
 _IN_TURN: Final = 10
 # ... and none waits for more than so many evaluations: a group is silent after 5 s.
 _LONGEST_TURN: Final = 4
-
-
-@dataclass(frozen=True, slots=True)
-class _Gathered:
-    batch: Batch
-    counts: tuple[InputCounts, ...]
-    sets: int
-    last: tuple[tuple[int | None, ...] | RecentDrop, ...]
 
 
 class _Watched(NamedTuple):
@@ -109,7 +98,7 @@ class Monitor:
         self._evaluate(longest_ago[: max(_IN_TURN, ceil(len(longest_ago) / _LONGEST_TURN))])
 
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
-        waits, seen = self._loop.call(lambda: self._gather(bindings)).result()
+        waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
         now = time.time_ns()
         # Messages are received by the system's clock: a step of it is no wait.
         has_stepped = self._system_clock.has_stepped()
@@ -120,39 +109,34 @@ class Monitor:
         for topic, losses in self._losses.items():
             losses.observe(topic.lost(), publishers=len(topic.publishers))
         self._empty_graph = self._surroundings.empty_graph()
-        for binding, gathered in zip(bindings, seen, strict=True):
+        for binding, batch in zip(bindings, batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
                 try:
-                    self._evaluate_group(binding, gathered, now, stopped)
+                    self._evaluate_group(binding, batch, now, stopped)
                 except Exception:
                     # Else an old report would stand for ever.
                     self._reports.pop(binding.group, None)
                     raise
 
-    def _evaluate_group(self, binding: GroupBinding, gathered: _Gathered, now: int, stopped: int | None) -> None:
+    def _evaluate_group(self, binding: GroupBinding, batch: Batch, now: int, stopped: int | None) -> None:
         watch, silence = self._watched[binding.group]
-        batch = gathered.batch
-        watch.add(batch.arrivals, batch.sets, gathered.counts, gathered.sets, keys=batch.keys, now=now)
+        watch.add(batch.arrivals, batch.sets, batch.counts, batch.n_sets, keys=batch.keys, now=now)
         shown = [self._surroundings.of(each, lost=self._losses[each.topic].recent) for each in binding.inputs]
-        failure = binding.group.failure
         facts = watch.facts(
             shown,
             now=now,
             clock_stopped=stopped,
             waited=max(self._waits[each.topic].longest for each in binding.inputs),
             standstill=self.standstills.longest,
-            failure=failure,
+            failure=binding.group.failure,
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
         )
         found = problems(facts)
-        self._reports[binding.group] = GroupReport(facts, found, gathered.last)
+        self._reports[binding.group] = GroupReport(facts, found, batch.last)
         for remark in silence.look(facts, found):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 
-    def _gather(self, bindings: Sequence[GroupBinding]) -> tuple[list[int], list[_Gathered]]:
-        """Take how long messages of each input waited, and what came and left. On the loop's thread."""
-        groups = [binding.group for binding in bindings]
-        return [each.take_wait() for each in self._waits], [
-            _Gathered(group.watched(), group.counts(), group.engine.sets, tuple(group.last)) for group in groups
-        ]
+    def _gather(self, bindings: Sequence[GroupBinding]) -> tuple[list[int], list[Batch]]:
+        """Take how long messages of each topic waited, and what came and left. On the loop's thread."""
+        return [each.take_wait() for each in self._waits], [binding.group.watched() for binding in bindings]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.duration import Duration
 
-from syncrelay.dataflow.backend import Content, Deliver, RclBackend
+from syncrelay.dataflow.backend import Content, Deliver, RclBackend, Source
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Refusal
@@ -67,8 +67,8 @@ class Outputs:
 
     def __init__(self, *, entities: Entities, backend: RclBackend) -> None:
         self.bindings: list[InputBinding] = []
-        self.deliver: Deliver = self._deliver
-        """Feeds them all a message."""
+        self.source: Source | None = None
+        """What feeds them; None as long as nothing does."""
         self.largest = 0
         """The size of the largest message in bytes; measured only where nothing is published."""
         self._handlers: list[Deliver] = []
@@ -87,7 +87,7 @@ class Outputs:
             binding.publisher = self._made(binding, message_type, profile)
             binding.publisher_refusal = None
 
-    def make_anew(self, message_type: Any, profile: Any) -> tuple[dict[InputBinding, Any], list[Refusal]]:
+    def remake(self, message_type: Any, profile: Any) -> tuple[dict[InputBinding, Any], list[Refusal]]:
         """Make publishers of another QoS. What DDS refuses stays as it was."""
         made: dict[InputBinding, Any] = {}
         refused = []
@@ -122,8 +122,9 @@ class Outputs:
         self.bindings = [binding for binding in self.bindings if binding.group is not group]
         self.feed()
 
-    def exchange(self, publishers: Mapping[InputBinding, Any]) -> list[Any]:
-        """Publish by these from now on; those that they replace."""
+    def exchange(self, source: Source, publishers: Mapping[InputBinding, Any]) -> list[Any]:
+        """Be fed by another source, and publish by these publishers; those that they replace."""
+        self.source = source
         old = [binding.publisher for binding in publishers]
         for binding, publisher in publishers.items():
             binding.publisher, binding.publisher_refusal = publisher, None
@@ -142,15 +143,18 @@ class Outputs:
     def feed(self) -> None:
         """Feed those that have a handler, and whose messages can leave."""
         self._handlers = [each.handler for each in self.bindings if each.handler and not each.publisher_refusal]
+        if self.source is None:
+            return
         if self._publishes:
-            self.deliver = self._handlers[0] if len(self._handlers) == 1 else self._deliver
+            self.source.deliver = self._handlers[0] if len(self._handlers) == 1 else self.deliver
         else:
-            self.deliver = self._measure
+            self.source.deliver = self._measure
 
     def _measure(self, payload: Any, content: Content, received: int) -> None:
         self.largest = max(self.largest, len(content))
-        self._deliver(payload, content, received)
+        self.deliver(payload, content, received)
 
-    def _deliver(self, payload: Any, content: Content, received: int) -> None:
+    def deliver(self, payload: Any, content: Content, received: int) -> None:
+        """Feed all of them a message."""
         for handle in self._handlers:
             handle(payload, content, received)

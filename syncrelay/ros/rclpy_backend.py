@@ -96,7 +96,7 @@ class WaitSetWatch:
 
 
 class NoGraphEvents:
-    """What rclpy tells of changes in the graph: nothing, so there may always be some."""
+    """rclpy does not report changes of the graph, so there may always be some."""
 
     def seen(self) -> bool:
         """Whether anything may have changed: always."""

@@ -15,8 +15,10 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from syncrelay.config import Config
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.environment.transport import apply_transport
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import GroupReport, recent
+from syncrelay.logs import name_after
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.bindings import GroupBinding, GroupBindings
 from syncrelay.ros.clock import WaitingClock
@@ -24,24 +26,21 @@ from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
-from syncrelay.ros.logs import RosoutHandler, name_after
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
-from syncrelay.ros.start import make_node, resolver, start
+from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.ros.transport import apply_transport
-from syncrelay.ros.wakeup import Wakeup
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
+from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
 
-# Changes of the graph are looked for this often while something is missing, so that a rig that starts loses
-# little ...
+# The graph is polled this often while something is missing, so that a rig that starts loses little ...
 _EAGER_POLL_S = 0.1
-# ... and this often when all is there.
+# ... and this often when nothing is missing.
 _POLL_S = 1.0
-# Whoever asks for the state every second or two sees all groups as of the last second.
+# While the state is asked for every second or two, all groups are evaluated every second.
 _ASKED_S = 3.0
 # What fails again at once must not take all of a core.
 _AFTER_FAILURE_S = 0.1
@@ -71,7 +70,7 @@ class Relay:
 
         One that only observes is hidden from lists of nodes, and publishes nothing.
 
-        Raises ConfigError where remaps make the file's names meet, UsageError where ROS does not take `ros_args`.
+        Raises ConfigError where remaps give two topics one name, UsageError where ROS rejects `ros_args`.
         `config_path` is what `state` calls the file. `on_turn` is called on the receive thread for as long as that
         turns, once a second at least.
         """
@@ -102,7 +101,7 @@ class Relay:
             now=self._clock.now,
             expire=lambda now: self._groups.expire(now),  # noqa: PLW0108  the groups come after the loop
             on_turn=on_turn,
-            contain=lambda error: self._bugs.tell("receiving", error),
+            contain=lambda error: self._bugs.log("receiving", error),
         )
         self._graph_changes = backend.graph_changes(self.node)
         entities = Entities(self.node, purpose)
@@ -138,7 +137,7 @@ class Relay:
         self._receiving: Future[None] | None = None
 
     def __enter__(self) -> Self:
-        # What there is by now stays: the garbage collector need not look through all modules for each few messages.
+        # What exists by now stays: the garbage collector need not search all modules again and again.
         gc.collect()
         gc.freeze()
         self._receiving = self._threads.submit(self._loop.run)
@@ -159,7 +158,7 @@ class Relay:
         self._next_evaluation = time.monotonic()
 
     def refuse_reload(self, reason: str) -> None:
-        """Tell in `state` that a reload failed, and why."""
+        """Report in `state` that a reload failed, and why."""
         self._groups.refuse_reload(reason)
 
     def _report_on(self, bindings: GroupBindings, config: Config) -> None:
@@ -197,7 +196,7 @@ class Relay:
             self._surroundings.forget()
 
     def _is_watched(self, now: float) -> bool:
-        """Whether somebody wants all groups every second: who plots them, or asks for the state."""
+        """Whether all groups are wanted every second: to plot them, or because the state is asked for."""
         plotted = self._groups.config.diagnostics is not None and self._groups.config.diagnostics.scalars
         return plotted or now - self._asked < _ASKED_S
 
@@ -259,15 +258,12 @@ class Relay:
         try:
             self.drain()
         finally:
-            self._leave_graph()
-
-    def _leave_graph(self) -> None:
-        self._clock.close()
-        self._services.shutdown()
-        self._threads.shutdown()
-        self._loop.close()
-        _LOG.removeHandler(self._rosout)
-        self._leave()
+            self._clock.close()
+            self._services.shutdown()
+            self._threads.shutdown()
+            self._loop.close()
+            _LOG.removeHandler(self._rosout)
+            self._leave()
 
     def _leave(self) -> None:
         self.node.destroy_node()

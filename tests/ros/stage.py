@@ -159,7 +159,7 @@ class Stage:
 
     def before_each_sensor(self, statements: str) -> None:
         """Have each sensor of a rig that is started from now on run these statements before all else."""
-        self._before("syncrelay.ros.rig", statements)
+        self._before("syncrelay.ros.sensor", statements)
 
     def before_each_relay(self, statements: str) -> None:
         """Have each relay that is started from now on run these statements before all else."""

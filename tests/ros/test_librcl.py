@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from syncrelay.config import load
-from syncrelay.dataflow.backend import BackendName
+from syncrelay.dataflow.backend import BackendName, PublishError
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import RosUnavailableError, UsageError
 from syncrelay.sync import DropReason
@@ -29,6 +29,7 @@ LibrclBackend = pytest.importorskip("syncrelay.ros.librcl.backend").LibrclBacken
 messages = pytest.importorskip("syncrelay.ros.librcl.messages")
 rcl = pytest.importorskip("syncrelay.ros.librcl.rcl")
 buffers = pytest.importorskip("syncrelay.ros.librcl.buffers")
+RclpyBackend = pytest.importorskip("syncrelay.ros.rclpy_backend").RclpyBackend
 choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
 handler = pytest.importorskip("syncrelay.ros.handlers").handler
 
@@ -368,12 +369,14 @@ def test_the_backend_can_be_chosen(here, caplog):
         choose_backend("dds", node=here.node, context=here.context)
 
 
-def test_a_call_that_rcl_refuses_says_why(here, topic):
-    outlet = here.backend.outlet(topic.publisher)
+def test_a_message_that_rcl_does_not_publish_says_why(here, topic):
+    outlet, other = here.backend.outlet(topic.publisher), RclpyBackend(here.context).outlet(topic.publisher)
     _, payload, _ = _published_and_taken(here, topic)
     here.context.try_shutdown()
-    with pytest.raises(rcl.RclCallError, match="rcl_publish_serialized_message failed with"):
+    with pytest.raises(PublishError, match="rcl_publish_serialized_message failed with"):
         outlet.send(payload)
+    with pytest.raises(PublishError, match="context is invalid"):
+        other.send(vector(BEGIN))
 
 
 def _published_and_taken(here, topic):

@@ -251,5 +251,5 @@ def test_a_group_that_cannot_be_judged_is_relayed_and_others_are_judged(stage: S
     relaying.conclude(player, collector, recording, aligned)
     assert len(relaying.sets_within(recording, collector, aligned)) == 3
     wait_for_finding(relay, "healthy")
-    relay.wait_for_log("a bug in syncrelay while evaluating unjudged; the relay goes on")
+    relay.wait_for_log("a bug in syncrelay while evaluating unjudged; the relay keeps running")
     assert relay.stderr.count("ZeroDivisionError: no rate") == 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from syncrelay.ros.transport import LARGE_MESSAGES, apply_transport
+from syncrelay.environment.transport import LARGE_MESSAGES, apply_transport
 from tests.ros import relaying
 from tests.ros.cdr_messages import IMAGE, header, serialize
 from tests.ros.configs import LOSSLESS, config, inputs, outputs

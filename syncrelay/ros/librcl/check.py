@@ -1,7 +1,7 @@
 """Whether librcl may be called here: our structures compared with what it does with them.
 
 No version number is trusted. Each structure stands before a margin that must stay as it is, and two messages go
-there and back within this process, one taken by librcl and one by rclpy, which must tell the same of them.
+there and back within this process, one taken by librcl and one by rclpy, which must agree.
 """
 
 import uuid
@@ -111,9 +111,9 @@ def _take_with_margin(rcl: Rcl, subscription: int, memory: Memory) -> MessageInf
 
 
 def _compare(ours: MessageInfo, theirs: Mapping[str, int]) -> None:
-    """Hold what librcl told of the first message to what rclpy told of the second, sent within a moment."""
+    """Compare what librcl says of the first message with what rclpy says of the second, sent within a moment."""
     for name in ("source_timestamp", "received_timestamp"):
-        _require(0 <= theirs[name] - getattr(ours, name) <= _PATIENCE_NS, f"{name} is not what rclpy tells")
+        _require(0 <= theirs[name] - getattr(ours, name) <= _PATIENCE_NS, f"{name} is not what rclpy says")
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Which subscriptions have messages: told by the kernel, at a cost that does not grow with their number.
+"""Which subscriptions have messages: the kernel knows, at a cost that does not grow with their number.
 
 An rcl wait set is filled, attached to every reader and taken apart again for each wait. Here DDS writes to an eventfd
 of the subscription when a message arrives, and an edge-triggered epoll gives those that were written to.
@@ -69,13 +69,13 @@ class EventWatch:
         if seen_until - self._forced_at >= _NS_PER_SECOND or seen_until < self._forced_at:
             return self._poll_all(seen_until)
         # What woke us says nothing of the sources that were written to a moment later. That does no harm where it is
-        # a single message, as nearly always: of what came before, DDS has told, or is just about to.
+        # a single message, as nearly always: DDS has reported what came before, or is about to.
         if len(ready) > 1 or (ready and ready[0].pending > 1):
             ready += [source for source in self._heard(self._epoll.poll(0)) if source not in ready]
         return ready, seen_until
 
     def _heard(self, events: Sequence[tuple[int, int]]) -> list[LibrclSource]:
-        """Add to each source how many messages it was told of."""
+        """Add to each source the messages that DDS reported."""
         ready = []
         for event, _ in events:
             if (source := self._sources.get(event)) is not None:

@@ -1,4 +1,4 @@
-"""Whether the ROS graph has changed: told by rcl, so that nobody has to ask for every topic's publishers again."""
+"""Whether the ROS graph has changed: rcl knows, so the publishers of every topic need not be asked for again."""
 
 import time
 from typing import Any, Final
@@ -7,7 +7,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.ros.librcl.rcl import Rcl
 
-# A change that was never told of must not hide a publisher for ever.
+# A change that was never reported must not hide a publisher for ever.
 _FORCE_S: Final = 60.0
 
 

@@ -19,7 +19,7 @@ class LibrclSource:
         self.deliver = deliver
         self.waited = 0
         self.pending = 0
-        """How many messages DDS has told of: asking librcl once more costs nearly as much as a message."""
+        """How many messages DDS has reported: asking librcl once more costs nearly as much as a message."""
         self._pool = pool
         self.address: Final[int] = subscription.handle.pointer
         # It owns what the address points to.

@@ -1,15 +1,13 @@
-"""The relay's talk: on stderr as text or JSON, and on /rosout for those who watch there."""
+"""The relay's log on stderr, as text or JSON."""
 
 import json
 import logging
 import sys
 from datetime import UTC, datetime
-from typing import Any
 
 from syncrelay.printable import one_entry
 
 LOGGER = logging.getLogger("syncrelay")
-
 
 _ROS_LEVELS = {"WARNING": "WARN", "CRITICAL": "FATAL"}
 
@@ -42,29 +40,8 @@ class _JsonFormatter(logging.Formatter):
         return json.dumps(line)
 
 
-class RosoutHandler(logging.Handler):
-    """Passes records on to a node's logger, which publishes them on /rosout and writes ROS's log file."""
-
-    def __init__(self, node_logger: Any) -> None:
-        super().__init__()
-        # rclpy refuses two severities from one line of code, hence a line for each.
-        self._emit_at = {
-            logging.DEBUG: lambda text: node_logger.debug(text),  # noqa: PLW0108
-            logging.INFO: lambda text: node_logger.info(text),  # noqa: PLW0108
-            logging.WARNING: lambda text: node_logger.warning(text),  # noqa: PLW0108
-            logging.ERROR: lambda text: node_logger.error(text),  # noqa: PLW0108
-            logging.CRITICAL: lambda text: node_logger.fatal(text),  # noqa: PLW0108
-        }
-
-    def emit(self, record: logging.LogRecord) -> None:
-        try:
-            self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(one_entry(record.getMessage()))
-        except Exception:  # noqa: BLE001  whoever logs goes on, as with every handler of logging
-            self.handleError(record)
-
-
 def name_after(node_name: str) -> None:
-    """Have all lines from now on bear a node's name, which tells two relays of a launch apart."""
+    """Name the node in all lines from now on, to distinguish two relays of a launch."""
 
     def name(record: logging.LogRecord) -> bool:
         record.node = node_name

@@ -9,7 +9,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from syncrelay.errors import SyncRelayError
-from syncrelay.ros.rig.schedule import SENSORS
+from syncrelay.rig.schedule import SENSORS
 
 UP = "publishes"
 """What a sensor says as soon as its publisher is there."""
@@ -69,7 +69,15 @@ class Rig:
 
 def _start(name: str, *, seed: int, start: int, talk: IO[bytes]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-m", "syncrelay.ros.rig", name, f"--seed={seed}", f"--start={start}", "--until-stdin-ends"],
+        [
+            sys.executable,
+            "-m",
+            "syncrelay.ros.sensor",
+            name,
+            f"--seed={seed}",
+            f"--start={start}",
+            "--until-stdin-ends",
+        ],
         stdin=subprocess.PIPE,
         stdout=talk,
         stderr=talk,

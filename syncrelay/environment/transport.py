@@ -11,7 +11,7 @@ LARGE_MESSAGES: Final = Path(__file__).with_name("large_messages.xml")
 """The profiles file for messages over the 0.5 MB of Fast DDS's default shared-memory segment."""
 
 _PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
-# Whoever set one of these has chosen already, as our image does: shared memory may not reach the others.
+# With one of these the user has chosen already, as our image does: shared memory may not reach the others.
 _CHOICES: Final = (_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")
 
 _LOG = logging.getLogger("syncrelay")

@@ -1,4 +1,4 @@
-"""One sensor of the rig as a process: `python -m syncrelay.ros.rig camera --seed 1`."""
+"""One sensor of the rig as a process: `python -m syncrelay.ros.sensor camera --seed 1`."""
 
 import argparse
 import os
@@ -9,10 +9,10 @@ import time
 from collections.abc import Iterator, Sequence
 
 from syncrelay.cdr import patch_stamp
+from syncrelay.rig.processes import UP
+from syncrelay.rig.schedule import SENSORS, Shot, schedule
 from syncrelay.ros.environment import log_arguments
-from syncrelay.ros.rig.processes import UP
-from syncrelay.ros.rig.schedule import SENSORS, Shot, schedule
-from syncrelay.ros.wakeup import Wakeup
+from syncrelay.wakeup import Wakeup
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m syncrelay.ros.rig", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m syncrelay.ros.sensor", description=__doc__)
     parser.add_argument("sensor", choices=tuple(SENSORS))
     parser.add_argument("--seed", type=int, default=0, help="of jitter, latency and losses (default: 0)")
     parser.add_argument("--start", type=int, help="begin of the schedule, in nanoseconds (default: now)")
@@ -51,7 +51,7 @@ def _publish(name: str, shots: Iterator[Shot], stop: Wakeup) -> None:
     from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: PLC0415
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
-    from syncrelay.ros.rig.scene import SCENES  # noqa: PLC0415
+    from syncrelay.rig.scene import SCENES  # noqa: PLC0415
     from syncrelay.ros.types import import_type  # noqa: PLC0415
 
     sensor, (type_name, make_frames) = SENSORS[name], SCENES[name]
