@@ -109,7 +109,7 @@ def no_publisher(facts: GroupFacts) -> Found:
     missing = [index for index in facts.required_first if not facts.inputs[index].graph.publishers]
     gone = [index for index in missing if facts.inputs[index].figures.last_received is not None]
     if never := [index for index in missing if index not in gone]:
-        yield _without_publisher(facts, never, _never_published([facts.inputs[index] for index in never]))
+        yield _without_publisher(facts, never, _never_published(facts, [facts.inputs[index] for index in never]))
     if gone:
         yield _without_publisher(facts, gone, _no_longer_published(facts, [facts.inputs[index] for index in gone]))
 
@@ -123,20 +123,32 @@ def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: t
     return Finding(Code.NO_PUBLISHER, severity, *words_of_it, indices[0] if len(indices) == 1 else None)
 
 
-def _never_published(missing: Sequence[InputFacts]) -> tuple[str, str]:
+def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[str, str]:
+    meant = _meant(facts, missing)
     if len(missing) == 1:
         (only,) = missing
         text = f"nobody publishes {only.name} ({only.type})"
-        if only.graph.alike:
-            return text, f"did you mean `topic: {only.graph.alike[0]}`? It is published as {only.type}"
+        if meant:
+            return text, f"did you mean `topic: {meant[only.name]}`? It is published as {only.type}"
         return text, f"start the node that publishes {only.name}, or correct the topic's name"
     text = f"nobody publishes {one_of(each.name for each in missing)}"
     if (moved := _in_another_namespace(missing)) is not None:
         namespace, names = moved
         return text, f"{all_of(names)} are published; did you mean namespace {namespace}?"
-    meant = [f"{each.graph.alike[0]} for {each.name}" for each in missing if each.graph.alike]
-    hint = f"did you mean {all_of(meant)}? Otherwise " if meant else ""
+    pairs = [f"{there} for {name}" for name, there in meant.items()]
+    hint = f"did you mean {all_of(pairs)}? Otherwise " if pairs else ""
     return text, f"{hint}start the nodes that publish them, or correct the topics' names"
+
+
+def _meant(facts: GroupFacts, missing: Sequence[InputFacts]) -> dict[str, str]:
+    """Find for each topic the one that may have been meant: not another input's, and none twice."""
+    taken = {each.name for each in facts.inputs}
+    meant: dict[str, str] = {}
+    for each in missing:
+        if (there := next((name for name in each.graph.alike if name not in taken), None)) is not None:
+            meant[each.name] = there
+            taken.add(there)
+    return meant
 
 
 def _in_another_namespace(missing: Sequence[InputFacts]) -> tuple[str, list[str]] | None:

@@ -139,4 +139,4 @@ def test_clients_that_stall_keep_no_message_and_no_answer_back(stage: Stage):
 
 def test_json_lines_carry_the_finding(stage: Stage):
     relay = stage.relay(front(), "--log-format", "json")
-    relay.wait_for_log('"group": "front", "finding": "no_publisher"}')
+    relay.wait_for_log('"group": "front", "finding": "alone"}')

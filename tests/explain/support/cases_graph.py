@@ -104,10 +104,10 @@ FOUND = {
     "several are published under other names": (
         Code.NO_PUBLISHER,
         Severity.ERROR,
-        a_silent_group(*unpublished({"camera": ("/cam",), "lidar": ("/front/lidar", "/lidar2")}, camera={}, lidar={})),
+        a_silent_group(*unpublished({"camera": ("/cam",), "lidar": ("/cam", "/lidar2")}, camera={}, lidar={})),
         "nobody publishes /camera or /lidar",
         (
-            "did you mean /cam for /camera and /front/lidar for /lidar? Otherwise start the nodes that publish them,"
+            "did you mean /cam for /camera and /lidar2 for /lidar? Otherwise start the nodes that publish them,"
             " or correct the topics' names"
         ),
     ),
