@@ -91,18 +91,17 @@ def inputs(group: Group, width: int) -> Iterator[Text]:
             f"{phrases.rate(each.rate_hz):<{_FIGURE}}",
             f"{phrases.duration(each.lag_ms):<{_FIGURE}}",
             f"{phrases.duration(each.jitter_ms):<{_FIGURE}}",
-            *_notes(each, group.problems_of(each)),
+            *_notes(each, group.problem_of(each)),
         )
 
 
-def _notes(each: Input, problems: Sequence[Finding]) -> Iterator[str | tuple[str, str]]:
+def _notes(each: Input, problem: Finding | None) -> Iterator[str | tuple[str, str]]:
     if not each.required:
         yield ("optional: ", "dim")
-    for number, problem in enumerate(problems):
-        yield ", " if number else ""
+    if problem is not None:
         yield (problem.label, STYLES[problem.severity])
-    if each.dropped_lately or not problems:
-        yield f"{'; ' if problems else ''}{phrases.drops(each.dropped_lately)}"
+    if each.dropped_lately or problem is None:
+        yield f"{'; ' if problem else ''}{phrases.drops(each.dropped_lately)}"
 
 
 def recent_sets(group: Group, width: int) -> Iterator[Text]:

@@ -1,6 +1,6 @@
 """The state of a relay as plain text, for logs and where there is no terminal."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from textwrap import wrap
 
 from syncrelay.status import Level
@@ -42,7 +42,7 @@ def group_lines(group: Group) -> Iterator[str]:
     for finding in group.findings:
         yield from _finding(finding)
     for each in group.inputs:
-        yield from _input(each, group.problems_of(each))
+        yield from _input(each, group.problem_of(each))
 
 
 def _finding(finding: Finding) -> Iterator[str]:
@@ -52,8 +52,8 @@ def _finding(finding: Finding) -> Iterator[str]:
         yield from _wrapped(f"fix: {finding.suggestion}", indent="    ")
 
 
-def _input(each: Input, problems: Sequence[Finding]) -> Iterator[str]:
-    figures = [problem.label for problem in problems]
+def _input(each: Input, problem: Finding | None) -> Iterator[str]:
+    figures = [problem.label] if problem else []
     if each.rate_hz:
         figures.append(phrases.rate(each.rate_hz))
     if each.lag_ms is not None:

@@ -160,9 +160,9 @@ class Group:
         """What is wrong."""
         return [finding for finding in self.findings if finding.severity is not Level.OK]
 
-    def problems_of(self, an_input: Input) -> list[Finding]:
-        """What is wrong with one of its inputs."""
-        return [finding for finding in self.problems if finding.topic == an_input.topic]
+    def problem_of(self, an_input: Input) -> Finding | None:
+        """What is wrong with one of its inputs, before all else; None if nothing is."""
+        return next((finding for finding in self.problems if finding.topic == an_input.topic), None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,6 +59,7 @@ def test_a_selected_group_says_what_is_wrong_and_what_to_do(keys):
     assert lines[6].startswith("── rear:")
     assert lines[7] == "ERROR    stamps of /rear/image_raw are 37.2 s behind those of /lidar/points"
     assert lines[8].startswith("       → synchronize the clocks of their machines, or write `offset: 37.156s`")
+    assert lines[11].startswith("/rear/image_raw 30 Hz     37.2 s    2.83 ms   other clock; 300 too_far")
 
 
 def test_a_wide_terminal_shows_spans_latencies_the_sentence_and_recent_sets():
