@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.config.file import GROUP_MODEL_OF
+from syncrelay.config.file import file_format
 from syncrelay.explain import Code
 from syncrelay.sync import DropReason
 from tests.sync.support.timeline import play_policy
@@ -95,13 +95,13 @@ def test_every_drawing_of_a_policy_is_what_the_policy_does(text):
     policy, *options = keys.split(", ")
     group = {"policy": policy, **dict(option.split(": ") for option in options), "topics": topics}
     (resolved,) = load_text(json.dumps({"version": 1, "groups": {"drawn": group}})).groups
-    left, drawn = play_policy(resolved.options.matcher(resolved.inputs), drawing)
+    left, drawn = play_policy(resolved.options.build_policy(resolved.inputs), drawing)
     assert drawn
     assert left == drawn
 
 
 def test_every_policy_has_a_drawing_and_a_row():
-    for policy in GROUP_MODEL_OF:
+    for policy in file_format().groups:
         assert any(text.startswith(policy) for text in _TIMELINES)
         assert f"| `{policy}` |" in _README
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 import yaml
 
 from syncrelay.config import QosOverrides, QosPreset
-from syncrelay.config.compose import LOADER
+from syncrelay.config.yaml_tree import LOADER
 
 # rclpy's default for every duration is 0, which is unset; rosbag2 writes it so, too.
 _UNSET: Final = 0

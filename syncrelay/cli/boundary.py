@@ -103,8 +103,7 @@ def _abandon(stream: TextIO) -> None:
 
 
 def _tell(error: SyncRelayError) -> None:
-    from syncrelay.config.errors import ConfigError
-    from syncrelay.config.render import render
+    from syncrelay.config import ConfigError, render
 
     if isinstance(error, ConfigError):
         say(render(error.problems, colour=wants_colour(sys.stderr.isatty())))

@@ -19,7 +19,6 @@ from syncrelay.cli.live import Moment, frame
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.tally import GroupPlan, Tally
 from syncrelay.config import GroupConfig, load_text
-from syncrelay.config.policies import ApproximateTimeGroup
 from syncrelay.ros.logs import LOGGER, configure
 from syncrelay.ros.snapshot import RelaySnapshot
 
@@ -123,7 +122,7 @@ def _relay(
 def _plan(group: GroupConfig) -> GroupPlan:
     return GroupPlan(
         policy=group.options.policy,
-        slop=group.options.slop if isinstance(group.options, ApproximateTimeGroup) else 0,
+        slop=group.options.tolerance.ns if group.options.tolerance else 0,
         offsets=tuple(topic.offset_ns for topic in group.topics),
     )
 

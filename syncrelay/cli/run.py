@@ -44,7 +44,7 @@ def run(
     Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
     cannot be used.
     """
-    from syncrelay.config import load, where
+    from syncrelay.config import Severity, load, where
     from syncrelay.ros.environment import require_rclpy
     from syncrelay.ros.logs import LOGGER, configure
 
@@ -53,7 +53,7 @@ def run(
     files = ConfigFiles(config_paths, watched=watch)
     config = load(*config_paths)
     for note in config.notes:
-        if note.code == "unit":
+        if note.severity is Severity.WARNING:
             LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)
     _require_groups(groups, config, config_paths)
     require_rclpy()

@@ -1,13 +1,11 @@
 """The file: read with positions, checked as a whole, and turned into what the relay is told."""
 
-from syncrelay.config.errors import ConfigError
 from syncrelay.config.listen import Listen
-from syncrelay.config.load import load, load_text
-from syncrelay.config.models import DiagnosticsConfig, NodeConfig, StampField, StampSource, Transport
-from syncrelay.config.problems import Problem, Severity, Span
+from syncrelay.config.load import Config, load, load_text
+from syncrelay.config.models import DiagnosticsConfig, NodeConfig, StampField, StampSource, Tolerance, Transport
+from syncrelay.config.problems import ConfigError, Problem, Severity, Span, render, where
 from syncrelay.config.qos import AUTO, QosOverrides, QosPreset
-from syncrelay.config.render import render, where
-from syncrelay.config.resolved import Config, GroupConfig, TopicConfig
+from syncrelay.config.resolved import GroupConfig, TopicConfig
 
 __all__ = [
     "AUTO",
@@ -24,6 +22,7 @@ __all__ = [
     "Span",
     "StampField",
     "StampSource",
+    "Tolerance",
     "TopicConfig",
     "Transport",
     "load",

@@ -1,14 +1,15 @@
 """A YAML file as a tree in which every key and value knows where it stands."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple, TypeAlias
 
 from syncrelay.config.problems import Path, Problem, Severity, Span, dotted
-from syncrelay.config.scalars import Scalar
 from syncrelay.config.source import Source
 from syncrelay.config.wording import LIKENESS, nearest, or_nearest
 from syncrelay.printable import printable
+
+Scalar: TypeAlias = str | int | float | bool | None
 
 MOST_VALUES: Final = 200_000
 """In a file, after following every alias and filling in defaults: a thousand groups are a tenth of it."""
@@ -57,10 +58,14 @@ Node: TypeAlias = ScalarNode | MappingNode | SequenceNode
 
 @dataclass(slots=True)
 class Document:
-    """The tree of a file, or of several that are read together; `sources` by their index."""
+    """The tree of a file, or of several that are read together; `sources` by their index.
+
+    `faulty` are the keys whose values are not known: nothing is said that rests on one.
+    """
 
     sources: Mapping[int, Source]
     root: Node
+    faulty: frozenset[Path] = frozenset()
     guesses: int = MOST_GUESSES
 
     def nearest(self, word: str, candidates: Iterable[str], *, likeness: float = LIKENESS) -> str | None:
@@ -74,15 +79,31 @@ class Document:
         """Return `, did you mean ...?` for the nearest candidate, or nothing."""
         return or_nearest(self.nearest(word, candidates, likeness=likeness))
 
-    def problem(self, path: Path, text: str, *, code: str, span: Span, severity: Severity = Severity.ERROR) -> Problem:
-        """Return a problem at a span."""
-        return self.sources[span.source].problem(text, code=code, span=span, path=dotted(path), severity=severity)
+    def problem(
+        self,
+        path: Path,
+        text: str,
+        *,
+        code: str,
+        span: Span | None = None,
+        severity: Severity = Severity.ERROR,
+        subject: str = "",
+    ) -> Problem:
+        """Return a problem of what stands at a path; it is shown there, or at a span."""
+        span = span or self.value_span(path)
+        return self.sources[span.source].problem(
+            text, code=code, span=span, path=dotted(path), severity=severity, subject=subject
+        )
 
     def line(self, path: Path, *, beside: Path) -> str:
         """Return the line of a value, and its file where that is another than the one of the value beside it."""
         span = self.value_span(path)
         is_elsewhere = span.source != self.value_span(beside).source
         return f"line {span.line}{f' of {printable(self.sources[span.source].name)}' if is_elsewhere else ''}"
+
+    def has(self, path: Path) -> bool:
+        """Tell whether something is written at a path."""
+        return self.find(path) is not None
 
     def key_span(self, path: Path) -> Span:
         """Return where the last key of a path stands; for a list item, the item."""
@@ -136,16 +157,3 @@ def plain(node: Node) -> Any:
             return tuple(plain(item) for item in node.items)
         case MappingNode():
             return {key: plain(entry.value) for key, entry in node.entries.items()}
-
-
-def mappings(node: Node) -> Iterator[tuple[Path, MappingNode]]:
-    """Yield every mapping of a mapping's or list's direct values, with its key or index."""
-    match node:
-        case MappingNode():
-            for key, entry in node.entries.items():
-                if isinstance(entry.value, MappingNode):
-                    yield (key,), entry.value
-        case SequenceNode():
-            for index, item in enumerate(node.items):
-                if isinstance(item, MappingNode):
-                    yield (index,), item

@@ -1,84 +1,23 @@
-"""The whole file as a model, and the loosest form of a group, which has the keys of every policy."""
+"""The whole file as a model: for the policies that there are, and in a form for files with faults."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import copy
-from functools import reduce
+from dataclasses import dataclass
+from functools import cache, reduce
 from operator import or_
 from types import GenericAlias
-from typing import Annotated, Any, Final, Literal, get_args
+from typing import Annotated, Any, Final, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Tag, create_model
 from pydantic.fields import FieldInfo
 
+from syncrelay.config import policies
 from syncrelay.config.keys import Keys
-from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, Topic
+from syncrelay.config.models import DiagnosticsConfig, Group, MetricsConfig, NodeConfig, Topic, Topics
 from syncrelay.config.names import check_group_name
-from syncrelay.config.policies import GROUP_MODELS, AnyGroup, Topics
 from syncrelay.config.wording import describe
 
-GROUP_MODEL_OF: Final[dict[str, type[AnyGroup]]] = {
-    get_args(model.model_fields["policy"].annotation)[0]: model for model in GROUP_MODELS
-}
-"""The model of each policy by the policy's name."""
-
-
-def topic_model(group: type[AnyGroup]) -> type[Topic]:
-    """Return the model of a group's topics."""
-    model: type[Topic] = get_args(group.model_fields["topics"].annotation)[0]
-    return model
-
-
-def _every_key(models: Iterable[type[BaseModel]]) -> dict[str, tuple[Any, FieldInfo]]:
-    return {name: (info.annotation, info) for model in models for name, info in model.model_fields.items()}
-
-
-def _optional(annotation: Any, info: FieldInfo) -> tuple[Any, FieldInfo]:
-    loose = copy(info)
-    loose.default = None
-    return annotation, loose
-
-
-_POLICY: Final = "How the messages of a group are matched."
-_PolicyName: Any = Literal[tuple(GROUP_MODEL_OF)]
-_GROUP_KEYS: Final[dict[str, Any]] = {
-    name: _optional(*key) for name, key in _every_key(GROUP_MODELS).items() if name not in ("policy", "topics")
-}
-_TOPIC_KEYS: Final[dict[str, Any]] = dict(_every_key(topic_model(group) for group in GROUP_MODELS))
-
-TopicOfAnyPolicy: Final = create_model("TopicOfAnyPolicy", __base__=Keys, **_TOPIC_KEYS)
-"""A topic with the keys of every policy."""
-_TopicsOfAnyPolicy: Any = GenericAlias(tuple, (TopicOfAnyPolicy, ...))
-
-GroupOfAnyPolicy: Final = create_model(
-    "GroupOfAnyPolicy",
-    __base__=Keys,
-    policy=(_PolicyName, Field(description=_POLICY)),
-    topics=(_TopicsOfAnyPolicy, Topics),
-    **_GROUP_KEYS,
-)
-"""A group whose policy is missing or misspelt: its other keys are checked all the same."""
-
-Defaults: Final = create_model(
-    "Defaults",
-    __base__=Keys,
-    __doc__="Keys of a group, used where a group is silent. What a group's policy does not have is passed over.",
-    policy=(_PolicyName, Field(default=None, description=_POLICY)),
-    **_GROUP_KEYS,
-)
-"""Every key of a group but its topics, all optional."""
-
-
-def _tag_of_group(value: Any) -> str:
-    policy = value.get("policy") if isinstance(value, dict) else None
-    return f"<{policy}>" if isinstance(policy, str) and policy in GROUP_MODEL_OF else "<any>"
-
-
-_BRANCHES: Final[tuple[Any, ...]] = (
-    *(Annotated[model, Tag(f"<{name}>")] for name, model in GROUP_MODEL_OF.items()),
-    Annotated[GroupOfAnyPolicy, Tag("<any>")],
-)
-_Group: Any = Annotated[reduce(or_, _BRANCHES), Discriminator(_tag_of_group)]
-_Groups: Any = GenericAlias(dict, (Annotated[str, AfterValidator(check_group_name)], _Group))
+AnyKeys = TypeVar("AnyKeys", bound=Keys)
 
 
 def _version(value: Any) -> Any:
@@ -95,38 +34,142 @@ class FileKeys(Keys):
     node: NodeConfig = Field(default_factory=NodeConfig, description="The ROS node.")
     metrics: MetricsConfig | None = Field(
         default_factory=MetricsConfig,
-        description="HTTP for programs and people, null for none.",
+        description="HTTP server for status and metrics, null for none.",
         json_schema_extra={"nullable": True},
     )
     diagnostics: DiagnosticsConfig | None = Field(
         default_factory=DiagnosticsConfig,
-        description="What is published about the relay, null for nothing.",
+        description="What the relay publishes about itself, null for nothing.",
         json_schema_extra={"nullable": True},
     )
     defaults: Keys | None = None
-    groups: dict[str, AnyGroup]
+    groups: dict[str, Group]
 
 
-File: Final = create_model(
-    "File",
-    __base__=FileKeys,
-    __doc__=FileKeys.__doc__,
-    defaults=(
-        Defaults,
-        Field(
-            default=None,
-            description=(
-                "Keys of a group, used where a group is silent. A key that the group's policy does not have is"
-                " passed over there; one that no policy has is an error."
+@dataclass(frozen=True, slots=True)
+class FileFormat:
+    """The models of a file. `groups` has those of groups by policy, `topics` those of their topics.
+
+    `any_group` and `any_topic` have the keys of all policies, for a group whose policy is missing or misspelt.
+    `defaults` has every key of a group but its topics. `partial` is `file` without a key that is needed.
+    """
+
+    groups: dict[str, type[Group]]
+    topics: dict[str, type[Topic]]
+    any_group: type[Group]
+    any_topic: type[Topic]
+    defaults: type[Keys]
+    file: type[FileKeys]
+    partial_file: type[FileKeys]
+
+    def group(self, policy: object) -> type[Group]:
+        """Return the model of a policy's groups; that of all policies for one that there is not."""
+        return self.groups.get(policy, self.any_group) if isinstance(policy, str) else self.any_group
+
+
+def file_format() -> FileFormat:
+    """Return the models of a file with all policies."""
+    return _format_of(policies.GROUP_MODELS)
+
+
+@cache
+def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
+    groups = {get_args(model.model_fields["policy"].annotation)[0]: model for model in models}
+    topics = {policy: _topic_model(model) for policy, model in groups.items()}
+    policy: Any = Literal[tuple(groups)]
+    about = "How the messages of a group are matched."
+    every_key = {name: info for name, info in _every_key(models).items() if name not in ("policy", "topics")}
+    keys: dict[str, Any] = {name: _loose(info, None) for name, info in every_key.items()}
+    own = {name: key for name, key in keys.items() if name not in Group.model_fields}
+    any_topic = create_model("TopicOfAnyPolicy", __base__=Topic, **_fields(_every_key(topics.values())))
+    any_group = create_model(
+        "GroupOfAnyPolicy",
+        __base__=Group,
+        policy=(policy, Field(description=about)),
+        topics=(_tuple_of(any_topic), Topics),
+        **own,
+    )
+    defaults = create_model(
+        "Defaults",
+        __base__=Keys,
+        __doc__="Keys for all groups. What a group's policy does not have is ignored there.",
+        policy=(policy, Field(default=None, description=about)),
+        **keys,
+    )
+    file = create_model(
+        "File",
+        __base__=FileKeys,
+        __doc__=FileKeys.__doc__,
+        defaults=(defaults, Field(default=None, description=_DEFAULTS)),
+        groups=(
+            _dict_of(Annotated[str, AfterValidator(check_group_name)], _by_policy(groups, any_group)),
+            Field(
+                description="Groups by name, 1 or more. The name stands in the log and in the names of outputs.",
+                json_schema_extra={"minProperties": 1, "propertyNames": {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}},
             ),
         ),
-    ),
-    groups=(
-        _Groups,
-        Field(
-            description=("Groups by name, 1 or more. The name stands in the log and in the names of outputs."),
-            json_schema_extra={"minProperties": 1, "propertyNames": {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$"}},
-        ),
-    ),
+    )
+    partial_groups = {name: _partial_group(model) for name, model in groups.items()}
+    partial_group = _by_policy(partial_groups, _partial_group(any_group))
+    partial_file = _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, partial_group), {}))
+    return FileFormat(groups, topics, any_group, any_topic, defaults, file, partial_file)
+
+
+_DEFAULTS: Final = (
+    "Keys for all groups, where a group does not have its own. A key that a group's policy does not have is ignored"
+    " there; one that no policy has is an error."
 )
-"""FileKeys with the group's model chosen by its policy."""
+
+
+def _topic_model(group: type[Group]) -> type[Topic]:
+    model: type[Topic] = get_args(group.model_fields["topics"].annotation)[0]
+    return model
+
+
+def _every_key(models: Iterable[type[BaseModel]]) -> dict[str, FieldInfo]:
+    return {name: info for model in models for name, info in model.model_fields.items()}
+
+
+def _fields(keys: Mapping[str, FieldInfo]) -> dict[str, Any]:
+    return {name: (info.annotation, info) for name, info in keys.items()}
+
+
+def _loose(info: FieldInfo, default: Any) -> tuple[Any, FieldInfo]:
+    loose = copy(info)
+    loose.default = default
+    return info.annotation, loose
+
+
+def _dict_of(key: Any, value: Any) -> Any:
+    return GenericAlias(dict, (key, value))
+
+
+def _tuple_of(model: type[Topic]) -> Any:
+    return GenericAlias(tuple, (model, ...))
+
+
+def _by_policy(groups: Mapping[str, type[Group]], any_group: type[Group]) -> Any:
+    """Return the union of groups, in which the policy chooses."""
+
+    def tag(value: Any) -> str:
+        policy = value.get("policy") if isinstance(value, dict) else None
+        return f"<{policy}>" if isinstance(policy, str) and policy in groups else "<any>"
+
+    tagged = [*((model, f"<{name}>") for name, model in groups.items()), (any_group, "<any>")]
+    branches: list[Any] = [Annotated[model, Tag(name)] for model, name in tagged]
+    return Annotated[reduce(or_, branches), Discriminator(tag)]
+
+
+# What a key holds that is needed, and is missing or faulty; any other None.
+_UNKNOWN: Final[Mapping[str, Any]] = {"topic": "", "type": ""}
+
+
+def _partial(model: type[AnyKeys], **fields: Any) -> type[AnyKeys]:
+    """Return a model of which every key may be missing."""
+    needed = {name: info for name, info in model.model_fields.items() if info.is_required() and name not in fields}
+    loose: dict[str, Any] = {name: _loose(info, _UNKNOWN.get(name)) for name, info in needed.items()}
+    return create_model(f"Partial{model.__name__}", __base__=model, **(loose | fields))
+
+
+def _partial_group(model: type[Group]) -> type[Group]:
+    return _partial(model, topics=(_tuple_of(_partial(_topic_model(model))), ()))

@@ -1,20 +1,53 @@
-"""Message types as the ament index knows them: read from files, nothing is imported.
+"""Message types as the ament index knows them, and their fields: read from files, nothing is imported.
 
 The index is a folder `share/ament_index/resource_index` in every prefix of AMENT_PREFIX_PATH. The ROS wheels leave
 that variable unset and put the index into the Python environment's own prefix.
 """
 
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Final, Self
+from typing import Final, NamedTuple, Self
 
-from syncrelay.config.msgfile import Field, parse_fields
+HEADER: Final = "std_msgs/msg/Header"
+TIME: Final = "builtin_interfaces/msg/Time"
+
+_FIELD = re.compile(
+    r"(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[[^\]]*\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)"
+)
+PRIMITIVES: Final = frozenset(
+    [
+        "bool",
+        "byte",
+        "char",
+        "float32",
+        "float64",
+        "int8",
+        "uint8",
+        "int16",
+        "uint16",
+        "int32",
+        "uint32",
+        "int64",
+        "uint64",
+        "string",
+        "wstring",
+    ]
+)
 
 _INDEX: Final = Path("share/ament_index/resource_index")
+
+
+class Field(NamedTuple):
+    """A field: its type in full, a primitive's by its own name; whether it is an array of that type."""
+
+    name: str
+    type: str
+    is_array: bool
 
 
 @dataclass(frozen=True)
@@ -81,3 +114,20 @@ class Interfaces:
 def _names_in(folder: Path) -> Iterator[str]:
     if folder.is_dir():
         yield from sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
+
+
+def parse_fields(text: str, *, package: str) -> tuple[Field, ...]:
+    """Return the fields in order; constants are none."""
+    fields = []
+    for line in text.splitlines():
+        found = _FIELD.match(line.partition("#")[0].strip())
+        if found is not None and not found["rest"].startswith("="):
+            fields.append(Field(found["name"], _full_name(found["type"], package), found["array"] is not None))
+    return tuple(fields)
+
+
+def _full_name(written: str, package: str) -> str:
+    if written in PRIMITIVES:
+        return written
+    owner, slash, name = written.rpartition("/")
+    return f"{owner.removesuffix('/msg')}/msg/{name}" if slash else f"{package}/msg/{name}"

@@ -7,12 +7,13 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Wit
 from syncrelay.config.listen import check_listen, parse_host
 from syncrelay.config.names import (
     LONGEST_TOPIC,
+    check_field_path,
     check_namespace,
     check_node_name,
     check_output_prefix,
     check_topic_name,
+    check_type_name,
 )
-from syncrelay.config.typenames import check_field_path, check_type_name
 from syncrelay.config.units import parse_duration, parse_rate
 from syncrelay.config.wording import describe
 
@@ -37,7 +38,7 @@ def _not_negative(value: Any) -> int:
 
 def _refuse_null(value: Any) -> Any:
     if value is None:
-        raise ValueError("found nothing: give the key a value, or leave it out")
+        raise ValueError("no value: give the key a value, or remove it")
     return value
 
 

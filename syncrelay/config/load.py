@@ -2,29 +2,44 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 from pydantic import ValidationError
 
-from syncrelay.config.checks import check_between
-from syncrelay.config.compose import compose
+from syncrelay.config.checks import check_groups, check_node
+from syncrelay.config.defaults import merged_documents, merged_files, with_defaults
 from syncrelay.config.document import Document, plain
-from syncrelay.config.drafts import GroupDraft, absolute_names, drafts
-from syncrelay.config.errors import ConfigError
-from syncrelay.config.file import File, FileKeys
-from syncrelay.config.filling import with_defaults
+from syncrelay.config.file import FileKeys, file_format
 from syncrelay.config.interfaces import Interfaces
-from syncrelay.config.merging import merged_documents, merged_files
+from syncrelay.config.listen import Listen
+from syncrelay.config.models import DiagnosticsConfig, NodeConfig
 from syncrelay.config.names_in_graph import NamesInFile
-from syncrelay.config.own_topics import check_own_topics
-from syncrelay.config.problems import Problem, Severity
-from syncrelay.config.resolved import Config, resolve
+from syncrelay.config.partial import partial_file
+from syncrelay.config.problems import ConfigError, Problem, Severity
+from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
 from syncrelay.config.source import PATIENCE_S, Source, check_text, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
+from syncrelay.config.yaml_tree import compose
 
 _NO_INDEX = "message types were not checked: there is no ament index here (source ROS 2, or install with '.[ros]')"
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """A file that is in order. `notes` are what could not be checked, or is hardly meant.
+
+    `names` tells what is wrong with it once remaps have made others of its topics' names.
+    `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published.
+    """
+
+    node: NodeConfig
+    groups: tuple[GroupConfig, ...]
+    listen: Listen | None
+    diagnostics: DiagnosticsConfig | None
+    names: NamesInFile = field(compare=False, repr=False)
+    notes: tuple[Problem, ...] = ()
 
 
 def load(
@@ -53,25 +68,28 @@ def load_text(
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """One file: its tree with defaults filled in, its keys where all of them are in order, and what is wrong."""
+    """One file: its tree with defaults filled in, the keys that are in order, and what is wrong with the others."""
 
     document: Document
-    file: FileKeys | None
+    file: FileKeys
     problems: Sequence[Problem]
 
 
 def _config(parts: Sequence[_Part], environ: Mapping[str, str]) -> Config:
+    """Resolve what could be read of all files and check that: it is what the relay uses if nothing is found."""
     document, repeated = merged_documents([part.document for part in parts])
+    file = merged_files([part.file for part in parts])
+    groups = resolve_groups(file)
+    names = NamesInFile(file.node, groups, file.diagnostics, document)
     problems = [*(problem for part in parts for problem in part.problems), *repeated]
-    groups = drafts(document)
-    problems += check_between(groups, document)
-    problems += check_own_topics(groups, document, absolute_names(document))
+    problems += check_node(file.node, document)
+    problems += check_groups(groups, document)
+    problems += names.problems(file.node.absolute, groups=file.groups)
     problems += _types(groups, document, environ)
     found = _in_order(problems, files=[source.name for source in document.sources.values()])
-    files = [part.file for part in parts if part.file is not None]
-    if len(files) < len(parts) or any(problem.severity is Severity.ERROR for problem in found):
+    if document.faulty or any(problem.severity is Severity.ERROR for problem in found):
         raise ConfigError(found)
-    return resolve(merged_files(files), names=NamesInFile(document), notes=found)
+    return Config(file.node, groups, resolve_listen(file.metrics), file.diagnostics, names, found)
 
 
 def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) -> list[_Part]:
@@ -97,12 +115,13 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
         # The groups may all be in the others.
         keys = {"groups": {}, **keys}
     try:
-        return _Part(document, File.model_validate(keys), problems)
+        return _Part(document, file_format().file.model_validate(keys), problems)
     except ValidationError as error:
-        return _Part(document, None, problems + translate(error.errors(include_url=False), document))
+        faults = error.errors(include_url=False)
+        return _Part(*partial_file(document, faults), problems + translate(faults, document))
 
 
-def _types(groups: Sequence[GroupDraft], document: Document, environ: Mapping[str, str]) -> Iterator[Problem]:
+def _types(groups: Sequence[GroupConfig], document: Document, environ: Mapping[str, str]) -> Iterator[Problem]:
     interfaces = Interfaces.find(environ)
     if interfaces is None:
         first = document.sources[0]

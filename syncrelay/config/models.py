@@ -1,6 +1,8 @@
 """What a file may say. The JSON Schema and the errors come from these models and nowhere else."""
 
-from typing import Annotated, Any, Literal, TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
@@ -21,21 +23,23 @@ from syncrelay.config.keys import (
     TypeName,
     tag_of_mapping,
 )
+from syncrelay.config.names import expand
 from syncrelay.config.qos import AUTO, Qos
 from syncrelay.config.wording import describe
+from syncrelay.sync import Policy
 
 Transport: TypeAlias = Literal["default", "large_messages"]
 
 
 class NodeConfig(Keys):
-    """The ROS node. Remaps and parameters behind --ros-args still win."""
+    """The ROS node. Remaps and parameters after --ros-args take precedence."""
 
     name: NodeName = Field(
         default="syncrelay", description="Name of the node. Default: syncrelay.", examples=["syncrelay"]
     )
     namespace: Namespace = Field(
         default="",
-        description="Namespace of the node, in which relative and `~/` topic names stand. Default: empty, the root.",
+        description="Namespace of the node, for relative and `~/` topic names. Default: empty, the root.",
         examples=["/robot1"],
     )
     use_sim_time: bool = Field(
@@ -45,12 +49,16 @@ class NodeConfig(Keys):
     transport: Transport = Field(
         default="default",
         description=(
-            "How Fast DDS carries messages of this node: `large_messages` gives it shared memory for images and clouds"
-            " over 0.5 MB, which publishers and subscribers need too, see configs/large_messages.xml. Transports that"
-            " the environment names stand. Default: default."
+            "How Fast DDS carries messages of this node. `large_messages` uses shared memory for images and clouds"
+            " larger than 0.5 MB; publishers and subscribers need it too, see configs/large_messages.xml. Transports"
+            " set in the environment take precedence. Default: default."
         ),
         examples=["default", "large_messages"],
     )
+
+    def absolute(self, name: str) -> str:
+        """Return the absolute name of a topic that the file names, before any remapping."""
+        return expand(name, node=self.name, namespace=self.namespace)
 
 
 class MetricsConfig(Keys):
@@ -67,9 +75,9 @@ class MetricsConfig(Keys):
     hosts: tuple[Host, ...] = Field(
         default=(),
         description=(
-            "Other names by which the relay is asked, such as that of a Kubernetes service: a page in a browser cannot"
-            " read the state under a name that is not here. Names of this machine and, where `listen` is open to"
-            " other machines, every address need not be listed. Default: none."
+            "Other host names that requests may use, such as that of a Kubernetes service: a page in a browser cannot"
+            " read the status under any other name. Names of this machine need not be listed; nor need addresses, where"
+            " `listen` is open to other machines. Default: none."
         ),
         examples=[["robot.lab.example"]],
     )
@@ -121,7 +129,7 @@ class Topic(Keys):
     required: bool = Field(
         default=True,
         description=(
-            "Whether every set has a message of this input. With false a set leaves without one after the group's"
+            "Whether every set needs a message of this input. If false, a set leaves without one after the group's"
             " max_wait, with latest_time at once. Default: true."
         ),
     )
@@ -139,8 +147,8 @@ class Topic(Keys):
     ] = Field(
         default="header",
         description=(
-            "Where a message's stamp is: `header` (the std_msgs/Header that the message begins with), `receive` (the"
-            " time of its arrival here) or a field, as in {field: status.stamp}. Default: header."
+            "Where to read a message's stamp: `header` (the std_msgs/Header that the message begins with), `receive`"
+            " (the time of its arrival here) or a field, as in {field: status.stamp}. Default: header."
         ),
         examples=["header", "receive", {"field": "status.stamp"}],
     )
@@ -151,7 +159,7 @@ class KeyedTopic(Topic):
 
     key: Annotated[FieldPath | None, NOT_NULL] = Field(
         default=None,
-        description="Path of the field to match by, where it is another than the group's `key`. Default: the group's.",
+        description="Path of the field to match by, if it differs from the group's `key`. Default: the group's.",
         examples=["image_header.frame_id"],
     )
 
@@ -162,7 +170,7 @@ class PacedTopic(Topic):
     min_period: Duration = Field(
         default=0,
         description=(
-            "Least time between two messages of this input: with it a set can leave before the next message comes."
+            "Least time between two messages of this input: it lets a set leave before the next message arrives."
             " Too large a value gives worse sets. A number is seconds, a text has a unit (ns, us, ms, s, min)."
             " Default: 0, nothing known."
         ),
@@ -177,8 +185,58 @@ def _restamp(value: Any) -> str:
     return value
 
 
+Topics = Field(
+    description="Inputs in the order in which the messages of a set leave, 2 or more.",
+    json_schema_extra={"minItems": 2},
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """The absolute names of a group's inputs, and the node in whose namespace the file's names stand."""
+
+    names: tuple[str, ...]
+    node: NodeConfig
+
+    @classmethod
+    def of(cls, topics: Sequence[Topic], node: NodeConfig) -> Self:
+        """Return the names of these topics."""
+        return cls(tuple(node.absolute(each.topic) for each in topics), node)
+
+    def index_of(self, topic: str) -> int:
+        """Return the index of an input that the file calls by this name. Raises ValueError where it is none."""
+        return self.names.index(self.node.absolute(topic))
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """How far apart the stamps of a set may be, in nanoseconds, and the key that says so.
+
+    `wider_policy` is the policy that has this key, where the group's own allows no distance.
+    """
+
+    key: str
+    ns: int
+    wider_policy: str | None = None
+
+
 class Group(Keys):
-    """Keys that the groups of every policy have."""
+    """Keys that the groups of every policy have, and what the rest of the program asks of a policy."""
+
+    by_stamp: ClassVar[bool] = True
+    """Whether stamps are what is matched, as the engine's policy says."""
+
+    repeats: ClassVar[bool] = False
+    """Whether a message may be in more than one set, as the engine's policy says."""
+
+    waits_for_optional: ClassVar[bool] = True
+    """Whether a set that lacks an optional message waits for it, up to `max_wait`."""
+
+    waits_for_next: ClassVar[bool] = False
+    """Whether a set waits for the next messages, which may be nearer; a topic's `min_period` can shorten that."""
+
+    matched_by: ClassVar[tuple[str, ...]] = ()
+    """Keys that say which messages belong together; none where it is how near their stamps are."""
 
     policy: str
     queue_size: int = Field(
@@ -192,7 +250,7 @@ class Group(Keys):
         default=None,
         description=(
             "How long a set may wait, once its required messages are there, for optional ones or for a closer match;"
-            " then it leaves as it is. Needed where an input is optional, but not by latest_time, which never waits for"
+            " then it leaves as it is. Needed if an input is optional, except with latest_time, which never waits for"
             " one. A number is seconds, a text has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["100ms"],
@@ -200,8 +258,8 @@ class Group(Keys):
     max_rate: Annotated[Rate | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "Most sets a second, evenly spaced by their stamps; the others are dropped whole, as `thinned`. A number"
-            " is Hz, a text has a unit (Hz, kHz). Default: no limit."
+            "Largest number of sets a second, evenly spaced by their stamps; the others are dropped whole, as"
+            " `thinned`. A number is Hz, a text has a unit (Hz, kHz). Default: no limit."
         ),
         examples=["10 Hz"],
     )
@@ -209,7 +267,7 @@ class Group(Keys):
         default=1,
         ge=1,
         le=MOST,
-        description="Only each n-th set leaves; the others are dropped whole, as `thinned`. Default: 1, every set.",
+        description="Only every n-th set leaves; the others are dropped whole, as `thinned`. Default: 1, every set.",
         examples=[2],
     )
     restamp: Annotated[str, BeforeValidator(_restamp)] = Field(
@@ -225,3 +283,22 @@ class Group(Keys):
         description="What default output names begin with. Default: / and the group's name.",
         examples=["/fused"],
     )
+    topics: tuple[Topic, ...] = Topics
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """How far apart the stamps of a set may be; None where any distance will do."""
+        return None
+
+    @property
+    def trigger_topic(self) -> str | None:
+        """The input whose every message makes a set; None where all inputs are alike."""
+        return None
+
+    def key_of(self, _topic: Topic) -> str | None:
+        """Return the path of the field that a topic's messages are matched by; None where it is their stamps."""
+        return None
+
+    def build_policy(self, _inputs: Inputs) -> Policy:
+        """Return a new policy of the engine."""
+        raise NotImplementedError

@@ -1,4 +1,7 @@
-"""The rules of ROS for names, as rcl and rmw check them (rcl_validate_topic_name, rmw_validate_full_topic_name)."""
+"""The form of names: of topics, nodes and namespaces as rcl and rmw check them, of message types and their fields.
+
+The rules are those of rcl_validate_topic_name and rmw_validate_full_topic_name.
+"""
 
 import re
 from typing import Final
@@ -10,6 +13,12 @@ LONGEST_TOPIC: Final = 247
 _LONGEST_NODE: Final = 255
 _TOKEN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_/]")
+_FULL: Final = re.compile(r"[A-Za-z]\w*/(msg|srv|action)/[A-Za-z]\w*", re.ASCII)
+_SHORT: Final = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)", re.ASCII)
+# As Python and C++ write it.
+_FOREIGN: Final = re.compile(r"([A-Za-z]\w*)(?:\.|::)msg(?:\.|::)([A-Za-z]\w*)", re.ASCII)
+_PATH: Final = re.compile(r"[A-Za-z]\w*(\.[A-Za-z]\w*)*", re.ASCII)
+_KINDS: Final = {"srv": "a service", "action": "an action"}
 
 
 def check_topic_name(name: object) -> str:
@@ -58,10 +67,10 @@ def check_node_name(name: str) -> str:
 def check_group_name(name: str) -> str:
     """Return a group's name: one token of a topic name; raises ValueError saying what is wrong."""
     if "$" in name:
-        raise ValueError(f"variables are filled in in values only, found {quoted(name)}")
+        raise ValueError(f"variables work in values only, found {quoted(name)}")
     if not _TOKEN.fullmatch(name):
         raise ValueError(
-            f"a group name has letters, digits and `_`, and no digit first, found {quoted(name)}:"
+            f"a group name may have only letters, digits and `_`, and no digit first, found {quoted(name)}:"
             " it becomes part of topic names"
         )
     return name
@@ -86,22 +95,45 @@ def _check_tokens(tokens: str, *, whole: str, kind: str) -> None:
     unallowed = _NOT_ALLOWED.search(tokens)
     if unallowed is not None:
         raise ValueError(
-            f"a {kind} has letters, digits, `_` and `/` only, found {quoted(unallowed.group())} in {quoted(whole)}"
+            f"a {kind} may have only letters, digits, `_` and `/`, found {quoted(unallowed.group())} in {quoted(whole)}"
         )
     for token in tokens.split("/"):
         if not token:
             raise ValueError(f"a {kind} has one `/` between its parts and none at the end, found {quoted(whole)}")
         if token[0].isdigit():
-            raise ValueError(f"no part of a {kind} begins with a digit, found {quoted(token)} in {quoted(whole)}")
+            raise ValueError(f"no part of a {kind} may begin with a digit, found {quoted(token)} in {quoted(whole)}")
 
 
 def _check_name(name: str, *, kind: str) -> None:
     if "{" in name or "}" in name:
         raise ValueError(
-            f"{quoted(name)}: substitutions such as {{ns}} are not filled in here, write a relative name instead"
+            f"{quoted(name)}: substitutions such as {{ns}} do not work here, write a relative name instead"
         )
     if name.startswith("~") and not name.startswith("~/"):
         raise ValueError(f"{quoted(name)}: `~` stands for the node's own name and is followed by `/`, as in ~/points")
     _check_tokens(name.removeprefix("~/" if name.startswith("~") else "/"), whole=name, kind=kind)
     if len(name) > LONGEST_TOPIC:
         raise ValueError(f"a {kind} of {len(name)} characters, at most {LONGEST_TOPIC} are allowed")
+
+
+def check_type_name(name: object) -> str:
+    """Return a type's name if it has the form of a message's; raises ValueError saying what is wrong."""
+    if not isinstance(name, str):
+        raise ValueError(f"expected a message type such as sensor_msgs/msg/Image, found {describe(name)}")  # noqa: TRY004
+    full = _FULL.fullmatch(name)
+    if full is not None:
+        kind = _KINDS.get(full[1])
+        if kind is None:
+            return name
+        raise ValueError(f"{quoted(name)} is {kind} type, expected a message type (package/msg/Name)")
+    other = _SHORT.fullmatch(name) or _FOREIGN.fullmatch(name)
+    if other is not None:
+        raise ValueError(f"{quoted(name)} is not the full name, write `{other[1]}/msg/{other[2]}`")
+    raise ValueError(f"{quoted(name)} is not a message type, expected package/msg/Name such as sensor_msgs/msg/Image")
+
+
+def check_field_path(path: str) -> str:
+    """Return a path of fields if it has the form of one; raises ValueError saying what is wrong."""
+    if not _PATH.fullmatch(path):
+        raise ValueError(f"expected names of fields joined by dots, such as header.stamp, found {describe(path)}")
+    return path

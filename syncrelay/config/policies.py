@@ -1,14 +1,14 @@
-"""The keys of a group, one model per policy, each of which makes the engine's policy from them."""
+"""The keys of a group, one model per policy: it makes the engine's policy from them, and says what is special about it.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, Literal, Self, TypeAlias, get_args
+To add a policy, see docs/policies.md.
+"""
+
+from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
 from syncrelay.config.keys import NOT_NULL, Duration, FieldPath, TopicName
-from syncrelay.config.models import Group, KeyedTopic, NodeConfig, PacedTopic, Topic
-from syncrelay.config.names import expand
+from syncrelay.config.models import Group, Inputs, KeyedTopic, PacedTopic, Tolerance, Topic, Topics
 from syncrelay.sync import (
     ApproximateEpsilonTime,
     ApproximateTime,
@@ -18,34 +18,21 @@ from syncrelay.sync import (
     LatestTime,
 )
 
-
-@dataclass(frozen=True, slots=True)
-class Inputs:
-    """The absolute names of a group's inputs, and the node in whose namespace the file's names stand."""
-
-    names: tuple[str, ...]
-    node: NodeConfig
-
-    @classmethod
-    def of(cls, topics: Sequence[Topic], node: NodeConfig) -> Self:
-        """Return the names of these topics."""
-        return cls(tuple(expand(each.topic, node=node.name, namespace=node.namespace) for each in topics), node)
-
-    def index_of(self, topic: str) -> int:
-        """Return the index of an input that the file calls by this name."""
-        return self.names.index(expand(topic, node=self.node.name, namespace=self.node.namespace))
-
-
-Topics = Field(
-    description="Inputs in the order in which the messages of a set leave, 2 or more.",
-    json_schema_extra={"minItems": 2},
-)
-
-
 Slop = Field(
     description="Largest span of a set, inclusive. A number is seconds, a text has a unit (ns, us, ms, s, min).",
     examples=["20ms"],
 )
+
+
+class SlopGroup(Group):
+    """A group whose sets may be as wide as `slop`."""
+
+    slop: Duration = Slop
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """The largest span of a set."""
+        return Tolerance("slop", self.slop)
 
 
 class ExactTimeGroup(Group):
@@ -54,18 +41,24 @@ class ExactTimeGroup(Group):
     policy: Literal["exact_time"] = Field(description="Sets of equal stamps.")
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ExactTime:
+    @property
+    def tolerance(self) -> Tolerance:
+        """None at all, whatever the keys."""
+        return Tolerance("slop", 0, wider_policy="approximate_time")
+
+    def build_policy(self, _inputs: Inputs) -> ExactTime:
         """Return a new policy of the engine."""
         return ExactTime(n_inputs=len(self.topics), queue_size=self.queue_size)
 
 
-class ApproximateTimeGroup(Group):
+class ApproximateTimeGroup(SlopGroup):
     """Sets of near stamps, each the best that there is."""
+
+    waits_for_next = True
 
     policy: Literal["approximate_time"] = Field(
         description="Sets of near stamps, each the best that there is; waits until no better one can come."
     )
-    slop: Duration = Slop
     age_penalty: float = Field(
         default=0.1,
         ge=0,
@@ -78,7 +71,7 @@ class ApproximateTimeGroup(Group):
     )
     topics: tuple[PacedTopic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ApproximateTime:
+    def build_policy(self, _inputs: Inputs) -> ApproximateTime:
         """Return a new policy of the engine."""
         return ApproximateTime(
             n_inputs=len(self.topics),
@@ -89,36 +82,38 @@ class ApproximateTimeGroup(Group):
         )
 
 
-class ApproximateTimeEagerGroup(Group):
+class ApproximateTimeEagerGroup(SlopGroup):
     """Sets of near stamps, each as soon as there is one."""
 
     policy: Literal["approximate_time_eager"] = Field(
         description="Sets of near stamps: the tightest that holds the message just arrived, at once."
     )
-    slop: Duration = Slop
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ApproximateTimeEager:
+    def build_policy(self, _inputs: Inputs) -> ApproximateTimeEager:
         """Return a new policy of the engine."""
         return ApproximateTimeEager(n_inputs=len(self.topics), queue_size=self.queue_size, slop_ns=self.slop)
 
 
-class ApproximateEpsilonTimeGroup(Group):
+class ApproximateEpsilonTimeGroup(SlopGroup):
     """Sets of the oldest messages of all inputs, where these are near."""
 
     policy: Literal["approximate_epsilon_time"] = Field(
         description="Sets of the oldest messages of all inputs, where these lie within slop; no search for better ones."
     )
-    slop: Duration = Slop
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> ApproximateEpsilonTime:
+    def build_policy(self, _inputs: Inputs) -> ApproximateEpsilonTime:
         """Return a new policy of the engine."""
         return ApproximateEpsilonTime(n_inputs=len(self.topics), queue_size=self.queue_size, epsilon_ns=self.slop)
 
 
 class LatestTimeGroup(Group):
     """At each message of one input, the latest of every other."""
+
+    repeats = LatestTime.repeats
+    waits_for_optional = False
+    matched_by = ("trigger", "max_age")
 
     policy: Literal["latest_time"] = Field(
         description="At each message of the trigger, the latest not newer one of every other input."
@@ -134,7 +129,17 @@ class LatestTimeGroup(Group):
     )
     topics: tuple[Topic, ...] = Topics
 
-    def matcher(self, inputs: Inputs) -> LatestTime:
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """How much older than the trigger's message another may be."""
+        return None if self.max_age is None else Tolerance("max_age", self.max_age)
+
+    @property
+    def trigger_topic(self) -> str:
+        """The trigger."""
+        return self.trigger
+
+    def build_policy(self, inputs: Inputs) -> LatestTime:
         """Return a new policy of the engine."""
         return LatestTime(
             n_inputs=len(self.topics),
@@ -147,6 +152,9 @@ class LatestTimeGroup(Group):
 class EqualKeyGroup(Group):
     """Sets of equal values of a field."""
 
+    by_stamp = EqualKey.by_stamp
+    matched_by = ("key",)
+
     policy: Literal["equal_key"] = Field(
         description="Sets of equal values of a field, such as a sequence number, an id or a frame name."
     )
@@ -158,17 +166,21 @@ class EqualKeyGroup(Group):
     )
     topics: tuple[KeyedTopic, ...] = Topics
 
-    def matcher(self, _inputs: Inputs) -> EqualKey:
+    def key_of(self, topic: Topic) -> str | None:
+        """Return the topic's own key, else the group's."""
+        return (topic.key if isinstance(topic, KeyedTopic) else None) or self.key
+
+    def build_policy(self, _inputs: Inputs) -> EqualKey:
         """Return a new policy of the engine."""
         return EqualKey(n_inputs=len(self.topics), queue_size=self.queue_size)
 
 
-AnyGroup: TypeAlias = (
-    ExactTimeGroup
-    | ApproximateTimeGroup
-    | ApproximateTimeEagerGroup
-    | ApproximateEpsilonTimeGroup
-    | LatestTimeGroup
-    | EqualKeyGroup
+GROUP_MODELS: Final[tuple[type[Group], ...]] = (
+    ExactTimeGroup,
+    ApproximateTimeGroup,
+    ApproximateTimeEagerGroup,
+    ApproximateEpsilonTimeGroup,
+    LatestTimeGroup,
+    EqualKeyGroup,
 )
-GROUP_MODELS: tuple[type[AnyGroup], ...] = get_args(AnyGroup)
+"""Every policy, in the order in which people read of them."""

@@ -1,23 +1,33 @@
-"""A fault in the user's file: where it stands, what was found, what was expected."""
+"""What is wrong with the user's file: where it is, what was found, what was expected, and all of it as text."""
 
 import json
 import re
+import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
+from syncrelay.errors import SyncRelayError
 from syncrelay.printable import printable
 
 Path: TypeAlias = tuple[str | int, ...]
 """Keys and list indices from the top of the file down to a value."""
 
 _PLAIN_KEY = re.compile(r"[A-Za-z_][\w-]*")
+_MOST_SHOWN: Final = 100
+_TAB_WIDTH: Final = 4
+# A longer line is cut to a window round its token.
+_LONGEST_LINE: Final = 100
+_LEAD: Final = 30
+_BOLD, _RED, _BLUE, _RESET = "\033[1m", "\033[31m", "\033[34m", "\033[0m"
 
 
 class Severity(Enum):
-    """An error refuses the file; a note says what could not be checked, or is hardly meant."""
+    """The file cannot be used; or it can, but says what is hardly meant; or something in it could not be checked."""
 
     ERROR = "error"
+    WARNING = "warning"
     NOTE = "note"
 
 
@@ -35,7 +45,10 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One fault. `span` is None where the file as a whole is meant; `source` is then empty."""
+    """One fault. `span` is None where the file as a whole is meant; `source` is then empty.
+
+    `subject` is the package or type that it is about, empty where it is about the file alone.
+    """
 
     file: str
     path: str
@@ -44,6 +57,7 @@ class Problem:
     span: Span | None = None
     source: str = ""
     severity: Severity = Severity.ERROR
+    subject: str = ""
 
 
 def dotted(path: Path) -> str:
@@ -56,3 +70,84 @@ def dotted(path: Path) -> str:
         text += "." if text else ""
         text += step if _PLAIN_KEY.fullmatch(step) else printable(json.dumps(step, ensure_ascii=False))
     return text
+
+
+class ConfigError(SyncRelayError):
+    """A file that cannot be used, with everything that is wrong with it, in the order of the file."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        super().__init__(problems)
+        self.problems = tuple(problems)
+
+    def __str__(self) -> str:
+        return render(self.problems)
+
+
+def render(problems: Sequence[Problem], *, colour: bool = False) -> str:
+    """Return one block of text per problem, without a newline at the end."""
+    blocks = [_block(problem, colour=colour) for problem in problems[:_MOST_SHOWN]]
+    unshown = len(problems) - _MOST_SHOWN
+    if unshown > 0:
+        blocks.append(f"... and {unshown} more")
+    return "\n".join(blocks)
+
+
+def where(problem: Problem) -> str:
+    """Return `file:line:column`, or the file alone if it is meant as a whole."""
+    file = printable(problem.file)
+    if problem.span is None:
+        return file
+    return f"{file}:{problem.span.line}:{problem.span.column}"
+
+
+def _block(problem: Problem, *, colour: bool) -> str:
+    bold, reset = (_BOLD, _RESET) if colour else ("", "")
+    prefix = "" if problem.severity is Severity.ERROR else f"{problem.severity.value}: "
+    path = f"{problem.path}: " if problem.path else ""
+    head = f"{bold}{where(problem)}:{reset} {prefix}{bold}{path}{reset}{printable(problem.text)}"
+    if problem.span is None or not problem.source.strip():
+        return head
+    return f"{head}\n{_excerpt(problem.source, problem.span, colour=colour)}"
+
+
+def _excerpt(source: str, span: Span, *, colour: bool) -> str:
+    start = span.column - 1
+    end = min(start + span.width, len(source))
+    first = 0
+    if len(source) > _LONGEST_LINE:
+        first = max(0, start - _LEAD)
+    before = ("…" if first else "") + _shown(source[first:start])
+    last = min(len(source), first + _LONGEST_LINE)
+    token = _shown(source[start : min(end, last)])
+    after = _shown(source[end:last]) + ("…" if last < len(source) else "")
+    number = f"{span.line:>5} | "
+    gutter = " " * 5 + " | "
+    underline = " " * _columns(before) + "^" * max(1, _columns(token))
+    if colour:
+        number, gutter = f"{_BLUE}{number}{_RESET}", f"{_BLUE}{gutter}{_RESET}"
+        underline = f"{_RED}{underline}{_RESET}"
+    return f"{number}{before}{token}{after}".rstrip() + f"\n{gutter}{underline}"
+
+
+def _shown(text: str) -> str:
+    """Replace what would move the cursor or hide in a terminal."""
+    return "".join(_shown_character(character) for character in text)
+
+
+def _shown_character(character: str) -> str:
+    if character == "\t":
+        return " " * _TAB_WIDTH
+    if unicodedata.category(character) in ("Cc", "Cf", "Cs"):
+        return "\N{REPLACEMENT CHARACTER}"
+    return character
+
+
+def _columns(text: str) -> int:
+    """Return how many columns of a terminal a text takes."""
+    return sum(_width(character) for character in text)
+
+
+def _width(character: str) -> int:
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1

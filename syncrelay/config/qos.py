@@ -102,13 +102,13 @@ class QosOverrides(Keys):
         default=None, description=f"Longest time between two messages. {_DURATION} Default: no limit."
     )
     lifespan: _QosDuration = Field(
-        default=None, description=f"Age at which a message is void. {_DURATION} Default: no limit."
+        default=None, description=f"Age at which a message expires. {_DURATION} Default: no limit."
     )
     liveliness: Annotated[
         Literal["automatic", "manual_by_topic", "system_default", "best_available"] | None, NOT_NULL
-    ] = Field(default=None, description="How a publisher shows that it lives. Default: system_default.")
+    ] = Field(default=None, description="How a publisher shows that it is alive. Default: system_default.")
     liveliness_lease_duration: _QosDuration = Field(
-        default=None, description=f"Silence after which a publisher counts as dead. {_DURATION} Default: no limit."
+        default=None, description=f"Silence after which a publisher counts as lost. {_DURATION} Default: no limit."
     )
     avoid_ros_namespace_conventions: Annotated[bool | None, NOT_NULL] = Field(
         default=None, description="Use the topic's name in DDS without the prefix of ROS. Default: false."

@@ -1,12 +1,13 @@
-"""What the relay is told: a file with every default filled in."""
+"""What the relay is told: a file with every default filled in, be it in order or as much of it as could be read."""
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 from syncrelay.config.file import FileKeys
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
 from syncrelay.config.models import (
-    DiagnosticsConfig,
-    KeyedTopic,
+    Group,
+    Inputs,
     MetricsConfig,
     NodeConfig,
     PacedTopic,
@@ -14,9 +15,7 @@ from syncrelay.config.models import (
     Topic,
 )
 from syncrelay.config.names import default_output
-from syncrelay.config.names_in_graph import NamesInFile
-from syncrelay.config.policies import AnyGroup, EqualKeyGroup, Inputs
-from syncrelay.config.problems import Problem
+from syncrelay.config.problems import Path
 from syncrelay.config.qos import QosOverrides, QosPreset
 from syncrelay.sync import Restamp, SyncGroup
 
@@ -42,18 +41,33 @@ class TopicConfig:
 
 @dataclass(frozen=True, slots=True)
 class GroupConfig:
-    """A group. `restamp` is the engine's: None, one of Restamp, or an input's index."""
+    """A group. `restamp` is the engine's: None, one of Restamp, or an input's index.
+
+    `trigger` is the index of the input whose every message makes a set, None where all inputs are alike. In a faulty
+    file both are also None where what they name is no input.
+    """
 
     name: str
     topics: tuple[TopicConfig, ...]
     restamp: Restamp | int | None
-    options: AnyGroup
+    trigger: int | None
+    options: Group
     inputs: Inputs
+
+    @property
+    def path(self) -> Path:
+        """Where it stands in the file."""
+        return ("groups", self.name)
+
+    def paths(self) -> Iterator[tuple[Path, TopicConfig]]:
+        """Yield its topics, each with the place where it stands in the file."""
+        for index, topic in enumerate(self.topics):
+            yield (*self.path, "topics", index), topic
 
     def engine(self) -> SyncGroup:
         """Return a new, empty engine of this group."""
         return SyncGroup(
-            self.options.matcher(self.inputs),
+            self.options.build_policy(self.inputs),
             required=tuple(topic.required for topic in self.topics),
             max_wait_ns=self.options.max_wait,
             offsets_ns=tuple(topic.offset_ns for topic in self.topics),
@@ -63,29 +77,13 @@ class GroupConfig:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Config:
-    """A file that is in order. `notes` say what could not be checked, or is hardly meant.
-
-    `names` tells what is wrong with it once remaps have made others of its topics' names.
-    `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published.
-    """
-
-    node: NodeConfig
-    groups: tuple[GroupConfig, ...]
-    listen: Listen | None
-    diagnostics: DiagnosticsConfig | None
-    names: NamesInFile = field(compare=False, repr=False)
-    notes: tuple[Problem, ...] = ()
+def resolve_groups(file: FileKeys) -> tuple[GroupConfig, ...]:
+    """Return the groups of a file with every default filled in."""
+    return tuple(_group(name, group, file.node) for name, group in file.groups.items())
 
 
-def resolve(file: FileKeys, *, names: NamesInFile, notes: tuple[Problem, ...]) -> Config:
-    """Return a validated file with every default filled in."""
-    groups = tuple(_group(name, group, file.node) for name, group in file.groups.items())
-    return Config(file.node, groups, _listen(file.metrics), file.diagnostics, names, notes)
-
-
-def _listen(metrics: MetricsConfig | None) -> Listen | None:
+def resolve_listen(metrics: MetricsConfig | None) -> Listen | None:
+    """Return where to listen for HTTP; None for nowhere."""
     if metrics is None:
         return None
     if metrics.listen is None:
@@ -93,29 +91,30 @@ def _listen(metrics: MetricsConfig | None) -> Listen | None:
     return replace(parse_listen(metrics.listen), hosts=metrics.hosts)
 
 
-def _group(name: str, group: AnyGroup, node: NodeConfig) -> GroupConfig:
+def _group(name: str, group: Group, node: NodeConfig) -> GroupConfig:
     prefix = f"/{name}" if group.output_prefix is None else group.output_prefix
     inputs = Inputs.of(group.topics, node)
     return GroupConfig(
         name=name,
         topics=tuple(_topic(topic, group, prefix=prefix) for topic in group.topics),
         restamp=_restamp(group.restamp, inputs),
+        trigger=_index(group.trigger_topic, inputs),
         options=group,
         inputs=inputs,
     )
 
 
-def _topic(topic: Topic, group: AnyGroup, *, prefix: str) -> TopicConfig:
+def _topic(topic: Topic, group: Group, *, prefix: str) -> TopicConfig:
     return TopicConfig(
         topic=topic.topic,
         type=topic.type,
-        output=topic.output or default_output(topic.topic, prefix=prefix),
+        output=default_output(topic.topic, prefix=prefix) if topic.output is None else topic.output,
         qos=topic.qos,
         offset_ns=topic.offset,
         min_period_ns=topic.min_period if isinstance(topic, PacedTopic) else 0,
         stamp=topic.stamp,
         required=topic.required,
-        key=(topic.key or group.key) if isinstance(topic, KeyedTopic) and isinstance(group, EqualKeyGroup) else None,
+        key=group.key_of(topic),
     )
 
 
@@ -128,4 +127,11 @@ def _restamp(word: str, inputs: Inputs) -> Restamp | int | None:
         case "latest":
             return Restamp.LATEST
         case topic:
-            return inputs.index_of(topic)
+            return _index(topic, inputs)
+
+
+def _index(topic: str | None, inputs: Inputs) -> int | None:
+    try:
+        return None if topic is None else inputs.index_of(topic)
+    except ValueError:
+        return None

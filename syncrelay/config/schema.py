@@ -7,7 +7,7 @@ pydantic's own schema is of a later draft, picks a group's model by OpenAPI's `d
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, TypeAlias
 
-from syncrelay.config.file import GROUP_MODEL_OF, File, GroupOfAnyPolicy
+from syncrelay.config.file import FileFormat, file_format
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -23,10 +23,11 @@ _ANNOTATIONS: Final = ("description", "default", "examples")
 
 def json_schema() -> Schema:
     """Return the schema of a file."""
-    generated = File.model_json_schema(ref_template=_REF + "{model}")
+    form = file_format()
+    generated = form.file.model_json_schema(ref_template=_REF + "{model}")
     models: dict[str, Schema] = generated.pop("$defs")
-    needed = {policy: _take_required(models[model.__name__]) for policy, model in GROUP_MODEL_OF.items()}
-    _take_required(models[GroupOfAnyPolicy.__name__])
+    needed = {policy: _take_required(models[model.__name__]) for policy, model in form.groups.items()}
+    _take_required(models[form.any_group.__name__])
     generated["properties"]["groups"]["additionalProperties"] = {"$ref": f"{_REF}Group"}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
@@ -36,7 +37,7 @@ def json_schema() -> Schema:
         "then": {"properties": {"groups": {"additionalProperties": {"allOf": list(_without_defaults(needed))}}}},
         "definitions": {
             **{name: _mapping(model) for name, model in models.items()},
-            "Group": _by_policy(),
+            "Group": _by_policy(form),
             "Variable": _VARIABLE,
         },
     }
@@ -49,10 +50,10 @@ def _take_required(group: Schema) -> list[str]:
     return [key for key in required if key not in ("policy", "topics")]
 
 
-def _by_policy() -> Schema:
+def _by_policy(form: FileFormat) -> Schema:
     """Return a group: by its policy's keys, or by those of all policies where it names none that is known."""
-    schema: Schema = {"$ref": _REF + GroupOfAnyPolicy.__name__}
-    for policy, model in reversed(GROUP_MODEL_OF.items()):
+    schema: Schema = {"$ref": _REF + form.any_group.__name__}
+    for policy, model in reversed(form.groups.items()):
         schema = {"if": _has_policy(policy), "then": {"$ref": _REF + model.__name__}, "else": schema}
     return schema
 

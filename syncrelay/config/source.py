@@ -11,8 +11,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Final
 
-from syncrelay.config.errors import ConfigError
-from syncrelay.config.problems import Problem, Severity, Span
+from syncrelay.config.problems import ConfigError, Problem, Severity, Span
 from syncrelay.config.wording import nearest
 
 STDIN: Final = "-"
@@ -48,10 +47,17 @@ class Source:
         return self.lines[number - 1] if number <= len(self.lines) else ""
 
     def problem(
-        self, text: str, *, code: str, span: Span | None, path: str = "", severity: Severity = Severity.ERROR
+        self,
+        text: str,
+        *,
+        code: str,
+        span: Span | None,
+        path: str = "",
+        severity: Severity = Severity.ERROR,
+        subject: str = "",
     ) -> Problem:
         """Return a problem of this file."""
-        return Problem(self.name, path, text, code, span, self.line(span.line) if span else "", severity)
+        return Problem(self.name, path, text, code, span, self.line(span.line) if span else "", severity, subject)
 
 
 def shown_name(path: str) -> str:
@@ -67,7 +73,7 @@ def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) ->
     if path == STDIN:
         return replace(decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path)), index=index)
     if not path:
-        raise _unreadable(shown_name(path), "is no file name")
+        raise _unreadable(shown_name(path), "is not a file name")
     try:
         content = _content(path, patience_s)
     except TimeoutError as error:
@@ -76,7 +82,7 @@ def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) ->
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
     except ValueError as error:
-        raise _unreadable(path, "is no file name") from error
+        raise _unreadable(path, "is not a file name") from error
     return replace(decode(content, name=path), index=index)
 
 
@@ -109,7 +115,7 @@ def _read(file: FileIO, *, deadline: float) -> bytes:
 def decode(content: bytes, *, name: str) -> Source:
     """Return the source that bytes hold; raises ConfigError if they are no text or too much of it."""
     if len(content) > _MOST_BYTES:
-        raise _unreadable(name, f"over {_MOST_BYTES // 1_000_000} MB, is this the right file?")
+        raise _unreadable(name, f"larger than {_MOST_BYTES // 1_000_000} MB: is this the right file?")
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise _unreadable(name, "the text is UTF-16, expected UTF-8")
     try:
@@ -125,7 +131,7 @@ def check_text(text: str, *, name: str) -> Source:
     """Return the source of a text; raises ConfigError for characters that YAML has no place for."""
     source = Source(name, text, _lines(text))
     if len(source.lines) > _MOST_LINES:
-        raise _unreadable(name, f"over {_MOST_LINES} lines, is this the right file?")
+        raise _unreadable(name, f"more than {_MOST_LINES} lines: is this the right file?")
     found = _UNPRINTABLE.search(text)
     if found is not None:
         span = _span_at(text[: found.start()])

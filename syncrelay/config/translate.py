@@ -1,46 +1,27 @@
 """pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode
-from syncrelay.config.file import (
-    GROUP_MODEL_OF,
-    Defaults,
-    File,
-    GroupOfAnyPolicy,
-    TopicOfAnyPolicy,
-    topic_model,
-)
+from syncrelay.config.file import FileFormat, file_format
 from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.qos import QosOverrides
-from syncrelay.config.scalars import read_plain
 from syncrelay.config.wording import all_of, describe, one_of, or_nearest, quoted
+from syncrelay.config.yaml_tree import read_plain
 
 Location: TypeAlias = tuple[str | int, ...]
 """A place in pydantic's words: a path with the tags of unions in it."""
 
-_LEVELS: Final[dict[str, type[BaseModel]]] = {
-    "the file": File,
-    "`node`": NodeConfig,
-    "`metrics`": MetricsConfig,
-    "`diagnostics`": DiagnosticsConfig,
-    "a group": GroupOfAnyPolicy,
-    "a topic": TopicOfAnyPolicy,
-    "a topic's `qos`": QosOverrides,
+_SECTIONS: Final[dict[str, type[BaseModel]]] = {
+    "node": NodeConfig,
+    "metrics": MetricsConfig,
+    "diagnostics": DiagnosticsConfig,
 }
-_MODEL_AT: Final[dict[Location, type[BaseModel]]] = {
-    (): File,
-    ("node",): NodeConfig,
-    ("metrics",): MetricsConfig,
-    ("diagnostics",): DiagnosticsConfig,
-    ("defaults",): Defaults,
-}
-_TOPIC_MODEL_OF: Final = {policy: topic_model(group) for policy, group in GROUP_MODEL_OF.items()}
 _EXPECTED: Final = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -55,7 +36,6 @@ _EXPECTED: Final = {
 _WHAT_IS_MISSING: Final = {
     "groups": "expected one group or more",
     "topics": "expected a list of 2 or more topics",
-    "policy": f"expected {one_of(GROUP_MODEL_OF)}",
     "version": "expected `version: 1`",
 }
 # What a key takes beside single words.
@@ -70,7 +50,7 @@ def translate(errors: Sequence[ErrorDetails], document: Document) -> list[Proble
     """Return a problem for every error, but none for what only follows from another problem."""
     # In the order of the file: what is meant is looked for in the first of many.
     located = sorted(
-        ((_path(error["loc"]), error) for error in errors), key=lambda each: document.key_span(each[0])[:2]
+        ((path_of(error["loc"]), error) for error in errors), key=lambda each: document.key_span(each[0])[:2]
     )
     meant = {
         path: document.nearest(str(path[-1]), _model(error["loc"][:-1]).model_fields)
@@ -136,58 +116,71 @@ def _found(value: object, kind: str) -> str:
     if not isinstance(value, str):
         return found
     if kind == "bool_type" and value.lower() in _TRUTH_WORDS:
-        return f"{found}, which is no truth value in YAML 1.2"
+        return f"{found}, which YAML 1.2 reads as text"
     if kind in ("int_type", "float_type") and isinstance(read_plain(value), int | float):
         return f"{found}: write it without quotes"
     return found
 
 
 def _unknown_key(loc: Location, meant: str | None, document: Document) -> str:
-    key = str(loc[-1])
+    key, form = str(loc[-1]), file_format()
     model = _model(loc[:-1])
-    for models in (GROUP_MODEL_OF, _TOPIC_MODEL_OF):
-        if model not in models.values():
+    for models in (form.groups, form.topics):
+        if models.get(_policy(loc)) is not model:
             continue
         owners = [policy for policy, other in models.items() if key in other.model_fields]
         if owners:
-            return f"{_policy(loc)} has no `{key}`, only {all_of(owners)}"
-    levels = [level for level, owner in _LEVELS.items() if key in owner.model_fields]
+            return f"{_policy(loc)} has no `{key}`, only {all_of(owners)} {'does' if len(owners) == 1 else 'do'}"
+    levels = [level for level, owner in _levels(form) if key in owner.model_fields]
     if levels and document.nearest(key, model.model_fields, likeness=_A_SLIP) is None:
-        return f"unknown key here, `{key}` is a key of {levels[0]}"
+        return f"`{key}` does not belong here, it is a key of {levels[0]}"
     if "$" in key:
-        return "unknown key; variables are filled in in values only"
+        return "unknown key; variables work in values only"
     if ":" in key:
-        return "unknown key, is a space missing behind the colon?"
+        return "unknown key: is a space missing after the colon?"
     return f"unknown key{or_nearest(meant)}" if meant else f"unknown key, expected {one_of(model.model_fields)}"
+
+
+def _levels(form: FileFormat) -> Iterator[tuple[str, type[BaseModel]]]:
+    yield "the file", form.file
+    yield from ((f"`{key}`", model) for key, model in _SECTIONS.items())
+    yield "a group", form.any_group
+    yield "a topic", form.any_topic
+    yield "a topic's `qos`", QosOverrides
 
 
 def _model(loc: Location) -> type[BaseModel]:
     """Return the model whose keys stand at a place of pydantic's."""
+    form = file_format()
     match loc:
         case (*_, "qos", "<mapping>"):
             return QosOverrides
         case (*_, "stamp", "<mapping>"):
             return StampField
         case ("groups", _, _, "topics", _):
-            return _TOPIC_MODEL_OF.get(_policy(loc), TopicOfAnyPolicy)
+            return form.topics.get(_policy(loc), form.any_topic)
         case ("groups", _, _):
-            return GROUP_MODEL_OF.get(_policy(loc), GroupOfAnyPolicy)
+            return form.group(_policy(loc))
+        case (str(key),):
+            return _SECTIONS.get(key, form.defaults)
         case _:
-            return _MODEL_AT[loc]
+            return form.file
 
 
 def _policy(loc: Location) -> str:
-    """Return the tag of the group's model, which is its policy's name."""
-    return str(loc[2]).strip("<>")
+    """Return the tag of the group's model, which is its policy's name; nothing outside of groups."""
+    return str(loc[2]).strip("<>") if loc[0] == "groups" else ""
 
 
 def _what_is_missing(loc: Location) -> str:
-    key = str(loc[-1])
+    key, policies = str(loc[-1]), file_format().groups
+    if loc[3:] == ("policy",):
+        return f"expected {one_of(policies)}"
     if key in _WHAT_IS_MISSING:
         return _WHAT_IS_MISSING[key]
     model = _model(loc[:-1])
     example = (model.model_fields[key].examples or [""])[0]
-    needs = f"{_policy(loc)} needs it, " if model in GROUP_MODEL_OF.values() else ""
+    needs = f"{_policy(loc)} needs it, " if model in policies.values() else ""
     return f"{needs}for example `{key}: {example}`"
 
 
@@ -201,8 +194,8 @@ def _owner_span(path: Path, document: Document) -> Any:
     return node.span
 
 
-def _path(loc: Location) -> Path:
-    """Return a place without its tags, which stand where a union is: at a group, and below `qos` and `stamp`."""
+def path_of(loc: Location) -> Path:
+    """Return the path of a place of pydantic's, which has tags too: at a group, and below `qos` and `stamp`."""
     match loc:
         case ("groups", name, _, "topics", index, ("qos" | "stamp") as key, _, *rest):
             return ("groups", name, "topics", index, key, *rest)

@@ -4,52 +4,54 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from syncrelay.config.document import Document
-from syncrelay.config.drafts import GroupDraft, TopicDraft
-from syncrelay.config.interfaces import Interfaces
-from syncrelay.config.msgfile import HEADER, PRIMITIVES, TIME, Field
+from syncrelay.config.interfaces import HEADER, PRIMITIVES, TIME, Field, Interfaces
+from syncrelay.config.models import StampField
 from syncrelay.config.problems import Path, Problem, Severity
+from syncrelay.config.resolved import GroupConfig, TopicConfig
 from syncrelay.config.wording import one_of, or_nearest, quoted
 
 
-def check_types(groups: Sequence[GroupDraft], document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+def check_types(groups: Sequence[GroupConfig], document: Document, interfaces: Interfaces) -> Iterator[Problem]:
     """Yield types that aren't installed and stamps that aren't in them, and as notes what could not be checked."""
     for group in groups:
-        for topic in group.topics:
-            yield from _check_topic(topic, document, interfaces)
+        for path, topic in group.paths():
+            if topic.type:
+                yield from _check_topic(topic, path, document, interfaces)
         yield from _check_restamp(group, document, interfaces)
 
 
-def _check_topic(topic: TopicDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
-    if topic.type is None:
-        return
-    path = (*topic.path, "type")
-    span = document.value_span(path)
+def _check_topic(topic: TopicConfig, path: Path, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+    of_type = (*path, "type")
+    package = topic.type.partition("/")[0]
     fault = _not_installed(topic.type, document, interfaces)
+    asked = list(_asked_fields(topic, path, document))
+    goes_by_header = topic.stamp == "header" and (*path, "stamp") not in document.faulty
     if fault is not None:
         text, code = fault
         # A package may be installed where the relay runs, and replay needs none.
         severity = Severity.NOTE if code == "package_missing" else Severity.ERROR
-        yield document.problem(path, text, code=code, span=span, severity=severity)
-    elif topic.has_header_stamp or topic.stamp_field is not None or topic.key is not None:
+        subject = package if code == "package_missing" else topic.type
+        yield document.problem(of_type, text, code=code, severity=severity, subject=subject)
+    elif asked or goes_by_header:
         fields = interfaces.fields(topic.type)
         if fields is None:
             text = f"{quoted(topic.type)} is installed without its .msg file, so its fields were not checked"
-            yield document.problem(path, text, code="not_checked", span=span, severity=Severity.NOTE)
-        else:
-            yield from _check_fields(topic, fields, document, interfaces)
+            yield document.problem(of_type, text, code="not_checked", severity=Severity.NOTE, subject=topic.type)
+            return
+        for each in asked:
+            yield from _check_field(topic, each, document, interfaces)
+        if goes_by_header and not _begins_with_header(fields):
+            yield _no_header(topic, path, fields, document, interfaces)
 
 
-def _check_fields(
-    topic: TopicDraft, fields: Sequence[Field], document: Document, interfaces: Interfaces
-) -> Iterator[Problem]:
-    if topic.stamp_field is not None:
-        stamp = _FieldDraft((*topic.path, "stamp", "field"), topic.stamp_field, _A_TIME)
-        yield from _check_field(topic, stamp, document, interfaces)
-    elif topic.has_header_stamp and not _begins_with_header(fields):
-        yield _no_header(topic, fields, document, interfaces)
-    if topic.key is not None:
-        key = _FieldDraft(topic.key_path, topic.key, _A_KEY)
-        yield from _check_field(topic, key, document, interfaces)
+def _asked_fields(topic: TopicConfig, path: Path, document: Document) -> Iterator["_AskedField"]:
+    """Yield the fields of its messages that the file names for a topic."""
+    if isinstance(topic.stamp, StampField):
+        yield _AskedField((*path, "stamp", "field"), topic.stamp.field, _A_TIME)
+    own = (*path, "key")
+    written = own if document.has(own) else (*path[:2], "key")
+    if topic.key is not None and written not in document.faulty:
+        yield _AskedField(written, topic.key, _A_KEY)
 
 
 def _not_installed(type_name: str, document: Document, interfaces: Interfaces) -> tuple[str, str] | None:
@@ -88,16 +90,17 @@ def _begins_with_header(fields: Sequence[Field]) -> bool:
     return bool(fields) and fields[0].type == HEADER and not fields[0].is_array
 
 
-def _no_header(topic: TopicDraft, fields: Sequence[Field], document: Document, interfaces: Interfaces) -> Problem:
+def _no_header(
+    topic: TopicConfig, path: Path, fields: Sequence[Field], document: Document, interfaces: Interfaces
+) -> Problem:
     times = list(_time_paths(fields, interfaces))
     own = f", or `stamp: {{field: {times[0]}}}`" if times else ""
     text = (
-        f"{quoted(str(topic.type))} does not begin with a std_msgs/msg/Header, where the stamp is looked for:"
-        f" write `stamp: receive` to go by arrival{own}"
+        f"{quoted(topic.type)} does not begin with a std_msgs/msg/Header, so it has no stamp there:"
+        f" write `stamp: receive` to use the time of arrival{own}"
     )
-    has_stamp = document.find((*topic.path, "stamp")) is not None
-    path = (*topic.path, "stamp" if has_stamp else "type")
-    return document.problem(path, text, code="no_header", span=document.value_span(path))
+    key = "stamp" if document.has((*path, "stamp")) else "type"
+    return document.problem((*path, key), text, code="no_header", subject=topic.type)
 
 
 def _time_paths(fields: Sequence[Field], interfaces: Interfaces, *, depth: int = 3) -> Iterator[str]:
@@ -116,7 +119,7 @@ class _Wanted(NamedTuple):
     name: str
 
 
-class _FieldDraft(NamedTuple):
+class _AskedField(NamedTuple):
     """A field that the file names: where it does, the fields to go through joined by dots, and what it has to be."""
 
     path: Path
@@ -129,11 +132,11 @@ _A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a text or 
 
 
 def _check_field(
-    topic: TopicDraft, field: _FieldDraft, document: Document, interfaces: Interfaces
+    topic: TopicConfig, field: _AskedField, document: Document, interfaces: Interfaces
 ) -> Iterator[Problem]:
-    text = _field_fault(str(topic.type), (), field.steps.split("."), field.wanted, interfaces, document=document)
+    text = _field_fault(topic.type, (), field.steps.split("."), field.wanted, interfaces, document=document)
     if text is not None:
-        yield document.problem(field.path, text, code="no_such_field", span=document.value_span(field.path))
+        yield document.problem(field.path, text, code="no_such_field", subject=topic.type)
 
 
 def _field_fault(
@@ -171,12 +174,11 @@ def _time_below(path: tuple[str, ...], field: Field, interfaces: Interfaces) -> 
     return f", did you mean `{'.'.join((*path, below))}`?" if below else ""
 
 
-def _check_restamp(group: GroupDraft, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
-    if group.restamp == "none" or not group.topics:
+def _check_restamp(group: GroupConfig, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+    if group.options.restamp == "none" or not group.topics:
         return
     known = [interfaces.fields(topic.type) if topic.type else None for topic in group.topics]
     if any(fields is None or _begins_with_header(fields) for fields in known):
         return
-    path: Path = (*group.path, "restamp")
     text = "no type of this group begins with a std_msgs/msg/Header, so there is no stamp to set"
-    yield document.problem(path, text, code="no_header", span=document.value_span(path))
+    yield document.problem((*group.path, "restamp"), text, code="no_header")

@@ -113,10 +113,8 @@ def _plan(config: Config | None, problems: Sequence[Problem], ros_args: Sequence
     if config is None:
         return Plan(ros_args=tuple(ros_args))
     topics = [topic for group in config.groups for topic in group.topics]
-    missing = {problem.text for problem in problems if problem.code == "package_missing"}
-    types = dict.fromkeys(
-        topic.type for topic in topics if not any(f"`{topic.type.partition('/')[0]}`" in text for text in missing)
-    )
+    missing = {problem.subject for problem in problems if problem.code == "package_missing"}
+    types = dict.fromkeys(topic.type for topic in topics if topic.type.partition("/")[0] not in missing)
     return Plan(
         node=config.node.name,
         namespace=config.node.namespace,

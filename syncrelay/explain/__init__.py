@@ -3,6 +3,7 @@
 Pure: values in, values out. The running relay and the analysis of recordings both ask here.
 """
 
+from syncrelay.config import Tolerance
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
@@ -13,7 +14,6 @@ from syncrelay.explain.facts import (
     Mismatch,
     Refusal,
     Standstill,
-    Tolerance,
 )
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.find import explanation, find, problems

@@ -4,6 +4,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from syncrelay.config import Tolerance
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.sync.counts import InputCounts
 
@@ -48,14 +49,6 @@ class Refusal:
         """The whole in words."""
         reason = f"this process has it as {self.held_as} already" if self.held_as else self.why
         return f"the relay cannot {self.verb} {self.topic} as {self.type}: {reason}"
-
-
-@dataclass(frozen=True, slots=True)
-class Tolerance:
-    """The key of the file that says how far apart the stamps of a set may be, and its value in nanoseconds."""
-
-    key: str
-    ns: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,11 +110,11 @@ class Standstill(NamedTuple):
 class GroupFacts:
     """A group. Durations in nanoseconds.
 
-    `tolerance` is None where stamps may be any distance apart, as with `equal_key`. `by_stamp` says whether stamps are
-    what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
-    others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it does
-    not; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
-    late; `failure` what stopped the group for good.
+    `tolerance` is None where stamps may be any distance apart, as where keys are matched. `by_stamp` says whether
+    stamps are what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest
+    of the others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it
+    does not; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest
+    of late; `failure` what stopped the group for good.
     """
 
     name: str

@@ -3,10 +3,11 @@
 from statistics import median_low
 from typing import Final
 
+from syncrelay.config import Tolerance
 from syncrelay.explain import words
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.drift import apart
-from syncrelay.explain.facts import GroupFacts, InputFacts, Tolerance
+from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
 from syncrelay.sync.messages import DropReason
 
@@ -92,8 +93,8 @@ def other_clock(facts: GroupFacts) -> Found:
 
 
 def no_common_key(facts: GroupFacts) -> Found:
-    """Find that the inputs of `equal_key` have no key in common."""
-    if facts.policy != "equal_key" or not facts.is_silent or any(each.key is None for each in facts.inputs):
+    """Find that inputs that are matched by key have none in common."""
+    if facts.by_stamp or not facts.is_silent or any(each.key is None for each in facts.inputs):
         return
     newest = ", ".join(f"{each.key!r} of {each.name}" for each in facts.inputs)
     yield Finding(
@@ -112,7 +113,7 @@ def over_slop(facts: GroupFacts) -> Found:
         return
     over = nearest.share_over(tolerance.ns)
     if facts.is_silent and over > 1 - _MISSED:
-        text, suggestion = _too_wide(facts, tolerance, nearest), _wide_enough(facts, tolerance, nearest)
+        text, suggestion = _too_wide(tolerance, nearest), _wide_enough(tolerance, nearest)
         yield Finding(Code.OVER_SLOP, Severity.ERROR, text, suggestion)
     elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
         text, suggestion = _often_too_wide(facts, tolerance, nearest)
@@ -127,27 +128,27 @@ def _come_at_once(facts: GroupFacts) -> bool:
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> tuple[str, str]:
     missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
     name = facts.pacemaker.name
-    if facts.policy == "exact_time":
+    if tolerance.wider_policy:
         # Others do have equal stamps: a wider slop would pair what does not belong together.
         lost = "look for messages that a driver leaves out or the network loses"
         return f"{missed} {name} have no partner of an equal stamp", lost
     farther = f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
-    return farther, _wide_enough(facts, tolerance, nearest)
+    return farther, _wide_enough(tolerance, nearest)
 
 
-def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
+def _too_wide(tolerance: Tolerance, nearest: Distribution) -> str:
     least, most = words.duration(nearest.quantile(0)), words.duration(nearest.quantile(0.95))
     widths = least if least == most else f"{least} to {most}"
-    if facts.policy == "exact_time":
+    if tolerance.wider_policy:
         return f"no stamps are equal: the nearest sets span {widths}"
     if tolerance.key == "max_age":
         return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
-    return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
+    return f"the nearest sets span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}"
 
 
-def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
+def _wide_enough(tolerance: Tolerance, nearest: Distribution) -> str:
     most, nearly_all = words.at_least(nearest.quantile(0.95)), words.at_least(nearest.quantile(0.99))
-    policy = "`policy: approximate_time` and " if facts.policy == "exact_time" else ""
+    policy = f"`policy: {tolerance.wider_policy}` and " if tolerance.wider_policy else ""
     less = "" if most == nearly_all else f", `{tolerance.key}: {most}` would match 95 %"
     return f"write {policy}`{tolerance.key}: {nearly_all}`, which would match 99 %{less}"
 

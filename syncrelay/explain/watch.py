@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Sequence
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.facts import GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
+from syncrelay.explain.facts import GroupFacts, InputFacts, InputGraph, Standstill
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.sync.counts import InputCounts
@@ -16,14 +16,11 @@ class GroupWatch:
         self.config = config
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
-        self._trigger = (
-            config.inputs.index_of(config.options.trigger) if config.options.policy == "latest_time" else None
-        )
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
             began=began,
-            trigger=self._trigger,
+            trigger=config.trigger,
         )
 
     def add(
@@ -73,9 +70,9 @@ class GroupWatch:
                 for topic, shown, counts, seen, key in rows
             ),
             figures=figures,
-            tolerance=_tolerance(self.config),
-            by_stamp=options.policy != "equal_key",
-            trigger=self._trigger,
+            tolerance=options.tolerance,
+            by_stamp=options.by_stamp,
+            trigger=self.config.trigger,
             max_wait=options.max_wait,
             every=options.every,
             least_period=options.max_rate,
@@ -84,15 +81,3 @@ class GroupWatch:
             standstill=standstill,
             failure=failure,
         )
-
-
-def _tolerance(config: GroupConfig) -> Tolerance | None:
-    match config.options.policy:
-        case "exact_time":
-            return Tolerance("slop", 0)
-        case "latest_time":
-            return None if config.options.max_age is None else Tolerance("max_age", config.options.max_age)
-        case "equal_key":
-            return None
-        case _:
-            return Tolerance("slop", config.options.slop)

@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Float64
 
 from syncrelay.config import Config
-from syncrelay.config.own_topics import DIAGNOSTICS, SCALARS
+from syncrelay.config.names_in_graph import DIAGNOSTICS, SCALARS
 from syncrelay.explain import Distribution, GroupReport, InputFacts, explanation
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.status import Level, level

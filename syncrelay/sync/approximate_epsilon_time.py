@@ -35,7 +35,7 @@ class ApproximateEpsilonTime(Policy):
         self._queues = [StampQueue() for _ in range(n_inputs)]
         self._losses = Losses(n_inputs)
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["ApproximateEpsilonTime", OptionalInputs]:
+    def for_required(self, required: Sequence[bool]) -> tuple["ApproximateEpsilonTime", OptionalInputs]:
         size, epsilon = self._queue_size, self._epsilon
         stage = OptionalInputs(required=required, queue_size=size, slop_ns=epsilon)
         return ApproximateEpsilonTime(n_inputs=sum(required), queue_size=size, epsilon_ns=epsilon), stage

@@ -52,9 +52,9 @@ class ApproximateTime(Policy):
         "_scale",
         "_slop",
         "_stamps",
-        "closed",
         "n_inputs",
-        "opened",
+        "waits_ended",
+        "waits_started",
     )
 
     def __init__(
@@ -83,10 +83,10 @@ class ApproximateTime(Policy):
         self._losses = Losses(n_inputs)
         # (stamp, place) of the head of each input that has one, in this order: the earliest first, the latest last.
         self._heads: list[tuple[int, int]] = []
-        self.opened = 0
+        self.waits_started = 0
         self._reset()
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["ApproximateTime", OptionalInputs]:
+    def for_required(self, required: Sequence[bool]) -> tuple["ApproximateTime", OptionalInputs]:
         policy = ApproximateTime(
             n_inputs=sum(required),
             queue_size=self._queue_size,
@@ -118,7 +118,7 @@ class ApproximateTime(Policy):
             return self._overflow(place, list(outcomes))
         return outcomes
 
-    def settle(self) -> Sequence[Outcome]:
+    def release_oldest(self) -> Sequence[Outcome]:
         outcomes: list[Outcome] = []
         self._emit(outcomes)
         return self._search(outcomes)
@@ -138,7 +138,7 @@ class ApproximateTime(Policy):
         return self._losses.needed[place]
 
     def _reset(self) -> None:
-        self.closed = self.opened
+        self.waits_ended = self.waits_started
         self._losses.forget()
         self._overflowed: set[int] = set()
         self._forget_candidate()
@@ -187,7 +187,7 @@ class ApproximateTime(Policy):
         """Search after a candidate was forgotten: the wait for a better one goes on if there is one again."""
         self._search(outcomes)
         if self._pivot == _NO_PIVOT:
-            self.closed = self.opened
+            self.waits_ended = self.waits_started
         return outcomes
 
     def _search(self, outcomes: list[Outcome]) -> list[Outcome]:
@@ -209,8 +209,8 @@ class ApproximateTime(Policy):
                     continue
                 self._pivot = latest
                 self._pivot_stamp = end
-                if self.opened == self.closed:
-                    self.opened += 1
+                if self.waits_started == self.waits_ended:
+                    self.waits_started += 1
                 self._take_candidate(start, end)
             else:
                 later_end = end - self._candidate_end
@@ -320,7 +320,7 @@ class ApproximateTime(Policy):
 
     def _emit(self, outcomes: list[Outcome]) -> None:
         outcomes.append(Match(tuple([messages.pop(0) for messages in self._messages])))
-        self.closed = self.opened
+        self.waits_ended = self.waits_started
         for stamps in self._stamps:
             del stamps[0]
         self._forget_candidate()

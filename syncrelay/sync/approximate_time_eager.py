@@ -39,7 +39,7 @@ class ApproximateTimeEager(Policy):
         self._messages: list[list[Message]] = [[] for _ in range(n_inputs)]
         self._losses = Losses(n_inputs)
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["ApproximateTimeEager", OptionalInputs]:
+    def for_required(self, required: Sequence[bool]) -> tuple["ApproximateTimeEager", OptionalInputs]:
         size, slop = self._queue_size, self._slop
         stage = OptionalInputs(required=required, queue_size=size, slop_ns=slop)
         return ApproximateTimeEager(n_inputs=sum(required), queue_size=size, slop_ns=slop), stage

@@ -38,7 +38,7 @@ class EqualKey(Policy):
         self._losses = Losses(n_inputs)
         self._reset()
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["EqualKey", OptionalKeys]:
+    def for_required(self, required: Sequence[bool]) -> tuple["EqualKey", OptionalKeys]:
         stage = OptionalKeys(required=required, queue_size=self._queue_size)
         return EqualKey(n_inputs=sum(required), queue_size=self._queue_size), stage
 

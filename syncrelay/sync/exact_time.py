@@ -31,7 +31,7 @@ class ExactTime(Policy):
         self._order: list[int] = []
         self._losses = Losses(n_inputs)
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["ExactTime", OptionalInputs]:
+    def for_required(self, required: Sequence[bool]) -> tuple["ExactTime", OptionalInputs]:
         stage = OptionalInputs(required=required, queue_size=self._queue_size, slop_ns=0)
         return ExactTime(n_inputs=sum(required), queue_size=self._queue_size), stage
 

@@ -22,7 +22,8 @@ class LatestTime(Policy):
 
     None is older than `max_age_ns` at the trigger's stamp (None: any age will do). A message may serve many
     sets. A trigger waits for required inputs that have nothing for it yet, and is too far once one of them has
-    shown newer messages only; it never waits for optional ones. `settle` lets the oldest waiting trigger expire.
+    shown newer messages only; it never waits for optional ones. `release_oldest` lets the oldest waiting trigger
+    expire.
 
         lidar |..a..b.c...d
         odom  |.A.B......D.
@@ -45,9 +46,9 @@ class LatestTime(Policy):
         "_required",
         "_served",
         "_trigger",
-        "closed",
         "n_inputs",
-        "opened",
+        "waits_ended",
+        "waits_started",
     )
 
     repeats = True
@@ -75,10 +76,10 @@ class LatestTime(Policy):
         self._queues = [StampQueue() for _ in needed]
         self._served = [False] * n_inputs
         self._losses = Losses(n_inputs)
-        self.opened = 0
-        self.closed = 0
+        self.waits_started = 0
+        self.waits_ended = 0
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["LatestTime", OptionalInputs]:
+    def for_required(self, required: Sequence[bool]) -> tuple["LatestTime", OptionalInputs]:
         policy = LatestTime(
             n_inputs=self.n_inputs,
             queue_size=self._queue_size,
@@ -97,16 +98,16 @@ class LatestTime(Policy):
         if replaced is not None:
             outcomes.append(Drop(replaced, DropReason.DUPLICATE))
         elif place == self._trigger:
-            self.opened += 1
+            self.waits_started += 1
         self._serve(outcomes)
         if len(queue.stamps) > self._queue_size:
             self._losses.lose(place, queue.stamps[0])
             if place == self._trigger:
-                self.closed += 1
+                self.waits_ended += 1
             outcomes += self._drop_oldest(place, 1, DropReason.OVERFLOW)
         return outcomes
 
-    def settle(self) -> Sequence[Outcome]:
+    def release_oldest(self) -> Sequence[Outcome]:
         outcomes: list[Outcome] = [*self._drop_trigger(DropReason.EXPIRED)]
         self._serve(outcomes)
         return outcomes
@@ -116,7 +117,7 @@ class LatestTime(Policy):
         for place, queue in enumerate(self._queues):
             drops += self._drop_oldest(place, len(queue.stamps), reason)
         self._losses.forget()
-        self.closed = self.opened
+        self.waits_ended = self.waits_started
         return drops
 
     def buffered(self, place: int) -> int:
@@ -167,12 +168,12 @@ class LatestTime(Policy):
         outcomes.append(Match(tuple(members)))
         self._queues[self._trigger].take(1)
         self._served[self._trigger] = False
-        self.closed += 1
+        self.waits_ended += 1
 
     def _drop_trigger(self, reason: DropReason) -> list[Drop]:
         stamp = self._queues[self._trigger].stamps[0]
         drops = self._drop_oldest(self._trigger, 1, reason)
-        self.closed += 1
+        self.waits_ended += 1
         for place in range(self.n_inputs):
             drops += self._drop_expired(place, stamp)
         return drops

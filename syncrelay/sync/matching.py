@@ -45,7 +45,7 @@ class Unlimited:
     __slots__ = ("_policy", "feed")
 
     def __init__(self, policy: Policy, *, required: Sequence[bool]) -> None:
-        self._policy, stage = policy.narrowed(required)
+        self._policy, stage = policy.for_required(required)
         if stage.inputs:
             raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
         # The policy's own: every message would pay for a call between.
@@ -77,15 +77,15 @@ class Limited(Matching):
 
     __slots__ = (
         "_arrivals",
-        "_closed",
         "_max_wait",
         "_now",
         "_offsets",
-        "_opened",
         "_places",
         "_policy",
         "_since",
         "_stage",
+        "_waits_ended",
+        "_waits_started",
     )
 
     def __init__(
@@ -97,7 +97,7 @@ class Limited(Matching):
         max_wait_ns: int,
         offsets_ns: Sequence[int],
     ) -> None:
-        self._policy, self._stage = policy.narrowed(required)
+        self._policy, self._stage = policy.for_required(required)
         taken = [index for index in range(policy.n_inputs) if index not in self._stage.inputs]
         self._places = {index: place for place, index in enumerate(taken)}
         self._arrivals = arrivals
@@ -105,7 +105,7 @@ class Limited(Matching):
         self._max_wait = max_wait_ns
         self._now = 0
         self._since: deque[int] = deque()
-        self._opened = self._closed = 0
+        self._waits_started = self._waits_ended = 0
 
     def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
         place = self._places.get(index)
@@ -125,7 +125,7 @@ class Limited(Matching):
             if self._stage.oldest_since is not None:
                 outcomes += self._stage.leave()
             else:
-                outcomes += self._join(self._policy.settle(), now)
+                outcomes += self._join(self._policy.release_oldest(), now)
         return outcomes
 
     def next_deadline(self) -> int | None:
@@ -175,9 +175,9 @@ class Limited(Matching):
     def _note_waits(self, now: int) -> int:
         """See what waits began and ended; give when the first that ended had begun, `now` if none did."""
         policy = self._policy
-        self._since.extend([now] * (policy.opened - self._opened))
-        ended = policy.closed - self._closed
-        self._opened, self._closed = policy.opened, policy.closed
+        self._since.extend([now] * (policy.waits_started - self._waits_started))
+        ended = policy.waits_ended - self._waits_ended
+        self._waits_started, self._waits_ended = policy.waits_started, policy.waits_ended
         since = self._since[0] if ended else now
         for _ in range(ended):
             self._since.popleft()

@@ -55,16 +55,16 @@ class Policy(Protocol):
     repeats: bool = False
     """Whether a message may be in more than one set."""
 
-    opened: int = 0
+    waits_started: int = 0
     """How many waits began in here: for a better message or for a missing one."""
 
-    closed: int = 0
+    waits_ended: int = 0
     """How many waits ended, in the order in which they began."""
 
     n_inputs: int
     """How many inputs a set has."""
 
-    def narrowed(self, required: Sequence[bool]) -> tuple["Policy", OptionalStage]:
+    def for_required(self, required: Sequence[bool]) -> tuple["Policy", OptionalStage]:
         """Give this rule, as new, for a group in which only some inputs are required.
 
         Either a policy of the required inputs alone, places counted among them, and the stage in which the
@@ -80,7 +80,7 @@ class Policy(Protocol):
         """Take a message to be matched at `place` and `stamp`; its own input and stamp are not looked at."""
         ...
 
-    def settle(self) -> Sequence[Outcome]:
+    def release_oldest(self) -> Sequence[Outcome]:
         """End the oldest wait: what it is for leaves as it is, as a set if it can be one."""
         return ()
 

@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-import syncrelay.config.compose
+import syncrelay.config.yaml_tree
 from syncrelay.config import ConfigError, load, load_text
 
 GOOD = """\
@@ -67,8 +67,8 @@ def error_of(tmp_path, monkeypatch, environ):
             "f.yaml:1:4: the character U+001B is not allowed in YAML\n    1 | a: \ufffd[31mred\n      |    ^",
             id="escape",
         ),
-        pytest.param(b"\n" * 60_000, "f.yaml: over 50000 lines, is this the right file?", id="many lines"),
-        pytest.param(b"a: 1\n" * 1_000_000, "f.yaml: over 1 MB, is this the right file?", id="a million lines"),
+        pytest.param(b"\n" * 60_000, "f.yaml: more than 50000 lines: is this the right file?", id="many lines"),
+        pytest.param(b"a: 1\n" * 1_000_000, "f.yaml: larger than 1 MB: is this the right file?", id="a million lines"),
         pytest.param(
             b"\tversion: 1\n",
             "f.yaml:1:1: a tab in the indentation, expected spaces\n    1 |     version: 1\n      | ^^^^",
@@ -87,7 +87,9 @@ def test_five_thousand_levels_are_refused_without_recursion(bracket, error_of):
 
 def test_a_list_of_everything_twice_over_is_refused_before_it_is_built(error_of):
     levels = "".join(f"l{n}: &l{n} [{', '.join([f'*l{n - 1}'] * 9)}]\n" for n in range(1, 30))
-    assert "with every alias followed the file has over 200000 values" in error_of(f"l0: &l0 [x]\n{levels}".encode())
+    assert "with all aliases expanded the file has more than 200000 values" in error_of(
+        f"l0: &l0 [x]\n{levels}".encode()
+    )
 
 
 def test_a_file_with_ten_thousand_faults_shows_a_hundred(environ):
@@ -130,8 +132,8 @@ def test_a_file_that_is_not_there_is_named_with_one_that_is(tmp_path, monkeypatc
 
 def test_what_is_no_file_says_what_it_is(tmp_path):
     assert text_of(str(tmp_path)) == f"{tmp_path}: is a directory, expected a YAML file"
-    assert text_of("") == "'': is no file name"
-    assert text_of("a\0b") == "a\\x00b: is no file name"
+    assert text_of("") == "'': is not a file name"
+    assert text_of("a\0b") == "a\\x00b: is not a file name"
     assert text_of("/dev/zero") == "/dev/zero: is a device, expected a YAML file"
     assert "cannot be read" in text_of("x" * 5000)
 
@@ -164,12 +166,12 @@ def test_a_damaged_file_is_a_config_or_a_config_error(start, length, inserted):
 @given(st.integers(0, len(GOOD)), st.integers(0, 12), st.text(alphabet="ab:- \n[]{}\"'&*|,", max_size=6))
 def test_without_libyaml_a_file_is_judged_alike(start, length, inserted):
     text = GOOD[:start] + inserted + GOOD[start + length :]
-    assert verdict(text, yaml.SafeLoader) == verdict(text, syncrelay.config.compose.LOADER)
+    assert verdict(text, yaml.SafeLoader) == verdict(text, syncrelay.config.yaml_tree.LOADER)
 
 
 def verdict(text, loader):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(syncrelay.config.compose, "LOADER", loader)
+        patch.setattr(syncrelay.config.yaml_tree, "LOADER", loader)
         try:
             return load_text(text, environ={}).groups
         except ConfigError as error:

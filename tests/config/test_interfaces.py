@@ -1,8 +1,7 @@
 import sys
 
 from syncrelay.config import Severity, load_text
-from syncrelay.config.interfaces import Interfaces
-from syncrelay.config.msgfile import Field, parse_fields
+from syncrelay.config.interfaces import Field, Interfaces, parse_fields
 from tests.config.ament import make_index
 
 FILE = """\

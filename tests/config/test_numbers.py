@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from syncrelay.config import ConfigError, load_text
-from syncrelay.config.file import GROUP_MODEL_OF, Defaults, FileKeys, topic_model
+from syncrelay.config.file import FileKeys, file_format
 from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.qos import QosOverrides
 
@@ -40,7 +40,7 @@ def _file(group: dict[str, Any], topic: dict[str, Any] | None = None, **top: Any
 
 def _group(of: str, **keys: Any) -> dict[str, Any]:
     needed = {"policy": of, "slop": "20ms", "trigger": "/a", "key": "header.stamp"}
-    return {key: needed[key] for key in GROUP_MODEL_OF[of].model_fields if key in needed} | keys
+    return {key: needed[key] for key in file_format().groups[of].model_fields if key in needed} | keys
 
 
 def _places() -> Iterator[tuple[str, dict[str, Any]]]:
@@ -50,12 +50,12 @@ def _places() -> Iterator[tuple[str, dict[str, Any]]]:
     for name, model in {"node": NodeConfig, "metrics": MetricsConfig, "diagnostics": DiagnosticsConfig}.items():
         for key in model.model_fields:
             yield f"{name}.{key}", _file(_group("exact_time"), **{name: {key: "number"}})
-    for key in Defaults.model_fields:
+    for key in file_format().defaults.model_fields:
         yield f"defaults.{key}", _file({"policy": "exact_time"}, defaults={key: "number"})
-    for policy, group in GROUP_MODEL_OF.items():
+    for policy, group in file_format().groups.items():
         for key in group.model_fields:
             yield f"groups.front.{key}", _file(_group(policy, **{key: "number"}))
-        for key in topic_model(group).model_fields:
+        for key in file_format().topics[policy].model_fields:
             yield f"groups.front.topics[0].{key}", _file(_group(policy), {key: "number"})
     for key in QosOverrides.model_fields:
         yield f"groups.front.topics[0].qos.{key}", _file(_group("exact_time"), {"qos": {key: "number"}})
@@ -94,9 +94,9 @@ def test_no_limit_as_rosbag2_writes_it_is_the_longest_duration(environ):
 @pytest.mark.parametrize(
     ("slop", "said"),
     [
-        ("20", "20 without a unit is 20 s; write 20ms if milliseconds are meant, else 20s"),
-        ("1234567.5", "1234567.5 without a unit is 1234567.5 s; write 1234567.5ms if"),
-        ("9223372036", "9223372036 without a unit is 9223372036 s; write 9223372036ms if"),
+        ("20", "20 without a unit means 20 s: write 20ms if you mean milliseconds, otherwise 20s"),
+        ("1234567.5", "1234567.5 without a unit means 1234567.5 s: write 1234567.5ms if"),
+        ("9223372036", "9223372036 without a unit means 9223372036 s: write 9223372036ms if"),
     ],
 )
 def test_a_slop_of_whole_seconds_is_noted_with_what_was_written(slop: str, said: str, environ):

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from syncrelay.config import Config, load_text
-from syncrelay.config.file import Defaults, File, GroupOfAnyPolicy, TopicOfAnyPolicy
+from syncrelay.config.file import file_format
 from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.qos import QosOverrides
 from syncrelay.sync import Match, Message
@@ -156,13 +156,13 @@ def test_changing_an_option_changes_what_comes_out(one, other, outcome, environ)
 
 def test_every_key_of_the_file_is_an_option_under_test():
     models = (
-        File,
+        file_format().file,
         NodeConfig,
         MetricsConfig,
         DiagnosticsConfig,
-        Defaults,
-        GroupOfAnyPolicy,
-        TopicOfAnyPolicy,
+        file_format().defaults,
+        file_format().any_group,
+        file_format().any_topic,
         StampField,
         QosOverrides,
     )
@@ -199,4 +199,4 @@ def test_a_default_counts_where_the_group_is_silent_and_only_there(key, environ)
 
 
 def test_every_key_of_defaults_is_a_default_under_test():
-    assert DEFAULTS.keys() == Defaults.model_fields.keys()
+    assert DEFAULTS.keys() == file_format().defaults.model_fields.keys()

@@ -81,13 +81,13 @@ def test_of_a_pipe_without_end_no_more_is_read_than_a_file_may_hold(fifo: Path):
                 pipe.write(b"# more\n" * 1000)
 
     with beside(write):
-        assert text_of(fifo, patience_s=60) == f"{fifo}: over 1 MB, is this the right file?"
+        assert text_of(fifo, patience_s=60) == f"{fifo}: larger than 1 MB: is this the right file?"
 
 
 def test_a_file_of_a_terabyte_is_refused_by_its_first_megabyte(tmp_path: Path):
     with (tmp_path / "huge.yaml").open("wb") as file:
         file.truncate(2**40)
-    assert text_of(tmp_path / "huge.yaml").endswith(": over 1 MB, is this the right file?")
+    assert text_of(tmp_path / "huge.yaml").endswith(": larger than 1 MB: is this the right file?")
 
 
 def test_a_socket_is_no_file(tmp_path: Path):

@@ -121,21 +121,21 @@ def test_what_remaps_leave_in_order_has_no_loop_and_no_name_twice():
         (
             {"/f/a": "/a"},
             (
-                "the default output `/a`, remapped from `/f/a`, is an input too (line 8): its messages would come back,"
-                " give it another `output`"
+                "the default output `/a`, remapped from `/f/a`, is also an input (line 8), which makes a loop:"
+                " choose another `output`"
             ),
         ),
         (
             {"/a": "/f/a"},
             (
-                "the default output `/f/a` is an input too (line 8, remapped from `/a`): its messages would come back,"
-                " give it another `output`"
+                "the default output `/f/a` is also an input (line 8, remapped from `/a`), which makes a loop:"
+                " choose another `output`"
             ),
         ),
         ({"/a": "/b"}, "`/b` is in this group twice, first in line 8, remapped from `/a`"),
         (
             {"/f/a": "/f/b"},
-            "the default output `/f/b` is taken by line 8, remapped from `/f/a`, give it another `output`",
+            "the default output `/f/b` is already used in line 8, remapped from `/f/a`: choose another `output`",
         ),
     ],
 )

@@ -9,12 +9,13 @@ import pytest
 import yaml
 from jsonschema import Draft7Validator
 
-from syncrelay.config.file import GROUP_MODEL_OF, Defaults, File, GroupOfAnyPolicy, TopicOfAnyPolicy
+from syncrelay.config.file import file_format
 from syncrelay.config.models import NodeConfig, StampField
 from syncrelay.config.qos import QosOverrides
 from syncrelay.config.schema import json_schema
 
 HERE = Path(__file__).parent
+FORMAT = file_format()
 SCHEMA = json_schema()
 VALIDATOR = Draft7Validator(SCHEMA)
 GOOD_FILES = [*sorted((HERE / "valid").glob("*.yaml")), *sorted((HERE.parents[1] / "configs").glob("*.yaml"))]
@@ -28,6 +29,7 @@ BEYOND_A_SCHEMA = {
     "slop_without_end",
     "message_misspelt",
     "names_too_long_in_full",
+    "output_prefix_empty",
     "node_name_too_long_in_full",
     "nothing_required",
     "one_topic_two_qos",
@@ -99,8 +101,16 @@ def test_what_is_wrong_in_itself_is_wrong_by_the_schema(file):
 
 
 def models():
-    yield from (File, NodeConfig, Defaults, GroupOfAnyPolicy, TopicOfAnyPolicy, StampField, QosOverrides)
-    yield from GROUP_MODEL_OF.values()
+    yield from (
+        FORMAT.file,
+        NodeConfig,
+        FORMAT.defaults,
+        FORMAT.any_group,
+        FORMAT.any_topic,
+        StampField,
+        QosOverrides,
+    )
+    yield from FORMAT.groups.values()
 
 
 def test_every_key_is_in_the_schema_with_a_description():
@@ -118,7 +128,7 @@ def test_every_optional_key_says_its_default():
     silent = [
         (model.__name__, key)
         for model in models()
-        if model not in (File, Defaults, GroupOfAnyPolicy)
+        if model not in (FORMAT.file, FORMAT.defaults, FORMAT.any_group)
         for key, info in model.model_fields.items()
         if not info.is_required() and "Default: " not in info.description
     ]

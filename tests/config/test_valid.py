@@ -88,8 +88,8 @@ def test_a_duration_of_the_middleware_has_a_largest_value(environ):
 @pytest.mark.parametrize(
     ("slop", "note"),
     [
-        ("40", "40 without a unit is 40 s; write 40ms if milliseconds are meant, else 40s"),
-        ("1.5", "1.5 without a unit is 1.5 s; write 1.5ms if milliseconds are meant, else 1.5s"),
+        ("40", "40 without a unit means 40 s: write 40ms if you mean milliseconds, otherwise 40s"),
+        ("1.5", "1.5 without a unit means 1.5 s: write 1.5ms if you mean milliseconds, otherwise 1.5s"),
         ("0.04", None),
         ("40s", None),
     ],

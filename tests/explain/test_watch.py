@@ -34,7 +34,7 @@ def facts(keys, topic=""):
 @pytest.mark.parametrize(
     ("keys", "tolerance"),
     [
-        ("policy: exact_time", Tolerance("slop", 0)),
+        ("policy: exact_time", Tolerance("slop", 0, "approximate_time")),
         ("{policy: approximate_time, slop: 20ms}", Tolerance("slop", 20 * MS)),
         ("{policy: approximate_time_eager, slop: 20ms}", Tolerance("slop", 20 * MS)),
         ("{policy: approximate_epsilon_time, slop: 20ms}", Tolerance("slop", 20 * MS)),

@@ -134,6 +134,6 @@ def test_a_reload_that_remaps_turn_into_a_loop_is_refused_and_the_running_file_k
         with pytest.raises(ConfigError) as raised:
             relay.reload(load_text(GOOD.replace("topic: /b", "topic: /c")))
         after = relay.snapshot()
-    assert "`/front/a` is an input too (line 7, remapped from `/c`)" in str(raised.value)
+    assert "`/front/a` is also an input (line 7, remapped from `/c`)" in str(raised.value)
     assert [each.topic for group in after.groups for each in group.inputs] == ["/a", "/b"]
     assert after == before

@@ -250,9 +250,9 @@ def test_a_better_set_does_not_begin_another_wait():
     policy = approximate(3)
     for index, column in ((0, 0), (1, 5), (2, 3)):
         policy.add(Message(index, column * TICK_NS, None))
-    assert (policy.opened, policy.closed) == (1, 0)
+    assert (policy.waits_started, policy.waits_ended) == (1, 0)
     assert len(policy.add(Message(0, 2 * TICK_NS, None))) == 1
-    assert (policy.opened, policy.closed) == (1, 0)
+    assert (policy.waits_started, policy.waits_ended) == (1, 0)
 
 
 def test_a_message_too_far_from_what_is_queued_does_not_ask_for_a_longer_queue():

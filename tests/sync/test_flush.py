@@ -55,5 +55,5 @@ def test_the_policy_is_as_new_but_for_the_queues_that_were_needed(name, data, ch
     needed = needed_queues(policy)
     for each in after:
         assert list(policy.add(each)) == list(new.add(each))
-        assert policy.opened - policy.closed == new.opened - new.closed
+        assert policy.waits_started - policy.waits_ended == new.waits_started - new.waits_ended
     assert needed_queues(policy) == list(map(max, needed, needed_queues(new)))

@@ -392,4 +392,4 @@ def test_a_policy_alone_loses_nothing_either(policy, rig):
     dropped = [outcome.message for outcome in left if isinstance(outcome, Drop)]
     assert Counter(matched + dropped) == Counter(fed)
     assert [subject.buffered(place) for place in range(chosen.n_inputs)] == [0] * chosen.n_inputs
-    assert subject.opened == subject.closed
+    assert subject.waits_started == subject.waits_ended

@@ -188,18 +188,18 @@ def test_a_trigger_that_has_waited_enough_expires_and_the_next_is_served():
     policy = latest(age=3)
     left, _ = play_policy(policy, "lidar |.....ab\n odom |A......")
     assert left == ()
-    assert (policy.opened, policy.closed) == (2, 0)
-    assert [drop.reason for drop in policy.settle()] == [DropReason.EXPIRED] * 2
-    assert (policy.opened, policy.closed, policy.buffered(0), policy.buffered(1)) == (2, 1, 1, 0)
+    assert (policy.waits_started, policy.waits_ended) == (2, 0)
+    assert [drop.reason for drop in policy.release_oldest()] == [DropReason.EXPIRED] * 2
+    assert (policy.waits_started, policy.waits_ended, policy.buffered(0), policy.buffered(1)) == (2, 1, 1, 0)
 
 
 def test_when_a_trigger_expires_the_next_may_be_too_far():
     policy = latest(3, age=3)
     left, _ = play_policy(policy, "lidar |...a...b..\n odom |.A.......B\n gps |..........")
     assert left == ()
-    told = [(drop.message.payload, drop.reason.value) for drop in policy.settle()]
+    told = [(drop.message.payload, drop.reason.value) for drop in policy.release_oldest()]
     assert told == [("a", "expired"), ("b", "too_far"), ("A", "expired")]
-    assert (policy.opened, policy.closed) == (2, 2)
+    assert (policy.waits_started, policy.waits_ended) == (2, 2)
 
 
 def test_a_trigger_that_overflows_waits_no_longer():
@@ -207,7 +207,7 @@ def test_a_trigger_that_overflows_waits_no_longer():
     for index, column in ((1, 6), (1, 7), (1, 8), (1, 9), (0, 10), (0, 11), (0, 12), (0, 13), (0, 14), (0, 15)):
         policy.add(Message(index, column * TICK_NS, None))
     # Two of the odometry's went, and of the triggers after 12, which find it too old, two wait.
-    assert (policy.opened, policy.closed, policy.buffered(0)) == (6, 4, 2)
+    assert (policy.waits_started, policy.waits_ended, policy.buffered(0)) == (6, 4, 2)
 
 
 @pytest.mark.parametrize("columns", [(5, 6, 7), (6, 7, 8, 9)], ids=["older", "of its stamp"])

@@ -95,4 +95,4 @@ def test_nothing_waits_in_a_policy_that_decides_at_once():
     for make in (exact_time, approximate_time_eager, approximate_epsilon_time, equal_key):
         policy, _ = make(random.Random(0), {"n_inputs": 2, "queue_size": 2})
         policy.add(Message(0, 1, None))
-        assert (policy.opened, policy.closed, policy.settle()) == (0, 0, ())
+        assert (policy.waits_started, policy.waits_ended, policy.release_oldest()) == (0, 0, ())

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from ruamel.yaml import YAML
 
-from syncrelay.config.file import GROUP_MODEL_OF, topic_model
+from syncrelay.config.file import file_format
 
 _POLICY: Final = "policy"
 _WIDEST: Final = 10_000
@@ -80,11 +80,11 @@ def _comment(mapping: Any, key: str, comment: str) -> None:
 
 
 def _fit(group: Any, policy: str) -> None:
-    model = GROUP_MODEL_OF[policy]
-    for key in [key for key in group if key not in model.model_fields]:
+    form = file_format()
+    for key in [key for key in group if key not in form.groups[policy].model_fields]:
         del group[key]
     for topic in group["topics"]:
-        for key in [key for key in topic if key not in topic_model(model).model_fields]:
+        for key in [key for key in topic if key not in form.topics[policy].model_fields]:
             del topic[key]
 
 

@@ -8,8 +8,7 @@ from syncrelay.bag.analysis.streams import Stream, read_topics
 from syncrelay.bag.analysis.topics import TopicFigures, figures_of
 from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.recording import Channel, Encoding, Recording
-from syncrelay.config.names import check_topic_name
-from syncrelay.config.typenames import check_type_name
+from syncrelay.config.names import check_topic_name, check_type_name
 from syncrelay.config.wording import counted
 
 FEWEST: Final = 10

@@ -15,6 +15,7 @@ from syncrelay.bag.analysis.nearest import Pair, PossibleSets, pair, tightest
 from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.analysis.topics import TopicFigures, figures_of
 from syncrelay.config import GroupConfig
+from syncrelay.config.wording import all_of
 from syncrelay.explain import words
 
 _US: Final = 1_000
@@ -31,7 +32,6 @@ _FAR_OFF: Final = 4
 _TOO_WIDE: Final = 4
 _SAME_SPAN: Final = 1.02
 _UNSET: Final = 0.5
-_MEASURED: Final = ("exact_time", "approximate_time", "approximate_time_eager", "approximate_epsilon_time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ def suggest(
     changed: Callable[[Sequence[Change]], GroupConfig],
 ) -> Suggestion:
     """Return better values for a group; `changed` gives the group with changes made."""
-    if group.options.policy not in _MEASURED:
-        return Suggestion((), (_NOT_MEASURED[group.options.policy],), 0, 0, 0)
+    if group.options.matched_by:
+        return Suggestion((), (_not_measured(group.options.matched_by),), 0, 0, 0)
     stamping = list(_stamping(group, streams))
     base = changed(stamping)
     streams = stamped(base, streams)
@@ -89,10 +89,9 @@ def suggest(
     return Suggestion(tuple(changes), hints, max(most, now, then), now, then)
 
 
-_NOT_MEASURED: Final = {
-    "latest_time": "no values to suggest: `trigger` and `max_age` decide which messages belong together",
-    "equal_key": "no values to suggest: `key` decides which messages belong together",
-}
+def _not_measured(keys: Sequence[str]) -> str:
+    said = f"{all_of(f'`{key}`' for key in keys)} {'decide' if len(keys) > 1 else 'decides'}"
+    return f"no values to suggest: {said} which messages belong together"
 
 
 def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> PossibleSets | None:
@@ -100,12 +99,12 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> PossibleSets
 
     None where one of them has no stamps, and for a policy by which messages need not be near to belong together.
     """
-    if group.options.policy not in _MEASURED:
+    if group.options.matched_by:
         return None
     required = [index for index, topic in enumerate(group.topics) if topic.required]
     chosen, offsets = [streams[index] for index in required], [group.topics[index].offset_ns for index in required]
     # The best match is certain only when what comes next is there, unless it may not wait so long.
-    waits = group.options.policy == "approximate_time" and group.options.max_wait is None
+    waits = group.options.waits_for_next and group.options.max_wait is None
     found = tightest(chosen, offsets, successors=int(waits))
     if found is None:
         return None
@@ -150,7 +149,7 @@ def _does(group: GroupConfig, evaluation: Evaluation, possible: PossibleSets) ->
     """Tell whether a group's values give enough, and no slop is far wider than what is needed."""
     if completed(evaluation.counts, possible.tightest.pivot) < ENOUGH * len(possible.spans):
         return False
-    slop = getattr(group.options, "slop", 0)
+    slop = group.options.tolerance.ns if group.options.tolerance else 0
     return bool(possible.is_exact and not slop) or (
         not possible.is_exact and bool(possible.spans) and slop <= _TOO_WIDE * possible.spans[-1]
     )
@@ -162,17 +161,17 @@ def _ladder(group: GroupConfig, possible: PossibleSets) -> Iterator[list[Change]
         for queue in _queues(group, possible, 0):
             yield [*_policy(group, "exact_time", "the stamps of a set are equal"), *queue]
         return
-    spans = possible.spans
-    if not spans:
+    spans, tolerance = possible.spans, group.options.tolerance
+    if not spans or tolerance is None:
         return
-    policy = "approximate_time" if group.options.policy == "exact_time" else group.options.policy
+    policy = tolerance.wider_policy or group.options.policy
     for slop in dict.fromkeys((spans[ceil(0.995 * len(spans)) - 1], spans[-1])):
         text = words.at_least(slop)
         reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
         for queue in _queues(group, possible, slop):
             yield [
                 *_policy(group, policy, "the stamps of a set differ"),
-                Change(group.name, None, "slop", text, reason),
+                Change(group.name, None, tolerance.key, text, reason),
                 *queue,
             ]
 
@@ -197,7 +196,7 @@ def _queues(group: GroupConfig, possible: PossibleSets, slop: int) -> Iterator[l
 
 def _periods(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
     """Tell the policy that can use it the least time between messages, where a topic keeps one."""
-    if group.options.policy != "approximate_time":
+    if not group.options.waits_for_next:
         return
     for index, (topic, stream) in enumerate(zip(group.topics, streams, strict=True)):
         figures = figures_of(stream)

@@ -29,7 +29,7 @@ class Marks:
 
 
 def slop_marks(now: GroupConfig, then: GroupConfig) -> Marks:
-    """Return the slops of a group as it is and as it is suggested; that of exact_time is 0."""
+    """Return the slops of a group as it is and as it is suggested."""
     return _marks(_slop(now), _slop(then))
 
 
@@ -62,7 +62,7 @@ def histogram(pair: Pair, slops: Marks) -> Histogram:
 
 
 def _slop(group: GroupConfig) -> int | None:
-    return 0 if group.options.policy == "exact_time" else getattr(group.options, "slop", None)
+    return None if group.options.matched_by or group.options.tolerance is None else group.options.tolerance.ns
 
 
 def _marks(now: int | None, then: int | None) -> Marks:

@@ -19,8 +19,6 @@ _NONE: Final = -1
 # What is made of it, with any time of receipt and any stamp, fits 64 bits.
 _LARGEST_OFFSET: Final = 2**61
 _LONGEST: Final = 2**63 - 1
-# Its messages serve many sets, and stand in their lane once.
-_REPEATING: Final = "latest_time"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +67,8 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
     lanes, places, astray = [], [], int(np.count_nonzero(is_astray[:, None] & ~missing))
     for index, stream in enumerate(group.streams):
         there = ~missing[:, index]
-        is_new = (
-            _is_new(stamps[there, index]) if group.group.options.policy == _REPEATING else np.ones(there.sum(), bool)
-        )
+        # A message that serves many sets stands in its lane once.
+        is_new = _is_new(stamps[there, index]) if group.group.options.repeats else np.ones(there.sum(), bool)
         first, which = np.flatnonzero(is_new), np.cumsum(is_new) - 1
         matched = times[there, index][first]
         dropped, codes, n_astray = _dropped(group, index, origin - offsets[index], begin)

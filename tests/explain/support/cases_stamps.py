@@ -87,14 +87,18 @@ FOUND = {
     "stamps that are never equal": (
         Code.OVER_SLOP,
         Severity.ERROR,
-        a_silent_group(figures=wide(*[0.014] * 5), policy="exact_time", tolerance=Tolerance("slop", 0)),
+        a_silent_group(
+            figures=wide(*[0.014] * 5), policy="exact_time", tolerance=Tolerance("slop", 0, "approximate_time")
+        ),
         "no stamps are equal: the nearest sets span 14 us",
         "write `policy: approximate_time` and `slop: 14us`, which would match 99 %",
     ),
     "stamps that are equal mostly": (
         Code.OVER_SLOP,
         Severity.WARN,
-        a_group(figures=wide(*[0] * 90, *[33] * 10), policy="exact_time", tolerance=Tolerance("slop", 0)),
+        a_group(
+            figures=wide(*[0] * 90, *[33] * 10), policy="exact_time", tolerance=Tolerance("slop", 0, "approximate_time")
+        ),
         "10 % of the last 100 messages of /camera have no partner of an equal stamp",
         "look for messages that a driver leaves out or the network loses",
     ),

@@ -1,4 +1,8 @@
-"""PyYAML's errors in words: it names the token that broke its grammar, we name what a person did."""
+"""PyYAML's errors in words: it names the token that broke its grammar, we name what a person did.
+
+What people meet most has sentences of ours: a tab, a colon or its space, indentation, a bracket, a quote. The rest is
+told in PyYAML's.
+"""
 
 import re
 from collections.abc import Callable
@@ -75,13 +79,15 @@ def in_words(error: yaml.MarkedYAMLError, lines: tuple[str, ...]) -> Fault:
     tab_at = scene.line.find("\t", 0, scene.column + 1)
     if tab_at >= 0 and not scene.line[:tab_at].strip("- "):
         return "a tab in the indentation, expected spaces", Span(scene.row + 1, tab_at + 1, 1)
-    for jargon, say in _SAYINGS:
-        if jargon in scene.jargon:
-            return say(scene)
-    return f"not valid YAML: {scene.jargon}", scene.here()
+    say = next((say for jargon, say in _SAYINGS if jargon in scene.jargon), None)
+    said = say(scene) if say is not None else None
+    if said is not None:
+        return said
+    context = f", {error.context}" if error.context else ""
+    return f"this is not valid YAML: {scene.jargon}{context}", scene.here()
 
 
-def _second_colon(scene: _Scene) -> Fault:
+def _second_colon(scene: _Scene) -> Fault | None:
     """`mapping values are not allowed`: a colon where no key can be."""
     above = scene.row_above()
     if ": " in scene.before:
@@ -89,7 +95,7 @@ def _second_colon(scene: _Scene) -> Fault:
         value = Span(scene.row + 1, value_at + 1, max(1, len(scene.line.rstrip()) - value_at))
         return "a second `: ` in one line: if it belongs to the value, put the value in quotes", value
     if above is None:
-        return "no key can be here", scene.here()
+        return None
     text = scene.text(above).strip()
     if _NO_SPACE_AFTER_COLON.match(text):
         return _SPACE_AFTER_COLON, scene.content(above)
@@ -97,7 +103,7 @@ def _second_colon(scene: _Scene) -> Fault:
         return "expected a space after `-`", scene.content(above)
     if _indent(scene.line) > _indent(scene.text(above)):
         return "indented deeper than the line above, which has a value already", scene.content(scene.row)
-    return "no key can be here: the value above it has no end", scene.content(scene.row)
+    return None
 
 
 _SPACE_AFTER_COLON: Final = "expected `key: value`, with a space after the colon"
@@ -111,13 +117,13 @@ def _no_colon(scene: _Scene) -> Fault:
     return "expected `key: value`, found no colon", content
 
 
-def _not_here(scene: _Scene) -> Fault:
+def _not_here(scene: _Scene) -> Fault | None:
     """`did not find expected key` or '-': the indentation is off, or something follows a whole value."""
     if scene.before.strip():
         return "text after the end of a value: put the whole value in quotes", scene.here()
-    if scene.found == ":":
-        return "expected a key before the colon", scene.here()
     levels = _open_levels(scene)
+    if not levels:
+        return None
     content = scene.content(scene.row)
     if scene.column not in levels:
         below = [level for level in levels if level < scene.column][:1]
@@ -175,48 +181,14 @@ def _open_quote(scene: _Scene) -> Fault:
     return "the quote is never closed", scene.start()
 
 
-def _no_content(scene: _Scene) -> Fault:
-    if not scene.found:
-        return "expected a value, found the end of the file: is a bracket not closed?", scene.here()
-    return f"expected a value, found {quoted(scene.found)}", scene.here()
+def _no_content(scene: _Scene) -> Fault | None:
+    """`node content`: what is wrong is plain where the file ends there."""
+    return (
+        None if scene.found else ("expected a value, found the end of the file: is a bracket not closed?", scene.here())
+    )
 
 
-def _special_first(scene: _Scene) -> Fault:
-    found = scene.line[scene.column : scene.column + 1]
-    if found == "\t":
-        return "a tab, expected a space", Span(scene.row + 1, scene.column + 1, 1)
-    return f"a text that begins with {quoted(found)} needs quotes", scene.here()
-
-
-def _anchor(scene: _Scene) -> Fault:
-    found = scene.text(scene.start_row)[scene.start_column : scene.start_column + 1]
-    return f"a text that begins with {quoted(found)} needs quotes", scene.start()
-
-
-def _escape(scene: _Scene) -> Fault:
-    row, column = scene.row, scene.line.rfind("\\", 0, scene.column + 1)
-    escape = scene.text(row)[column : column + 2]
-    text = f"{quoted(escape)} means nothing in double quotes: write a backslash twice, or use single quotes"
-    return text, Span(row + 1, column + 1, 2)
-
-
-def _after_block(scene: _Scene) -> Fault:
-    return "a text that begins with `|` or `>` goes on in the next line, or needs quotes", scene.here()
-
-
-def _document(scene: _Scene) -> Fault:
-    return "expected nothing after the end of the document", scene.content(scene.row)
-
-
-def _directive(scene: _Scene) -> Fault:
-    return "a line that begins with `%` is a directive, and this one is not known", scene.content(scene.start_row)
-
-
-def _tag(scene: _Scene) -> Fault:
-    return "a text that begins with `!` needs quotes; tags are not supported", scene.start()
-
-
-_SAYINGS: Final[tuple[tuple[str, Callable[[_Scene], Fault]], ...]] = (
+_SAYINGS: Final[tuple[tuple[str, Callable[[_Scene], Fault | None]], ...]] = (
     ("mapping values are not allowed", _second_colon),
     ("could not find expected ':'", _no_colon),
     ("did not find expected key", _not_here),
@@ -226,20 +198,6 @@ _SAYINGS: Final[tuple[tuple[str, Callable[[_Scene], Fault]], ...]] = (
     ("unexpected end of stream", _open_quote),
     ("document separator", _open_quote),
     ("node content", _no_content),
-    ("cannot start any token", _special_first),
-    ("alphabetic or numeric character", _anchor),
-    ("mapping keys are not allowed", _special_first),
-    ("block sequence entries are not allowed", _special_first),
-    ("sequence entries are not allowed", _special_first),
-    ("escape", _escape),
-    ("hexdecimal", _escape),
-    ("comment or line break", _after_block),
-    ("comment or a line break", _after_block),
-    ("chomping or indentation", _after_block),
-    ("<document start>", _document),
-    ("incompatible YAML document", _directive),
-    ("directive", _directive),
-    ("tag", _tag),
 )
 
 

@@ -4,20 +4,27 @@ On PyYAML's events and not its loader, because the loader keeps the last of two 
 1.1 scalars, recurses once per level and builds an alias bomb before anyone can object.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 import yaml
 
-from syncrelay.config.document import MOST_VALUES, Document, Entry, MappingNode, Node, ScalarNode, SequenceNode
-from syncrelay.config.errors import ConfigError
-from syncrelay.config.problems import Path, Problem, Span, dotted
-from syncrelay.config.scalars import Scalar, read_plain
+from syncrelay.config.document import (
+    MOST_VALUES,
+    Document,
+    Entry,
+    MappingNode,
+    Node,
+    Scalar,
+    ScalarNode,
+    SequenceNode,
+)
+from syncrelay.config.problems import ConfigError, Path, Problem, Span, dotted
 from syncrelay.config.source import Source
-from syncrelay.config.substitution import substitute
-from syncrelay.config.syntax import in_words
 from syncrelay.config.wording import quoted
+from syncrelay.config.yaml_errors import in_words
 
 LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 # A file that uses every key is 7 levels deep.
@@ -28,6 +35,24 @@ _MOST_PROBLEMS: Final = 1_000
 _LONGEST_KEY: Final = 255
 # A text of so many characters counts as one value more.
 _CHARACTERS: Final = 100
+
+# YAML 1.2's core schema (10.3.2), so that editors and syncrelay agree.
+_CONSTANTS: Final[dict[str, Scalar]] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
+    **{sign + word: float(sign + "inf") for sign in ("", "+", "-") for word in (".inf", ".Inf", ".INF")},
+}
+_DECIMAL = re.compile(r"[-+]?[0-9]+")
+_OCTAL_OR_HEXADECIMAL = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
+# Python refuses to read longer ones, and no key has a use for them.
+_LONGEST_NUMBER = 400
+
+_DOLLAR = re.compile(
+    r"\$(?:(?P<escaped>\$)|\{(?P<name>[A-Za-z_]\w*)(?P<default>:-[^{}$]*)?\}|(?P<other>\{[^}]*\}?|\w*))"
+)
 
 
 def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[Problem]]:
@@ -89,7 +114,7 @@ class _Composer:
         self._check_tag(event)
         if self._awaits_key():
             what = "mapping" if isinstance(node, MappingNode) else "list"
-            raise self._refusal(f"a {what} cannot be a key; a text that begins with a bracket needs quotes", node.span)
+            raise self._refusal(f"a {what} cannot be a key: put text that begins with a bracket in quotes", node.span)
         if len(self._open) == _DEEPEST:
             raise self._refusal(f"more than {_DEEPEST} levels of nesting", node.span)
         self._open.append(_Open(node, event.anchor))
@@ -125,7 +150,7 @@ class _Composer:
             self._report(text, span, code="merge_key")
         elif key in top.node.entries:
             first = top.node.entries[key].key.line
-            self._report(f"the key is here twice, first in line {first}", span, code="duplicate_key")
+            self._report(f"duplicate key, first in line {first}", span, code="duplicate_key")
 
     def _value(self, event: yaml.ScalarEvent, span: Span) -> ScalarNode:
         try:
@@ -146,15 +171,15 @@ class _Composer:
     def _alias(self, event: yaml.AliasEvent) -> None:
         span, name = self._span(event), str(event.anchor)
         if any(container.anchor == name for container in self._open):
-            raise self._refusal(f"{quoted('*' + name)} stands inside what it repeats", span)
+            raise self._refusal(f"{quoted('*' + name)} refers to a block that contains it", span)
         target = self._anchors.get(name)
         if target is None:
-            raise self._refusal(f"{quoted('*' + name)} repeats nothing: no `&{name}` above", span)
+            raise self._refusal(f"{quoted('*' + name)} has no anchor: there is no `&{name}` above", span)
         if self._awaits_key():
             raise self._refusal("an alias cannot be a key", span)
         self._place(target, None)
         if sum(container.node.size for container in self._open) > MOST_VALUES:
-            raise self._refusal(f"with every alias followed the file has over {MOST_VALUES} values", span)
+            raise self._refusal(f"with all aliases expanded the file has more than {MOST_VALUES} values", span)
 
     def _place(self, node: Node, anchor: str | None) -> None:
         if anchor:
@@ -183,7 +208,7 @@ class _Composer:
 
     def _report(self, text: str, span: Span, *, code: str) -> None:
         if len(self.problems) == _MOST_PROBLEMS:
-            text = "the file was not read on from here: there are errors enough above"
+            text = "too many errors: the file was not read beyond this line"
             raise ConfigError([*self.problems, self._source.problem(text, span=span, code="yaml")])
         self.problems.append(self._source.problem(text, path=dotted(self._path()), span=span, code=code))
 
@@ -199,3 +224,43 @@ class _Composer:
         if width < 1 or isinstance(event, yaml.CollectionStartEvent):
             width = len(self._source.line(start.line + 1)) - start.column
         return Span(start.line + 1, start.column + 1, max(1, width), self._source.index)
+
+
+def read_plain(text: str) -> Scalar:
+    """Return the value of an unquoted scalar, as YAML 1.2 has it."""
+    if text in _CONSTANTS:
+        return _CONSTANTS[text]
+    if len(text) > _LONGEST_NUMBER:
+        return text
+    if _DECIMAL.fullmatch(text):
+        return int(text)
+    if _OCTAL_OR_HEXADECIMAL.fullmatch(text):
+        return int(text, 0)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    return text
+
+
+def substitute(text: str, environ: Mapping[str, str]) -> str:
+    """Return the text with its variables filled in; `$$` is a dollar sign.
+
+    A default stands for a variable that is unset or empty, as in a shell. Raises ValueError for an unset
+    variable without a default and for what only looks like a variable.
+    """
+    return _DOLLAR.sub(lambda found: _value(found, environ), text)
+
+
+def _value(found: re.Match[str], environ: Mapping[str, str]) -> str:
+    if found["escaped"]:
+        return "$"
+    name, default = found["name"], found["default"]
+    if name is None:
+        raise ValueError(
+            f"{quoted(found.group())}: expected ${{NAME}} or ${{NAME:-default}}; write $$ for a dollar sign"
+        )
+    value = environ.get(name)
+    if default is not None:
+        return value or default.removeprefix(":-")
+    if value is None:
+        raise ValueError(f"the environment variable {name} is not set; write ${{{name}:-default}} to give it a default")
+    return value

@@ -1,0 +1,48 @@
+"""What can be used of a faulty file: the keys that are in order. Checks between keys need not wait for the others."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Any
+
+from pydantic_core import ErrorDetails
+
+from syncrelay.config.document import Document, MappingNode, Node, ScalarNode, SequenceNode
+from syncrelay.config.file import FileKeys, file_format
+from syncrelay.config.problems import Path
+from syncrelay.config.translate import path_of
+
+
+def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Document, FileKeys]:
+    """Return the tree of a file that pydantic refused, with its faulty keys marked, and a file without these.
+
+    In it a missing topic or type is empty, and another key that is needed None.
+    """
+    # A group whose name is refused has its keys all the same.
+    faulty = frozenset(_key(path_of(error["loc"])) for error in errors if error["loc"][2:] != ("[key]",))
+    usable = _usable(document.root, (), faulty)
+    keys = usable if isinstance(usable, dict) else {}
+    return replace(document, faulty=faulty), file_format().partial_file.model_validate(keys)
+
+
+def _key(path: Path) -> Path:
+    """Return the key of the file, a group or a topic that a path is below of; it is faulty as a whole."""
+    match path:
+        case ("groups", _, "topics", *_):
+            return path[:5]
+        case ("groups", *_):
+            return path[:3]
+        case _:
+            return path[:2]
+
+
+def _usable(node: Node, path: Path, faulty: Collection[Path]) -> Any:
+    """Return the tree as dicts, tuples and scalars; an item that is faulty as a whole is an empty mapping."""
+    match node:
+        case ScalarNode():
+            return node.value
+        case SequenceNode():
+            items = enumerate(node.items)
+            return tuple({} if (*path, i) in faulty else _usable(item, (*path, i), faulty) for i, item in items)
+        case MappingNode():
+            entries = ((key, (*path, key), entry.value) for key, entry in node.entries.items())
+            return {key: _usable(value, below, faulty) for key, below, value in entries if below not in faulty}
