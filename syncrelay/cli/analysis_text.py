@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from syncrelay.bag.analysis import Analysis, GroupAnalysis, patch
-from syncrelay.bag.analysis.curves import Curves, Point
+from syncrelay.bag.analysis.curves import Curves, Point, slop_key
 from syncrelay.bag.analysis.nearest import Pair
 from syncrelay.bag.analysis.suggest import Suggestion
 from syncrelay.bag.analysis.topics import TopicFigures
@@ -142,7 +142,7 @@ def promise(suggestion: Suggestion) -> str:
 
 def slop_text(each: GroupAnalysis, point: Point) -> str:
     """Return a slop of a curve, and whether it is in use or suggested."""
-    return _marked(each, "slop", point, words.duration(point.value))
+    return _marked(each, slop_key(each.group) or "", point, words.duration(point.value))
 
 
 def size_text(each: GroupAnalysis, point: Point) -> str:
@@ -151,7 +151,7 @@ def size_text(each: GroupAnalysis, point: Point) -> str:
 
 
 def _marked(each: GroupAnalysis, option: str, point: Point, text: str) -> str:
-    if getattr(each.group.options, option) == point.value:
+    if getattr(each.group.options, option, None) == point.value:
         return f"{text} (in use)"
     return f"{text} (suggested)" if getattr(each.suggested.options, option, None) == point.value else text
 
@@ -183,7 +183,7 @@ def _curves(each: GroupAnalysis) -> Iterator[str]:
         return
     sampled = "" if curves.is_of_all else f" ({sampled_line(curves)})"
     for option, points, text in (
-        ("slop", curves.by_slop, slop_text),
+        (slop_key(each.group), curves.by_slop, slop_text),
         ("queue_size", curves.by_queue_size, size_text),
     ):
         if points:

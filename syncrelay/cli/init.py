@@ -70,7 +70,7 @@ def init_from_graph(seconds: float, output: str | None) -> int:
         say(f"listening to the graph for {seconds:g} s ...")
     heard = listen(seconds=seconds)
     if heard.relayed:
-        remark(f"left out, as outputs of a relay that runs: {', '.join(heard.relayed)}")
+        remark(f"left out: published by a running relay: {', '.join(heard.relayed)}")
     headerless = [f"{name} ({type_name}): {NO_HEADER}" for name, type_name in heard.headerless.items()]
     without = (*heard.unusable, *headerless)
     try:
@@ -100,5 +100,5 @@ def _streams(heard: "Heard") -> Iterator[tuple[Channel, Stream]]:
 
 def _what_helps(heard: "Heard") -> str:
     if not (heard.topics or heard.headerless or heard.unusable):
-        return "nobody publishes anything that can be used here: start the nodes; `syncrelay doctor --live` tells more"
-    return "with --seconds N it listens longer; a topic of a group may go by `stamp: receive`"
+        return "nobody publishes anything that can be used here: start the nodes, or run `syncrelay doctor --live`"
+    return "listen longer with --seconds N, or write `stamp: receive` for topics without stamps"

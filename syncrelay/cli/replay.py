@@ -112,7 +112,7 @@ def _written(output: str | None, wirings: Sequence[Wiring], opened: ExitStack) -
     channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)
     recording = opened.enter_context(McapOutput(Path(output)))
     if any(channel.encoding is Encoding.ROS1 for channel in channels):
-        remark("the recording is of ROS 1, what is written is CDR as ROS 2 has it, without header.seq")
+        remark("this is a ROS 1 recording: its messages are written as ROS 2 CDR, without header.seq")
     return recording
 
 

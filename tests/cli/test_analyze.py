@@ -100,12 +100,12 @@ other rig.mcap: 9.9 s, 300 messages of 4 topics
   topic    type                              messages  rate   stamps
   /camera  {VECTOR}  100       10 Hz  5 ms before receipt
   /lidar   {VECTOR}  100       10 Hz  5 ms before receipt
-  /text    {STRING}               50        20 Hz  none: its type has no header, and so no stamp to match by
+  /text    {STRING}               50        20 Hz  none: its type has no header, so no stamp to match by
   /unset   {VECTOR}  50        20 Hz  50 with stamp 0
 
 Next, to match two topics or more:
   syncrelay analyze 'other rig.mcap' /camera /lidar
-or to have a file proposed for all, and see what it makes of the recording:
+or to get a file for all of them, and see what it gives:
   syncrelay init --from-bag 'other rig.mcap' -o fusion.yaml
   syncrelay analyze 'other rig.mcap' --config fusion.yaml
 """
@@ -133,7 +133,7 @@ def test_the_list_is_there_for_programs_too(folder, other_rig):
     assert {topic["topic"]: (topic["messages"], topic["unfit"]) for topic in found["topics"]} == {
         "/camera": (100, None),
         "/lidar": (100, None),
-        "/text": (50, "its type has no header, and so no stamp to match by"),
+        "/text": (50, "its type has no header, so no stamp to match by"),
         "/unset": (50, "50 messages, 50 with stamp 0"),
     }
 

@@ -18,8 +18,6 @@ MOST_MESSAGES: Final = 50_000
 LARGEST_QUEUE: Final = 1000
 """Longer queues are neither tried nor suggested."""
 
-_SLOP: Final = "slop"
-_QUEUE_SIZE: Final = "queue_size"
 _SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 # Beyond the widest possible set more slop may still help: a queue may hold the second best partner only.
 _WIDER: Final = (1.1, 1.5, 2)
@@ -66,22 +64,28 @@ def curves_of(
 ) -> Curves:
     """Return what a group gives with other values, with its own and with the suggested ones among them."""
     used = list(islice(arrivals(streams), most))
-    pivot = possible.tightest.pivot
+    pivot, slop = possible.tightest.pivot, slop_key(group)
 
     def points(option: str, values: set[int]) -> tuple[Point, ...]:
         values |= {getattr(each.options, option) for each in (group, suggested) if hasattr(each.options, option)}
-        if not hasattr(group.options, option) or len(values) == 1:
+        if len(values) == 1:
             return ()
         return tuple(_point(group, option, value, used, pivot) for value in sorted(values))
 
     return Curves(
-        by_slop=points(_SLOP, _slops(possible)),
-        by_queue_size=points(_QUEUE_SIZE, _sizes(group, suggested, possible)),
+        by_slop=() if slop is None else points(slop, _slops(possible)),
+        by_queue_size=points("queue_size", _sizes(group, suggested, possible)),
         messages=len(used),
         recorded=sum(len(stream.places) for stream in streams),
         lasts=used[-1].received - used[0].received if used else 0,
         of=sum(arrival.input == pivot for arrival in used),
     )
+
+
+def slop_key(group: GroupConfig) -> str | None:
+    """Return the key of the file that says how wide a group's sets may be, None where it has none."""
+    tolerance = group.options.tolerance
+    return tolerance.key if tolerance is not None and hasattr(group.options, tolerance.key) else None
 
 
 def _point(group: GroupConfig, option: str, value: int, used: Sequence[Arrival], pivot: int) -> Point:
