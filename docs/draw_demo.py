@@ -5,14 +5,15 @@ from pathlib import Path
 from picture import COLUMNS, LINES, draw
 
 from syncrelay.cli.demo import prepare_ros, relay_rig
-from syncrelay.cli.live import Moment, frame
+from syncrelay.cli.demo_screen import WIDEST_STRIP, Moment, frame
 from syncrelay.cli.stop import StopRequest
 from syncrelay.explain import RecentDrop
-from syncrelay.top.strip import Sweep, newest_stamp
+from syncrelay.top.group_blocks import as_matched
+from syncrelay.top.strip import Sweep
 
-_STRIP = 65
 _SECONDS = 16.0
 _SETTLED_S = 8.0
+_LIDAR = 1
 _PICTURE = Path(__file__).parent / "demo.svg"
 
 
@@ -21,17 +22,17 @@ def main() -> None:
     prepare_ros()
     moments: list[Moment] = []
     relay_rig(moments.append, total_s=_SECONDS, seed=0, stop=StopRequest())
-    best = max((moment for moment in moments if moment.elapsed_s > _SETTLED_S), key=_fullness)
-    draw(frame(best, width=COLUMNS, height=LINES), _PICTURE)
+    settled = [moment for moment in moments if moment.elapsed_s > _SETTLED_S]
+    healthy = [moment for moment in settled if not any(group.problems for group in moment.state.groups)]
+    draw(frame(max(healthy or settled, key=_fullness), width=COLUMNS, height=LINES), _PICTURE)
 
 
 def _fullness(moment: Moment) -> tuple[bool, int]:
-    """Prefer a moment that shows a lost set, and then one at which the sweep is about to begin again."""
-    states = tuple(figures.state for figures in moment.groups)
-    sweep = Sweep(head=newest_stamp(outcome for state in states for outcome in state.recent), width=_STRIP)
-    lidar = next(index for index, each in enumerate(states[0].inputs) if "lidar" in each.topic)
-    lost = [one for one in states[0].recent if isinstance(one, RecentDrop) and one.input == lidar]
-    return any(sweep.column(one.stamp) for one in lost), sweep.column(sweep.head) or 0
+    """Prefer a moment that shows a lost set, and then one at which the strip is about to begin again."""
+    sweep = Sweep(head=moment.head, width=WIDEST_STRIP)
+    outcomes = as_matched(moment.state.groups[0])
+    lost = [each for each in outcomes if isinstance(each, RecentDrop) and each.input == _LIDAR]
+    return any(sweep.column(each.stamp) for each in lost), sweep.column(sweep.head) or 0
 
 
 if __name__ == "__main__":

@@ -4,12 +4,13 @@ from collections import Counter
 from typing import Final
 
 from syncrelay.bag.recording import LATEST, Channel, RawMessage
+from syncrelay.config.wording import counted
 
 STRAY: Final[RawMessage] = (Channel(-1, "", "", ""), -1, b"")
-"""Stands in place of a message of a channel that the file does not describe: of a time before all others."""
+"""Stands in place of a message channel not described in the file: of a time before all others."""
 
-OF_NO_CHANNEL: Final = "of a channel that the file does not describe"
-OF_NO_TIME: Final = "received at a time that no clock shows, before 1970 or after 2116"
+OF_NO_CHANNEL: Final = "channel not described in the file"
+OF_NO_TIME: Final = "received before 1970 or after 2116"
 
 
 class Losses:
@@ -25,10 +26,10 @@ class Losses:
     @property
     def sentences(self) -> list[str]:
         """All so far."""
-        counted = [f"{_messages(count)} left out: {why}" for why, count in self._left_out.items() if count]
+        told = [f"{counted(count, 'message')} left out: {why}" for why, count in self._left_out.items() if count]
         if self._too_late:
-            counted.append(f"{_messages(self._too_late)} out of order: the index tells other times than they have")
-        return [*self._said, *(f"{self._name}: {each}" for each in counted)]
+            told.append(f"{counted(self._too_late, 'message')} out of order: the index has other times")
+        return [*self._said, *(f"{self._name}: {each}" for each in told)]
 
     def say(self, what: str) -> None:
         """Take in what is wrong with the file."""
@@ -36,16 +37,16 @@ class Losses:
 
     def cut_off(self, place: int, size: int) -> None:
         """Take in that nothing can be read from a byte on."""
-        self.say(f"cut off or damaged at byte {place} of {size}, what is before it is read")
+        self.say(f"cut off or damaged at byte {place} of {size}; read up to there")
 
     def not_closed(self) -> None:
         """Take in that the file ends where more could follow."""
-        self.say("was not closed or is cut off, what it holds is read")
+        self.say("was not closed, or is cut off; read to its end")
 
     def damaged(self, what: str, fault: BaseException, *, read: int = 0) -> None:
         """Take in that of something, named with its article, only so many messages could be read."""
         why = "there is not enough memory for it" if isinstance(fault, MemoryError) else fault
-        kept = f"after {_messages(read)} that can be read" if read else "and left out"
+        kept = f"after {counted(read, 'readable message')}" if read else "and left out"
         self.say(f"{what} is damaged {kept}{f': {why}' if str(why) else ''}")
 
     def leave_out(self, why: str, count: int = 1) -> None:
@@ -65,7 +66,3 @@ class Losses:
         self.leave_out(OF_NO_CHANNEL, strays)
         self.leave_out(OF_NO_TIME, len(messages) - len(good) - strays)
         return good
-
-
-def _messages(count: int) -> str:
-    return f"{count} {'message' if count == 1 else 'messages'}"

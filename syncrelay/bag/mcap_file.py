@@ -106,7 +106,7 @@ class McapFile:
             return self._bytes(segment.offset, segment.size)
         opcode, length = RECORD.unpack(self._bytes(segment.offset, RECORD.size))
         if opcode != Opcode.CHUNK or length != segment.size - RECORD.size:
-            raise ValueError("it is not what the index says")
+            raise ValueError("it does not match the index")
         return unpacked(self._chunk(segment))
 
     def _chunk(self, record: Segment) -> Chunk:
@@ -129,7 +129,7 @@ class McapFile:
             opcode, length = RECORD.unpack(self._bytes(place, RECORD.size)) if begin <= end else (0, end)
             place = begin + length
             if place > end:
-                raise EOFError("a record ends behind the end")
+                raise EOFError("a record ends past the end")
             yield opcode, begin, place
 
     def _read_index(self) -> bool:
@@ -165,7 +165,7 @@ class McapFile:
         if head != RECORD.pack(Opcode.FOOTER, _FOOTER.size) or not len(MAGIC) <= begin < end:
             raise ValueError("there is no summary")
         if checksum not in (0, self._checksum(begin, end + RECORD.size + _FOOTER.size - _CHECKSUM_SIZE)):
-            raise ValueError("its checksum does not fit")
+            raise ValueError("its checksum is wrong")
         count = told = 0
         for opcode, place, stop in self._walk(begin, end):
             match opcode:

@@ -48,7 +48,7 @@ class _Bounded:
 
     def read(self, size: int) -> bytes:
         if size > self._left:
-            raise EOFError("a length in it points behind its end")
+            raise EOFError("a length in it points past its end")
         self._left -= size
         return self._stream.read(size)
 
@@ -72,7 +72,7 @@ def unpacked(chunk: Chunk) -> bytes:
     content = unpack(chunk.data)
     # 0 is that of no sum.
     if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
-        raise ValueError("its checksum does not fit")
+        raise ValueError("its checksum is wrong")
     return content
 
 
@@ -103,7 +103,7 @@ def messages(content: bytes, channels: Mapping[int, Channel | None]) -> Iterator
         _, length, number, _, time, _ = unpack(content, place)
         end = place + RECORD.size + length
         if end > size:
-            raise ValueError("a message in it ends behind it")
+            raise ValueError("a message in it ends past its end")
         if number not in channels or length < least:
             yield STRAY
         elif (channel := channels[number]) is not None:

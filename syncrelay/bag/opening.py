@@ -164,14 +164,14 @@ def _open_plain(path: Path, magic: bytes, name: str) -> Recording:
     if not magic:
         raise BagError(f"{name}: is empty")
     if magic.startswith(b"#ROSBAG V"):
-        raise BagError(f"{name}: is a bag of another format than 2.0: `rosbag migrate` turns it into one")
-    raise BagError(f"{name}: is no recording, expected MCAP, a sqlite3 file of rosbag2 or a ROS 1 bag")
+        raise BagError(f"{name}: is a bag of a format other than 2.0: convert it with `rosbag migrate`")
+    raise BagError(f"{name}: is not a recording, expected MCAP, a sqlite3 file of rosbag2 or a ROS 1 bag")
 
 
 def _magic(path: Path) -> bytes:
     try:
         if not path.is_file():
-            raise BagError(f"{path}: is not a file that can be read from any place, as a recording has to be")
+            raise BagError(f"{path}: is not a regular file, as a recording has to be")
         with path.open("rb") as file:
             return file.read(_LONGEST_MAGIC)
     except OSError as error:
@@ -195,5 +195,5 @@ def _decompressed(path: Path, decompressor: Callable[[Path], Any], opened: ExitS
                 raise BagError(
                     f"{path}: no space in {folder} to decompress it, set TMPDIR to another folder"
                 ) from error
-            return content, [f"{path}: cut off or damaged, what is before that is read: {error}"]
+            return content, [f"{path}: cut off or damaged; read up to there: {error}"]
     return content, []

@@ -1,22 +1,68 @@
 """Stamps and keys in recorded payloads, read in place where that can be done."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from struct import Struct
 from typing import Any, Final, TypeAlias
 
 from syncrelay.bag.definitions import begins_with_header, converter, fields_of
-from syncrelay.bag.recording import Channel, Encoding
-from syncrelay.cdr import LATEST_STAMP, read_stamp
+from syncrelay.bag.recording import LATEST, Channel, Encoding, RawMessage
+from syncrelay.cdr import LATEST_STAMP, has_place_for_stamp, read_stamp
 from syncrelay.cdr_fields import FieldsOf, UnreadableFieldError, field_reader, time_reader
-from syncrelay.config import StampField, StampSource
+from syncrelay.config import GroupConfig, StampField, StampSource
 from syncrelay.errors import BagError
 
 ReadStamp: TypeAlias = Callable[[bytes], int | None]
 """From a payload to its stamp in nanoseconds; None where none can be read."""
 
+ReadMessage: TypeAlias = Callable[[RawMessage], tuple[int | None, Hashable]]
+"""From a message to its stamp and its key; a stamp of None where the group cannot use the message."""
+
 _NS_PER_SECOND: Final = 1_000_000_000
 # A ROS 1 Header begins with uint32 seq; the time behind it is two uint32, always little-endian.
 _ROS1_STAMP: Final = Struct("<4xII")
+
+
+def message_reader(group: GroupConfig, index: int, channel: Channel) -> ReadMessage:
+    """Return what reads the messages of a channel for one input of a group.
+
+    Raises BagError where the channel's type has no such stamp or key.
+    """
+    topic = group.topics[index]
+    read = _stamped_by(stamp_reader(topic.stamp, channel))
+    if topic.key is not None:
+        read = _with_key(read, value_reader(channel, topic.key))
+    # Reading a header's stamp shows that there is a place for one, and that a header can hold it.
+    if group.restamp is None or topic.stamp == "header":
+        return read
+    latest = LATEST_STAMP if topic.stamp == "receive" else LATEST
+    needs_place = channel.encoding is not Encoding.ROS1 and bool(begins_with_header(channel))
+
+    def read_if_it_can_be_restamped(raw: RawMessage) -> tuple[int | None, Hashable]:
+        can_be = raw[1] <= latest and (not needs_place or has_place_for_stamp(raw[2]))
+        return read(raw) if can_be else (None, None)
+
+    return read_if_it_can_be_restamped
+
+
+def stamp_or_receipt_reader(channel: Channel) -> ReadMessage:
+    """Return what reads the headers' stamps, or the times of receipt of a type that is not known or has no header."""
+    has_header = isinstance(channel.encoding, Encoding) and bool(begins_with_header(channel))
+    return _stamped_by(stamp_reader("header" if has_header else "receive", channel))
+
+
+def _stamped_by(read_stamp: ReadStamp | None) -> ReadMessage:
+    if read_stamp is None:
+        return lambda raw: (raw[1], None)
+    return lambda raw: (read_stamp(raw[2]), None)
+
+
+def _with_key(read: ReadMessage, read_key: Callable[[bytes], Any]) -> ReadMessage:
+    def read_both(raw: RawMessage) -> tuple[int | None, Hashable]:
+        stamp, _ = read(raw)
+        key: Hashable = read_key(raw[2])
+        return None if key is None else stamp, key
+
+    return read_both
 
 
 def stamp_reader(source: StampSource, channel: Channel) -> ReadStamp | None:

@@ -167,7 +167,7 @@ class Ros1File:
         begin = header + self._length_at(place) + LENGTH.size
         end = begin + self._length_at(begin - LENGTH.size)
         if end > self.size:
-            raise EOFError("it ends behind the file")
+            raise EOFError("it ends past the end of the file")
         return Record(fields_of(self._bytes(header, begin - LENGTH.size - header)), begin, end)
 
     def _length_at(self, place: int) -> int:

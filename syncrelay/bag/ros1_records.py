@@ -39,7 +39,7 @@ def time_of(value: bytes) -> int:
 def unpacked(fields: Mapping[bytes, bytes], content: bytes) -> bytes:
     """Return the records of a chunk; raises one of UNREADABLE where it is none, or is damaged."""
     if fields.get(b"op") != CHUNK:
-        raise ValueError("it is not what the index says")
+        raise ValueError("it does not match the index")
     compression = field_of(fields, b"compression")
     unpack = _UNPACKERS.get(compression)
     if unpack is None:
@@ -56,7 +56,7 @@ def fields_of(header: bytes) -> dict[bytes, bytes]:
         begin = place + LENGTH.size
         place = begin + size
         if place > len(header):
-            raise ValueError("a field ends behind its header")
+            raise ValueError("a field ends past its header")
         name, _, value = header[begin:place].partition(b"=")
         fields[name] = value
     return fields

@@ -84,7 +84,7 @@ class SqliteFile:
                     continue
                 yield channel, time, content
         except _UNREADABLE as fault:
-            self._losses.say(f"damaged, what could be read is read: {fault or 'there is not enough memory'}")
+            self._losses.say(f"damaged; read as far as possible: {fault or 'there is not enough memory'}")
         self.position = self.size
 
     def close(self) -> None:

@@ -46,7 +46,7 @@ def zstd_unpacker() -> Callable[[bytes], bytes]:
         if size == _UNKNOWN:
             return _streamed(decompressor, packed)
         if size > _MOST_IN_A_BLOCK * (len(packed) // _LEAST_BLOCK):
-            raise ValueError(f"{len(packed)} bytes cannot hold the {size} that they tell of")
+            raise ValueError(f"{len(packed)} bytes cannot hold the {size} that they claim")
         _require_bearable(size)
         return decompressor.decompress(packed)
 

@@ -64,7 +64,7 @@ def _is_ros(channel: Channel) -> bool:
 
 def _misfit(channel: Channel, topic: TopicConfig) -> str:
     if not _is_ros(channel):
-        return f"{channel.topic} is recorded as {channel.encoding or 'bytes of no named encoding'}, expected cdr"
+        return f"{channel.topic} is recorded as {channel.encoding or 'bytes without a named encoding'}, expected cdr"
     return f"{channel.topic} is recorded as {channel.type or 'a type without a name'}, the file says {topic.type}"
 
 

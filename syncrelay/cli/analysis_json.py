@@ -1,14 +1,11 @@
 """An analysis for programs. All times and durations are nanoseconds, shares are of 1."""
 
 from dataclasses import asdict
-from typing import Any, Final
+from typing import Any
 
 from syncrelay.bag.analysis import Analysis, GroupAnalysis
-from syncrelay.bag.analysis.curves import queue_curve, slop_curve
 from syncrelay.bag.analysis.nearest import Pair
-from syncrelay.bag.analysis.trial import LastingFinding
-
-_SHARES: Final = (*(step / 40 for step in range(1, 40)), 0.99, 0.995, 1.0)
+from syncrelay.bag.analysis.watching import LastingFinding
 
 
 def as_json(name: str, analysis: Analysis) -> dict[str, Any]:
@@ -27,15 +24,16 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
     return {
         "name": each.group.name,
         "policy": each.group.options.policy,
-        "sets": len(each.trial.sets),
+        "sets": len(each.evaluation.sets),
         "inputs": [
             {
                 "topic": topic.topic,
                 "received": counts.fed,
                 "matched": counts.matched,
                 "dropped": {reason.value: count for reason, count in counts.dropped.items()},
+                "unneeded": fates.unneeded,
             }
-            for topic, counts in zip(each.group.topics, each.trial.counts, strict=True)
+            for topic, counts, fates in zip(each.group.topics, each.evaluation.counts, each.fates, strict=True)
         ],
         "pairs": [_pair(pair) for pair in each.pairs],
         **_curves(each),
@@ -60,16 +58,25 @@ def _pair(pair: Pair) -> dict[str, Any]:
 
 
 def _curves(each: GroupAnalysis) -> dict[str, Any]:
-    found = each.tightest
-    if found is None:
-        return {"by_slop": [], "by_queue_size": []}
-    tolerance = each.group.options.tolerance
-    points = slop_curve(found, marks=(tolerance.ns,) if tolerance and tolerance.ns else (), shares=_SHARES)
-    sizes = queue_curve(found, each.slop, marks=(each.group.options.queue_size,), shares=_SHARES)
-    return {
-        "by_slop": [{"slop": at, "matched": share, "median_span": span} for at, share, span in points],
-        "by_queue_size": [{"queue_size": size, "matched": share} for size, share in sizes],
-    }
+    """Return the curves; `matched` is the share of the slowest input's messages, of the `tried` ones."""
+    curves = each.curves
+    if curves is None:
+        return {"by_slop": [], "by_queue_size": [], "tried": None}
+    by_slop = [
+        {
+            "slop": point.value,
+            "sets": point.sets,
+            "matched": point.sets / max(1, curves.of),
+            "median_span": point.median_span,
+        }
+        for point in curves.by_slop
+    ]
+    by_queue_size = [
+        {"queue_size": point.value, "sets": point.sets, "matched": point.sets / max(1, curves.of)}
+        for point in curves.by_queue_size
+    ]
+    tried = {"messages": curves.messages, "recorded": curves.recorded, "lasts": curves.lasts}
+    return {"by_slop": by_slop, "by_queue_size": by_queue_size, "tried": tried}
 
 
 def _finding(lasting: LastingFinding) -> dict[str, Any]:

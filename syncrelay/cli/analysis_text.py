@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 
 from syncrelay.bag.analysis import Analysis, GroupAnalysis, patch
-from syncrelay.bag.analysis.curves import queue_curve, slop_curve
+from syncrelay.bag.analysis.curves import Curves, Point, slop_key
 from syncrelay.bag.analysis.nearest import Pair
+from syncrelay.bag.analysis.suggest import Suggestion
 from syncrelay.bag.analysis.topics import TopicFigures
-from syncrelay.bag.replay import GroupResult, InputResult
-from syncrelay.cli.summary import summarize
+from syncrelay.bag.analysis.unneeded import InputFates
+from syncrelay.config.wording import counted
 from syncrelay.explain import in_words, words
 from syncrelay.printable import printable
 
@@ -17,7 +18,8 @@ _SECOND = 1_000_000_000
 def report(name: str, analysis: Analysis) -> Iterator[str]:
     """Yield the lines."""
     messages = sum(topic.messages for topic in analysis.topics)
-    yield f"{printable(name)}: {words.seconds(analysis.end - analysis.begin)}, {messages} messages of the topics named"
+    of = f"{counted(messages, 'message')} of {counted(len(analysis.topics), 'topic')}"
+    yield f"{printable(name)}: {words.seconds(analysis.end - analysis.begin)}, {of}"
     for topic in analysis.topics:
         yield ""
         yield from _topic(topic)
@@ -48,12 +50,21 @@ def faults_of(topic: TopicFigures) -> list[str]:
 
 
 def _rhythm(topic: TopicFigures) -> Iterator[str]:
-    yield f"{topic.messages} messages"
-    if topic.period is not None and topic.jitter is not None:
+    yield counted(topic.messages, "message")
+    if topic.period is not None:
         yield f"{words.rate(topic.rate_hz)}"
-        yield f"period {words.duration(topic.period)}, 95 % within {words.duration(topic.jitter)} of it"
+        yield f"period {period_text(topic)}"
     if topic.gaps and topic.longest_gap is not None:
-        yield f"{topic.gaps} gaps, the longest {words.duration(topic.longest_gap)}"
+        yield f"{counted(topic.gaps, 'gap')}, longest {words.duration(topic.longest_gap)}"
+
+
+def period_text(topic: TopicFigures) -> str:
+    """Return a topic's period, and how far single ones are off it; nothing where there is none."""
+    if topic.period is None:
+        return ""
+    return words.duration(topic.period) + (
+        f", 95 % within {words.duration(topic.jitter)} of it" if topic.jitter else ""
+    )
 
 
 def delay_line(topic: TopicFigures) -> str:
@@ -62,9 +73,10 @@ def delay_line(topic: TopicFigures) -> str:
     assert delay is not None  # noqa: S101  asked for only where there is one
     drift = "" if topic.drift_ppm is None else f"; drift {words.figure(topic.drift_ppm)} ppm"
     if abs(delay.median) >= _SECOND:
-        return f"stamps are of another clock: {_long(delay.median)} before receipt{drift}"
+        return f"received {_long(abs(delay.median))} {'after' if delay.median > 0 else 'before'} the stamp{drift}"
     low, middle, high, most = (words.duration(each) for each in (delay.low, delay.median, delay.high, delay.greatest))
-    return f"received {middle} after the stamp, 5 to 95 % {low} to {high}, at most {most}{drift}"
+    spread = "" if low == most else f" (90 % between {low} and {high}, at most {most})"
+    return f"received {middle} after the stamp{spread}{drift}"
 
 
 def _long(nanoseconds: int) -> str:
@@ -74,38 +86,91 @@ def _long(nanoseconds: int) -> str:
 
 
 def _group(each: GroupAnalysis) -> Iterator[str]:
-    name = each.group.name
-    suggestion = each.suggestion
+    name, suggestion = each.group.name, each.suggestion
     yield f"group {name}, {each.group.options.policy}"
+    yield f"  {_sets(each)}"
+    for row in each.fates:
+        yield f"  {row.topic}: {', '.join(_fates(row))}"
     for pair in each.pairs:
         yield f"  {pair_line(pair)}"
     yield from (f"  {line}" for line in _curves(each))
-    topics = [topic.topic for topic in each.group.topics]
-    inputs = tuple(InputResult(*row) for row in zip(topics, each.trial.counts, strict=True))
-    yield from (f"  {line}" for line in summarize(GroupResult(name, inputs, len(each.trial.sets))))
     for lasting in each.findings:
-        yield f"  {lasting.finding.severity.name.lower()}, {lasting.seconds} s: {in_words(lasting.finding)}"
+        yield f"  {lasting.finding.severity.name.lower()}, for {lasting.seconds} s: {in_words(lasting.finding)}"
     for hint in suggestion.hints:
         yield f"  hint: {hint}"
-    if not suggestion.changes:
-        if suggestion.possible:
-            yield f"  suggestion: none; {suggestion.now} of {suggestion.possible} possible sets come together"
-        return
-    given = f"{suggestion.then} of {suggestion.possible} possible sets in place of {suggestion.now}"
-    yield f"  suggestion, which gives {given}:"
-    yield from (f"    {line}" for line in patch(suggestion.changes, {name: topics}).splitlines())
-    for reason in dict.fromkeys(f"{change.key}: {change.reason}" for change in suggestion.changes):
-        yield f"    # {reason}"
+    if suggestion.changes:
+        yield f"  suggestion: {promise(suggestion)} with"
+        topics = [topic.topic for topic in each.group.topics]
+        yield from (f"    {line}" for line in patch(suggestion.changes, {name: topics}).splitlines())
+        for reason in dict.fromkeys(f"{change.key}: {change.reason}" for change in suggestion.changes):
+            yield f"    # {reason}"
+    elif suggestion.possible:
+        yield "  suggestion: none, no better values were found"
+
+
+def _sets(each: GroupAnalysis) -> str:
+    suggestion, sets = each.suggestion, len(each.evaluation.sets)
+    if not suggestion.possible:
+        return counted(sets, "set")
+    together = f"{suggestion.now} of {counted(suggestion.possible, 'possible set')}"
+    return together if sets == suggestion.now else f"{counted(sets, 'set')} after thinning, {together}"
+
+
+def _fates(row: InputFates) -> Iterator[str]:
+    yield f"{row.received} received"
+    yield f"{row.matched} in sets"
+    if row.unneeded:
+        yield f"{row.unneeded} not needed ({unneeded_line(row)})"
+    if row.dropped:
+        reasons = sorted(row.dropped.items(), key=lambda item: -item[1])
+        told = ", ".join(f"{reason.value} {count}" for reason, count in reasons)
+        yield f"{sum(row.dropped.values())} dropped ({told})"
+
+
+def unneeded_line(row: InputFates) -> str:
+    """Return why messages of an input were not needed; asked only where there are some."""
+    return f"no message of {' or '.join(row.lacking)} left to pair with"
+
+
+def promise(suggestion: Suggestion) -> str:
+    """Return what suggested values give, and what the file's give."""
+    possible = counted(suggestion.possible, "possible set")
+    if suggestion.then == suggestion.now:
+        return f"still {suggestion.then} of {possible}"
+    return f"{suggestion.now} -> {suggestion.then} of {possible}"
+
+
+def slop_text(each: GroupAnalysis, point: Point) -> str:
+    """Return a slop of a curve, and whether it is in use or suggested."""
+    return _marked(each, slop_key(each.group) or "", point, words.duration(point.value))
+
+
+def size_text(each: GroupAnalysis, point: Point) -> str:
+    """Return a queue size of a curve, and whether it is in use or suggested."""
+    return _marked(each, "queue_size", point, str(point.value))
+
+
+def _marked(each: GroupAnalysis, option: str, point: Point, text: str) -> str:
+    if getattr(each.group.options, option, None) == point.value:
+        return f"{text} (in use)"
+    return f"{text} (suggested)" if getattr(each.suggested.options, option, None) == point.value else text
+
+
+def sampled_line(curves: Curves) -> str:
+    """Return how much of a long recording other values were tried on; nothing where it was all."""
+    if curves.is_of_all:
+        return ""
+    return f"tried on the first {words.seconds(curves.lasts)}: {curves.messages} of {curves.recorded} messages"
 
 
 def pair_line(pair: Pair) -> str:
     """Return how far the messages of one topic lie from the nearest of another."""
     low, middle, high = (_signed(each) for each in (pair.signed.low, pair.signed.median, pair.signed.high))
-    distance = pair.distance
-    return (
-        f"{pair.first} to the nearest of {pair.second}: median {middle}, 5 to 95 % {low} to {high}; distance"
-        f" {words.duration(distance.median)}, at most {words.duration(distance.greatest)}"
-    )
+    to = f"{pair.first} to the nearest {pair.second}"
+    if pair.signed.least == pair.signed.greatest:
+        return f"{to}: always {middle}"
+    most = words.duration(pair.distance.greatest)
+    return f"{to}: median {middle}, 90 % between {low} and {high}, at most {most} apart"
 
 
 def _signed(nanoseconds: int) -> str:
@@ -113,11 +178,13 @@ def _signed(nanoseconds: int) -> str:
 
 
 def _curves(each: GroupAnalysis) -> Iterator[str]:
-    found = each.tightest
-    if found is None:
+    curves = each.curves
+    if curves is None:
         return
-    tolerance = each.group.options.tolerance
-    points = slop_curve(found, marks=(tolerance.ns,) if tolerance and tolerance.ns else ())
-    yield f"by slop: {', '.join(f'{words.duration(at)} {words.share(share)}' for at, share, _ in points)}"
-    sizes = queue_curve(found, each.slop, marks=(each.group.options.queue_size,))
-    yield f"by queue_size: {', '.join(f'{size} {words.share(share)}' for size, share in sizes)}"
+    sampled = "" if curves.is_of_all else f" ({sampled_line(curves)})"
+    for option, points, text in (
+        (slop_key(each.group), curves.by_slop, slop_text),
+        ("queue_size", curves.by_queue_size, size_text),
+    ):
+        if points:
+            yield f"sets by {option}{sampled}: {', '.join(f'{point.sets} at {text(each, point)}' for point in points)}"

@@ -48,11 +48,11 @@ class ConfigFiles:
         self._wanted.set()
 
     def call_when_read(self, done: Callable[[], None]) -> None:
-        """Have `done` called, on the thread that reads, when there is something to take."""
+        """Call `done`, on the thread that reads, when there is something to take."""
         self._done = done
 
     def read_again(self) -> None:
-        """Have the files read."""
+        """Read the files, on the thread that reads."""
         with self._lock:
             self._since = self._since or time.monotonic()
         self._wanted.set()
@@ -60,7 +60,7 @@ class ConfigFiles:
     def take(self) -> "Future[Config] | None":
         """Return what was read since this was last asked: a Config, or what reading raised.
 
-        A read that takes too long is a ConfigError. Should it come to its end all the same, its Config is next.
+        A read that takes too long is a ConfigError. If it ends after all, its Config is returned then.
         """
         with self._lock:
             read, self._read = self._read, None
@@ -95,7 +95,7 @@ class ConfigFiles:
         self._done()
 
     def _have_changed(self) -> bool:
-        """Tell whether a watched file is another than when this was last asked; not while one is gone."""
+        """Whether a watched file has changed since this was last called; not while one is missing."""
         if self._known is None:
             return False
         marks = self._marks()
@@ -109,7 +109,7 @@ class ConfigFiles:
 
 
 def _mark(path: Path) -> tuple[int, int, int] | None:
-    """Return what changes with a file, behind whatever links lead to it: a mounted volume changes them instead."""
+    """Return what changes when a file does; follows links, as a mounted volume changes those instead."""
     try:
         status = path.stat()
     except OSError:

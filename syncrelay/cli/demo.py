@@ -4,7 +4,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.resources import files
 from logging.handlers import MemoryHandler
@@ -14,19 +14,19 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from syncrelay.cli.digest import plain_line, summary
-from syncrelay.cli.live import Moment, frame
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
+from syncrelay.cli.demo_screen import Moment, frame, plain_line, summary
+from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
-from syncrelay.cli.tally import GroupPlan, Tally
-from syncrelay.config import GroupConfig, load_text
-from syncrelay.ros.logs import LOGGER, configure
-from syncrelay.ros.snapshot import RelaySnapshot
+from syncrelay.config import load_text
+from syncrelay.logs import LOGGER, configure
+from syncrelay.status import document
+from syncrelay.top.state import State, state_of
 
 if TYPE_CHECKING:
+    from syncrelay.rig.processes import Rig
     from syncrelay.ros.relay import Relay
-    from syncrelay.ros.rig.processes import Rig
 
-_TITLE = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
 _STARTING = "Starting a simulated camera, lidar and IMU ..."
 _FRAME_S = 0.125
 _LINE_S = 1.0
@@ -39,6 +39,30 @@ def shipped_config() -> str:
     return (files("syncrelay.cli") / "demo.yaml").read_text(encoding="utf-8")
 
 
+def command(words: Sequence[str], stop: StopRequest) -> int:
+    """Run `syncrelay demo`."""
+    parser = Parser(
+        "syncrelay demo",
+        description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it. "
+        "Exit code 1 if a group gave no set.",
+    )
+    parser.add_argument("--seconds", metavar="N", type=positive, help="end N seconds after the sensors are up")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
+    parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays, and exit")
+    parser.add_argument(
+        "--record",
+        metavar="OUT",
+        help="write what the sensors send in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT"
+        " as a rosbag2 folder",
+    )
+    arguments = parser.read(words)
+    if arguments.record is not None:
+        from syncrelay.cli.demo_recording import record
+
+        return record(arguments.record, arguments.seconds, arguments.seed)
+    return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)
+
+
 def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopRequest) -> int:  # noqa: FBT001 - as parsed
     """Run the demo for a time, or until asked to stop; 0 if every group gave sets, 1 if not.
 
@@ -47,22 +71,22 @@ def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopReque
     """
     if show_config:
         sys.stdout.write(shipped_config())
-        return 0
+        return DONE
     configure("warning", "text")
     prepare_ros()
     console = Console(highlight=False)
     with _view(console) as view:
         final = relay_rig(view.show, total_s=seconds, seed=seed, stop=stop)
     if final is None:
-        sys.stderr.write("syncrelay: stopped before it started\n")
-        return 0
-    console.print(summary(final))
-    return 0 if all(figures.state.sets for figures in final.groups) else 1
+        remark("stopped before it started")
+        return DONE
+    put(summary(final))
+    return DONE if all(group.sets for group in final.state.groups) else AT_FAULT
 
 
 def prepare_ros() -> None:
     """Import rclpy with this process kept to its machine; raises RosUnavailableError where ROS cannot be used."""
-    from syncrelay.ros.domain import require_domain
+    from syncrelay.environment.domain import require_domain
     from syncrelay.ros.environment import require_rclpy
 
     os.environ.update(isolation(os.environ))
@@ -76,8 +100,8 @@ def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: in
     Time counts from when every sensor publishes: how long their start takes is the machine's affair. None if it was
     stopped before.
     """
-    from syncrelay.ros.rig.discovery import quick_discovery
-    from syncrelay.ros.rig.processes import Rig
+    from syncrelay.environment.quick_discovery import quick_discovery
+    from syncrelay.rig.processes import Rig
 
     stop.defer()
     with quick_discovery(), Rig(seed=seed) as rig:
@@ -90,41 +114,29 @@ def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: in
         if stop.requested:
             return None
         with Relay(config) as relay:
-            tally = Tally([_plan(group) for group in config.groups])
-            return _relay(relay, rig, tally, show, total_s=total_s, stop=stop)
+            return _relay(relay, rig, show, total_s=total_s, stop=stop)
 
 
 def _relay(
-    relay: "Relay",
-    rig: "Rig",
-    tally: Tally,
-    show: Callable[[Moment], None],
-    *,
-    total_s: float | None,
-    stop: StopRequest,
+    relay: "Relay", rig: "Rig", show: Callable[[Moment], None], *, total_s: float | None, stop: StopRequest
 ) -> Moment:
     began = time.monotonic()
     end = math.inf if total_s is None else began + total_s
 
-    def moment(snapshot: RelaySnapshot) -> Moment:
-        elapsed_s = time.monotonic() - began
-        tally.add(elapsed_s, snapshot)
-        return Moment(_TITLE, tally.figures(), elapsed_s, total_s)
+    def moment(state: State) -> Moment:
+        return Moment(state, time.monotonic() - began, total_s, time.time_ns())
 
     stop.wake_with(relay.wake)
+    reports = relay.evaluate()
+    state = state_of(document(relay.state()))
     while not stop.requested and (left_s := end - time.monotonic()) > 0:
         relay.step(min(_FRAME_S, left_s))
         rig.check()
-        show(moment(relay.snapshot()))
-    return moment(relay.drain())
-
-
-def _plan(group: GroupConfig) -> GroupPlan:
-    return GroupPlan(
-        policy=group.options.policy,
-        slop=group.options.tolerance.ns if group.options.tolerance else 0,
-        offsets=tuple(topic.offset_ns for topic in group.topics),
-    )
+        if (told := relay.state()).groups != reports:
+            reports, state = told.groups, state_of(document(told))
+        show(moment(state))
+    relay.drain()
+    return moment(state_of(document(relay.state())))
 
 
 def isolation(environ: Mapping[str, str]) -> dict[str, str]:

@@ -1,29 +1,33 @@
-"""The sign of life of a relay: a file that its receive loop writes the time into, and a probe that reads it.
+"""A relay's heartbeat: a file that its receive loop writes the time into, and `syncrelay healthcheck`, which reads it.
 
-The probe is the standard library's alone, so that `python3 -I -S heartbeat.py` can skip what the ROS wheels do at
-every start of Python. Times are those of the machine's monotonic clock, which its containers share.
+The check needs the standard library only: `python3 -I -S heartbeat.py` skips what the ROS wheels do whenever Python
+starts. Times are those of the machine's monotonic clock, which its containers share.
 """
 
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
+
+if TYPE_CHECKING:
+    from syncrelay.cli.stop import StopRequest
 
 VARIABLE: Final = "SYNCRELAY_HEARTBEAT"
 """The environment variable that names the file; without it there is no heartbeat."""
 
 _PERIOD_NS: Final = 500_000_000
-# The loop turns once a second when idle. A stall of this length has no other cause than that it hangs.
+# An idle loop turns once a second: one that has not turned for this long hangs.
 _STALE_NS: Final = 5_000_000_000
 
 
 class Heartbeat:
-    """Writes the time into a file, at most twice a second; a context manager that removes the file at its end."""
+    """Writes the time into a file, at most twice a second; a context manager that removes the file when it ends."""
 
     def __init__(self, path: Path) -> None:
-        """Make the file, empty until the first beat. Raises OSError where that cannot be done."""
+        """Create the file, empty until the first beat; raises OSError if it cannot be created."""
         self._path = path
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
         self._due = 0
@@ -38,7 +42,7 @@ class Heartbeat:
         os.close(self._file)
 
     def beat(self) -> None:
-        """Say that the loop turned."""
+        """Note that the loop has turned."""
         now = time.monotonic_ns()
         if now >= self._due:
             self._due = now + _PERIOD_NS
@@ -47,23 +51,35 @@ class Heartbeat:
 
 
 def ailment(path: Path) -> str | None:
-    """Return what is wrong with the relay that beats in this file, None if nothing is."""
+    """Return what is wrong with the relay that writes this file, None if nothing is."""
     try:
         written = path.read_bytes()
     except OSError as error:
-        return f"no relay runs, or it cannot write its heartbeat: {path}: {error.strerror}"
+        return f"no relay is running, or it cannot write its heartbeat: {path}: {error.strerror}"
     if not written:
-        return "the relay has not begun to receive yet"
+        return "the relay is not receiving yet"
     age = time.monotonic_ns() - int(written)
     if 0 <= age <= _STALE_NS:
         return None
-    return f"the receive loop last turned {age / 1e9:.0f} s ago" if age > 0 else "the heartbeat is of an earlier run"
+    return f"the receive loop last turned {age / 1e9:.0f} s ago" if age > 0 else "the heartbeat is from an earlier run"
+
+
+def command(words: Sequence[str], _stop: "StopRequest") -> int:
+    """Run `syncrelay healthcheck`."""
+    from syncrelay.cli.parser import Parser
+
+    Parser(
+        "syncrelay healthcheck",
+        description=f"Checks that the relay is receiving: the relay writes a heartbeat into the file that {VARIABLE} "
+        "names. Exit code 1 if it is not receiving.",
+    ).read(words)
+    return healthcheck()
 
 
 def healthcheck() -> int:
-    """Print what is wrong, if anything is; 0 if the relay receives, 1 if not."""
+    """Print what is wrong, if anything is; 0 if the relay is receiving, 1 if not."""
     named = os.environ.get(VARIABLE)
-    found = ailment(Path(named)) if named else f"{VARIABLE} does not name the heartbeat's file"
+    found = ailment(Path(named)) if named else f"{VARIABLE} is not set: it names the heartbeat's file"
     print(found or "receiving")  # noqa: T201  Docker keeps it with the result
     return 1 if found else 0
 

@@ -1,7 +1,7 @@
 """`syncrelay init`: a first file, from what a recording or the ROS graph shows."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -13,12 +13,34 @@ from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.qos import Profile
 from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
+from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.reading import reading
+from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:
     from syncrelay.ros.listening import Heard
+
+
+def command(words: Sequence[str], _stop: StopRequest) -> int:
+    """Run `syncrelay init`."""
+    parser = Parser(
+        "syncrelay init",
+        description="Proposes a file for a recording or for a live ROS graph: groups of its topics, their types, and "
+        "values that fit, with what was measured as comments.",
+    )
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
+    source.add_argument("--from-graph", action="store_true", help="listen to what is being published now")
+    parser.add_argument("--seconds", metavar="N", type=positive, help="with --from-graph: listen for N s (10)")
+    parser.add_argument("-o", "--output", metavar="NEW", help="write the file here instead of printing it")
+    arguments = parser.read(words)
+    if arguments.from_graph:
+        return init_from_graph(arguments.seconds or 10.0, arguments.output)
+    if arguments.seconds is not None:
+        parser.error("--seconds N is for how long --from-graph listens, and --from-graph is missing")
+    return init_from_bag(arguments.from_bag, arguments.output)
 
 
 def init_from_bag(bag: str, output: str | None) -> int:
@@ -48,7 +70,7 @@ def init_from_graph(seconds: float, output: str | None) -> int:
         say(f"listening to the graph for {seconds:g} s ...")
     heard = listen(seconds=seconds)
     if heard.relayed:
-        remark(f"left out, as outputs of a relay that runs: {', '.join(heard.relayed)}")
+        remark(f"left out: published by a running relay: {', '.join(heard.relayed)}")
     headerless = [f"{name} ({type_name}): {NO_HEADER}" for name, type_name in heard.headerless.items()]
     without = (*heard.unusable, *headerless)
     try:
@@ -78,5 +100,5 @@ def _streams(heard: "Heard") -> Iterator[tuple[Channel, Stream]]:
 
 def _what_helps(heard: "Heard") -> str:
     if not (heard.topics or heard.headerless or heard.unusable):
-        return "nobody publishes anything that can be used here: start the nodes; `syncrelay doctor --live` tells more"
-    return "with --seconds N it listens longer; a topic of a group may go by `stamp: receive`"
+        return "nobody publishes anything that can be used here: start the nodes, or run `syncrelay doctor --live`"
+    return "listen longer with --seconds N, or write `stamp: receive` for topics without stamps"

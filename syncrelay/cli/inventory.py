@@ -17,7 +17,6 @@ from syncrelay.explain import words
 from syncrelay.printable import printable
 
 _HEADING: Final = ("topic", "type", "messages", "rate", "stamps")
-_SECOND: Final = 1_000_000_000
 
 
 def put_inventory(bag: str, recording: Recording, *, is_json: bool) -> None:
@@ -61,8 +60,7 @@ def _stamps(topic: Topic) -> str:
     faults, delay = faults_of(topic.figures), topic.figures.delay
     if delay is None:
         return ", ".join(faults) or "equal to receipt"
-    clock = "of another clock: " if abs(delay.median) >= _SECOND else ""
-    return ", ".join([f"{clock}{words.duration(delay.median)} before receipt", *faults])
+    return ", ".join([f"{words.duration(delay.median)} before receipt", *faults])
 
 
 def _next(bag: str, fit: Sequence[str]) -> Iterator[str]:
@@ -70,10 +68,10 @@ def _next(bag: str, fit: Sequence[str]) -> Iterator[str]:
     name = quote(printable(bag))
     yield ""
     if len(fit) < 2:  # noqa: PLR2004  one alone has nothing to be matched with
-        yield "No two topics have stamps and enough messages: in a file, a topic may go by `stamp: receive`."
+        yield "No two topics have stamps and enough messages. In a file, `stamp: receive` matches a topic by arrival."
         return
     yield "Next, to match two topics or more:"
     yield f"  syncrelay analyze {name} {' '.join(fit[:2])}"
-    yield "or to have a file proposed for all, and see what it makes of the recording:"
+    yield "or to get a file for all of them, and see what it gives:"
     yield f"  syncrelay init --from-bag {name} -o fusion.yaml"
     yield f"  syncrelay analyze {name} --config fusion.yaml"

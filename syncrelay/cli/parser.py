@@ -1,19 +1,28 @@
 """argparse with our errors: one sentence, the nearest valid word, where to read on."""
 
 import argparse
+import os
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from textwrap import fill
+from typing import Any, Final, NoReturn
 
 from syncrelay.errors import UsageError
 
+_ROS_ARGS: Final = "--ros-args"
+_WIDTH: Final = 78
+
+
+class HelpRequested(Exception):  # noqa: N818  not an error
+    """The words ask for help; its text is the only argument."""
+
 
 class Parser(argparse.ArgumentParser):
-    """A parser that raises UsageError and never exits but for --help."""
+    """A parser that raises UsageError, and HelpRequested where help is asked for, and never exits."""
 
     def __init__(self, prog: str, *, description: str, **options: Any) -> None:
         super().__init__(
             prog=prog,
-            description=description,
+            description=fill(description, _WIDTH),
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
             add_help=False,
@@ -25,8 +34,16 @@ class Parser(argparse.ArgumentParser):
         raise UsageError(f"{message}\n  {self.prog} --help says more")
 
     def read(self, words: Sequence[str]) -> argparse.Namespace:
-        """Return the arguments; an unknown one is an error with the nearest valid option."""
-        arguments, unknown = self.parse_known_args(words)
+        """Return the arguments, with what follows --ros-args, which the parser may have, as `ros_args`.
+
+        An unknown argument is an error with the nearest valid option.
+        """
+        self.add_argument("-h", "--help", action="store_true", help="print this help")
+        own, ros_args = self._split(words)
+        # Whatever else is there, or missing.
+        if "-h" in own or "--help" in own:
+            raise HelpRequested(self.format_help())
+        arguments, unknown = self.parse_known_args(own)
         if unknown:
             from syncrelay.config.wording import did_you_mean
 
@@ -34,4 +51,33 @@ class Parser(argparse.ArgumentParser):
             options = [option for action in self._actions for option in action.option_strings]
             hint = did_you_mean(word.partition("=")[0], options) if word.startswith("-") else ""
             self.error(f"unknown argument {word}{hint}")
+        arguments.ros_args = ros_args
         return arguments
+
+    def _split(self, words: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
+        if _ROS_ARGS not in words or _ROS_ARGS not in self._option_string_actions:
+            return words, ()
+        at = words.index(_ROS_ARGS)
+        return words[:at], words[at + 1 :]
+
+    def refuse_repeated(self, files: Sequence[str]) -> None:
+        """Refuse to read a file twice, whatever it is called; standard input can only be read once too."""
+        named: dict[str, str] = {}
+        for file in files:
+            place = file if file == "-" else os.path.realpath(file)
+            if place in named:
+                first = named[place]
+                same = f"{file} is named twice" if first == file else f"{first} and {file} are the same file"
+                self.error(f"{same}: name each file once")
+            named[place] = file
+
+
+def positive(text: str) -> float:
+    """Read a number above 0."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a number above 0, found {text}")
+    return number

@@ -3,11 +3,14 @@
 import os
 import signal
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find_one
+from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
 from syncrelay.printable import one_entry, printable
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask
@@ -16,7 +19,18 @@ from syncrelay.top.state import Relay
 # Reading a file takes milliseconds; a relay that is busy turns to it within a second or two.
 _PATIENCE_S: Final = 10.0
 _POLL_S: Final = 0.1
-_OTHERWISE: Final = "  Where the relay's file says `metrics: null`, send SIGHUP to its process"
+_OTHERWISE: Final = "  If the relay's file says `metrics: null`, send SIGHUP to its process"
+
+
+def command(words: Sequence[str], _stop: StopRequest) -> int:
+    """Run `syncrelay reload`."""
+    parser = Parser(
+        "syncrelay reload",
+        description="Has the relay on this machine read its file again. Groups that did not change keep running and "
+        "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
+    )
+    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host:port or URL")
+    return reload(parser.read(words).url)
 
 
 def reload(named: str | None) -> int:
@@ -37,7 +51,7 @@ def reload(named: str | None) -> int:
         if now.refused_reloads != before.refused_reloads:
             say(one_entry(f"{now.node}: reload failed; it keeps its running configuration:\n{now.reload_error}"))
             return AT_FAULT
-    raise SyncRelayError(f"{before.node} has not read its file within {_PATIENCE_S:.0f} s")
+    raise SyncRelayError(f"{before.node} did not read its file again within {_PATIENCE_S:.0f} s")
 
 
 def _relay(url: str) -> Relay:
@@ -49,14 +63,14 @@ def _relay(url: str) -> Relay:
 
 def _signal(pid: int) -> None:
     """Signal a relay; the number may be of another container or machine, where it is something else here."""
-    elsewhere = "it runs in a container or on another machine: `docker kill --signal=HUP` there does the same"
+    elsewhere = "it runs in a container or on another machine; use `docker kill --signal=HUP` there"
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
     except OSError:
         words = []
     if not any(b"syncrelay" in word for word in words) or not any(word.startswith(b"--config") for word in words):
-        raise SyncRelayError(f"process {pid} is not the relay here; {elsewhere}")
+        raise SyncRelayError(f"process {pid} is not the relay: {elsewhere}")
     try:
         os.kill(pid, signal.SIGHUP)
     except PermissionError as error:
-        raise SyncRelayError(f"the relay is another user's: process {pid} takes no signal from this one") from error
+        raise SyncRelayError(f"the relay belongs to another user, who alone may signal its process {pid}") from error

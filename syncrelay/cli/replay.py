@@ -13,7 +13,9 @@ from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.wiring import Wiring, wire
 from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
+from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
 from syncrelay.config import load
 from syncrelay.config.wording import counted
@@ -28,6 +30,32 @@ class Wanted:
     sets: bool
     drops: bool
     output: str | None
+
+
+def command(words: Sequence[str], _stop: StopRequest) -> int:
+    """Run `syncrelay replay`."""
+    parser = Parser(
+        "syncrelay replay",
+        description="Runs the groups of a file on a recording, without ROS, and says what became of every message. "
+        "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic.",
+    )
+    parser.add_argument(
+        "bags",
+        metavar="BAG",
+        nargs="+",
+        help="a rosbag2 folder, or an MCAP, sqlite3 or ROS 1 bag file, compressed or not; several are read as one",
+    )
+    parser.add_argument(
+        "--config", metavar="FILE", action="append", required=True, help="the file with the groups; may be repeated"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
+    )
+    parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
+    parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
+    arguments = parser.read(words)
+    parser.refuse_repeated(arguments.config)
+    return replay(arguments.bags, arguments.config, Wanted(arguments.json, arguments.drops, arguments.output))
 
 
 def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> int:
@@ -52,7 +80,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         remark(f"{wanted.output} is written: {counted(written.count, 'message')} of {counted(sets, 'set')}")
     tell = say if wanted.sets or wanted.drops else put
     for result in results:
-        for line in summarize(result):
+        for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):
             tell(line)
     return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
 
@@ -84,7 +112,7 @@ def _written(output: str | None, wirings: Sequence[Wiring], opened: ExitStack) -
     channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)
     recording = opened.enter_context(McapOutput(Path(output)))
     if any(channel.encoding is Encoding.ROS1 for channel in channels):
-        remark("the recording is of ROS 1, what is written is CDR as ROS 2 has it, without header.seq")
+        remark("this is a ROS 1 recording: its messages are written as ROS 2 CDR, without header.seq")
     return recording
 
 

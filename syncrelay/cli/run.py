@@ -7,8 +7,10 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.config_files import ConfigFiles
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
+from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import ListenError, SyncRelayError, UsageError
 
@@ -19,10 +21,70 @@ if TYPE_CHECKING:
     from syncrelay.ros.relay import Relay
     from syncrelay.status import Server
 
+_USAGE: Final = """\
+syncrelay --config FILE [option ...] [--ros-args ...]
+       syncrelay COMMAND ..."""
+_ABOUT: Final = "Matches ROS 2 messages by time, as a YAML file describes, and republishes each matched set."
+_CODES: Final = """\
+exit codes: 0 done, 1 the file or data has a problem, 2 wrong usage,
+  69 ROS cannot be used here, 70 a bug in syncrelay, 130 interrupted"""
 _BUG: Final = (
     "reload failed because of a bug in syncrelay; keeping the running configuration;"
     " please report it with these lines and the file:"
 )
+
+
+def command(words: Sequence[str], stop: StopRequest) -> int:
+    """Run `syncrelay --config FILE`, or answer --help and --version."""
+    parser = _parser()
+    arguments = parser.read(words)
+    if arguments.version:
+        put(_version())
+        return DONE
+    if not arguments.config:
+        parser.error("--config FILE is missing")
+    parser.refuse_repeated(arguments.config)
+    return run(
+        arguments.config,
+        arguments.group,
+        arguments.log_level,
+        arguments.log_format,
+        arguments.ros_args,
+        explain_s=arguments.explain,
+        watch=arguments.watch,
+        stop=stop,
+    )
+
+
+def _parser() -> Parser:
+    from syncrelay.cli.dispatch import commands_help
+
+    parser = Parser("syncrelay", description=_ABOUT, usage=_USAGE, epilog=f"commands:\n{commands_help()}\n\n{_CODES}")
+    add = parser.add_argument_group("the relay").add_argument
+    add("--config", metavar="FILE", action="append", default=[], help="run the groups of FILE; may be repeated")
+    add("--group", metavar="NAME", action="append", default=[], help="run this group only; may be repeated")
+    add("--watch", action="store_true", help="read FILE again when it changes, not only at SIGHUP")
+    add("--explain", metavar="N", type=positive, help="publish nothing; after N s say what is wrong")
+    add(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="info",
+        metavar="LEVEL",
+        help="debug, info (default), warning or error",
+    )
+    add("--log-format", choices=("text", "json"), default="text", metavar="FORMAT", help="text (default) or json")
+    add("--ros-args", action="store_true", help="pass what follows to ROS: -r __ns:=/robot1, say")
+    parser.add_argument("--version", action="store_true", help="print the version")
+    return parser
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return f"syncrelay {version('syncrelay')}"
+    except PackageNotFoundError:
+        return "syncrelay (not installed)"
 
 
 def run(
@@ -45,8 +107,8 @@ def run(
     cannot be used.
     """
     from syncrelay.config import Severity, load, where
+    from syncrelay.logs import LOGGER, configure
     from syncrelay.ros.environment import require_rclpy
-    from syncrelay.ros.logs import LOGGER, configure
 
     configure(log_level, log_format)
     # Before they are read: what changes while the relay starts is seen too.
@@ -71,8 +133,8 @@ def run(
             config_path=", ".join(config_paths),
             groups=groups or None,
             ros_args=ros_args,
-            beat=heartbeat.beat if heartbeat else None,
-            purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
+            on_turn=heartbeat.beat if heartbeat else None,
+            purpose=Purpose.RELAY if explain_s is None else Purpose.OBSERVE,
         ) as relay,
         files,
     ):
@@ -81,7 +143,7 @@ def run(
         if server is not None:
             server.serve(relay.state)
             LOGGER.info(
-                "status and metrics: http://%s/, `syncrelay top --url %s` shows them", server.place, server.place.url
+                "status and metrics: http://%s/; watch with `syncrelay top --url %s`", server.place, server.place.url
             )
         if explain_s is not None:
             return explain(relay, explain_s, stop=stop)
@@ -91,15 +153,16 @@ def run(
                 files.read_again()
             if (read := files.take()) is not None:
                 _reload(relay, read, config_paths, groups)
-        for group in relay.drain().groups:
-            for line in summarize(group):
-                LOGGER.info(line, extra={"group": group.name})
+        for report in relay.drain():
+            facts = report.facts
+            for line in summarize(facts.name, facts.figures.sets, [(each.name, each.counts) for each in facts.inputs]):
+                LOGGER.info(line, extra={"group": facts.name})
     return 0
 
 
 def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str], groups: Sequence[str]) -> None:
     """Take on the files as they were read again; whatever is wrong with them, the relay keeps its configuration."""
-    from syncrelay.ros.logs import LOGGER
+    from syncrelay.logs import LOGGER
 
     try:
         config = read.result()
@@ -114,7 +177,7 @@ def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str],
 
 
 def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:
-    from syncrelay.ros.logs import LOGGER
+    from syncrelay.logs import LOGGER
 
     if not named:
         return nullcontext()
@@ -130,7 +193,7 @@ def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]
 
     Raises ListenError where the port that it asks for cannot be had.
     """
-    from syncrelay.ros.logs import LOGGER
+    from syncrelay.logs import LOGGER
     from syncrelay.status import Server
 
     if listen is None:
@@ -140,7 +203,7 @@ def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]
     except ListenError as error:
         if listen.is_asked_for:
             raise
-        LOGGER.warning("no /status and no /metrics: %s", error)
+        LOGGER.warning("not serving /status and /metrics: %s", error)
         return nullcontext()
 
 

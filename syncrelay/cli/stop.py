@@ -1,6 +1,6 @@
-"""SIGINT and SIGTERM as a request to end in order, SIGHUP as one to read the file again.
+"""SIGINT and SIGTERM ask for an orderly end, SIGHUP to read the file again.
 
-Imports nothing slow: it must be there before all else.
+Imports nothing slow: the signals must be in hand before anything else is imported.
 """
 
 import os
@@ -19,7 +19,7 @@ _ENDED_BY = 128
 
 
 def release_signals() -> None:
-    """Let SIGINT and SIGTERM come, with those that were held back until now.
+    """Unblock SIGINT and SIGTERM; those that were held back arrive now.
 
     The image's entry point blocks them: PID 1 would lose what comes before Python has a handler.
     """
@@ -27,7 +27,7 @@ def release_signals() -> None:
 
 
 class StopRequest:
-    """Ends the process at once while there is nothing to lose, and is remembered from `defer` on.
+    """A request to end: until `defer` it ends the process at once, from then on it is remembered.
 
     A second SIGINT or SIGTERM ends the process at once in any case, whatever hangs by then.
 
@@ -44,7 +44,7 @@ class StopRequest:
         self._signalled = False
 
     def install(self) -> None:
-        """Take the signals from here on."""
+        """Handle the signals from here on."""
         for number in _SIGNALS:
             signal.signal(number, self._request)
         signal.signal(signal.SIGHUP, self._request_reload)
@@ -53,17 +53,17 @@ class StopRequest:
         _count_on_a_thread()
 
     def defer(self) -> None:
-        """From here on there is something to end in order: only remember the request."""
+        """Only remember the request from here on: there is now something to end in order."""
         self._deferred = True
 
     def wake_with(self, wake: Callable[[], None]) -> None:
-        """Have `wake` called when the request comes, at once if it has come already."""
+        """Call `wake` when the request comes, at once if it has come already."""
         self._wake = wake
         if self.requested:
             wake()
 
     def take_reload(self) -> bool:
-        """Whether the file is to be read again, since this was last asked."""
+        """Whether a reload was requested since this was last called."""
         asked, self._reload = self._reload, False
         return asked
 
@@ -99,7 +99,7 @@ class StopRequest:
 
 
 def _count_on_a_thread() -> None:
-    """Have two signals of different kinds end the process too, while the handlers' turn does not come."""
+    """Let a second signal of another kind end the process too while Python cannot run the handlers."""
     import threading
 
     received, told = os.pipe()
@@ -121,9 +121,9 @@ def _end_at_the_second(received: int) -> None:
 
 
 def _take_once(number: int) -> None:
-    """Have the kernel itself end the process at the second signal, should the handler's turn never come.
+    """Let the kernel itself end the process at the second signal, in case Python never gets to run the handler.
 
-    It comes when this thread next runs Python: not while a call into DDS hangs, nor a file system.
+    It only does when this thread next runs Python: not while a call into DDS or a file system hangs.
     """
     if os.getpid() == 1:
         return

@@ -1,36 +1,16 @@
-"""What became of every message, in words: the last thing a relay, a replay and the demo say."""
+"""What became of every message: the last thing that a relay and a replay say."""
 
-from collections.abc import Iterator, Sequence
-from typing import Protocol
+from collections.abc import Iterable, Iterator
 
+from syncrelay.config.wording import counted
 from syncrelay.sync.counts import InputCounts
 
 
-class InputAccount(Protocol):
-    """An input, by the name that the file gives its topic, and where its messages went."""
-
-    @property
-    def topic(self) -> str: ...
-    @property
-    def counts(self) -> InputCounts: ...
-
-
-class GroupAccount(Protocol):
-    """A group, its inputs in the file's order, and how many sets left."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def inputs(self) -> Sequence[InputAccount]: ...
-    @property
-    def sets(self) -> int: ...
-
-
-def summarize(group: GroupAccount) -> Iterator[str]:
-    """A line for the group, and one for each input."""
-    yield f"{group.name}: {group.sets} {'set' if group.sets == 1 else 'sets'}"
-    for each in group.inputs:
-        yield f"{group.name}:   {each.topic}: {_fates(each.counts)}"
+def summarize(group: str, sets: int, inputs: Iterable[tuple[str, InputCounts]]) -> Iterator[str]:
+    """Return a line for a group, and one for each of its inputs, which are named by their topics."""
+    yield f"{group}: {counted(sets, 'set')}"
+    for topic, counts in inputs:
+        yield f"{group}:   {topic}: {_fates(counts)}"
 
 
 def _fates(counts: InputCounts) -> str:
@@ -39,5 +19,5 @@ def _fates(counts: InputCounts) -> str:
         reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
         text += f" ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})"
     if counts.needed_queue is not None:
-        text += f"; a match needed what had overflowed: queue_size {counts.needed_queue} would have held it"
+        text += "; some left the full queue before their partners came"
     return text

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from enum import Enum
 
 from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find, find_one
+from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
 from syncrelay.top.client import Answer, base_urls
 
@@ -18,6 +20,25 @@ class Output(Enum):
     SCREEN = "screen"
     TEXT = "text"
     JSON = "json"
+
+
+def command(words: Sequence[str], _stop: StopRequest) -> int:
+    """Run `syncrelay top`."""
+    parser = Parser(
+        "syncrelay top",
+        description="Shows a running relay live: its groups, their inputs, their last sets, and what is wrong. "
+        "Without --url it shows the relay of this machine, and asks which if there are several. "
+        "Exit code 1 if no relay answers.",
+    )
+    parser.add_argument(
+        "--url", metavar="URL", help="the relay's host, host:port or URL, such as robot or http://robot:9464"
+    )
+    parser.add_argument("--once", action="store_true", help="print the state once as text, and exit")
+    parser.add_argument("--json", action="store_true", help="with --once: print the state as JSON")
+    arguments = parser.read(words)
+    if arguments.json and not arguments.once:
+        parser.error("--json goes with --once")
+    return top(arguments.url, Output.JSON if arguments.json else Output.TEXT if arguments.once else Output.SCREEN)
 
 
 def top(named: str | None, output: Output) -> int:
@@ -56,10 +77,10 @@ def _require_terminal() -> None:
     # Keys come from stdin and the screen goes to stderr; who redirects stdout wants text.
     streams = (sys.stdin, sys.stdout, sys.stderr)
     if not all(stream.isatty() for stream in streams):
-        raise SyncRelayError("top draws on a terminal, and here is none\n  `syncrelay top --once` prints text")
+        raise SyncRelayError("top needs a terminal, and there is none here\n  `syncrelay top --once` prints text")
     if os.environ.get("TERM", "dumb") in {"dumb", "unknown"} or not sys.stderr.encoding.lower().startswith("utf"):
         raise SyncRelayError(
-            "this terminal cannot be drawn on: see TERM and LANG\n  `syncrelay top --once` prints text"
+            "top cannot draw on this terminal: check TERM and LANG\n  `syncrelay top --once` prints text"
         )
 
 

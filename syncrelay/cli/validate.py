@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
+from syncrelay.cli.parser import Parser
+from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 from syncrelay.config.source import shown_name
 from syncrelay.config.wording import counted
@@ -20,6 +22,31 @@ class Finding:
     files: tuple[str, ...]
     config: Config | None
     problems: tuple[Problem, ...]
+
+
+def command(words: Sequence[str], _stop: StopRequest) -> int:
+    """Run `syncrelay validate`."""
+    parser = Parser(
+        "syncrelay validate",
+        description="Checks files without ROS and shows every error at once, each at its line, with the nearest valid "
+        "word. Message types are checked where ROS is installed; a package that is missing there is only a note. "
+        "Exit code 1 if a file has an error.",
+    )
+    parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, or - for standard input")
+    parser.add_argument(
+        "--together", action="store_true", help="check the files as one, as the relay does: --config FILE ..."
+    )
+    parser.add_argument(
+        "--format",
+        choices=tuple(_PRINT),
+        default="text",
+        metavar="FORMAT",
+        help="text (default), json, or github: annotations for a workflow",
+    )
+    arguments = parser.read(words)
+    files = arguments.files
+    parser.refuse_repeated(files if arguments.together else [each for each in files if each == "-"])
+    return validate([files] if arguments.together else [[file] for file in files], arguments.format)
 
 
 def validate(sets: Sequence[Sequence[str]], output_format: str) -> int:

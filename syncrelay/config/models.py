@@ -235,6 +235,9 @@ class Group(Keys):
     waits_for_next: ClassVar[bool] = False
     """Whether a set waits for the next messages, which may be nearer; a topic's `min_period` can shorten that."""
 
+    patient_policy: ClassVar[str | None] = None
+    """The policy that takes the same keys and waits for messages that come too late for this one."""
+
     matched_by: ClassVar[tuple[str, ...]] = ()
     """Keys that say which messages belong together; none where it is how near their stamps are."""
 

@@ -85,6 +85,8 @@ class ApproximateTimeGroup(SlopGroup):
 class ApproximateTimeEagerGroup(SlopGroup):
     """Sets of near stamps, each as soon as there is one."""
 
+    patient_policy = "approximate_time"
+
     policy: Literal["approximate_time_eager"] = Field(
         description="Sets of near stamps: the tightest that holds the message just arrived, at once."
     )

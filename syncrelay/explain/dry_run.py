@@ -16,17 +16,30 @@ class EngineDriver:
 
     def __init__(self, group: GroupConfig, take: Take) -> None:
         self.engine: Final = group.engine()
+        # Without max_wait nothing is ever due, and asking for each message costs a tenth of a replay.
+        self.has_deadlines: Final = group.options.max_wait is not None
         self._take = take
 
     def add(self, message: Message, *, now: int) -> None:
         """Add a message after all that is due before it."""
-        self.expire(now)
-        self._take(self.engine.add(message, now=now), now)
+        if self.has_deadlines:
+            self.expire(now)
+        outcomes = self.engine.add(message, now=now)
+        if outcomes:
+            self._take(outcomes, now)
 
     def reject(self, index: int, payload: Any, *, now: int) -> None:
         """Count a message of which no stamp or key could be read."""
         self.expire(now)
         self._take([self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED)], now)
+
+    def feed(self, arrival: "Arrival") -> None:
+        """Add an arrival, or count it as malformed; the message's payload is the time when it was received."""
+        index, stamp, received, key = arrival
+        if stamp is None:
+            self.reject(index, received, now=received)
+        else:
+            self.add(Message(index, stamp, received, key), now=received)
 
     def expire(self, now: int) -> None:
         """Let what has waited long enough leave, each at its own time, up to `now`."""
@@ -36,8 +49,8 @@ class EngineDriver:
     def finish(self, now: int) -> None:
         """Let all leave that may: what still waits has a deadline, or will never have a partner."""
         while (deadline := self.engine.next_deadline()) is not None:
+            self._take(self.engine.expire(now=deadline), deadline)
             now = max(now, deadline)
-            self._take(self.engine.expire(now=now), now)
         self._take(self.engine.flush(DropReason.SHUTDOWN), now)
 
 
@@ -72,11 +85,8 @@ def dry_run(group: GroupConfig, arrivals: Iterable[Arrival]) -> DryRun:
 
     driver = EngineDriver(group, take)
     now = 0
-    for index, stamp, received, key in arrivals:
-        now = received
-        if stamp is None:
-            driver.reject(index, None, now=now)
-        else:
-            driver.add(Message(index, stamp, None, key), now=now)
+    for arrival in arrivals:
+        now = arrival.received
+        driver.feed(arrival)
     driver.finish(now)
     return DryRun(driver.engine.sets, driver.engine.counts(), tuple(spans))

@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from statistics import median_low
 from typing import NamedTuple, Self
 
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.find import with_ok
 from syncrelay.explain.findings import Finding
+from syncrelay.explain.judge import with_ok
 from syncrelay.sync.messages import DropReason
 
 
@@ -56,3 +57,12 @@ class GroupReport:
     def recent(self) -> tuple[RecentSet | RecentDrop, ...]:
         """What left last, oldest first."""
         return recent(self.last)
+
+    @property
+    def span_without_offsets(self) -> int | None:
+        """The median span, in nanoseconds, that the last sets would have without offsets; None if there are none."""
+        if not any(each.offset for each in self.facts.inputs):
+            return None
+        sets = (each.stamps for each in self.recent if isinstance(each, RecentSet))
+        as_stamped = [[stamp for stamp in stamps if stamp is not None] for stamps in sets]
+        return median_low(max(each) - min(each) for each in as_stamped) if as_stamped else None

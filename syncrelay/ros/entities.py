@@ -16,10 +16,10 @@ _ROSOUT: Final = ("/rosout", "rcl_interfaces/msg/Log")
 
 
 class Purpose(Enum):
-    """What a node is there for: to relay, or to look only, which publishes nothing."""
+    """What a node is for: to relay, or to observe only, which publishes nothing."""
 
     RELAY = "relay"
-    LOOK = "look"
+    OBSERVE = "observe"
 
 
 class RefusedError(Exception):
@@ -53,7 +53,7 @@ class Entities:
     def __init__(self, node: Any, purpose: Purpose) -> None:
         self._node = node
         self.purpose = purpose
-        """Where it is to look, nobody asks for publishers."""
+        """Where it is to observe, nobody asks for publishers."""
         self._left_to_the_loop = _LeftToTheReceiveLoop()
         # An entity of the node itself, which never ends, stands for itself.
         self._holders: dict[str, dict[Any, str]] = {}
@@ -69,7 +69,7 @@ class Entities:
             return self._node.create_subscription(
                 message_type,
                 topic,
-                _never_called,
+                never_called,
                 profile,
                 raw=True,
                 callback_group=self._left_to_the_loop,
@@ -117,5 +117,5 @@ class Entities:
         self._holders.setdefault(name, {})[entity] = type_name
 
 
-def _never_called(_: bytes) -> None:
+def never_called(_: bytes) -> None:
     """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""

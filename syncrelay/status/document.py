@@ -13,6 +13,7 @@ from syncrelay.explain import (
     InputFacts,
     RecentDrop,
     RecentSet,
+    explanation,
 )
 from syncrelay.status.state import RelayState, is_ready, level
 
@@ -35,7 +36,7 @@ def document(state: RelayState) -> dict[str, Any]:
             "reload_error": state.reload_error,
             "pid": os.getpid(),
         },
-        "groups": [_group(report) for report in state.groups],
+        "groups": [group_document(report) for report in state.groups],
     }
 
 
@@ -47,7 +48,8 @@ def own_version() -> str:
         return "unknown"
 
 
-def _group(report: GroupReport) -> dict[str, Any]:
+def group_document(report: GroupReport) -> dict[str, Any]:
+    """Return what there is to say of a group as what json.dumps takes."""
     facts, figures = report.facts, report.facts.figures
     return {
         "name": facts.name,
@@ -61,11 +63,12 @@ def _group(report: GroupReport) -> dict[str, Any]:
         "possible_hz": round(facts.possible_hz, 3),
         "since_last_set_ms": _ms(None if figures.last_set is None else figures.now - figures.last_set),
         "span_ms": _percentiles(figures.spans),
+        "span_without_offsets_ms": _ms(report.span_without_offsets),
         "latency_ms": _percentiles(figures.latencies),
         "nearest_ms": _percentiles(figures.nearest),
         "last_sets": [{"span_ms": _ms(span), "latency_ms": _ms(late)} for span, late in reversed(figures.last_sets)],
         "inputs": [_input(facts, index, each) for index, each in enumerate(facts.inputs)],
-        "findings": [_finding(facts, finding) for finding in report.findings],
+        "findings": [_finding(facts, finding) for finding in _explanation_first(report.findings)],
         "recent": [_recent(outcome) for outcome in report.recent],
     }
 
@@ -80,7 +83,7 @@ def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
         "offset_ms": _ms(each.offset),
         "rate_hz": round(figures.rate_hz, 3),
         "age_ms": _ms(None if figures.last_received is None else facts.figures.now - figures.last_received),
-        "lag_ms": _ms(figures.delay),
+        "lag_ms": _ms(facts.lag(index)),
         "jitter_ms": _ms(figures.jitter),
         "drift_ppm": figures.drift and round(figures.drift.slope * 1e6, 1),
         "received": counts.fed,
@@ -99,6 +102,11 @@ def _endpoint(endpoint: Endpoint) -> dict[str, Any]:
     why = endpoint.mismatch
     mismatch = why and {"policy": why.policy, "offered": why.offered, "requested": why.requested}
     return {"node": endpoint.node, "type": endpoint.type, "mismatch": mismatch}
+
+
+def _explanation_first(findings: tuple[Finding, ...]) -> list[Finding]:
+    first = explanation(findings)
+    return [first, *(finding for finding in findings if finding is not first)]
 
 
 def _finding(facts: GroupFacts, finding: Finding) -> dict[str, Any]:

@@ -34,28 +34,28 @@ class _OfState(Collector):
     def collect(self) -> Iterator[Metric]:
         state = self._state()
         yield _build(state)
-        yield GaugeMetricFamily("syncrelay_ready", "Whether every required input is matched.", value=is_ready(state))
-        yield CounterMetricFamily("syncrelay_reloads", "Times that the file was read again.", value=state.reloads)
+        yield GaugeMetricFamily("syncrelay_ready", "1 if all required inputs have a publisher.", value=is_ready(state))
+        yield CounterMetricFamily("syncrelay_reloads", "Reloads that succeeded.", value=state.reloads)
         yield from _of_inputs(state)
         yield from _of_groups(state)
         yield _findings(state)
 
 
 def _build(state: RelayState) -> Metric:
-    info = InfoMetricFamily("syncrelay_build", "What runs.")
+    info = InfoMetricFamily("syncrelay_build", "Version of what is running.")
     values = {"version": own_version(), "python": platform.python_version(), "receives_by": state.receives_by}
     info.add_metric([], values)
     return info
 
 
 def _of_inputs(state: RelayState) -> Iterator[Metric]:
-    received = CounterMetricFamily("syncrelay_messages_received", "Messages that came in.", labels=("group", "topic"))
+    received = CounterMetricFamily("syncrelay_messages_received", "Messages received.", labels=("group", "topic"))
     outcomes = CounterMetricFamily(
         "syncrelay_messages",
         "Messages by what became of them: matched, or the reason why they were dropped.",
         labels=("group", "topic", "outcome"),
     )
-    buffered = GaugeMetricFamily("syncrelay_queue_length", "Messages that wait.", labels=("group", "topic"))
+    buffered = GaugeMetricFamily("syncrelay_queue_length", "Messages waiting in queues.", labels=("group", "topic"))
     for report in state.groups:
         for each in report.facts.inputs:
             labels = [report.facts.name, each.name]
@@ -68,7 +68,7 @@ def _of_inputs(state: RelayState) -> Iterator[Metric]:
 
 
 def _of_groups(state: RelayState) -> Iterator[Metric]:
-    sets = CounterMetricFamily("syncrelay_sets", "Sets that left.", labels=("group",))
+    sets = CounterMetricFamily("syncrelay_sets", "Sets published.", labels=("group",))
     spans = HistogramMetricFamily("syncrelay_set_span_seconds", "Spans of the sets.", labels=("group",))
     latencies = HistogramMetricFamily(
         "syncrelay_set_latency_seconds",
@@ -90,7 +90,7 @@ def _add(family: HistogramMetricFamily, group: str, histogram: Histogram) -> Non
 
 
 def _findings(state: RelayState) -> Metric:
-    family = GaugeMetricFamily("syncrelay_finding", "What is so now.", labels=("group", "code", "severity", "topic"))
+    family = GaugeMetricFamily("syncrelay_finding", "What was found.", labels=("group", "code", "severity", "topic"))
     for report in state.groups:
         for finding in report.findings:
             topic = "" if finding.input is None else report.facts.inputs[finding.input].name

@@ -107,8 +107,8 @@ def _bound(listen: Listen) -> socket.socket:
         else:
             return bound
     raise ListenError(
-        f"cannot listen on {listen}: another process does;"
-        " give `metrics` another `listen`, or write `metrics: null` to go without"
+        f"cannot listen on {listen}: another process uses it;"
+        " set another `listen` in `metrics`, or write `metrics: null` to run without"
     )
 
 

@@ -19,8 +19,8 @@ class RelayState:
     """A relay at one moment. `turned_s` is how long ago its receive loop last turned, `uptime_s` since its start.
 
     `receives_by` names the way by which messages are taken and published, `reloads` counts how often the file was
-    read again and taken, `refused_reloads` how often it was left aside, `reload_error` says why the last time.
-    `unjudged` are groups of which there is no report, as before the first look.
+    reloaded, `refused_reloads` how often a reload failed, `reload_error` says why it last did.
+    `unjudged` are groups that have no report, as before the first one.
     """
 
     node: str

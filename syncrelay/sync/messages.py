@@ -1,9 +1,10 @@
 """The values that go into the engine and come out of it."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, TypeAlias
+from types import MappingProxyType
+from typing import Any, Final, TypeAlias
 
 # None of these changes once it is made, so they may be hashed. Frozen ones take three times as long to make,
 # NamedTuples nearly twice: with a message and a drop each, a fifth of what the engine needs.
@@ -26,6 +27,28 @@ class DropReason(Enum):
     MALFORMED = "malformed"
     THINNED = "thinned"
     SHUTDOWN = "shutdown"
+
+    @property
+    def meaning(self) -> str:
+        """What it says of the message, in a few words."""
+        return _MEANINGS[self]
+
+
+_MEANINGS: Final[Mapping[DropReason, str]] = MappingProxyType(
+    {
+        DropReason.LATE: "older than the last set",
+        DropReason.DUPLICATE: "its stamp came twice",
+        DropReason.OVERFLOW: "its queue was full",
+        DropReason.SUPERSEDED: "a newer set left",
+        DropReason.TOO_FAR: "nothing within slop",
+        DropReason.EXPIRED: "waited too long",
+        DropReason.TIME_JUMP: "timestamps jumped back",
+        DropReason.UNSTAMPED: "its stamp is 0",
+        DropReason.MALFORMED: "no stamp could be read",
+        DropReason.THINNED: "its set was left out",
+        DropReason.SHUTDOWN: "the relay ended",
+    }
+)
 
 
 @dataclass(slots=True, unsafe_hash=True)

@@ -68,14 +68,14 @@ def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -
     except (OSError, IncompleteRead, UnicodeError) as error:
         raise _no_answer(error, timeout_s) from error
     except HTTPException as error:
-        raise OtherServerError("what listens there is no relay: it does not answer as HTTP says") from error
+        raise OtherServerError("what listens there is not a relay: its answer is not HTTP") from error
     if status != HTTPStatus.OK:
         raise OtherServerError(_refused(f"{status} {reason}", body))
     try:
         return Answer(url, body, read_state(body))
     except NotAStateError as error:
         raise OtherServerError(
-            f"what listens there is no relay, or one of another version ({printable(str(error))})"
+            f"what listens there is not a relay, or runs another version ({printable(str(error))})"
         ) from error
 
 
@@ -118,14 +118,14 @@ def _ended_after(connected: socket.socket, whole_s: float) -> Iterator[None]:
     finally:
         timer.cancel()
         if is_over.is_set():
-            raise NoAnswerError(f"no whole answer within {whole_s:g} s")
+            raise NoAnswerError(f"no complete answer within {whole_s:g} s")
 
 
 def _refused(answer: str, body: bytes) -> str:
     words = printable(body.decode(errors="replace").strip())
     if words.startswith(REFUSAL):
         return words
-    return f"what listens there is no relay: it answers {printable(answer)}"
+    return f"what listens there is not a relay: it answers {printable(answer)}"
 
 
 def search(urls: Sequence[str], *, timeout_s: float = _SEARCH_TIMEOUT_S, whole_s: float = _WHOLE_S) -> Search:
@@ -186,7 +186,7 @@ def _no_answer(error: Exception, timeout_s: float) -> NoAnswerError:
         case TimeoutError():
             return NoAnswerError(f"no answer within {timeout_s:g} s")
         case socket.gaierror():
-            return NoAnswerError("no machine of that name is known")
+            return NoAnswerError("no machine of that name was found")
         case IncompleteRead() | ConnectionError():
             return NoAnswerError("the connection ended before the answer did")
         case OSError(strerror=str() as words):

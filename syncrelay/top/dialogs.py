@@ -19,16 +19,16 @@ _KEYS: Final = (
     ("enter", "open the selected group"),
     ("left, right, p, n", "in a group: the one before, the next"),
     ("escape, backspace", "back to the groups, or to the list of relays"),
-    ("space", "hold the picture, and let it go on"),
+    ("space", "pause the screen, and resume"),
     ("s", "sort: as in the file, worst first, by name"),
     ("q, ctrl-c", "quit"),
 )
 _MEANINGS: Final = (
-    ("SETS/s", "sets a second, of those that the slowest input allows"),
+    ("SETS/s", "sets a second, out of those that the slowest input allows"),
     ("SPAN", "from the oldest to the newest stamp of a set"),
-    ("LAT.", "latency: from the last message of a set to its leaving"),
-    ("LAG", "time of receipt minus stamp, the median"),
-    ("JITTER", "how far the time between stamps is off its median, p95"),
+    ("LAT.", "latency: from the last message of a set until it is published"),
+    ("LAG", "time of receipt minus stamp, median"),
+    ("JITTER", "how far the time between stamps strays from its median, p95"),
 )
 
 
@@ -63,7 +63,7 @@ class KeysScreen(ModalScreen[None]):
         """Lay out one text."""
         keys = [line((f"{key:<30}", "bold"), does) for key, does in _KEYS]
         meanings = [line((f"{name:<8}", "bold"), means) for name, means in _MEANINGS]
-        back = line(("any key goes back", "dim"))
+        back = line(("press any key to go back", "dim"))
         yield Static(Text("\n").join([*keys, Text(""), *meanings, Text(""), back]), id="keys")
 
     def on_key(self) -> None:

@@ -1,23 +1,24 @@
 """What there is to see of one group, in blocks of lines: figures, findings, inputs, recent sets, connections."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from rich.text import Text
 
 from syncrelay.explain import RecentDrop, RecentSet
-from syncrelay.status import Level
+from syncrelay.sync import DropReason
 from syncrelay.top import phrases
 from syncrelay.top.names import fitted, fitted_names, short_names
 from syncrelay.top.pieces import STYLES, bar, line, sparkline, wrapped
 from syncrelay.top.state import Endpoint, Finding, Group, Input, Percentiles
-from syncrelay.top.strip import MARKS, Lanes, drop_style, letter_style, newest_stamp, strip, window_of
+from syncrelay.top.strip import MARKS, Axis, Lanes, drop_style, letter_style, newest_stamp, strip, window_of
 
 _LABEL: Final = 9
 _BAR: Final = 24
 _FIGURE: Final = 10
 _LEAST_TOPIC, _LEAST_NOTES = 16, 22
-_LANE_LABEL: Final = 13
+LANE_LABEL: Final = 13
+_NS_PER_MS: Final = 1_000_000
 # On a wider strip the recent outcomes of a fast input would not reach back to its begin.
 _WIDEST_STRIP: Final = 160
 _LINES_OF_SPARKS: Final = 44
@@ -25,24 +26,35 @@ _LINES_OF_SPARKS: Final = 44
 
 def title(group: Group, width: int) -> Text:
     """Draw the group's name and what the file says of it, as a rule across the screen."""
-    text = f"── {group.name}: {phrases.keys(group)} "
+    text = f"── {group.name}: {phrases.options(group)} "
     return line((text + "─" * max(0, width - len(text)), "bold"))
 
 
 def figures(group: Group, width: int) -> Iterator[Text]:
     """Draw how many sets leave, their spans and their latencies."""
+    yield rate_line(group, width)
+    if group.last_sets:
+        room = max(10, width - _LABEL - _LINES_OF_SPARKS)
+        spans = [each.span_ms for each in group.last_sets]
+        latencies = [each.latency_ms for each in group.last_sets]
+        yield line((f"{'span':<{_LABEL}}", "bold"), sparkline(spans, room), " ", _percentiles(group.span_ms))
+        yield line((f"{'latency':<{_LABEL}}", "bold"), sparkline(latencies, room), " ", _percentiles(group.latency_ms))
+    yield from offsets(group, width)
+
+
+def rate_line(group: Group, width: int) -> Text:
+    """Draw how many of the possible sets leave."""
     share = phrases.share_of_possible(group)
     before = f"{phrases.sets_of_possible(group)} possible a second "
     behind = f" {share:.0%}, {phrases.last_set(group)}"
     room = width - _LABEL - len(before) - len(behind)
-    yield line((f"{'sets':<{_LABEL}}", "bold"), before, bar(share, max(0, min(_BAR, room))), behind)
-    if not group.last_sets:
-        return
-    room = max(10, width - _LABEL - _LINES_OF_SPARKS)
-    spans = [each.span_ms for each in group.last_sets]
-    latencies = [each.latency_ms for each in group.last_sets]
-    yield line((f"{'span':<{_LABEL}}", "bold"), sparkline(spans, room), " ", _percentiles(group.span_ms))
-    yield line((f"{'latency':<{_LABEL}}", "bold"), sparkline(latencies, room), " ", _percentiles(group.latency_ms))
+    return line((f"{'sets':<{_LABEL}}", "bold"), before, bar(share, max(0, min(_BAR, room))), behind)
+
+
+def offsets(group: Group, width: int) -> Iterator[Text]:
+    """Say what the file's offsets do, if it has some."""
+    if effect := phrases.offsets(group):
+        yield from wrapped(effect, width, first=line((f"{'offset':<{_LABEL}}", "bold")))
 
 
 def _percentiles(sample: Percentiles | None) -> str:
@@ -53,10 +65,8 @@ def _percentiles(sample: Percentiles | None) -> str:
 
 
 def findings(group: Group, width: int) -> Iterator[Text]:
-    """Say what is so and what to do about it, what explains most first."""
-    first = group.explanation
-    others = [finding for finding in group.findings if finding is not first]
-    for finding in [first, *others] if first else []:
+    """Say what was found, what explains most first, and what to do about it."""
+    for finding in group.findings:
         yield from _finding(finding, width)
 
 
@@ -81,52 +91,79 @@ def inputs(group: Group, width: int) -> Iterator[Text]:
             f"{phrases.rate(each.rate_hz):<{_FIGURE}}",
             f"{phrases.duration(each.lag_ms):<{_FIGURE}}",
             f"{phrases.duration(each.jitter_ms):<{_FIGURE}}",
-            *_notes(each),
+            *_notes(each, group.problem_of(each)),
         )
 
 
-def _notes(each: Input) -> Iterator[str | tuple[str, str]]:
+def _notes(each: Input, problem: Finding | None) -> Iterator[str | tuple[str, str]]:
     if not each.required:
         yield ("optional: ", "dim")
-    trouble = phrases.trouble(each)
-    if trouble is None:
-        yield phrases.drops(each.dropped_lately)
-        return
-    yield (trouble, STYLES[Level.ERROR if each.required else Level.WARN])
-    if each.dropped_lately:
-        yield f"; {phrases.drops(each.dropped_lately)}"
+    if problem is not None:
+        yield (problem.label, STYLES[problem.severity])
+    if each.dropped_lately or problem is None:
+        yield f"{'; ' if problem else ''}{phrases.drops(each.dropped_lately)}"
 
 
 def recent_sets(group: Group, width: int) -> Iterator[Text]:
     """Draw the strip of recent sets, with a legend of what is on it."""
     if not group.recent:
         return
-    offsets = [round(each.offset_ms * 1_000_000) for each in group.inputs]
-    recent = tuple(outcome.shifted(offsets) for outcome in group.recent)
-    window = window_of(recent, min(width - _LANE_LABEL - 2, _WIDEST_STRIP))
-    fed = tuple(each.received for each in group.inputs)
-    drawn = strip(Lanes(fed, group.sets, recent), window)
+    recent, fed = as_matched(group), _fed(group)
+    window = window_of(recent, min(width - LANE_LABEL - 2, _WIDEST_STRIP))
+    yield from lanes(group, recent, window)
+    shown = [each for each in recent if window.column(newest_stamp([each])) is not None]
+    drops = [each for each in shown if isinstance(each, RecentDrop)]
+    sets = [line(*_letters(), " sets")] if len(drops) < len(shown) else []
+    # The style that stands out is the longer.
+    styles = {
+        reason: max((drop_style(fed, each.input) for each in drops if each.reason is reason), key=len)
+        for reason in {each.reason for each in drops}
+    }
+    yield from side_by_side([*sets, *marks(styles)], width)
+    yield line((f"a column is {phrases.duration(window.column_ns / _NS_PER_MS)}, the newest is on the right", "dim"))
+
+
+def as_matched(group: Group) -> tuple[RecentSet | RecentDrop, ...]:
+    """Return what left last with the stamps by which it was matched, offsets added."""
+    shifts = [round(each.offset_ms * _NS_PER_MS) for each in group.inputs]
+    return tuple(outcome.shifted(shifts) for outcome in group.recent)
+
+
+def lanes(group: Group, recent: Sequence[RecentSet | RecentDrop], axis: Axis) -> Iterator[Text]:
+    """Draw a lane for each input, what left recently on it, and the spans of the sets below."""
+    drawn = strip(Lanes(_fed(group), group.sets, tuple(recent)), axis)
     for index, name in enumerate(short_names([each.topic for each in group.inputs])):
-        label = fitted(name, _LANE_LABEL).rjust(_LANE_LABEL)
+        shift = f" {group.inputs[index].offset_ms:+g} ms" if group.inputs[index].offset_ms else ""
+        label = f"{fitted(name, LANE_LABEL - len(shift))}{shift}".rjust(LANE_LABEL)
         yield line((label, "bold"), (" ▏", "dim"), drawn[2 * index])
-        below = "span in ms" if index == len(fed) - 1 else ""
-        yield line((below.rjust(_LANE_LABEL), "dim"), (" ▏", "dim"), drawn[2 * index + 1])
-    yield _legend([each for each in recent if window.column(newest_stamp([each])) is not None], fed)
-    yield line((f"a column is {phrases.duration(window.column_ns / 1_000_000)}, the newest is on the right", "dim"))
+        below = "span in ms" if index == len(group.inputs) - 1 else ""
+        yield line((below.rjust(LANE_LABEL), "dim"), (" ▏", "dim"), drawn[2 * index + 1])
 
 
-def _legend(shown: Sequence[RecentSet | RecentDrop], fed: Sequence[int]) -> Text:
-    parts = []
-    if any(isinstance(each, RecentSet) for each in shown):
-        parts.append(line(*((letter, letter_style(number)) for number, letter in enumerate("ABC")), " sets"))
+def _fed(group: Group) -> tuple[int, ...]:
+    return tuple(each.received for each in group.inputs)
+
+
+def _letters() -> list[tuple[str, str]]:
+    return [(letter, letter_style(number)) for number, letter in enumerate("ABC")]
+
+
+def marks(styles: Mapping[DropReason, str]) -> Iterator[Text]:
+    """Say what the marks of dropped messages mean, each in its style."""
     for reason in MARKS:
-        styles = {
-            drop_style(fed, each.input) for each in shown if isinstance(each, RecentDrop) and each.reason is reason
-        }
-        if styles:
-            # The style that stands out is the longer.
-            parts.append(line((MARKS[reason], max(styles, key=len)), f" {reason.value}"))
-    return Text("   ").join(parts)
+        if reason in styles:
+            yield line((MARKS[reason], styles[reason]), f" {reason.value}: {reason.meaning}")
+
+
+def side_by_side(texts: Iterable[Text], width: int) -> Iterator[Text]:
+    """Put texts beside each other, as many in a line as fit."""
+    filled: list[Text] = []
+    for text in texts:
+        if filled and sum(each.cell_len + 3 for each in filled) + text.cell_len > width:
+            yield Text("   ").join(filled)
+            filled = []
+        filled.append(text)
+    yield Text("   ").join(filled)
 
 
 def connections(group: Group, width: int) -> Iterator[Text]:

@@ -81,7 +81,7 @@ def _reason(group: Group, columns: Columns) -> Text:
     elif group.level is Level.OK or finding is None:
         text = sparkline([each.span_ms for each in group.last_sets], max(0, columns.reason - 1))
     else:
-        text = finding.code.replace("_", " ")
+        text = finding.label
     reason = Text(text)
     reason.truncate(columns.reason, overflow="ellipsis")
     return reason

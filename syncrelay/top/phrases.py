@@ -1,4 +1,4 @@
-"""What the figures of a state are called, for the screen and for plain text alike."""
+"""What a state's figures are in words, for the screen and for plain text alike."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -34,7 +34,7 @@ def duration(milliseconds: float | None) -> str:
 
 
 def ago(milliseconds: float) -> str:
-    """Return how long ago something was, to be watched."""
+    """Return how long ago something was."""
     if milliseconds < _JUST_NOW_MS:
         return "just now"
     return f"{words.seconds(milliseconds * _NS_PER_MS)} ago"
@@ -67,7 +67,7 @@ def last_set(group: Group) -> str:
     return f"{group.sets} {'set' if group.sets == 1 else 'sets'}, last {ago(group.since_last_set_ms)}"
 
 
-def keys(group: Group) -> str:
+def options(group: Group) -> str:
     """Say what the file says of a group."""
     tolerance = [f"{group.tolerance.key} {duration(group.tolerance.ms)}"] if group.tolerance else []
     waits = [] if group.max_wait_ms is None else [f"max_wait {duration(group.max_wait_ms)}"]
@@ -79,18 +79,12 @@ def phase(relay: Relay) -> str:
     return f"{relay.phase.value}, {'ready' if relay.ready else 'not ready'}"
 
 
-def trouble(an_input: Input) -> str | None:
-    """Say why an input gives nothing, None if it does or if nothing is known."""
-    if not an_input.publishers:
-        return "nobody publishes it"
-    of_type = [publisher for publisher in an_input.publishers if publisher.type == an_input.type]
-    if not of_type:
-        return f"published as {an_input.publishers[0].type}"
-    if all(publisher.mismatch for publisher in of_type):
-        return f"incompatible {' and '.join({each.mismatch.policy: None for each in of_type if each.mismatch})}"
-    if an_input.rate_hz:
+def offsets(group: Group) -> str | None:
+    """Say what the file's offsets do to the spans; None without offsets or sets."""
+    if group.span_without_offsets_ms is None or group.span_ms is None:
         return None
-    return "no message yet" if an_input.age_ms is None else f"silent for {words.seconds(an_input.age_ms * _NS_PER_MS)}"
+    given = ", ".join(f"{each.offset_ms:+g} ms on {each.topic}" for each in group.inputs if each.offset_ms)
+    return f"{given}: span p50 {duration(group.span_ms.p50)}, {duration(group.span_without_offsets_ms)} without it"
 
 
 def drops(dropped: Mapping[str, int]) -> str:

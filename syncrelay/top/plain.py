@@ -25,43 +25,45 @@ def _lines(answer: Answer) -> Iterator[str]:
     )
     for group in answer.state.groups:
         yield ""
-        yield from _group(group)
+        yield from group_lines(group)
 
 
-def _group(group: Group) -> Iterator[str]:
+def group_lines(group: Group) -> Iterator[str]:
+    """Say all of a group."""
     rate = f"{phrases.sets_of_possible(group)} possible sets a second, {phrases.last_set(group)}"
     yield from _wrapped(f"{group.name}: {phrases.LEVELS[group.level]}, {rate}", indent="")
-    yield from _wrapped(phrases.keys(group), indent="  ")
+    yield from _wrapped(phrases.options(group), indent="  ")
     for name, sample in (("span", group.span_ms), ("latency", group.latency_ms)):
         if sample is not None:
             values = (("p50", sample.p50), ("p95", sample.p95), ("max", sample.max))
             yield f"  {name}: {', '.join(f'{key} {phrases.duration(value)}' for key, value in values)}"
+    if effect := phrases.offsets(group):
+        yield from _wrapped(f"offset: {effect}", indent="  ")
     for finding in group.findings:
         yield from _finding(finding)
     for each in group.inputs:
-        yield from _input(each)
+        yield from _input(each, group.problem_of(each))
 
 
 def _finding(finding: Finding) -> Iterator[str]:
     level = "" if finding.severity is Level.OK else f"{phrases.LEVELS[finding.severity]}: "
     yield from _wrapped(f"{level}{finding.text}", indent="  ")
     if finding.suggestion:
-        yield from _wrapped(f"so: {finding.suggestion}", indent="    ")
+        yield from _wrapped(f"fix: {finding.suggestion}", indent="    ")
 
 
-def _input(each: Input) -> Iterator[str]:
-    figures = [phrases.rate(each.rate_hz)] if each.rate_hz else []
+def _input(each: Input, problem: Finding | None) -> Iterator[str]:
+    figures = [problem.label] if problem else []
+    if each.rate_hz:
+        figures.append(phrases.rate(each.rate_hz))
     if each.lag_ms is not None:
         figures.append(f"lag {phrases.duration(each.lag_ms)}")
     if each.jitter_ms is not None:
         figures.append(f"jitter {phrases.duration(each.jitter_ms)}")
-    trouble = phrases.trouble(each)
-    if trouble:
-        figures.insert(0, trouble)
-    optional = "" if each.required else " (optional)"
     if each.dropped_lately:
         figures.append(f"dropped in the last 10 s: {phrases.drops(each.dropped_lately)}")
-    yield from _wrapped(f"{each.topic}{optional}: {', '.join(figures)}", indent="  ")
+    optional = "" if each.required else " (optional)"
+    yield from _wrapped(f"{each.topic}{optional}: {', '.join(figures) or 'no message yet'}", indent="  ")
     yield from _wrapped(phrases.fates(each), indent="    ")
 
 

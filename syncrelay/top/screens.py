@@ -143,7 +143,7 @@ def _summary(group: Group, *, width: int, height: int) -> list[Text]:
 def _clipped(lines: Sequence[Text], height: int) -> list[Text]:
     if len(lines) <= height:
         return list(lines)
-    return [*lines[: max(0, height - 1)], line((f"… {len(lines) - height + 1} more lines: enter", "dim"))]
+    return [*lines[: max(0, height - 1)], line((f"… {len(lines) - height + 1} more lines: press enter", "dim"))]
 
 
 class GroupScreen(WatchScreen):

@@ -1,4 +1,4 @@
-"""The state of a relay as it tells it over HTTP, read back as values. Durations in milliseconds, as in the document."""
+"""The state of a relay as /status gives it, read back as values. Durations in milliseconds, as in the document."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ Text: TypeAlias = Annotated[str, AfterValidator(printable)]
 
 
 class NotAStateError(SyncRelayError):
-    """What was read is no state of a relay, or one of another version."""
+    """What was read is not the state of a relay, or that of another version."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +104,18 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that is so; `severity` is never STALE."""
+    """What the relay found; `topic` is the input that it is about, if it is about one. `severity` is never STALE."""
 
     code: Text
     severity: Level
     text: Text
     suggestion: Text | None
+    topic: Text | None = None
+
+    @property
+    def label(self) -> str:
+        """Its code in words."""
+        return self.code.replace("_", " ")
 
 
 def _outcome(told: Any) -> Any:
@@ -124,7 +130,7 @@ def _outcome(told: Any) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """A group; `last_sets` and `recent` oldest first."""
+    """A group; `last_sets` and `recent` oldest first, `findings` with the one that explains most first."""
 
     name: Text
     policy: Text
@@ -142,13 +148,21 @@ class Group:
     inputs: tuple[Input, ...]
     findings: tuple[Finding, ...]
     recent: tuple[Annotated[RecentSet | RecentDrop, BeforeValidator(_outcome)], ...]
+    span_without_offsets_ms: float | None = None
 
     @property
     def explanation(self) -> Finding | None:
-        """The finding that says most of its state, as syncrelay.explain chooses it: the first of the worst."""
-        bad = [finding for finding in self.findings if finding.severity is not Level.OK]
-        errors = [finding for finding in bad if finding.severity is Level.ERROR]
-        return next(iter(errors or bad), self.findings[-1] if self.findings else None)
+        """The finding that explains most, None where there is none."""
+        return self.findings[0] if self.findings else None
+
+    @property
+    def problems(self) -> list[Finding]:
+        """What is wrong."""
+        return [finding for finding in self.findings if finding.severity is not Level.OK]
+
+    def problem_of(self, an_input: Input) -> Finding | None:
+        """What is wrong with one of its inputs, before all else; None if nothing is."""
+        return next((finding for finding in self.problems if finding.topic == an_input.topic), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +176,13 @@ class State:
 _STATE: Final = TypeAdapter(State)
 
 
+def state_of(document: Mapping[str, Any]) -> State:
+    """Return the state that a document of this process holds."""
+    return _STATE.validate_python(document)
+
+
 def read_state(document: bytes) -> State:
-    """Return the state that a document holds; keys that it has beyond ours are left aside. Raises NotAStateError."""
+    """Return the state that a JSON document holds; ignores keys that it does not know. Raises NotAStateError."""
     try:
         return _STATE.validate_json(document)
     except ValidationError as error:

@@ -71,5 +71,5 @@ def title(view: View, width: int) -> list[Text]:
             line((f" STALE: no answer for {phrases.seconds(view.quiet_s)}: {view.trouble}; still trying ", "reverse"))
         )
     elif view.paused:
-        lines.append(line((" PAUSED: space goes on ", "reverse")))
+        lines.append(line((" PAUSED: press space to resume ", "reverse")))
     return lines

@@ -4,19 +4,19 @@ import random
 from array import array
 from itertools import product
 
-import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from syncrelay.bag.analysis.analysis import group_of
+from syncrelay.bag.analysis.analysis import analyze_group, group_of
 from syncrelay.bag.analysis.changes import Change, patch, with_changes
-from syncrelay.bag.analysis.curves import queue_curve, slop_curve
+from syncrelay.bag.analysis.curves import curves_of
+from syncrelay.bag.analysis.evaluation import completed, evaluate
 from syncrelay.bag.analysis.nearest import pair, tightest
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.analysis.suggest import possible_sets, suggest
 from syncrelay.bag.analysis.topics import figures_of
-from syncrelay.bag.analysis.trial import looked_at, try_group, watch_group
+from syncrelay.bag.analysis.watching import judged_seconds, watch_group
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -112,34 +112,153 @@ def test_a_queue_must_hold_what_comes_until_the_set_can_leave():
     assert tightest([slow, fast], (0, 0)).queues.tolist() == [6]
 
 
-def test_curves_rise_and_end_where_everything_is_matched():
-    streams = _streams(_every(100 * MS, 200, jitter=10 * MS), _every(33 * MS, 600, jitter=MS, seed=2))
-    found = tightest(streams, (0, 0))
-    slops = slop_curve(found, marks=(5 * MS,))
-    assert 5 * MS in [slop for slop, _, _ in slops]
-    assert [share for _, share, _ in slops] == sorted(share for _, share, _ in slops)
-    assert slops[-1][1] == 1.0
-    for slop, share, span in slops:
-        assert share == np.mean(found.spans <= slop)
-        assert span <= slop
-    sizes = queue_curve(found, slops[-1][0])
-    assert sizes[-1][1] == 1.0
-    assert queue_curve(found, -1) == []
-
-
-@pytest.mark.parametrize(
-    ("policy", "successors"), [("approximate_time", 1), ("approximate_time_eager", 0)], ids=["waits", "eager"]
-)
-def test_the_curve_against_queue_size_is_what_the_engine_reaches(policy, successors):
-    streams = _streams(_every(100 * MS, 200, jitter=MS), _every(10 * MS, 2000, jitter=MS, seed=2), late=30 * MS)
-    found = tightest(streams, (0, 0), successors=successors)
+def _pair_of(policy="approximate_time", **keys):
     topics = inputs({"/a": VECTOR, "/b": VECTOR})
-    for size in (1, 3, 4, 10, 20):
-        group = {"policy": policy, "slop": "7ms", "queue_size": size, "topics": topics}
-        sets = len(try_group(group_of(config({"front": group}), "front"), streams).sets)
-        promised = 200 * found.share_held(size, 7 * MS)
-        # One that waits may find other sets in time: then there are more than are sure.
-        assert sets >= promised - 1 if successors else sets == promised
+    group = {"policy": policy, "slop": "10ms", "topics": topics, **keys}
+    return config({"front": {key: value for key, value in group.items() if value is not None}})
+
+
+def _analyzed(streams, text):
+    return analyze_group(group_of(text, "front"), tuple(streams), text)
+
+
+_POLICIES = ("approximate_time", "approximate_time_eager", "approximate_epsilon_time", "exact_time")
+
+
+@pytest.mark.parametrize("policy", _POLICIES)
+@settings(max_examples=15)
+@given(
+    keys=st.fixed_dictionaries(
+        {"slop": st.integers(0, 20), "queue_size": st.integers(1, 12), "every": st.integers(1, 3)}
+    ),
+    period=st.sampled_from([20, 50, 100]),
+    late=st.integers(0, 300),
+)
+def test_a_curve_at_the_value_in_use_is_the_count_beside_it(policy, keys, period, late):
+    streams = _streams(
+        _every(100 * MS, 20, jitter=3 * MS), _every(period * MS, 2000 // period, jitter=MS, seed=2), late=late * MS
+    )
+    slop = None if policy == "exact_time" else f"{keys['slop']}ms"
+    found = _analyzed(streams, _pair_of(policy, **{**keys, "slop": slop}))
+    count = completed(found.evaluation.counts, 0)
+    in_use = {point.value: point.sets for point in found.curves.by_queue_size}
+    assert in_use[keys["queue_size"]] == count
+    if slop is None:
+        assert found.curves.by_slop == ()
+    else:
+        in_use = {point.value: point.sets for point in found.curves.by_slop}
+        assert in_use[found.group.options.slop] == count
+    assert found.curves.is_of_all
+
+
+def test_each_point_of_a_curve_is_what_a_file_with_that_value_gives():
+    streams = _streams(_every(100 * MS, 200, jitter=MS), _every(10 * MS, 2000, jitter=MS, seed=2), late=30 * MS)
+    curves = _analyzed(streams, _pair_of(slop="7ms", queue_size=3)).curves
+    for point in curves.by_queue_size:
+        text = _pair_of(slop="7ms", queue_size=point.value)
+        assert len(evaluate(group_of(text, "front"), streams).sets) == point.sets
+    assert [point.value for point in curves.by_queue_size] == sorted({point.value for point in curves.by_queue_size})
+    for point in curves.by_slop:
+        sets = evaluate(group_of(_pair_of(slop=f"{point.value}ns", queue_size=3), "front"), streams).sets
+        assert len(sets) == point.sets
+        assert point.median_span == (sorted(each.span for each in sets)[(len(sets) - 1) // 2] if sets else 0)
+
+
+def test_of_a_long_recording_values_are_tried_on_its_begin_and_that_is_said():
+    streams = tuple(_streams(_every(100 * MS, 100), _every(100 * MS, 100)))
+    found = _analyzed(streams, _pair_of(queue_size=5))
+    curves = curves_of(found.group, found.suggested, streams, found.possible, most=50)
+    assert (curves.messages, curves.recorded, curves.is_of_all, curves.of) == (50, 200, False, 25)
+    assert curves.lasts == 24 * 100 * MS
+    first = _streams(_every(100 * MS, 25), _every(100 * MS, 25))
+    count = len(evaluate(found.group, first).sets)
+    assert {point.value: point.sets for point in curves.by_queue_size}[5] == count
+
+
+def test_a_gps_beside_fast_odometry_has_no_needless_loss_to_show():
+    # 20 Hz beside 1 Hz: 19 of 20 have no partner to miss.
+    streams = _streams(_every(_SECOND, 60, phase=24 * MS), _every(50 * MS, 1200, jitter=2 * MS), late=40 * MS)
+    found = _analyzed(streams, _pair_of(slop="30ms"))
+    gps, odometry = found.fates
+    assert len(found.evaluation.sets) == found.suggestion.possible == 60
+    assert found.evaluation.counts[1].dropped[DropReason.OVERFLOW] > 500
+    assert (odometry.matched, odometry.unneeded, odometry.dropped, odometry.lacking) == (60, 1140, {}, ("/a",))
+    assert (gps.matched, gps.unneeded, gps.dropped) == (60, 0, {})
+    assert {point.value: point.sets for point in found.curves.by_queue_size}[10] == 60
+    assert not [each for each in found.findings if each.finding.severity.name != "OK"]
+
+
+def test_drops_that_cost_a_set_are_told_from_those_that_do_not():
+    # The slow input's messages come 300 ms late: its partners have overflowed by then.
+    streams = _streams(_every(_SECOND, 30, jitter=MS), _every(5 * MS, 6_100), late=300 * MS)
+    found = _analyzed(streams, _pair_of("approximate_time_eager", slop="3ms"))
+    slow, fast = found.fates
+    assert found.suggestion.now < 2
+    assert slow.received - slow.matched - slow.unneeded == sum(slow.dropped.values()) > 27
+    assert 27 < sum(fast.dropped.values()) < 100 < fast.unneeded
+    assert fast.lacking == ("/a",)
+
+
+def test_what_slop_alone_keeps_apart_was_needed():
+    streams = _streams(_every(100 * MS, 50), _every(100 * MS, 50, phase=3 * MS))
+    for row in _analyzed(streams, _pair_of(slop="1ms")).fates:
+        assert (row.matched, row.unneeded, sum(row.dropped.values())) == (0, 0, 50)
+
+
+def test_faults_of_stamps_are_never_called_not_needed():
+    streams = _streams(_every(_SECOND, 20), _every(50 * MS, 400))
+    streams[1].stamps[5], streams[1].stamps[7], streams[1].stamps[9] = 0, UNREADABLE, streams[1].stamps[8]
+    _, fast = _analyzed(streams, _pair_of(slop="10ms")).fates
+    assert fast.dropped == {DropReason.UNSTAMPED: 1, DropReason.MALFORMED: 1, DropReason.DUPLICATE: 1}
+    assert fast.received == 400 == fast.matched + fast.unneeded + 3
+
+
+_FAULTS = {DropReason.MALFORMED, DropReason.UNSTAMPED, DropReason.DUPLICATE, DropReason.THINNED}
+
+
+def _costs_nothing(drop, found):
+    """Whether a drop cost no set, by its definition, one message after another."""
+    group, sets, drops = found.group, found.evaluation.sets, found.evaluation.drops
+    offsets = [topic.offset_ns for topic in group.topics]
+    if drop.reason in {*_FAULTS, DropReason.LATE, DropReason.TIME_JUMP}:
+        return False
+    for index, topic in enumerate(group.topics):
+        if not topic.required or index == drop.input:
+            continue
+        left = [each.stamp for each in drops if each.input == index and each.reason not in _FAULTS]
+        left += [each.stamps[index] for each in sets if each.stamps[drop.input] is None and each.stamps[index]]
+        at = drop.stamp + offsets[drop.input]
+        if all(abs(stamp + offsets[index] - at) > found.possible.widest for stamp in left):
+            return True
+    return False
+
+
+@settings(max_examples=60)
+@given(
+    topics=st.lists(st.lists(st.integers(1, 80), min_size=1, max_size=20, unique=True), min_size=3, max_size=3),
+    slop=st.integers(0, 15),
+    queue_size=st.integers(1, 4),
+    optional=st.booleans(),
+)
+def test_what_was_not_needed_is_as_defined(topics, slop, queue_size, optional):
+    streams = _streams(*([BEGIN + stamp for stamp in stamps] for stamps in topics), latency=5)
+    rows = inputs({"/a": VECTOR, "/b": VECTOR, "/c": VECTOR})
+    rows[1]["offset"] = "3ns"
+    if optional:
+        rows[2]["required"] = False
+    text = _pair_of(
+        "approximate_time_eager",
+        slop=f"{slop}ns",
+        queue_size=queue_size,
+        topics=rows,
+        max_wait="9ns" if optional else None,
+    )
+    found = _analyzed(streams, text)
+    assert found.possible is not None
+    expected = [bool(found.possible.spans) and _costs_nothing(drop, found) for drop in found.evaluation.drops]
+    assert found.unneeded.flags.tolist() == expected
+    for row, counts in zip(found.fates, found.evaluation.counts, strict=True):
+        assert row.received == row.matched + row.unneeded + sum(row.dropped.values()) == counts.fed
 
 
 def _suggested(streams, **keys):
@@ -147,8 +266,9 @@ def _suggested(streams, **keys):
     group = {"policy": "approximate_time", "slop": "10ms", "topics": topics, **keys}
     text = config({"front": {key: value for key, value in group.items() if value is not None}})
     group = group_of(text, "front")
-    trial = try_group(group, streams)
-    return suggest(group, streams, trial, lambda changes: group_of(with_changes(text, changes), "front"))
+    return suggest(
+        group, streams, evaluate(group, streams), lambda changes: group_of(with_changes(text, changes), "front")
+    )
 
 
 def _values(suggestion):
@@ -292,21 +412,19 @@ def test_one_message_of_1970_does_not_keep_the_others_from_being_judged():
 
 
 @given(st.one_of(st.integers(-(2**63), 200), st.integers(0, 2**63)))
-def test_few_seconds_of_a_pause_are_looked_at_and_they_stand_for_all(seconds):
-    looks = looked_at(seconds)
+def test_few_seconds_of_a_pause_are_judged_seconds_and_they_stand_for_all(seconds):
+    looks = judged_seconds(seconds)
     assert looks == sorted(set(looks))
     assert len(looks) <= 32 + 63
     assert looks[:16] == list(range(1, min(16, max(0, seconds)) + 1))
     assert looks[-16:] == list(range(max(1, seconds - 15), seconds + 1))
 
 
-def test_a_trial_loses_no_message():
+def test_an_evaluation_loses_no_message():
     streams = _streams(_every(100 * MS, 50, jitter=9 * MS), _every(30 * MS, 150, jitter=MS))
-    topics = inputs({"/a": VECTOR, "/b": VECTOR})
-    text = config({"front": {"policy": "approximate_time", "slop": "10ms", "topics": topics}})
-    trial = try_group(group_of(text, "front"), streams)
-    assert sum(each.fed for each in trial.counts) == 2 * len(trial.sets) + len(trial.drops) == 200
-    assert {drop.reason for drop in trial.drops} <= set(DropReason)
+    evaluation = evaluate(group_of(_pair_of(), "front"), streams)
+    assert sum(each.fed for each in evaluation.counts) == 2 * len(evaluation.sets) + len(evaluation.drops) == 200
+    assert {drop.reason for drop in evaluation.drops} <= set(DropReason)
 
 
 _FILE = """\

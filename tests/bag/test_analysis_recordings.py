@@ -68,8 +68,8 @@ def test_the_mtig_stamps_one_epoch_some_microseconds_apart_and_exact_time_matche
     for pair in group.pairs:
         assert pair.distance.least > 0
         assert pair.distance.median <= 14 * _US
-    assert group.tightest.share_within(0) == 0
-    assert group.tightest.share_within(30 * _US) == 1
+    assert group.possible.tightest.share_within(0) == 0
+    assert group.possible.tightest.share_within(30 * _US) == 1
     assert group.group.options.policy == "approximate_time"
     assert group.group.options.slop <= 30 * _US
     assert _topic(analysis, "/imu_data").delay.median == pytest.approx(81 * _MS, abs=_MS)
@@ -164,15 +164,15 @@ _EXACT = {"stereo": 778, "four cameras": 5178}
 def test_suggested_values_reach_99_percent_of_the_possible_sets(name, real_data: Path):
     bag, topics = _GROUPS[name]
     (group,) = _analyzed(real_data / bag, topics).groups
-    assert len(group.possible) > 9
-    assert len(group.trial.sets) >= 0.99 * len(group.possible)
+    assert len(group.possible.spans) > 9
+    assert len(group.evaluation.sets) >= 0.99 * len(group.possible.spans)
     if name in _EXACT:
-        assert (group.group.options.policy, len(group.trial.sets)) == ("exact_time", _EXACT[name])
+        assert (group.group.options.policy, len(group.evaluation.sets)) == ("exact_time", _EXACT[name])
 
 
 def test_suggested_values_reach_99_percent_of_what_boreas_and_tum_have(real_data: Path, boreas: Path, tmp_path):
     tum = write_mcap(tmp_path / "tum.mcap", recordings.tum_stamps(real_data))
     for bag, topics in ((tum, (recordings.RGB, recordings.DEPTH)), (boreas, ("/camera", "/lidar", "/radar"))):
         (group,) = _analyzed(bag, topics).groups
-        assert len(group.possible) > 650
-        assert len(group.trial.sets) >= 0.99 * len(group.possible)
+        assert len(group.possible.spans) > 650
+        assert len(group.evaluation.sets) >= 0.99 * len(group.possible.spans)

@@ -88,10 +88,10 @@ def test_every_topic_that_is_left_out_is_named_with_the_reason(tmp_path):
     assert sets["fused"] >= 49
     assert _left_out(bag) == {
         f"/a<script> ({VECTOR})": "a topic name may have only letters, digits, `_` and `/`, found `<` in `/a<script>`",
-        f"/diagnostics ({DIAGNOSTICS})": "nodes tell of themselves in it, no sensor of the world",
-        f"/rare ({VECTOR})": "3 messages, and 10 are the fewest that tell a rhythm",
-        f"/stuck ({VECTOR})": "50 messages, all of one stamp",
-        f"/text ({STRING})": "its type has no header, and so no stamp to match by",
+        f"/diagnostics ({DIAGNOSTICS})": "it carries diagnostics, not sensor data",
+        f"/rare ({VECTOR})": "3 messages, at least 10 are needed",
+        f"/stuck ({VECTOR})": "50 messages, all with the same stamp",
+        f"/text ({STRING})": "its type has no header, so no stamp to match by",
         f"/unset ({VECTOR})": "50 messages, 50 with stamp 0",
         f"/unset_once ({VECTOR})": "10 messages, 1 with stamp 0",
     }
@@ -122,7 +122,7 @@ def test_of_a_topic_of_two_types_the_one_with_more_messages_is_taken(tmp_path):
     write_mcap(second, _stereo_and_lidar())
     text, _ = _proposed(tmp_path)
     assert {topic.type for group in load_text(text).groups for topic in group.topics} == {VECTOR}
-    why = f"a group takes one type of a topic, and more messages of it are {VECTOR}"
+    why = f"recorded as several types; most messages are {VECTOR}"
     assert _left_out(tmp_path) == {f"/left ({POINT})": why}
 
 

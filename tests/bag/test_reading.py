@@ -240,9 +240,9 @@ def test_qos_and_definitions_are_those_that_were_recorded(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("notes.txt", b"hello", "is no recording, expected MCAP, a sqlite3 file of rosbag2 or a ROS 1 bag"),
+        ("notes.txt", b"hello", "is not a recording, expected MCAP, a sqlite3 file of rosbag2 or a ROS 1 bag"),
         ("empty.mcap", b"", "is empty"),
-        ("old.bag", b"#ROSBAG V1.2\n", "is a bag of another format than 2.0"),
+        ("old.bag", b"#ROSBAG V1.2\n", "is a bag of a format other than 2.0"),
         ("torn.mcap", b"\x89MCAP0\r\n\x01", "no message can be read: .*cut off or damaged at byte 8 of 9"),
         ("torn.bag", b"#ROSBAG V2.0\n\x45\0\0\0", "no message can be read: .*cut off or damaged at byte 13"),
         ("other.db3", b"SQLite format 3\0" + bytes(100), "cannot be read as a rosbag2 recording"),

@@ -19,6 +19,7 @@ def test_help_names_every_command_and_option_on_stdout(tmp_path):
         "demo",
     ):
         assert word in done.stdout
+    assert fits_a_screen(done.stdout, lines=36)
     assert run("help", folder=tmp_path).stdout == run("-h", folder=tmp_path).stdout == done.stdout
 
 
@@ -32,6 +33,9 @@ def test_help_names_every_command_and_option_on_stdout(tmp_path):
         ("replay", ["BAG", "--config", "--output", "--json", "--drops"]),
         ("demo", ["--seconds", "--seed", "--show-config", "--record"]),
         ("doctor", ["--config", "--live", "--seconds", "--json", "--ros-args"]),
+        ("top", ["--url", "--once", "--json"]),
+        ("reload", ["--url"]),
+        ("healthcheck", ["SYNCRELAY_HEARTBEAT"]),
     ],
 )
 def test_every_command_explains_itself(command, words, tmp_path):
@@ -39,6 +43,11 @@ def test_every_command_explains_itself(command, words, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"usage: syncrelay {command} ")
     assert all(word in done.stdout for word in words)
+    assert fits_a_screen(done.stdout, lines=24)
+
+
+def fits_a_screen(text, *, lines, columns=80):
+    return len(text.splitlines()) <= lines and all(len(line) <= columns for line in text.splitlines())
 
 
 def test_without_a_word_it_says_how_on_stderr(tmp_path):

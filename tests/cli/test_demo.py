@@ -63,10 +63,16 @@ def test_it_stays_on_this_machine_unless_a_network_was_chosen(environ, added):
     assert isolation(environ) == added
 
 
-def summary_rows(text):
-    """Group name -> (sets, possible, span and p95 in milliseconds) of a summary."""
-    rows = re.findall(r"^(\w+) +(\d+) +(\d+) +\d+% +([\d.]+) ms +([\d.]+) ms", text, re.MULTILINE)
-    return {name: (int(sets), int(possible), float(span), float(p95)) for name, sets, possible, span, p95 in rows}
+def summed_up(text):
+    """Group name -> (sets, p50 and p95 of the spans in milliseconds, counts of each input) of a summary."""
+    return {each.split(":")[0]: _of_group(" ".join(each.split())) for each in text.replace("\r", "").split("\n\n")[1:]}
+
+
+def _of_group(text):
+    sets = int(re.search(r"(\d+) sets?, last", text)[1])
+    span = [float(number) / {"us": 1000, "ms": 1}[unit] for number, unit in re.findall(r"p\d\d ([\d.]+) (\w+)", text)]
+    inputs = re.findall(r"(\d+) received, (\d+) in sets, (\d+) waiting, (\d+) dropped", text)
+    return sets, *span[:2], [tuple(map(int, counts)) for counts in inputs]
 
 
 def children(pid):
@@ -84,13 +90,16 @@ def running(pid):
 def test_it_matches_a_simulated_rig_and_sums_up(stage):
     demo = stage.start("demo", [*_DEMO, "--seconds", "10"])
     assert demo.wait() == 0, demo.stderr
-    rows = summary_rows(demo.stdout)
-    assert set(rows) == {"camera_lidar", "lidar_imu"}
-    for sets, possible, _, _ in rows.values():
-        assert 0 < sets <= possible
-    assert rows["camera_lidar"][2] < 3  # the offset is in use: without it, 12
-    assert re.search(r"Without it, the span of these sets would be 1[12](\.\d)? ms", " ".join(demo.stdout.split()))
-    assert rows["lidar_imu"][3] <= 8
+    groups = summed_up(demo.stdout)
+    assert set(groups) == {"camera_lidar", "lidar_imu"}
+    for sets, _, p95, inputs in groups.values():
+        assert p95 <= 10
+        for received, matched, waiting, dropped in inputs:
+            assert 0 < sets == matched
+            assert waiting == 0
+            assert received == matched + dropped
+    assert groups["camera_lidar"][1] < 3  # the offset is in use: without it, 12
+    assert re.search(r"offset: -12 ms on /demo/camera/image_raw: span .* 1[12](\.\d+)? ms without it", demo.stdout)
     assert len(re.findall(r"^ +\d+\.\d s  camera_lidar", demo.stdout, re.MULTILINE)) in range(1, 12)
     assert "\x1b" not in demo.stdout
     # Of what a busy machine makes of a rig, the relay may warn.
@@ -103,7 +112,7 @@ def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
     stage.before_each_sensor("import time; time.sleep(8)")
     demo = stage.start("demo", [*_DEMO, "--seconds", "4"])
     assert demo.wait() == 0, demo.stdout + demo.stderr
-    assert set(summary_rows(demo.stdout)) == {"camera_lidar", "lidar_imu"}
+    assert set(summed_up(demo.stdout)) == {"camera_lidar", "lidar_imu"}
     assert "nobody publishes" not in demo.stderr
 
 
@@ -124,25 +133,27 @@ def test_it_can_be_stopped_before_the_sensors_publish(stage):
 def test_it_fails_if_no_set_came(stage):
     never = "itertools.repeat(schedule.Shot(0, 0, 1 << 62))"
     stage.before_each_sensor(
-        f"import itertools; from syncrelay.ros.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
+        f"import itertools; from syncrelay.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
     )
     demo = stage.start("demo", [*_DEMO, "--seconds", "1"])
     assert demo.wait() == 1
-    assert re.search(r"^camera_lidar +0 +0 ", demo.stdout, re.MULTILINE)
+    assert re.search(r"^camera_lidar: .*no set yet", demo.stdout, re.MULTILINE)
 
 
 @pytest.mark.ros
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_with_the_summary_and_leaves_nothing(stage, number):
     demo = stage.start("demo", [*_DEMO, "--seed", "7"])
-    demo.wait_until(lambda: re.search(r"camera_lidar .* span .* lidar_imu .* span", demo.stdout), "sets of both groups")
+    demo.wait_until(
+        lambda: re.search(r"camera_lidar: .* span .* lidar_imu: .* span", demo.stdout), "sets of both groups"
+    )
     sensors = children(demo.pid)
     assert len(sensors) == 3
     assert all(b"--seed=7" in Path(f"/proc/{pid}/cmdline").read_bytes() for pid in sensors)
     stage.note_shared_memory()
     demo.send(number)
     assert demo.wait() == 0, demo.stderr
-    assert set(summary_rows(demo.stdout)) == {"camera_lidar", "lidar_imu"}
+    assert set(summed_up(demo.stdout)) == {"camera_lidar", "lidar_imu"}
     assert not any(map(running, sensors))
     assert stage.left_in_shared_memory() == set()
 
@@ -164,7 +175,7 @@ def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
     assert re.search(r"camera -12 ms.*A", drawn)
     assert "each letter is a set" in drawn
     assert "38;5" not in screen  # the stage sets NO_COLOR
-    assert set(summary_rows(re.sub(r"\x1b\[[\d;]*m", "", after).replace("\r", ""))) == {"camera_lidar", "lidar_imu"}
+    assert set(summed_up(after)) == {"camera_lidar", "lidar_imu"}
 
 
 @pytest.mark.ros
@@ -172,7 +183,7 @@ def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
 def test_a_terminal_that_cannot_draw_gets_plain_lines(stage, setting):
     screen = on_terminal(stage, [*_DEMO, "--seconds", "5"], columns=80, lines=24, **setting)
     assert "\x1b[?1049h" not in screen
-    assert "s  camera_lidar " in screen
+    assert "s  camera_lidar: " in screen
 
 
 def on_terminal(stage, argv, *, columns, lines, **environ):

@@ -4,12 +4,12 @@ import pytest
 
 from syncrelay.cli.boundary import AT_FAULT, DONE
 from syncrelay.cli.explain import conclude
-from syncrelay.explain import GroupReport, problems
+from syncrelay.explain import GroupReport, judge
 from tests.explain.support.groups import NOW, S, a_group, an_input
 
 
 def _report(facts) -> GroupReport:
-    return GroupReport(facts, tuple(problems(facts)))
+    return GroupReport(facts, judge(facts))
 
 
 def test_where_all_groups_are_healthy_the_code_is_0_and_nothing_decided_it(capsys: pytest.CaptureFixture[str]):
@@ -31,7 +31,7 @@ def test_a_look_that_is_too_short_says_what_decided(capsys: pytest.CaptureFixtur
 def test_findings_of_a_group_decide_and_are_counted(capsys: pytest.CaptureFixture[str]):
     lonely = _report(a_group(an_input(publishers=()), an_input("/lidar", publishers=())))
     assert conclude([_report(a_group()), lonely], 10) == AT_FAULT
-    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: front has 2 warnings"
+    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: front has 1 warning"
 
 
 def test_a_group_of_which_there_is_no_report_is_not_healthy(capsys: pytest.CaptureFixture[str]):

@@ -22,13 +22,13 @@ def test_a_relay_that_has_just_beaten_ails_nothing(tmp_path):
 
 def test_a_relay_that_has_not_begun_is_no_healthy_one(tmp_path):
     with Heartbeat(tmp_path / "beat"):
-        assert ailment(tmp_path / "beat") == "the relay has not begun to receive yet"
+        assert ailment(tmp_path / "beat") == "the relay is not receiving yet"
 
 
 def test_what_an_earlier_run_left_does_not_speak_for_this_one(tmp_path):
     (tmp_path / "beat").write_text(f"{time.monotonic_ns():020d}\n")
     with Heartbeat(tmp_path / "beat"):
-        assert ailment(tmp_path / "beat") == "the relay has not begun to receive yet"
+        assert ailment(tmp_path / "beat") == "the relay is not receiving yet"
 
 
 def test_a_loop_that_stopped_turning_is_told_with_its_age(tmp_path):
@@ -38,7 +38,7 @@ def test_a_loop_that_stopped_turning_is_told_with_its_age(tmp_path):
 
 def test_a_beat_from_before_the_machine_started_is_not_believed(tmp_path):
     (tmp_path / "beat").write_text(f"{time.monotonic_ns() + 3600 * _SECOND_NS:020d}\n")
-    assert ailment(tmp_path / "beat") == "the heartbeat is of an earlier run"
+    assert ailment(tmp_path / "beat") == "the heartbeat is from an earlier run"
 
 
 def test_nothing_is_left_after_the_end(tmp_path):
@@ -82,4 +82,4 @@ def test_the_command_and_the_bare_probe_say_the_same(tmp_path, command):
     code, said = probe(**{VARIABLE: str(tmp_path / "old")})
     assert code == 1
     assert said.startswith("the receive loop last turned 36")
-    assert probe(**{VARIABLE: ""}) == (1, f"{VARIABLE} does not name the heartbeat's file")
+    assert probe(**{VARIABLE: ""}) == (1, f"{VARIABLE} is not set: it names the heartbeat's file")

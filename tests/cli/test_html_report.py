@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.cli.analysis_html import as_html
-from syncrelay.cli.analysis_html.fates import CODES, FATES, MATCHED
+from syncrelay.cli.analysis_html.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.cli.analysis_html.lanes import Lanes, lanes_of
 from syncrelay.cli.analysis_html.packing import pack
 from syncrelay.sync import DropReason
@@ -48,16 +48,18 @@ def test_what_is_packed_comes_out_again(values, step):
 
 
 def test_every_reason_has_a_shape_of_its_own():
-    assert set(CODES) == {MATCHED, *(reason.value for reason in DropReason)}
+    assert set(CODES) == {MATCHED, UNNEEDED, *(reason.value for reason in DropReason)}
     assert len({(fate.path, fate.is_filled) for fate in FATES}) == len(FATES)
 
 
 def test_every_message_stands_in_its_lane_with_its_fate(analysis):
     counts = _counts(_lanes(analysis))
-    for each, of_input in zip(analysis.groups[0].trial.counts, counts, strict=True):
+    for each, of_input in zip(analysis.groups[0].fates, counts, strict=True):
         expected = {reason.value: count for reason, count in each.dropped.items()}
-        assert of_input == {MATCHED: each.matched, **expected}
-        assert sum(of_input.values()) == each.fed
+        of_input.setdefault(UNNEEDED, 0)
+        assert of_input == {MATCHED: each.matched, UNNEEDED: each.unneeded, **expected}
+        assert sum(of_input.values()) == each.received
+    assert counts[2][UNNEEDED] > 1000
 
 
 def test_a_line_joins_the_messages_of_a_set(analysis):
@@ -67,12 +69,12 @@ def test_a_line_joins_the_messages_of_a_set(analysis):
     assert (np.max(times, axis=1) - np.min(times, axis=1)).tolist() == lanes.spans.tolist()
     for lane, places in zip(lanes.lanes, lanes.members.T, strict=True):
         assert set(lane.fates[places].tolist()) == {CODES[MATCHED]}
-    assert len(lanes.spans) == len(analysis.groups[0].trial.sets)
+    assert len(lanes.spans) == len(analysis.groups[0].evaluation.sets)
 
 
 def test_a_message_that_serves_many_sets_stands_in_its_lane_once(tmp_path):
     analysis = analyzed(tmp_path, drive(seconds=10), policy="latest_time", trigger="/imu", slop=None)
-    lanes, counts = _lanes(analysis), analysis.groups[0].trial.counts
+    lanes, counts = _lanes(analysis), analysis.groups[0].evaluation.counts
     assert [each[MATCHED] for each in _counts(lanes)] == [each.matched for each in counts]
     assert len(lanes.members) > 4 * counts[0].matched
 
@@ -97,7 +99,7 @@ def test_unset_stamps_stand_where_they_were_received(tmp_path):
     assert lanes.astray == sum(1 for frame in frames if frame.payload == vector(0))
     assert lanes.lanes[2].times[0] >= -_SECOND
     assert lanes.lanes[2].times[-1] <= analysis.end - analysis.begin + _SECOND
-    assert "stand where they were received" in as_html("rig", analysis)
+    assert "drawn at the time of receipt" in as_html("rig", analysis)
 
 
 def test_the_passes_of_a_recording_that_began_again_stand_side_by_side(tmp_path):
@@ -108,7 +110,7 @@ def test_the_passes_of_a_recording_that_began_again_stand_side_by_side(tmp_path)
     first_pass = int(np.count_nonzero(lanes.begins < 10.5 * _SECOND))
     assert first_pass == pytest.approx(len(lanes.begins) / 2, abs=5)
     assert lanes.begins[-1] > 20 * _SECOND
-    assert _counts(lanes)[0][MATCHED] == analysis.groups[0].trial.counts[0].matched
+    assert _counts(lanes)[0][MATCHED] == analysis.groups[0].evaluation.counts[0].matched
 
 
 def test_what_is_too_much_is_thinned_by_whole_stretches(tmp_path):
@@ -128,7 +130,7 @@ def test_the_page_says_what_was_thinned_and_its_tables_are_of_all(analysis, monk
     monkeypatch.setattr("syncrelay.cli.analysis_html.document._MOST_MESSAGES", 500)
     thinned = as_html("rig", analysis)
     assert "more messages than the page can hold" not in whole
-    assert "of every 5 stretches of 10 s one is drawn" in thinned
+    assert "one of every 5 stretches of 10 s is drawn" in thinned
     tables = [re.findall(r"<table.*?</table>", page, re.DOTALL) for page in (whole, thinned)]
     assert tables[0] == tables[1]
 

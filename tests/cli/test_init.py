@@ -34,8 +34,8 @@ def test_what_it_leaves_out_is_named_with_the_reason(folder):
     done = run("init", "--from-bag", "more.mcap", folder=folder)
     assert done.returncode == 0
     assert done.stderr.splitlines() == [
-        f"syncrelay: left out: /rare ({VECTOR}): 1 message, and 10 are the fewest that tell a rhythm",
-        f"syncrelay: left out: /text ({STRING}): its type has no header, and so no stamp to match by",
+        f"syncrelay: left out: /rare ({VECTOR}): 1 message, at least 10 are needed",
+        f"syncrelay: left out: /text ({STRING}): its type has no header, so no stamp to match by",
     ]
 
 

@@ -21,7 +21,7 @@ def test_where_nobody_answers_it_names_whom_it_asked(tmp_path):
     assert asked.stderr.splitlines() == [
         f"syncrelay: no relay answers at {url}",
         f"  {url}: nothing listens there",
-        "  Where the relay's file says `metrics: null`, send SIGHUP to its process",
+        "  If the relay's file says `metrics: null`, send SIGHUP to its process",
     ]
 
 
@@ -59,6 +59,4 @@ def test_what_is_no_relay_here_gets_no_signal(tmp_path, told):
         server.body = json.dumps(state).encode()
         asked = run("reload", "--url", server.url, folder=tmp_path)
     assert (asked.returncode, asked.stdout) == (1, "")
-    assert asked.stderr.startswith(
-        f"syncrelay: process {told.get('pid', 0)} is not the relay here; it runs in a container"
-    )
+    assert asked.stderr.startswith(f"syncrelay: process {told.get('pid', 0)} is not the relay: it runs in a container")

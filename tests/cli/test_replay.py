@@ -99,7 +99,7 @@ def test_that_ros1_is_written_as_ros2_is_said(folder):
     write_ros1(folder / "rig.bag", rig())
     done = run("replay", "rig.bag", "--config", "f.yaml", "-o", "out.mcap", folder=folder)
     assert (done.returncode, done.stdout) == (0, _SUMMARY)
-    assert "the recording is of ROS 1, what is written is CDR" in done.stderr
+    assert "this is a ROS 1 recording: its messages are written as ROS 2 CDR" in done.stderr
 
 
 def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
@@ -117,7 +117,7 @@ def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
     [
         (["none.mcap", "--config", "f.yaml"], 1, "syncrelay: none.mcap: no such file or folder"),
         (["x" * 300, "--config", "f.yaml"], 1, f"syncrelay: {'x' * 300}: cannot be read: File name too long"),
-        (["f.yaml", "--config", "f.yaml"], 1, "syncrelay: f.yaml: is no recording"),
+        (["f.yaml", "--config", "f.yaml"], 1, "syncrelay: f.yaml: is not a recording"),
         (["rig.mcap", "--config", "g.yaml"], 1, "g.yaml: no such file"),
         (["rig.mcap"], 2, "syncrelay: the following arguments are required: --config"),
         (["--config", "f.yaml"], 2, "syncrelay: the following arguments are required: BAG"),

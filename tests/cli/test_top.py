@@ -32,8 +32,8 @@ def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
     assert "front: OK, 10 of 10 possible sets a second, 300 sets, last just now" in lines
     assert "  latency: p50 2.56 ms, p95 9.01 ms, max 11.3 ms" in lines
     assert "  ERROR: stamps of /rear/image_raw are 37.2 s behind those of /lidar/points" in lines
-    assert "    so: synchronize the clocks of their machines, or write `offset: 37.156s` at" in lines
-    assert "  /radar/points: nobody publishes it" in lines
+    assert "    fix: synchronize the clocks of their machines, or write `offset: 37.156s` at" in lines
+    assert "  /radar/points: no publisher" in lines
     assert "    900 received, 300 in sets, 2 waiting, 598 dropped (598 too_far)" in lines
     assert max(map(len, lines)) <= 80
     assert shown.stdout.isascii()
@@ -79,7 +79,7 @@ def test_without_a_terminal_it_points_to_text(tmp_path):
         shown = run("top", "--url", server.url, folder=tmp_path)
     assert (shown.returncode, shown.stdout) == (1, "")
     assert shown.stderr == (
-        "syncrelay: top draws on a terminal, and here is none\n  `syncrelay top --once` prints text\n"
+        "syncrelay: top needs a terminal, and there is none here\n  `syncrelay top --once` prints text\n"
     )
 
 
@@ -87,7 +87,7 @@ def test_without_a_terminal_it_points_to_text(tmp_path):
 def test_a_terminal_that_cannot_draw_gets_a_sentence(tmp_path, setting):
     with serving(states.healthy()) as server, on_terminal(server.url, tmp_path, **setting) as top:
         assert top.wait_for_end() == 1
-    assert "this terminal cannot be drawn on: see TERM and LANG" in top.written
+    assert "top cannot draw on this terminal: check TERM and LANG" in top.written
     assert "\x1b[?1049h" not in top.written
 
 

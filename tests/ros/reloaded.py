@@ -28,12 +28,15 @@ class ReloadedFile:
     def reload(self, **groups: Any) -> None:
         """Write the file, have it read, and wait until it is taken."""
         self.write(config(groups, metrics=ANY_PORT))
-        before = self.count("reloads")
+        taken, refused = self.count("reloads"), self.count("refused_reloads")
         self.relay.send(signal.SIGHUP)
-        wait_until(lambda: self.count("reloads") == before + 1, "the file to be read")
+        wait_until(
+            lambda: self.count("reloads") + self.count("refused_reloads") > taken + refused, "the file to be read"
+        )
+        assert self.count("reloads") == taken + 1, status(self.relay)["relay"]["reload_error"]
 
     def refuse(self, text: str) -> str:
-        """Write a file that is to be left aside; why it was."""
+        """Write a file that is to be refused; why it was."""
         self.write(text)
         before = self.count("refused_reloads")
         self.relay.send(signal.SIGHUP)

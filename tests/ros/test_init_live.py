@@ -34,7 +34,7 @@ def _init(stage: Stage, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
 
 
-@pytest.mark.parametrize("receive_path", ["direct", "rclpy"])
+@pytest.mark.parametrize("backend", ["direct", "rclpy"])
 def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     reliable = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
     lossy = stage.player({"/imu": VECTOR, "/log": STRING}, reliability="best_effort")
@@ -44,7 +44,7 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     written = stage.folder / "new.yaml"
     done = _init(stage, *_LISTEN, "-o", str(written))
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
-    left_out = f"syncrelay: left out: /log ({STRING}): its type has no header, and so no stamp to match by\n"
+    left_out = f"syncrelay: left out: /log ({STRING}): its type has no header, so no stamp to match by\n"
     assert done.stderr == f"{left_out}syncrelay: {written} is written\n"
 
     (group,) = load(str(written)).groups
@@ -62,7 +62,7 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
 
     again = _init(stage, *_LISTEN, "-o", str(stage.folder / "again.yaml"))
     outputs = ", ".join(sorted(topic.output for topic in group.topics))
-    assert f"left out, as outputs of a relay that runs: {outputs}\n" in again.stderr
+    assert f"left out: published by a running relay: {outputs}\n" in again.stderr
     (group,) = load(str(stage.folder / "again.yaml")).groups
     assert {topic.topic for topic in group.topics} == {"/camera", "/lidar", "/imu"}
 
@@ -80,7 +80,7 @@ def test_topics_without_stamps_are_named_with_the_reason(stage: Stage):
     player.start(merged(words, _now("/unset", period_ms=50, is_stamped=False)), speed=1)
     done = _init(stage, *_LISTEN)
     assert (done.returncode, done.stdout) == (1, "")
-    assert f"/text ({STRING}): its type has no header, and so no stamp to match by" in done.stderr
+    assert f"/text ({STRING}): its type has no header, so no stamp to match by" in done.stderr
     (unset,) = (line for line in done.stderr.splitlines() if "/unset" in line)
     assert unset.endswith(" with stamp 0")
     assert int(unset.split("messages, ")[1].split()[0]) > 0

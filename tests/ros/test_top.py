@@ -56,7 +56,7 @@ def test_its_groups_are_printed_once(stage: Stage, relay):
 
 def test_a_relay_is_found_wherever_it_listens_and_its_log_says_how_to_ask_it(stage: Stage):
     relay = stage.relay(config(GROUPS, metrics=ANY_PORT))
-    relay.wait_for_log(f"`syncrelay top --url {address(relay)}` shows them")
+    relay.wait_for_log(f"watch with `syncrelay top --url {address(relay)}`")
 
     def is_found() -> bool:
         # Others may run on this machine: then it is among those to choose from.

@@ -37,19 +37,19 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
             may_turn.wait(DEADLINE_S)
 
     player = stage.player(_FRONT | _REAR)
-    with Relay(load_text(_FILE), beat=turn) as relay:
+    with Relay(load_text(_FILE), on_turn=turn) as relay:
 
         def sets_of(*counts: int) -> bool:
             relay.step(0)
-            return [group.sets for group in relay.snapshot().groups] == list(counts)
+            return [report.facts.figures.sets for report in relay.evaluate()] == list(counts)
 
         def told() -> dict[str, bool]:
             return {
                 report.facts.name: any(finding.code is Code.TOO_SLOW for finding in report.findings)
-                for report in relay.look()
+                for report in relay.evaluate()
             }
 
-        wait_until(lambda: relay.step(0) or all(each.subscribed for each in _inputs(relay)), "the subscriptions")
+        wait_until(lambda: relay.step(0) or all(map(relay.node.count_subscribers, _FRONT | _REAR)), "the subscriptions")
         player.match()
         player.play(merged(at("/a", 0), at("/b", 0), at("/c", 0), at("/d", 0)))
         wait_until(lambda: sets_of(1, 1), "a set of both groups")
@@ -64,7 +64,3 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
         may_turn.set()
         wait_until(lambda: sets_of(2, 1), "the set that waited")
         assert told() == {"front": True, "rear": False}
-
-
-def _inputs(relay):
-    return [each for group in relay.snapshot().groups for each in group.inputs]

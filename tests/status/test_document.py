@@ -55,6 +55,7 @@ def test_what_is_said_of_a_group():
         "possible_hz": 10.0,
         "since_last_set_ms": 0.0,
         "span_ms": {"p50": 5.0, "p95": 5.0, "max": 5.0},
+        "span_without_offsets_ms": None,
         "latency_ms": {"p50": 2.0, "p95": 2.0, "max": 2.0},
         "nearest_ms": {"p50": 5.0, "p95": 5.0, "max": 5.0},
         "last_sets": [{"span_ms": 5.0, "latency_ms": 2.0}] * 30,

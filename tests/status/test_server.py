@@ -181,8 +181,8 @@ def test_a_port_that_is_taken_is_an_error_that_names_it_and_what_to_do():
         with pytest.raises(ListenError) as caught:
             Server(Listen("127.0.0.1", range(port, port + 1)))
     assert str(caught.value) == (
-        f"cannot listen on 127.0.0.1:{port}: another process does; give `metrics` another `listen`, or write"
-        " `metrics: null` to go without"
+        f"cannot listen on 127.0.0.1:{port}: another process uses it; set another `listen` in `metrics`, or write"
+        " `metrics: null` to run without"
     )
 
 

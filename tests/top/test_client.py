@@ -77,16 +77,16 @@ def test_who_accepts_and_never_answers_is_given_up():
 
 
 def test_an_unknown_machine_is_said():
-    with pytest.raises(NoAnswerError, match="no machine of that name is known"):
+    with pytest.raises(NoAnswerError, match="no machine of that name was found"):
         ask("http://robot.invalid:9464")
 
 
 @pytest.mark.parametrize(
     ("body", "text"),
     [
-        (b"# HELP go_threads", "is no relay, or one of another version"),
+        (b"# HELP go_threads", "is not a relay, or runs another version"),
         (b'{"relay": {}, "groups": []}', "relay.node: Field required"),
-        (b"", "is no relay"),
+        (b"", "is not a relay"),
     ],
 )
 def test_somebody_else_is_not_taken_for_a_relay(body, text):

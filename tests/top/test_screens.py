@@ -59,6 +59,7 @@ def test_a_selected_group_says_what_is_wrong_and_what_to_do(keys):
     assert lines[6].startswith("── rear:")
     assert lines[7] == "ERROR    stamps of /rear/image_raw are 37.2 s behind those of /lidar/points"
     assert lines[8].startswith("       → synchronize the clocks of their machines, or write `offset: 37.156s`")
+    assert lines[11].startswith("/rear/image_raw 30 Hz     37.2 s    2.83 ms   other clock; 300 too_far")
 
 
 def test_a_wide_terminal_shows_spans_latencies_the_sentence_and_recent_sets():
@@ -145,7 +146,7 @@ def test_the_screen_follows_the_relay():
             async with terminal(server) as user:
                 server.show(states.silent())
                 await user.sees("/lidar/points has been silent for 18 s; until then it came at 10 Hz")
-                assert "→ look at /lidar_driver, which publishes it, or died" in user.text
+                assert "→ check /lidar_driver, which publishes it, or died" in user.text
 
     asyncio.run(look())
 
@@ -155,7 +156,7 @@ def test_a_held_picture_stays_and_then_shows_what_came_meanwhile():
         with serving(states.healthy()) as server:
             async with terminal(server) as user:
                 await user.press("space")
-                assert " PAUSED: space goes on" in user.lines
+                assert " PAUSED: press space to resume" in user.lines
                 asked = server.asked
                 server.show(states.silent())
                 while server.asked < asked + 2:
@@ -245,7 +246,7 @@ def test_sixteen_inputs_are_told_apart_by_what_differs_in_their_names():
 
 
 def test_what_has_no_room_is_counted():
-    assert "… 4 more lines: enter" in at_terminal(states.sixteen_inputs())
+    assert "… 4 more lines: press enter" in at_terminal(states.sixteen_inputs())
 
 
 def test_a_bug_ends_it_and_is_handed_on():

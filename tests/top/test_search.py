@@ -117,7 +117,7 @@ def test_names_without_number_are_not_all_asked():
     ids=["slow letters", "goes on slowly", "slow body", "goes on"],
 )
 def test_who_does_not_come_to_an_end_is_given_up(speech):
-    with speaking(speech) as url, pytest.raises(NoAnswerError, match=r"^no whole answer within 0\.3 s$"):
+    with speaking(speech) as url, pytest.raises(NoAnswerError, match=r"^no complete answer within 0\.3 s$"):
         ask(url, whole_s=0.3)
 
 

@@ -4,12 +4,21 @@
 
 import pytest
 
+from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.sync.messages import DropReason
 from syncrelay.top.strip import MARKS, Lanes, Sweep, Window, drop_style, newest_stamp, strip, window_of
-from tests.cli.demo_states import MS, a_drop, a_set
 
+MS = 1_000_000
 # A column is 20 ms.
 _HEAD = 340 * MS
+
+
+def a_set(*stamps_ms):
+    return RecentSet(tuple(None if stamp is None else round(stamp * MS) for stamp in stamps_ms))
+
+
+def a_drop(lane, stamp_ms, reason=DropReason.SUPERSEDED):
+    return RecentDrop(lane, round(stamp_ms * MS), reason)
 
 
 def lanes_of(recent, *, fed=(10, 10), sets=None):

@@ -8,11 +8,14 @@ from itertools import combinations
 import yaml
 
 from syncrelay.bag.analysis.changes import Change, with_changes
-from syncrelay.bag.analysis.nearest import Pair, Tightest, pair
+from syncrelay.bag.analysis.curves import Curves, curves_of
+from syncrelay.bag.analysis.evaluation import Evaluation, evaluate
+from syncrelay.bag.analysis.nearest import Pair, PossibleSets, pair
 from syncrelay.bag.analysis.streams import Stream, read_streams
 from syncrelay.bag.analysis.suggest import Suggestion, possible_sets, stamped, suggest
 from syncrelay.bag.analysis.topics import TopicFigures, figures_of
-from syncrelay.bag.analysis.trial import LastingFinding, Trial, try_group, watch_group
+from syncrelay.bag.analysis.unneeded import InputFates, Unneeded, find_unneeded, input_fates
+from syncrelay.bag.analysis.watching import LastingFinding, watch_group
 from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.recording import Channel, Recording
 from syncrelay.bag.wiring import Wiring
@@ -22,28 +25,41 @@ from syncrelay.config import GroupConfig, load_text
 # No slots: what takes long is found when it is first asked for, and kept.
 @dataclass(frozen=True)
 class GroupAnalysis:
-    """One group. `tightest` is None where an input has no stamps; `possible` are the spans of sets there could be."""
+    """One group, and the group with the suggested values.
+
+    `possible` is None where no measure tells which messages belong together, or a required input has no stamps.
+    """
 
     group: GroupConfig
+    suggested: GroupConfig
     streams: tuple[Stream, ...]
     pairs: tuple[Pair, ...]
-    tightest: Tightest | None
-    possible: tuple[int, ...]
-    trial: Trial
+    possible: PossibleSets | None
+    evaluation: Evaluation
     suggestion: Suggestion
 
     @cached_property
     def findings(self) -> tuple[LastingFinding, ...]:
-        """What the running relay would have found, the worst first: it looks once a second of the recording."""
+        """What the running relay would have found, the worst first: it judges once a second of the recording."""
         return watch_group(self.group, self.streams)
 
+    @cached_property
+    def unneeded(self) -> Unneeded:
+        """Which dropped messages cost no set."""
+        reach = self.possible.widest if self.possible is not None and self.possible.spans else None
+        return find_unneeded(self.group, self.evaluation, reach)
+
     @property
-    def slop(self) -> int:
-        """The slop of the file if it matches anything, else the one that would match all that belongs together."""
-        tolerance = self.group.options.tolerance
-        if tolerance is not None and self.tightest is not None and self.tightest.share_within(tolerance.ns):
-            return tolerance.ns
-        return self.possible[-1] if self.possible else 0
+    def fates(self) -> tuple[InputFates, ...]:
+        """Where the messages of each input went."""
+        return input_fates(self.group, self.evaluation, self.unneeded)
+
+    @cached_property
+    def curves(self) -> Curves | None:
+        """What other values would give; None where possible sets are not known."""
+        if self.possible is None:
+            return None
+        return curves_of(self.group, self.suggested, self.streams, self.possible)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,19 +120,23 @@ def group_of(text: str, name: str) -> GroupConfig:
 
 def analyze_group(group: GroupConfig, streams: tuple[Stream, ...], text: str) -> GroupAnalysis:
     """Return what a group of a file's text makes of the streams of its inputs."""
-    trial = try_group(group, streams)
-    possible = possible_sets(group, streams)
+    evaluation = evaluate(group, streams)
     offsets = [topic.offset_ns for topic in group.topics]
     pairs = [
         pair(streams[first], streams[second], (offsets[first], offsets[second]))
         for first, second in combinations(range(len(streams)), 2)
     ]
+
+    def changed(changes: Sequence[Change]) -> GroupConfig:
+        return group_of(with_changes(text, changes), group.name) if changes else group
+
+    suggestion = suggest(group, streams, evaluation, changed)
     return GroupAnalysis(
         group=group,
+        suggested=changed(suggestion.changes),
         streams=streams,
         pairs=tuple(each for each in pairs if each is not None),
-        tightest=None if possible is None else possible.tightest,
-        possible=() if possible is None else possible.spans,
-        trial=trial,
-        suggestion=suggest(group, streams, trial, lambda changes: group_of(with_changes(text, changes), group.name)),
+        possible=possible_sets(group, streams),
+        evaluation=evaluation,
+        suggestion=suggestion,
     )

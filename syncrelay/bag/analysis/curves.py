@@ -1,37 +1,112 @@
-"""Match rate and span against slop, and match rate against queue size: both read off the tightest sets."""
+"""How many sets a group would give with other values: the engine is run with each of them, nothing is estimated."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Final
 
 import numpy as np
 
-from syncrelay.bag.analysis.nearest import Tightest
+from syncrelay.bag.analysis.evaluation import completed
+from syncrelay.bag.analysis.nearest import PossibleSets
+from syncrelay.bag.analysis.streams import Stream, arrivals
+from syncrelay.config import GroupConfig
+from syncrelay.explain import Arrival, dry_run
 
-_SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
+MOST_MESSAGES: Final = 50_000
+"""Of a longer recording, these first ones are used: up to 20 runs of the engine then take some seconds."""
+LARGEST_QUEUE: Final = 1000
+"""Longer queues are neither tried nor suggested."""
+
+_SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+# Beyond the widest possible set more slop may still help: a queue may hold the second best partner only.
+_WIDER: Final = (1.1, 1.5, 2)
+_SIZES: Final = (1, 2, 5, 10, 20, 50, 100, 200, 500, LARGEST_QUEUE)
 
 
-def slop_curve(
-    found: Tightest, *, marks: Sequence[int] = (), shares: Sequence[float] = _SHARES
-) -> list[tuple[int, float, int]]:
-    """Return slops in nanoseconds, the share of the slowest input's messages that each matches, and the median span.
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A value, nanoseconds or messages, how many sets come together with it, and their median span."""
 
-    A slop for each of `shares`, where it is reached first, and those of `marks`.
+    value: int
+    sets: int
+    median_span: int
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """What other values of slop and queue_size would give; no points where there is nothing to compare.
+
+    They are of the first `messages` of the `recorded` ones of the group's inputs, received within `lasts` nanoseconds;
+    `of` counts those of the slowest input, of which each can be in one set.
     """
-    slops = {int(each) for each in np.quantile(found.spans, shares, method="inverted_cdf")} | set(marks)
-    return [(slop, found.share_within(slop), _median_span(found, slop)) for slop in sorted(slops)]
+
+    by_slop: tuple[Point, ...]
+    by_queue_size: tuple[Point, ...]
+    messages: int
+    recorded: int
+    lasts: int
+    of: int
+
+    @property
+    def is_of_all(self) -> bool:
+        """Whether all messages were used."""
+        return self.messages == self.recorded
 
 
-def queue_curve(
-    found: Tightest, slop: int, *, marks: Sequence[int] = (), shares: Sequence[float] = _SHARES
-) -> list[tuple[int, float]]:
-    """Return queue sizes and the share of the slowest input's messages whose sets within a slop each holds."""
-    within = found.queues[found.spans <= slop]
-    if not len(within):
-        return []
-    sizes = {int(each) for each in np.quantile(within, shares, method="inverted_cdf")} | set(marks)
-    return [(size, found.share_held(size, slop)) for size in sorted(sizes)]
+def curves_of(
+    group: GroupConfig,
+    suggested: GroupConfig,
+    streams: Sequence[Stream],
+    possible: PossibleSets,
+    *,
+    most: int = MOST_MESSAGES,
+) -> Curves:
+    """Return what a group gives with other values, with its own and with the suggested ones among them."""
+    used = list(islice(arrivals(streams), most))
+    pivot, slop = possible.tightest.pivot, slop_key(group)
+
+    def points(option: str, values: set[int]) -> tuple[Point, ...]:
+        values |= {getattr(each.options, option) for each in (group, suggested) if hasattr(each.options, option)}
+        if len(values) == 1:
+            return ()
+        return tuple(_point(group, option, value, used, pivot) for value in sorted(values))
+
+    return Curves(
+        by_slop=() if slop is None else points(slop, _slops(possible)),
+        by_queue_size=points("queue_size", _sizes(group, suggested, possible)),
+        messages=len(used),
+        recorded=sum(len(stream.places) for stream in streams),
+        lasts=used[-1].received - used[0].received if used else 0,
+        of=sum(arrival.input == pivot for arrival in used),
+    )
 
 
-def _median_span(found: Tightest, slop: int) -> int:
-    within = found.spans[found.spans <= slop]
-    return int(np.quantile(within, 0.5, method="inverted_cdf")) if len(within) else 0
+def slop_key(group: GroupConfig) -> str | None:
+    """Return the key of the file that says how wide a group's sets may be, None where it has none."""
+    tolerance = group.options.tolerance
+    return tolerance.key if tolerance is not None and hasattr(group.options, tolerance.key) else None
+
+
+def _point(group: GroupConfig, option: str, value: int, used: Sequence[Arrival], pivot: int) -> Point:
+    tried = replace(group, options=group.options.model_copy(update={option: value}))
+    run = dry_run(tried, used)
+    span = int(np.quantile(run.spans, 0.5, method="inverted_cdf")) if run.spans else 0
+    return Point(value, completed(run.counts, pivot), span)
+
+
+def _slops(possible: PossibleSets) -> set[int]:
+    """Return slops that give ever more of the possible sets, and some that are wider than the widest of them."""
+    if not possible.spans:
+        return set()
+    narrow = np.quantile(possible.spans, _SHARES, method="inverted_cdf").tolist()
+    return {*narrow, *(round(factor * possible.widest) for factor in _WIDER)}
+
+
+def _sizes(group: GroupConfig, suggested: GroupConfig, possible: PossibleSets) -> set[int]:
+    """Return queue sizes up to twice what is in use, suggested or needed by nearly all of the possible sets."""
+    found = possible.tightest
+    queues = found.queues[found.spans <= possible.widest]
+    needed = int(np.quantile(queues, 0.99, method="inverted_cdf")) if len(queues) else 1
+    most = 2 * max(needed, group.options.queue_size, suggested.options.queue_size)
+    return {size for size in _SIZES if size <= most}

@@ -13,7 +13,7 @@ from syncrelay.config.wording import counted
 
 FEWEST: Final = 10
 """Fewer messages tell nothing of a rhythm."""
-NO_HEADER: Final = "its type has no header, and so no stamp to match by"
+NO_HEADER: Final = "its type has no header, so no stamp to match by"
 
 # Stamped, but of nodes, not of the world.
 _OF_NO_SENSOR: Final = ("diagnostic_msgs/msg/DiagnosticArray",)
@@ -56,7 +56,7 @@ def _topics(read: Sequence[tuple[Channel, Stream, str | None]]) -> tuple[Topic, 
 
 def _topic(channel: Channel, stream: Stream, lack: str | None, fullest: Stream) -> Topic:
     figures = figures_of(stream)
-    other = f"a group takes one type of a topic, and more messages of it are {fullest.type}"
+    other = f"recorded as several types; most messages are {fullest.type}"
     unfit = lack or (None if fullest is stream else other) or _too_little(channel, figures)
     return Topic(channel, stream, figures, lack, unfit)
 
@@ -64,7 +64,7 @@ def _topic(channel: Channel, stream: Stream, lack: str | None, fullest: Stream) 
 def _lack(channel: Channel) -> str | None:
     """Return why a file cannot name a channel, or a stamp not be read in it."""
     if not isinstance(channel.encoding, Encoding):
-        return f"it is recorded as {channel.encoding or 'bytes of no named encoding'}, expected cdr"
+        return f"it is recorded as {channel.encoding or 'bytes without a named encoding'}, expected cdr"
     try:
         # Not all who write recordings keep to ROS's rules.
         check_topic_name(channel.topic)
@@ -80,14 +80,14 @@ def _lack(channel: Channel) -> str | None:
 def _too_little(channel: Channel, figures: TopicFigures) -> str | None:
     """Return why nothing could be measured of a topic."""
     if channel.type in _OF_NO_SENSOR:
-        return "nodes tell of themselves in it, no sensor of the world"
+        return "it carries diagnostics, not sensor data"
     unset = figures.unstamped + figures.unreadable
     if figures.messages - unset >= FEWEST and figures.period:
         return None
     faults = ((figures.unstamped, "with stamp 0"), (figures.unreadable, "without a readable stamp"))
     said = [counted(figures.messages, "message"), *(f"{count} {what}" for count, what in faults if count)]
     if not unset and figures.messages >= FEWEST:
-        said.append("all of one stamp")
+        said.append("all with the same stamp")
     elif not unset:
-        said.append(f"and {FEWEST} are the fewest that tell a rhythm")
+        said.append(f"at least {FEWEST} are needed")
     return ", ".join(said)

@@ -1,4 +1,4 @@
-"""Which messages lie nearest to which, whatever slop and queues are: the one pass that both curves come from."""
+"""Which messages lie nearest to which, and so what sets there could be, whatever slop and queues are."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -45,10 +45,23 @@ class Tightest:
         """Return the share of the pivot's messages, 0 to 1, whose tightest set is no wider."""
         return float(np.mean(self.spans <= slop)) if len(self.spans) else 0.0
 
-    def share_held(self, queue_size: int, slop: int) -> float:
-        """Return the share of the pivot's messages whose tightest set is no wider, and held by such queues."""
-        held = (self.spans <= slop) & (self.queues <= queue_size)
-        return float(np.mean(held)) if len(self.spans) else 0.0
+
+@dataclass(frozen=True, slots=True)
+class PossibleSets:
+    """The sets that a recording holds, by the tightest set of each message of the slowest input.
+
+    `spans`, sorted, are of those whose messages belong together and share none with a tighter one; `is_exact` tells
+    that their stamps are meant to be equal.
+    """
+
+    tightest: Tightest
+    is_exact: bool
+    spans: tuple[int, ...]
+
+    @property
+    def widest(self) -> int:
+        """The span of the widest, 0 where there is none."""
+        return self.spans[-1] if self.spans else 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,10 +136,13 @@ def _sorted(stream: Stream, offset: int) -> _Sorted:
     # Of a repeated stamp the last counts, as for the engine.
     _, last = np.unique(stamps[is_set][::-1], return_index=True)
     at = len(stamps[is_set]) - 1 - last
-    # Within what can be subtracted from each other, whatever the file says.
+    return _Sorted(shifted(stamps[is_set][at], offset), places[is_set][at], np.sort(places))
+
+
+def shifted(stamps: Nanoseconds, offset: int) -> Nanoseconds:
+    """Return stamps with an offset added, within what can be subtracted from each other, whatever the file says."""
     shift = max(-LATEST, min(LATEST, offset))
-    shifted = np.clip(stamps[is_set][at] + shift, -LATEST, LATEST)
-    return _Sorted(shifted, places[is_set][at], np.sort(places))
+    return np.clip(stamps + shift, -LATEST, LATEST)
 
 
 def _sides(pivots: Nanoseconds, stamps: Nanoseconds) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:

@@ -7,11 +7,11 @@ from typing import Final
 
 from syncrelay.bag.analysis.analysis import analyze_group, group_of, proposed_text
 from syncrelay.bag.analysis.changes import Change, with_changes, with_evidence
+from syncrelay.bag.analysis.curves import LARGEST_QUEUE
+from syncrelay.bag.analysis.evaluation import completed, evaluate
 from syncrelay.bag.analysis.inventory import FEWEST, Topic, inventory
 from syncrelay.bag.analysis.nearest import pair
-from syncrelay.bag.analysis.suggest import LARGEST_QUEUE, completed
 from syncrelay.bag.analysis.topics import TopicFigures
-from syncrelay.bag.analysis.trial import try_group
 from syncrelay.bag.recording import Recording
 from syncrelay.config import GroupConfig
 from syncrelay.errors import NothingToMatchError
@@ -129,7 +129,7 @@ def _with_room(name: str, members: Sequence[Topic], changes: Sequence[Change], t
 def _sets(group: GroupConfig, members: Sequence[Topic]) -> int:
     streams = tuple(each.stream for each in members)
     rarest = min(range(len(streams)), key=lambda index: len(streams[index].stamps))
-    return completed(try_group(group, streams), rarest)
+    return completed(evaluate(group, streams).counts, rarest)
 
 
 def _latency(figures: TopicFigures) -> int:

@@ -1,18 +1,18 @@
 """The stamps of a recording, read once: all that the analysis asks for comes from these arrays."""
 
 from array import array
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from syncrelay.bag.definitions import begins_with_header
-from syncrelay.bag.payloads import stamp_reader, value_reader
-from syncrelay.bag.recording import Channel, Encoding, Recording
+from syncrelay.bag.payloads import ReadMessage, message_reader, stamp_or_receipt_reader
+from syncrelay.bag.recording import Channel, Encoding, RawMessage, Recording
 from syncrelay.bag.wiring import Wiring
 from syncrelay.config import StampSource
+from syncrelay.explain import Arrival
 
 Nanoseconds: TypeAlias = npt.NDArray[np.int64]
 
@@ -40,8 +40,8 @@ class Stream:
         return _array(self.stamps), _array(self.received), _array(self.places)
 
 
-_Wanted: TypeAlias = tuple[str, StampSource, str | None]
-_Take: TypeAlias = Callable[[int, int, bytes], None]
+_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool]
+_Take: TypeAlias = Callable[[int, RawMessage], None]
 
 
 def read_streams(recording: Recording, wirings: Sequence[Wiring]) -> tuple[tuple[Stream, ...], ...]:
@@ -54,13 +54,15 @@ def read_streams(recording: Recording, wirings: Sequence[Wiring]) -> tuple[tuple
     chosen: list[tuple[Stream, ...]] = []
     for wiring in wirings:
         of_group = []
-        for each in wiring.inputs:
-            wanted = (each.topic, each.config.stamp, each.config.key)
+        for index, each in enumerate(wiring.inputs):
+            topic = each.config
+            needs_place = wiring.group.restamp is not None and topic.stamp != "header"
+            wanted = (each.topic, topic.stamp, topic.key, needs_place)
             if wanted not in streams:
-                streams[wanted] = Stream(each.topic, each.config.type, keys=None if each.config.key is None else [])
+                streams[wanted] = Stream(each.topic, topic.type, keys=None if topic.key is None else [])
                 for channel in each.channels:
-                    taker = _taker(streams[wanted], channel, each.config.stamp, each.config.key)
-                    takers.setdefault(channel, []).append(taker)
+                    read = message_reader(wiring.group, index, channel)
+                    takers.setdefault(channel, []).append(_taker(streams[wanted], read))
             of_group.append(streams[wanted])
         chosen.append(tuple(of_group))
     _pour(recording, takers)
@@ -77,32 +79,41 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
     for channel in recording.channels:
         first = (channel, Stream(channel.topic, channel.type))
         _, stream = found.setdefault((channel.topic, channel.type, channel.encoding), first)
-        takers[channel] = [_taker(stream, channel, "header" if _has_stamps(channel) else "receive", None)]
+        takers[channel] = [_taker(stream, stamp_or_receipt_reader(channel))]
     _pour(recording, takers)
     return tuple(found.values())
 
 
-def _has_stamps(channel: Channel) -> bool:
-    return isinstance(channel.encoding, Encoding) and bool(begins_with_header(channel))
+def arrivals(streams: Sequence[Stream]) -> Iterator[Arrival]:
+    """Yield the messages of a group's inputs in the order of the recording."""
+    lengths = [len(stream.places) for stream in streams]
+    places = np.concatenate([stream.numbers()[2] for stream in streams])
+    inputs = np.repeat(np.arange(len(streams)), lengths)
+    indexes = np.concatenate([np.arange(length) for length in lengths])
+    # Stable: a topic that feeds two inputs feeds them in their order.
+    order = np.argsort(places, kind="stable")
+    for index, at in zip(inputs[order].tolist(), indexes[order].tolist(), strict=True):
+        stream = streams[index]
+        stamp = stream.stamps[at]
+        key = None if stream.keys is None else stream.keys[at]
+        is_unusable = stamp == UNREADABLE or (stream.keys is not None and key is None)
+        yield Arrival(index, None if is_unusable else stamp, stream.received[at], key)
 
 
 def _pour(recording: Recording, takers: Mapping[Channel, Sequence[_Take]]) -> None:
-    for place, (channel, received, payload) in enumerate(recording.messages(takers.keys())):
-        for take in takers[channel]:
-            take(place, received, payload)
+    for place, raw in enumerate(recording.messages(takers.keys())):
+        for take in takers[raw[0]]:
+            take(place, raw)
 
 
-def _taker(stream: Stream, channel: Channel, source: StampSource, key: str | None) -> _Take:
-    read_stamp = stamp_reader(source, channel)
-    read_key: Callable[[bytes], Any] | None = None if key is None else value_reader(channel, key)
-
-    def take(place: int, received: int, payload: bytes) -> None:
-        stamp = received if read_stamp is None else read_stamp(payload)
+def _taker(stream: Stream, read: ReadMessage) -> _Take:
+    def take(place: int, raw: RawMessage) -> None:
+        stamp, key = read(raw)
         stream.stamps.append(UNREADABLE if stamp is None else stamp)
-        stream.received.append(received)
+        stream.received.append(raw[1])
         stream.places.append(place)
-        if read_key is not None and stream.keys is not None:
-            stream.keys.append(read_key(payload))
+        if stream.keys is not None:
+            stream.keys.append(key)
 
     return take
 

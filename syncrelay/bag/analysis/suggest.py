@@ -9,14 +9,14 @@ from typing import Final
 import numpy as np
 
 from syncrelay.bag.analysis.changes import Change
-from syncrelay.bag.analysis.nearest import Pair, Tightest, pair, tightest
+from syncrelay.bag.analysis.curves import LARGEST_QUEUE
+from syncrelay.bag.analysis.evaluation import Evaluation, completed, evaluate
+from syncrelay.bag.analysis.nearest import Pair, PossibleSets, pair, tightest
 from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.analysis.topics import TopicFigures, figures_of
-from syncrelay.bag.analysis.trial import Trial, try_group
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
-from syncrelay.sync import DropReason
 
 _US: Final = 1_000
 _MS: Final = 1_000_000
@@ -30,8 +30,6 @@ _PERIODS: Final = 1.5
 _FAR_OFF: Final = 4
 # A slop so many times what is needed lets wrong messages in where the right ones are missing.
 _TOO_WIDE: Final = 4
-LARGEST_QUEUE: Final = 1000
-"""More messages than that are not suggested to be kept, whatever would come of it."""
 _SAME_SPAN: Final = 1.02
 _UNSET: Final = 0.5
 
@@ -49,61 +47,54 @@ class Suggestion:
     possible: int
     now: int
     then: int
-    trial: Trial | None
-
-
-@dataclass(frozen=True, slots=True)
-class _Possible:
-    """What could be had: the tightest sets, how many of them are no accident, and their spans."""
-
-    tightest: Tightest
-    is_exact: bool
-    spans: tuple[int, ...]
 
 
 def suggest(
-    group: GroupConfig, streams: Sequence[Stream], trial: Trial, changed: Callable[[Sequence[Change]], GroupConfig]
+    group: GroupConfig,
+    streams: Sequence[Stream],
+    evaluation: Evaluation,
+    changed: Callable[[Sequence[Change]], GroupConfig],
 ) -> Suggestion:
     """Return better values for a group; `changed` gives the group with changes made."""
     if group.options.matched_by:
-        return Suggestion((), (_not_measured(group.options.matched_by),), 0, 0, 0, None)
+        return Suggestion((), (_not_measured(group.options.matched_by),), 0, 0, 0)
     stamping = list(_stamping(group, streams))
     base = changed(stamping)
     streams = stamped(base, streams)
     possible = possible_sets(base, streams)
     if possible is None:
         missing = [stream.topic for stream in streams if not stream.stamps]
-        return Suggestion((), (f"nothing to measure: no messages of {', '.join(missing)}",), 0, 0, 0, None)
+        return Suggestion((), (f"no values to suggest: no messages of {', '.join(missing)}",), 0, 0, 0)
     hints = tuple(_hints(base, streams))
     most = len(possible.spans)
-    now = completed(trial, possible.tightest.pivot)
-    changes, best = stamping, try_group(base, streams) if stamping else trial
+    now = completed(evaluation.counts, possible.tightest.pivot)
+    changes, best = stamping, evaluate(base, streams) if stamping else evaluation
     if not _does(base, best, possible):
         for more in _ladder(base, possible):
-            attempt = try_group(changed([*stamping, *more]), streams)
-            reached = completed(attempt, possible.tightest.pivot)
-            if reached >= ENOUGH * most or reached > completed(best, possible.tightest.pivot):
+            attempt = evaluate(changed([*stamping, *more]), streams)
+            reached = completed(attempt.counts, possible.tightest.pivot)
+            if reached >= ENOUGH * most or reached > completed(best.counts, possible.tightest.pivot):
                 changes, best = [*stamping, *more], attempt
             if reached >= ENOUGH * most:
                 break
     sooner = [*changes, *_periods(changed(changes), streams)]
     if len(sooner) > len(changes):
-        quick = try_group(changed(sooner), streams)
+        quick = evaluate(changed(sooner), streams)
         if _is_sooner(quick, best):
             reason = f"sets leave {words.duration(_latency(best) - _latency(quick))} sooner"
             changes = [replace(each, reason=reason) if each.key == "min_period" else each for each in sooner]
             best = quick
-    then = completed(best, possible.tightest.pivot)
+    then = completed(best.counts, possible.tightest.pivot)
     # A policy may find sets that are wider than the tightest of a message.
-    return Suggestion(tuple(changes), hints, max(most, now, then), now, then, best)
+    return Suggestion(tuple(changes), hints, max(most, now, then), now, then)
 
 
 def _not_measured(keys: Sequence[str]) -> str:
-    said = f"{all_of(f'`{key}`' for key in keys)} {'say' if len(keys) > 1 else 'says'}"
-    return f"which messages belong together is what {said}: no measure can tell"
+    deciding = f"{all_of(f'`{key}`' for key in keys)} {'decide' if len(keys) > 1 else 'decides'}"
+    return f"no values to suggest: {deciding} which messages belong together"
 
 
-def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | None:
+def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> PossibleSets | None:
     """Return what sets a recording holds for the required inputs.
 
     None where one of them has no stamps, and for a policy by which messages need not be near to belong together.
@@ -119,19 +110,13 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> _Possible | 
         return None
     found = replace(found, pivot=required[found.pivot])
     if found.share_within(0) >= _EQUAL:
-        return _Possible(found, is_exact=True, spans=(0,) * int(np.count_nonzero(found.spans == 0)))
+        return PossibleSets(found, is_exact=True, spans=(0,) * int(np.count_nonzero(found.spans == 0)))
     periods = [figures_of(streams[index]).period or 0 for index in required if index != found.pivot]
     # Where most lie close together, what lies far off has lost its partner.
     usual = int(np.quantile(found.spans, 0.75, method="inverted_cdf"))
     limit = min(_PERIODS * max(periods), _FAR_OFF * usual)
     within = found.spans[found.disjoint & (found.spans <= limit)]
-    return _Possible(found, is_exact=False, spans=tuple(np.sort(within).tolist()))
-
-
-def completed(trial: Trial, pivot: int) -> int:
-    """Return how many sets came together, also those that thinning left out."""
-    counts = trial.counts[pivot]
-    return counts.matched + counts.dropped.get(DropReason.THINNED, 0)
+    return PossibleSets(found, is_exact=False, spans=tuple(np.sort(within).tolist()))
 
 
 def _stamping(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
@@ -148,7 +133,7 @@ def _stamping(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]
     usual = sorted(delays.values(), key=abs)[0 if len(delays) <= 2 else (len(delays) - 1) // 2] if delays else 0  # noqa: PLR2004
     for index, delay in delays.items():
         if abs(delay - usual) > _SECOND and not group.topics[index].offset_ns:
-            reason = f"its clock is {words.duration(abs(delay - usual))} off the others'"
+            reason = f"its stamps are {words.duration(abs(delay - usual))} off the others'"
             yield Change(group.name, index, "offset", words.exactly(delay - usual), reason)
 
 
@@ -160,9 +145,9 @@ def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
     ]
 
 
-def _does(group: GroupConfig, trial: Trial, possible: _Possible) -> bool:
+def _does(group: GroupConfig, evaluation: Evaluation, possible: PossibleSets) -> bool:
     """Tell whether a group's values give enough, and no slop is far wider than what is needed."""
-    if completed(trial, possible.tightest.pivot) < ENOUGH * len(possible.spans):
+    if completed(evaluation.counts, possible.tightest.pivot) < ENOUGH * len(possible.spans):
         return False
     slop = group.options.tolerance.ns if group.options.tolerance else 0
     return bool(possible.is_exact and not slop) or (
@@ -170,11 +155,11 @@ def _does(group: GroupConfig, trial: Trial, possible: _Possible) -> bool:
     )
 
 
-def _ladder(group: GroupConfig, possible: _Possible) -> Iterator[list[Change]]:
+def _ladder(group: GroupConfig, possible: PossibleSets) -> Iterator[list[Change]]:
     """Yield values, the tightest first."""
     if possible.is_exact:
         for queue in _queues(group, possible, 0):
-            yield [*_policy(group, "exact_time", "stamps of one set are equal"), *queue]
+            yield [*_policy(group, "exact_time", "the stamps of a set are equal"), *queue]
         return
     spans, tolerance = possible.spans, group.options.tolerance
     if not spans or tolerance is None:
@@ -185,7 +170,7 @@ def _ladder(group: GroupConfig, possible: _Possible) -> Iterator[list[Change]]:
         reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
         for queue in _queues(group, possible, slop):
             yield [
-                *_policy(group, policy, "stamps of one set differ"),
+                *_policy(group, policy, "the stamps of a set differ"),
                 Change(group.name, None, tolerance.key, text, reason),
                 *queue,
             ]
@@ -195,7 +180,7 @@ def _policy(group: GroupConfig, policy: str, reason: str) -> list[Change]:
     return [] if group.options.policy == policy else [Change(group.name, None, "policy", policy, reason)]
 
 
-def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list[Change]]:
+def _queues(group: GroupConfig, possible: PossibleSets, slop: int) -> Iterator[list[Change]]:
     """Yield larger and larger queues, first the one that there is."""
     yield []
     found = possible.tightest
@@ -204,7 +189,7 @@ def _queues(group: GroupConfig, possible: _Possible, slop: int) -> Iterator[list
     size = need + ceil(need / 4) + 1
     while size <= 4 * max(need, group.options.queue_size) and size <= LARGEST_QUEUE:
         if size > group.options.queue_size:
-            reason = f"up to {need} messages of one input come before a set that it is in can leave"
+            reason = f"up to {need} messages of one input arrive before its set is complete"
             yield [Change(group.name, None, "queue_size", size, reason)]
         size *= 2
 
@@ -231,31 +216,32 @@ def _lower_bound(figures: TopicFigures) -> str | None:
     return f"{bound // _US}us" if bound >= _US else None
 
 
-def _is_sooner(quick: Trial, slow: Trial) -> bool:
+def _is_sooner(quick: Evaluation, slow: Evaluation) -> bool:
     if len(quick.sets) < len(slow.sets) or not slow.sets:
         return False
-    spans = [median(each.span for each in trial.sets) for trial in (quick, slow)]
+    spans = [median(each.span for each in evaluation.sets) for evaluation in (quick, slow)]
     gain = _latency(slow) - _latency(quick)
     # The last sets, which only one of the two has, move the median a little.
     return spans[0] <= _SAME_SPAN * spans[1] and gain >= max(_MS, _latency(slow) / 10)
 
 
-def _latency(trial: Trial) -> float:
-    return median(each.latency for each in trial.sets)
+def _latency(evaluation: Evaluation) -> float:
+    return median(each.latency for each in evaluation.sets)
 
 
 def _hints(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[str]:
-    """Yield which inputs lie a constant time apart: a clock that is off, or a trigger that is."""
+    """Yield which inputs are stamped a constant time apart."""
     for first in range(len(streams)):
         for second in range(first + 1, len(streams)):
             offsets = (group.topics[first].offset_ns, group.topics[second].offset_ns)
             found = pair(streams[first], streams[second], offsets)
             if found is not None and _is_constant(found, streams):
-                apart = found.signed.median
+                apart, scatter = found.signed.median, found.signed.high - found.signed.low
+                about = f", give or take {words.duration(scatter / 2)}" if scatter else ""
                 yield (
                     f"{found.second} is stamped {words.duration(abs(apart))} {'after' if apart > 0 else 'before'}"
-                    f" {found.first}, give or take {words.duration((found.signed.high - found.signed.low) / 2)}: if one"
-                    f" trigger starts both, write `offset: {words.exactly(-apart)}` at {found.second}"
+                    f" {found.first}{about}: if one trigger starts both, write `offset: {words.exactly(-apart)}` at"
+                    f" {found.second}"
                 )
 
 

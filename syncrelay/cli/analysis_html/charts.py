@@ -1,13 +1,10 @@
-"""What the page draws of a group beside its messages: how far stamps lie apart, and what slop and queues would give."""
+"""How far the stamps of a group's inputs lie apart, as a histogram, and the values that are marked in the charts."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from syncrelay.bag.analysis import GroupAnalysis
-from syncrelay.bag.analysis.curves import queue_curve, slop_curve
 from syncrelay.bag.analysis.nearest import Pair
 from syncrelay.config import GroupConfig
 
@@ -16,7 +13,6 @@ _BINS: Final = 60
 _FARTHEST: Final = 1.5
 # A slop line so many times farther out than the offsets is left out for the same reason.
 _FARTHEST_LINE: Final = 3
-_SHARES: Final = (*(step / 40 for step in range(1, 40)), 0.99, 0.995, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +59,6 @@ def histogram(pair: Pair, slops: Marks) -> Histogram:
     edges = np.linspace(low - margin, high + margin, _BINS + 1)
     counts, _ = np.histogram(pair.offsets, edges)
     return Histogram(tuple(edges.tolist()), tuple(counts.tolist()), len(pair.offsets) - int(counts.sum()))
-
-
-def by_slop(group: GroupAnalysis, slops: Marks, shares: Sequence[float] = _SHARES) -> list[tuple[int, float, int]]:
-    """Return slops, the share that each matches, and the median span; none where that cannot be measured."""
-    return [] if group.tightest is None else slop_curve(group.tightest, marks=slops.known, shares=shares)
-
-
-def by_queue_size(group: GroupAnalysis, sizes: Marks, shares: Sequence[float] = _SHARES) -> list[tuple[int, float]]:
-    """Return queue sizes and the share that each holds at the group's slop."""
-    return [] if group.tightest is None else queue_curve(group.tightest, group.slop, marks=sizes.known, shares=shares)
 
 
 def _slop(group: GroupConfig) -> int | None:

@@ -1,4 +1,4 @@
-"""How each fate of a message looks: a shape and a name for a colour, so that no fate is told by colour alone."""
+"""How each fate of a message looks: a shape and a name for a colour, so that colour alone never tells them apart."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,6 +6,7 @@ from typing import Final
 from syncrelay.sync import DropReason
 
 MATCHED: Final = "matched"
+UNNEEDED: Final = "unneeded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +38,9 @@ _SHAPES: Final = {
 
 FATES: Final = (
     Fate(MATCHED, "in sets", "M-4 0A4 4 0 1 0 4 0A4 4 0 1 0-4 0", is_filled=True),
+    Fate(UNNEEDED, "not needed", "M-1.5 0A1.5 1.5 0 1 0 1.5 0A1.5 1.5 0 1 0-1.5 0", is_filled=True),
     *(Fate(reason.value, reason.value, path, is_filled) for reason, (path, is_filled) in _SHAPES.items()),
 )
-"""All fates; a message's is told by its place here."""
+"""All fates. A message's code is its fate's place here."""
 
 CODES: Final = {fate.name: code for code, fate in enumerate(FATES)}

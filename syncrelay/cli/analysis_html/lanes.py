@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from syncrelay.bag.analysis import GroupAnalysis
 from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds
-from syncrelay.cli.analysis_html.fates import CODES, MATCHED
+from syncrelay.cli.analysis_html.fates import CODES, MATCHED, UNNEEDED
 
 _SECOND: Final = 1_000_000_000
 _STRETCH: Final = 10 * _SECOND
@@ -53,7 +53,7 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
     """Return the lanes of a group in a recording that begins at `begin`, with about `most` messages."""
     delay = _usual_delay(group)
     origin = begin - delay
-    sets = group.trial.sets
+    sets = group.evaluation.sets
     n_inputs = len(group.streams)
     missing = np.array([[stamp is None for stamp in each.stamps] for each in sets], dtype=bool).reshape(-1, n_inputs)
     stamps = np.array([[stamp or 0 for stamp in each.stamps] for each in sets], dtype=np.int64).reshape(-1, n_inputs)
@@ -120,12 +120,18 @@ def _offsets(group: GroupAnalysis) -> list[int]:
 
 def _dropped(group: GroupAnalysis, index: int, origin: int, begin: int) -> tuple[Nanoseconds, Nanoseconds, int]:
     """Return when the dropped messages of an input were made, the codes of their fates, and how many are astray."""
-    drops = [each for each in group.trial.drops if each.input == index]
+    rows = zip(group.evaluation.drops, group.unneeded.flags.tolist(), strict=True)
+    drops, unneeded = [], []
+    for drop, is_unneeded in rows:
+        if drop.input == index:
+            drops.append(drop)
+            unneeded.append(is_unneeded)
     stamps = np.array([each.stamp for each in drops], dtype=np.int64)
     received = np.array([each.received for each in drops], dtype=np.int64)
     times = stamps - origin
     is_astray = (stamps == 0) | (np.abs(times - received + begin) > _ASTRAY)
     codes = np.array([CODES[each.reason.value] for each in drops], dtype=np.int64)
+    codes[np.array(unneeded, dtype=bool)] = CODES[UNNEEDED]
     return np.where(is_astray, received - begin, times), codes, int(np.count_nonzero(is_astray))
 
 

@@ -7,15 +7,25 @@ from typing import ClassVar
 from syncrelay.bag.analysis import GroupAnalysis, patch
 from syncrelay.bag.analysis.nearest import Pair
 from syncrelay.bag.analysis.topics import TopicFigures
-from syncrelay.bag.analysis.trial import LastingFinding
-from syncrelay.cli.analysis_html.charts import by_queue_size, by_slop
+from syncrelay.bag.analysis.unneeded import InputFates
+from syncrelay.bag.analysis.watching import LastingFinding
 from syncrelay.cli.analysis_html.drawings import Drawings
-from syncrelay.cli.analysis_html.fates import FATES, MATCHED
-from syncrelay.cli.analysis_text import delay_line, faults_of, pair_line
+from syncrelay.cli.analysis_html.fates import FATES, MATCHED, UNNEEDED
+from syncrelay.cli.analysis_text import (
+    delay_line,
+    faults_of,
+    pair_line,
+    period_text,
+    promise,
+    sampled_line,
+    size_text,
+    slop_text,
+    unneeded_line,
+)
+from syncrelay.config.wording import counted
 from syncrelay.explain import Severity, in_words, words
-from syncrelay.sync import InputCounts
+from syncrelay.sync import DropReason
 
-_SHARES = (0.05, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99, 1.0)
 _GOOD = 0.99
 _SIGNS = {Severity.ERROR: "\N{MULTIPLICATION X}", Severity.WARN: "!"}
 
@@ -77,26 +87,24 @@ class GroupWords:
     fates: tuple[str, ...]
     rows: tuple[FateRow, ...]
     pairs: tuple[str, ...]
-    by_slop: tuple[tuple[str, str, str], ...]
-    by_queue_size: tuple[tuple[str, str], ...]
-    curve_slop: str
+    unneeded: str
+    by_slop: tuple[tuple[str, int, str], ...]
+    by_queue_size: tuple[tuple[str, int], ...]
+    sampled: str
     thinned: str
     astray: str
 
 
 def topic_row(topic: TopicFigures) -> TopicRow:
     """Return the row of a topic."""
-    period = "" if topic.period is None else words.duration(topic.period)
-    if topic.jitter is not None:
-        period += f", 95 % within {words.duration(topic.jitter)} of it"
     gaps = str(topic.gaps)
     if topic.gaps and topic.longest_gap is not None:
-        gaps += f", the longest {words.duration(topic.longest_gap)}"
+        gaps += f", longest {words.duration(topic.longest_gap)}"
     cells = (
         topic.type,
         str(topic.messages),
         words.rate(topic.rate_hz),
-        period,
+        period_text(topic),
         gaps,
         ", ".join(faults_of(topic)) or "none",
         "" if topic.delay is None else delay_line(topic),
@@ -108,31 +116,33 @@ def group_words(group: GroupAnalysis, drawings: Drawings) -> GroupWords:
     """Return what is said of a group."""
     suggestion, config = group.suggestion, group.group
     topics = [topic.topic for topic in config.topics]
-    counts = group.trial.counts
-    fates = tuple(fate.name for fate in FATES if any(_count(each, fate.name) for each in counts))
+    rows = group.fates
+    fates = tuple(fate.name for fate in FATES if any(_count(row, fate.name) for row in rows))
     verdict, tone = _verdict(group)
+    curves = group.curves
     return GroupWords(
         name=config.name,
         policy=config.options.policy,
-        sets=len(group.trial.sets),
+        sets=len(group.evaluation.sets),
         verdict=verdict,
         tone=tone,
         notes=tuple(_note(each) for each in group.findings),
         hints=suggestion.hints,
-        promise=f"{suggestion.then} of {suggestion.possible} possible sets, in place of {suggestion.now}",
+        promise=promise(suggestion),
         patch=patch(suggestion.changes, {config.name: topics}).rstrip() if suggestion.changes else "",
         reasons=tuple(dict.fromkeys(f"{change.key}: {change.reason}" for change in suggestion.changes)),
         fates=fates,
-        rows=tuple(_fate_row(topic, each, fates) for topic, each in zip(topics, counts, strict=True)),
+        rows=tuple(_fate_row(row, fates) for row in rows),
+        unneeded="; ".join(f"{row.topic}: {unneeded_line(row)}" for row in rows if row.unneeded),
         pairs=tuple(_pair(pair, each.outside) for pair, each in zip(group.pairs, drawings.histograms, strict=True)),
         by_slop=tuple(
-            (words.duration(slop), words.share(share), words.duration(span))
-            for slop, share, span in by_slop(group, drawings.slops, _SHARES)
+            (slop_text(group, point), point.sets, words.duration(point.median_span) if point.sets else "")
+            for point in (curves.by_slop if curves else ())
         ),
         by_queue_size=tuple(
-            (str(size), words.share(share)) for size, share in by_queue_size(group, drawings.sizes, _SHARES)
+            (size_text(group, point), point.sets) for point in (curves.by_queue_size if curves else ())
         ),
-        curve_slop=words.duration(group.slop),
+        sampled=sampled_line(curves) if curves else "",
         thinned=_thinned(drawings),
         astray=_astray(drawings),
     )
@@ -142,8 +152,8 @@ def _verdict(group: GroupAnalysis) -> tuple[str, str]:
     """Return how a group does, and the class of the style sheet for it."""
     suggestion = group.suggestion
     if not suggestion.possible:
-        sets = len(group.trial.sets)
-        return f"{sets} sets come together", "ok" if sets else "error"
+        sets = len(group.evaluation.sets)
+        return f"{counted(sets, 'set')} {'comes' if sets == 1 else 'come'} together", "ok" if sets else "error"
     share = suggestion.now / suggestion.possible
     tone = "ok" if share >= _GOOD else "warn" if suggestion.now else "error"
     return f"{suggestion.now} of {suggestion.possible} possible sets come together", tone
@@ -155,15 +165,15 @@ def _note(lasting: LastingFinding) -> Note:
     return Note(severity.name.lower(), _SIGNS[severity], severity.name.lower(), text)
 
 
-def _count(counts: InputCounts, fate: str) -> int:
+def _count(row: InputFates, fate: str) -> int:
     if fate == MATCHED:
-        return counts.matched
-    return sum(count for reason, count in counts.dropped.items() if reason.value == fate)
+        return row.matched
+    return row.unneeded if fate == UNNEEDED else row.dropped.get(DropReason(fate), 0)
 
 
-def _fate_row(topic: str, counts: InputCounts, fates: tuple[str, ...]) -> FateRow:
-    of_each = tuple(_count(counts, fate) for fate in fates)
-    return FateRow(topic, counts.fed, of_each, tuple(_segments(fates, of_each, counts.fed)))
+def _fate_row(row: InputFates, fates: tuple[str, ...]) -> FateRow:
+    of_each = tuple(_count(row, fate) for fate in fates)
+    return FateRow(row.topic, row.received, of_each, tuple(_segments(fates, of_each, row.received)))
 
 
 def _segments(fates: tuple[str, ...], counts: tuple[int, ...], whole: int) -> Iterator[Segment]:
@@ -184,8 +194,8 @@ def _thinned(drawings: Drawings) -> str:
         return ""
     stretch = words.seconds(lanes.stretch)
     return (
-        f"This recording has more messages than the page can hold: of every {lanes.each} stretches of {stretch} one is"
-        " drawn, with all its messages. Figures, tables and curves are of all."
+        f"This recording has more messages than the page can hold: one of every {lanes.each} stretches of {stretch} is"
+        " drawn, with all its messages. The figures and tables count every message."
     )
 
 
@@ -193,6 +203,6 @@ def _astray(drawings: Drawings) -> str:
     if not drawings.lanes.astray:
         return ""
     return (
-        f"{drawings.lanes.astray} messages stand where they were received: their stamps are unset, or seconds off the"
-        " usual."
+        f"{counted(drawings.lanes.astray, 'message')} drawn at the time of receipt: unset stamps, or stamps seconds"
+        " off the usual delay."
     )

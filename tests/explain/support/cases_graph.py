@@ -1,10 +1,19 @@
 """What the graph tells: facts that come to a finding, and the nearest that do not."""
 
 from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
-from groups import IMAGE, MS, NOW, S, a_group, a_silent_group
+from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Endpoint, Mismatch, Refusal, Severity
+from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Severity
 from syncrelay.sync.counts import InputCounts
+
+
+def unpublished(alike=None, /, **figures):
+    """Inputs that nobody publishes, by their names; nothing came of those without figures."""
+    return [
+        an_input(f"/{name}", publishers=(), alike=(alike or {}).get(name, ()), figures=each or {"last_received": None})
+        for name, each in figures.items()
+    ]
+
 
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
@@ -35,6 +44,13 @@ FOUND = {
         a_group(camera(not_importable="no package fancy_msgs\nand more"), LIDAR),
         "/camera: no package fancy_msgs",
         "install the package where the relay runs, or source the workspace that has it",
+    ),
+    "a field that the type does not have": (
+        Code.TYPE_NOT_IMPORTABLE,
+        Severity.ERROR,
+        a_group(camera(not_readable="sensor_msgs/msg/Image has no usable field trigger: no such field"), LIDAR),
+        "/camera: sensor_msgs/msg/Image has no usable field trigger: no such field",
+        "name another field at `stamp` or `key`, then `syncrelay reload`",
     ),
     "a publisher of another type": (
         Code.OTHER_TYPE,
@@ -68,8 +84,65 @@ FOUND = {
         Code.NO_PUBLISHER,
         Severity.WARN,
         a_group(camera(publishers=(), figures={"last_received": NOW - 3 * S}), LIDAR),
-        f"nobody publishes /camera ({IMAGE}) any more, since 3 s",
+        f"nobody publishes /camera ({IMAGE}) any more; its last message came 3 s ago",
         "restart the node that published /camera",
+    ),
+    "several are not published any more": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(*unpublished(camera={"last_received": NOW - 9 * S}, lidar={"last_received": NOW - 8 * S})),
+        "nobody publishes /camera or /lidar any more; the last message came 8 s ago",
+        "restart the nodes that published them",
+    ),
+    "several are not published": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(*unpublished(camera={}, imu={}, lidar={})),
+        "nobody publishes /camera, /imu or /lidar",
+        "start the nodes that publish them, or correct the topics' names",
+    ),
+    "several are published under other names": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(*unpublished({"camera": ("/cam",), "lidar": ("/cam", "/lidar2")}, camera={}, lidar={})),
+        "nobody publishes /camera or /lidar",
+        (
+            "did you mean /cam for /camera and /lidar2 for /lidar? Otherwise start the nodes that publish them,"
+            " or correct the topics' names"
+        ),
+    ),
+    "several are published in a namespace": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(
+            *unpublished(
+                {"camera": ("/robot2/camera", "/robot1/camera"), "lidar": ("/robot1/lidar",)}, camera={}, lidar={}
+            )
+        ),
+        "nobody publishes /camera or /lidar",
+        "/robot1/camera and /robot1/lidar are published; did you mean namespace /robot1?",
+    ),
+    "several are published outside of the namespace": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(
+            *unpublished(
+                {"robot1/camera": ("/camera",), "robot1/lidar": ("/lidar",)},
+                **{"robot1/camera": {}, "robot1/lidar": {}},
+            )
+        ),
+        "nobody publishes /robot1/camera or /robot1/lidar",
+        "/camera and /lidar are published; did you mean namespace /?",
+    ),
+    "nobody is there": (
+        Code.ALONE,
+        Severity.ERROR,
+        a_silent_group(*unpublished(camera={}, lidar={}), empty_graph=GraphSnapshot(7, "LOCALHOST")),
+        "no other node was found on domain 7 (discovery range LOCALHOST)",
+        (
+            "start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
+            " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`"
+        ),
     ),
     "QoS that does not fit": (
         Code.INCOMPATIBLE_QOS,
@@ -88,7 +161,7 @@ FOUND = {
     "a clock that stands still": (
         Code.CLOCK_STOPPED,
         Severity.ERROR,
-        a_silent_group(clock_stopped=4 * S),
+        a_silent_group(clock=ClockState(received=True, stopped=4 * S)),
         "/clock has stood still for 4 s: nothing that waits expires",
         "start or resume what publishes /clock, or run without use_sim_time",
     ),
@@ -96,29 +169,32 @@ FOUND = {
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(counts=InputCounts(0, 0, {}, 0), figures={**ONCE, "last_received": None}), LIDAR),
-        "/usb_cam publishes /camera, but no message has come",
-        "see with `ros2 topic hz /camera` whether /usb_cam sends; if it does, ask `syncrelay doctor`",
+        "/usb_cam publishes /camera, but no message has arrived",
+        (
+            "check with `ros2 topic hz /camera` whether /usb_cam is sending; if so, run `syncrelay doctor --config FILE"
+            " --live`"
+        ),
     ),
     "nothing comes any more": (
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(figures=QUIET), LIDAR),
         "/camera has been silent for 7 s; until then it came at 10 Hz",
-        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+        "check /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
     ),
     "nothing came for long": (
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(figures={**QUIET, "last_received": NOW - 21 * S}), LIDAR),
         "/camera has been silent for 21 s; until then it came at 10 Hz",
-        "look at /usb_cam, which still publishes it",
+        "check /usb_cam, which still publishes it",
     ),
     "nothing of what is held comes any more, which always came": (
         Code.SILENT,
         Severity.WARN,
         a_group(camera(figures=QUIET), LIDAR, **AGES),
         "/camera has been silent for 7 s; until then it came at 10 Hz",
-        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+        "check /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
     ),
     "what was sent once is too old": (
         Code.SILENT,
@@ -126,7 +202,7 @@ FOUND = {
         a_silent_group(camera(figures={**ONCE, "last_received": NOW - 60 * S}), LIDAR, **HALF_A_SECOND),
         "/camera has been silent for 60 s",
         (
-            "look at /usb_cam, which still publishes it; if it is sent that rarely by design, write a larger `max_age`"
+            "check /usb_cam, which still publishes it; if it is sent that rarely by design, write a larger `max_age`"
             " than 500 ms, or none"
         ),
     ),
@@ -162,6 +238,30 @@ FOUND = {
     ),
 }
 
+FOUND |= {
+    "all inputs that fell silent together": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures=QUIET), an_input("/lidar", figures={**QUIET, "last_received": NOW - 8 * S})),
+        "all inputs have been silent for 7 s",
+        "check whether their publishers are still running, and the network to them",
+    ),
+    "a recording that was paused": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures=QUIET), an_input("/lidar", figures=QUIET), is_recorded=True),
+        "all inputs have been silent for 7 s",
+        "check whether recording was paused",
+    ),
+    "no clock at all": (
+        Code.NO_CLOCK,
+        Severity.ERROR,
+        a_silent_group(clock=ClockState(received=False, stopped=7 * S)),
+        "no /clock has been received for 7 s, and the relay runs with use_sim_time: nothing that waits expires",
+        "start what publishes /clock, such as `ros2 bag play --clock`, or run without use_sim_time",
+    ),
+}
+
 # The code that must not be found, facts.
 QUIETLY = {
     "another relay that is about to end": (
@@ -172,10 +272,27 @@ QUIETLY = {
         Code.NO_PUBLISHER,
         a_group(camera(publishers=()), LIDAR, figures={"began": NOW - 1900 * MS}),
     ),
+    "nobody is there in the first two seconds": (
+        Code.ALONE,
+        a_group(
+            *unpublished(camera={}, lidar={}),
+            figures={"began": NOW - 1900 * MS},
+            empty_graph=GraphSnapshot(0, "SUBNET"),
+        ),
+    ),
+    "nobody is there any more": (
+        Code.ALONE,
+        a_silent_group(
+            *unpublished(camera={"last_received": NOW - 9 * S}, lidar={}), empty_graph=GraphSnapshot(0, "SUBNET")
+        ),
+    ),
     "another type is no QoS": (Code.INCOMPATIBLE_QOS, a_silent_group(camera(publishers=(STRANGER,)), LIDAR)),
     "what nobody publishes is not silent": (Code.SILENT, a_silent_group(camera(publishers=(), figures=QUIET), LIDAR)),
     "what does not fit is not silent": (Code.SILENT, a_silent_group(camera(publishers=(UNFIT,), figures=QUIET), LIDAR)),
-    "silence while /clock stands": (Code.SILENT, a_silent_group(camera(figures=QUIET), LIDAR, clock_stopped=4 * S)),
+    "silence while /clock stands": (
+        Code.SILENT,
+        a_silent_group(camera(figures=QUIET), LIDAR, clock=ClockState(received=True, stopped=4 * S)),
+    ),
     "a slow input between two messages": (
         Code.SILENT,
         a_group(camera(figures={"rate_hz": 0.1, "last_received": NOW - 9 * S}), LIDAR, figures={"best_hz": 0.1}),

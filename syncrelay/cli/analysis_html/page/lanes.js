@@ -3,6 +3,7 @@
 const ROOM = 5;  // CSS pixels that a mark needs
 const COLUMN = 3;
 const MATCHED = 0;
+const UNNEEDED = 1;
 
 // The place of the first value that is not below a bound, in values that rise.
 function firstNotBelow(values, bound) {

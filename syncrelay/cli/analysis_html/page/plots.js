@@ -79,7 +79,7 @@ function drawMarks(plot, marks) {
 
 function bothMarks({now, then}, text) {
   const marks = [];
-  if (now !== null) marks.push([now, `now ${text(now)}`, "now", []]);
+  if (now !== null) marks.push([now, `in use ${text(now)}`, "now", []]);
   if (then !== null) marks.push([then, `suggested ${text(then)}`, "then", [6, 4]]);
   return marks;
 }
@@ -103,45 +103,38 @@ function drawHistogram(place, {edges, counts}, slops) {
   }, [middles, counts]);
 }
 
-const PERCENT = {range: () => [0, 104]};
+const FROM_ZERO = {range: (plot, low, high) => [0, Math.max(1, high) * 1.04]};
 
+// A point is a run of the engine; the lines only lead the eye from one to the next.
 function curveSeries(name, dash, scale) {
-  return {scale, stroke: () => colour(name), width: 2, dash, points: {show: false}, paths: uPlot.paths.stepped({align: 1})};
+  return {scale, stroke: () => colour(name), width: 2, dash, points: {show: true, size: 6, fill: () => colour(name)}};
 }
 
-// A few sets without partners would press all that matters into a corner: the table has those too.
-function withoutTail(points, {now, then}) {
-  const enough = points.find(([, share]) => share >= 0.9)?.[0] ?? points.at(-1)[0];
-  const last = 4 * Math.max(enough, now ?? 0, then ?? 0);
-  return points.filter(([slop], at) => slop <= last || at < 2);
-}
-
-function drawBySlop(place, all, slops) {
-  const points = withoutTail(all, slops);
+function drawBySlop(place, points, slops) {
   const [size, unit] = unitOf(points.at(-1)[0] / 2);
   const spans = Math.max(...points.map(([, , span]) => span));
   const [spanSize, spanUnit] = unitOf(spans / 2);
   plotIn(place, 260, {
     padding: [30, 0, 0, 0],
-    scales: {x: {time: false}, y: PERCENT, span: {range: [0, Math.max(1, spans / spanSize) * 1.04]}},
+    scales: {x: {time: false}, y: FROM_ZERO, span: {range: [0, Math.max(1, spans / spanSize) * 1.04]}},
     axes: [
-      axis(`slop, ${unit}`), axis("matched, %, solid", {size: 50}),
+      axis(`slop, ${unit}`), axis("sets, solid", {size: 60}),
       axis(`median span, ${spanUnit}, dotted`, {scale: "span", side: 1, size: 50, grid: {show: false}}),
     ],
     series: [{}, curveSeries("curve", [], "y"), curveSeries("second", [2, 4], "span")],
     hooks: {draw: [(plot) => drawMarks(plot, bothMarks(slops, duration).map(([at, ...rest]) => [at / size, ...rest]))]},
   }, [
-    points.map(([slop]) => slop / size), points.map(([, share]) => 100 * share),
-    points.map(([, , span]) => span / spanSize),
+    points.map(([slop]) => slop / size), points.map(([, sets]) => sets),
+    points.map(([, sets, span]) => (sets ? span / spanSize : null)),
   ]);
 }
 
 function drawByQueue(place, points, sizes) {
   plotIn(place, 260, {
     padding: [30, 12, 0, 0],
-    scales: {x: {time: false, range: (plot, low, high) => [Math.min(low, 0), high + 1]}, y: PERCENT},
-    axes: [axis("queue size"), axis("matched, %", {size: 50})],
-    series: [{}, {...curveSeries("curve", [], "y"), points: {show: true, size: 6, fill: () => colour("curve")}}],
+    scales: {x: {time: false, range: (plot, low, high) => [Math.min(low, 0), high + 1]}, y: FROM_ZERO},
+    axes: [axis("queue size", {incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500]}), axis("sets", {size: 60})],
+    series: [{}, curveSeries("curve", [], "y")],
     hooks: {draw: [(plot) => drawMarks(plot, bothMarks(sizes, String))]},
-  }, [points.map(([size]) => size), points.map(([, share]) => 100 * share)]);
+  }, [points.map(([size]) => size), points.map(([, sets]) => sets)]);
 }

@@ -154,18 +154,18 @@ class Timeline {
     actions[what]();
   }
 
-  // The next message, one way or the other, that went into no set.
+  // The next message, one way or the other, that was needed and went into no set.
   step(way) {
     const from = this.chosen ? this.timeline.lanes[this.chosen.lane].times[this.chosen.place] : this.shown[0] * SECOND;
     let best = null;
     this.timeline.lanes.forEach(({times, fates}, lane) => {
       let place = way > 0 ? firstNotBelow(times, from) : firstNotBelow(times, from + 1) - 1;
       const isPast = () => this.chosen && times[place] === from && way * (lane - this.chosen.lane) <= 0;
-      while (place >= 0 && place < times.length && (fates[place] === MATCHED || isPast())) place += way;
+      while (place >= 0 && place < times.length && (fates[place] <= UNNEEDED || isPast())) place += way;
       if (place < 0 || place >= times.length) return;
       if (!best || way * (times[place] - best.time) < 0) best = {lane, place, time: times[place]};
     });
-    if (!best) return this.say("There is no further message without a set.");
+    if (!best) return this.say("No further message is missing from a set.");
     this.chosen = best;
     const at = best.time / SECOND, [low, high] = this.shown;
     if (at < low || at > high) this.show([at - (high - low) / 2, at + (high - low) / 2]);

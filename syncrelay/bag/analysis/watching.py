@@ -1,0 +1,103 @@
+"""What the running relay would have reported of a recording: the same watch, fed by the times of receipt."""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from syncrelay.bag.analysis.evaluation import Outcomes
+from syncrelay.bag.analysis.streams import Stream, arrivals
+from syncrelay.config import GroupConfig
+from syncrelay.explain import Arrival, Code, Endpoint, EngineDriver, Finding, GroupWatch, InputGraph, Judge, Severity
+
+_SECOND: Final = 1_000_000_000
+# The start and the end of a recording bring findings that last less long.
+_PASSING: Final = 3
+# Findings speak of the last seconds: fewer than these.
+_CLOSELY: Final = 16
+
+
+@dataclass(frozen=True, slots=True)
+class LastingFinding:
+    """A finding as it last was, and for how many of the recording's seconds it held."""
+
+    finding: Finding
+    seconds: int
+
+
+def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingFinding, ...]:
+    """Return what the running relay would have found, judging once a second, the worst and longest first.
+
+    However long nothing is received, that takes no more than some tens of judgements.
+    """
+    watch = None
+    for arrival in arrivals(streams):
+        if watch is None:
+            watch = _Watch(group, streams, began=arrival.received)
+        watch.judge_until(arrival.received)
+        watch.add(arrival)
+    return () if watch is None else watch.lasting()
+
+
+def judged_seconds(seconds: int) -> list[int]:
+    """Return which of so many seconds without a message are judged: first and last ones, between ever fewer.
+
+    When a pause begins and ends, findings come and go; one of years is as one of minutes.
+    """
+    first = range(1, min(seconds, _CLOSELY) + 1)
+    between = (_CLOSELY << times for times in range(1, (max(0, seconds) // _CLOSELY).bit_length()))
+    last = range(max(seconds - _CLOSELY, _CLOSELY) + 1, seconds + 1)
+    return sorted({*first, *between, *last})
+
+
+class _Watch:
+    """Drives a group and watches it, as the running relay does; remembers each finding and for how long it held."""
+
+    def __init__(self, group: GroupConfig, streams: Sequence[Stream], *, began: int) -> None:
+        self._outcomes = Outcomes(group)
+        self._driver = EngineDriver(group, self._outcomes.take)
+        self._watch = GroupWatch(group, began=began)
+        self._judge_of = Judge()
+        self._due = began + _SECOND
+        self._arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]
+        self._keys: list[Hashable] = [None] * len(streams)
+        self._found: dict[tuple[Code, int | None], LastingFinding] = {}
+        self._graph = [
+            InputGraph(topic.topic, topic.output, (Endpoint("its publisher", topic.type),) if stream.places else ())
+            for topic, stream in zip(group.topics, streams, strict=True)
+        ]
+
+    def judge_until(self, now: int) -> None:
+        """Judge the seconds that end by `now`."""
+        before = 0
+        for second in judged_seconds((now - self._due) // _SECOND + 1):
+            self._judge(self._due + (second - 1) * _SECOND, lasting=second - before)
+            before = second
+        self._due += before * _SECOND
+
+    def add(self, arrival: Arrival) -> None:
+        """Add a message."""
+        self._driver.feed(arrival)
+        if arrival.stamp is not None:
+            self._arrivals[arrival.input].append((arrival.stamp, arrival.received))
+        if arrival.key is not None:
+            self._keys[arrival.input] = arrival.key
+
+    def lasting(self) -> tuple[LastingFinding, ...]:
+        """Judge the last second, and return what was wrong for longer than it takes to start or to end."""
+        self._judge(self._due, lasting=1)
+        wrong = (each for each in self._found.values() if each.finding.severity is not Severity.OK)
+        lasting = (each for each in wrong if each.seconds >= _PASSING)
+        return tuple(sorted(lasting, key=lambda each: (-each.finding.severity, -each.seconds)))
+
+    def _judge(self, now: int, *, lasting: int) -> None:
+        self._driver.expire(now)
+        engine, sets = self._driver.engine, self._outcomes.sets
+        left = [(each.stamps, each.latency) for each in sets]
+        self._watch.add(self._arrivals, left, engine.counts(), engine.sets, keys=tuple(self._keys), now=now)
+        self._arrivals = [[] for _ in self._arrivals]
+        sets.clear()
+        self._outcomes.drops.clear()
+        for finding in self._judge_of.judge(self._watch.facts(self._graph, now=now, is_recorded=True)):
+            key = (finding.code, finding.input)
+            before = self._found[key].seconds if key in self._found else 0
+            self._found[key] = LastingFinding(finding, before + lasting)

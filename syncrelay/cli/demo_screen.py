@@ -1,0 +1,120 @@
+"""The demo's screen, lines and last words: what `top` shows of a relay, and what a newcomer needs beside it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Final
+
+from rich.console import Group as Lines
+from rich.text import Text
+
+from syncrelay.sync import DropReason
+from syncrelay.top import group_blocks, phrases
+from syncrelay.top.pieces import line
+from syncrelay.top.plain import group_lines
+from syncrelay.top.state import Group, State
+from syncrelay.top.strip import COLUMN_NS, Sweep, letter_style, newest_stamp
+
+_TITLE: Final = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
+# Reports come once a second, and hold what left by then. Shown so much later, the strip moves on between them.
+_DELAY_NS: Final = 1_250_000_000
+# On a wider strip what a report holds of a 100 Hz input would not reach back to the begin.
+WIDEST_STRIP: Final = 65
+# What every newcomer meets, whether it has happened yet or not.
+_ALWAYS_EXPLAINED: Final = (DropReason.TOO_FAR, DropReason.SUPERSEDED)
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The relay's state as of its last report, `elapsed_s` after the start, of `total_s` if an end is set.
+
+    `now` is the time, in nanoseconds of the clock that the rig stamps by.
+    """
+
+    state: State
+    elapsed_s: float
+    total_s: float | None
+    now: int
+
+    @property
+    def head(self) -> int:
+        """The stamp up to which the strip is drawn, in nanoseconds."""
+        recent = chain.from_iterable(map(group_blocks.as_matched, self.state.groups))
+        return min(self.now - _DELAY_NS, newest_stamp(recent))
+
+
+def frame(moment: Moment, *, width: int, height: int) -> Lines:
+    """Draw a moment for a terminal of so many columns and lines; 80x24 shows all of two groups of two inputs."""
+    groups = moment.state.groups
+    sweep = Sweep(head=moment.head, width=min(width - group_blocks.LANE_LABEL - 2, WIDEST_STRIP))
+    strips = [list(group_blocks.lanes(group, group_blocks.as_matched(group), sweep)) for group in groups]
+    legend = list(_legend(groups, sweep, width))
+    for draw in (_large_block, _block, _small_block):
+        drawn = [list(draw(group, strip, width)) for group, strip in zip(groups, strips, strict=True)]
+        blocks = [[_title(moment, width)], *drawn, legend]
+        spare = height - sum(map(len, blocks))
+        if spare >= 0:
+            break
+    # A blank line above each block but the title, above the last ones first, as far as there is room.
+    above = [0, *(max(0, min(1, spare - index)) for index in reversed(range(len(blocks) - 1)))]
+    lines = [each for blank, block in zip(above, blocks, strict=True) for each in (*[Text("")] * blank, *block)]
+    return Lines(*lines[:height])
+
+
+def _large_block(group: Group, strip: Sequence[Text], width: int) -> Iterator[Text]:
+    yield group_blocks.title(group, width)
+    yield from group_blocks.figures(group, width)
+    yield from group_blocks.findings(group, width)
+    yield from strip
+    yield from group_blocks.inputs(group, width)
+
+
+def _block(group: Group, strip: Sequence[Text], width: int) -> Iterator[Text]:
+    yield from _small_block(group, strip, width)
+    yield from group_blocks.inputs(group, width)
+
+
+def _small_block(group: Group, strip: Sequence[Text], width: int) -> Iterator[Text]:
+    yield group_blocks.title(group, width)
+    if group.problems:
+        yield from group_blocks.findings(group, width)
+    else:
+        yield group_blocks.rate_line(group, width)
+        yield from group_blocks.offsets(group, width)
+    yield from strip
+
+
+def _title(moment: Moment, width: int) -> Text:
+    clock = f"{moment.elapsed_s:.1f}" + (" s" if moment.total_s is None else f" / {moment.total_s:g} s")
+    title = Text(_TITLE, style="bold", no_wrap=True)
+    title.truncate(width - len(clock) - 1, overflow="ellipsis", pad=True)
+    return Text.assemble(title, " ", clock)
+
+
+def _legend(groups: Sequence[Group], sweep: Sweep, width: int) -> Iterator[Text]:
+    letters = Text(" ").join(Text(letter, letter_style(number)) for number, letter in enumerate("ABC"))
+    yield line(letters, "  each letter is a set: messages matched by time and sent on together")
+    occurred = {DropReason(reason) for group in groups for each in group.inputs for reason in each.dropped}
+    styles = dict.fromkeys((*_ALWAYS_EXPLAINED, *occurred), "bold")
+    yield from group_blocks.side_by_side(group_blocks.marks(styles), width)
+    column, strip_s = phrases.duration(COLUMN_NS / 1e6), sweep.width * COLUMN_NS / 1e9
+    yield line((f"a column is {column}; after {strip_s:.1f} s it starts again on the left; Ctrl-C ends it", "dim"))
+
+
+def plain_line(moment: Moment) -> str:
+    """Return one line on all groups, for where nothing can be drawn."""
+    return f"{moment.elapsed_s:5.1f} s  {'; '.join(map(_in_short, moment.state.groups))}"
+
+
+def _in_short(group: Group) -> str:
+    if not group.rate_hz or group.span_ms is None:
+        return f"{group.name}: {group.explanation.text if group.explanation else 'no set yet'}"
+    rates = f"{phrases.sets_of_possible(group)} possible sets a second, span {phrases.duration(group.span_ms.p50)}"
+    problems = ", ".join(problem.label for problem in group.problems)
+    return f"{group.name}: {rates}{f' ({problems})' if problems else ''}"
+
+
+def summary(moment: Moment) -> str:
+    """Say at the end what became of every message and what the relay found, as `syncrelay top --once` does."""
+    groups = chain.from_iterable(["", *group_lines(group)] for group in moment.state.groups)
+    return "\n".join([f"{_TITLE}: {moment.elapsed_s:.1f} s", *groups])

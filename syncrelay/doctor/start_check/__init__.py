@@ -1,0 +1,127 @@
+"""A node started and ended as a check, in its own process: rcl and broken message libraries may end that."""
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Final
+
+_DEADLINE_S: Final = 60.0
+_COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
+_OVERRULED: Final = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
+
+
+class Step(Enum):
+    """The steps in their order, but ARGUMENTS: what comes after --ros-args can fail at any of the last three."""
+
+    IMPORT = "import"
+    TYPES = "types"
+    INIT = "init"
+    NODE = "node"
+    NAMES = "names"
+    ARGUMENTS = "arguments"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What to try: a node of this name, the import of types, and what remaps make of topic names.
+
+    `use_sim_time` is what the file says.
+    """
+
+    node: str = "syncrelay"
+    namespace: str = ""
+    types: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    ros_args: tuple[str, ...] = ()
+    use_sim_time: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class StartResult:
+    """How it went. `failed` is the step that failed, None if all went well, and `fault` says why.
+
+    `unusable` has the fault of every type that cannot be imported. `names` are the topics after all remaps. `path` is
+    how messages pass, direct or rclpy, and `path_fault` why not directly.
+    """
+
+    failed: Step | None = None
+    fault: str = ""
+    unusable: Mapping[str, str] = field(default_factory=dict)
+    node: str = ""
+    names: Mapping[str, str] = field(default_factory=dict)
+    use_sim_time: bool = False
+    middleware: str = ""
+    path: str = ""
+    path_fault: str = ""
+
+
+def start_node(plan: Plan, environ: Mapping[str, str]) -> StartResult:
+    """Start a node as planned, end it, and return how that went. It finds nobody and nobody finds it."""
+    quiet = {name: value for name, value in environ.items() if name not in _OVERRULED}
+    request = {
+        "node": plan.node,
+        "namespace": plan.namespace,
+        "types": plan.types,
+        "names": plan.names,
+        "ros_args": plan.ros_args,
+        "use_sim_time": plan.use_sim_time,
+    }
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "syncrelay.doctor.start_check"],
+            input=json.dumps(request),
+            env={**quiet, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"},
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_DEADLINE_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return StartResult(Step.IMPORT, f"it did not finish within {_DEADLINE_S:.0f} s")
+    except OSError as error:
+        return StartResult(Step.IMPORT, f"{sys.executable} cannot be started: {error.strerror}")
+    return _read(_objects(done.stdout), done.returncode, done.stderr)
+
+
+def _objects(stdout: str) -> list[dict[str, Any]]:
+    # What libraries print on the way is no object.
+    return [json.loads(line) for line in stdout.splitlines() if line.startswith('{"step"')]
+
+
+def _read(objects: Sequence[Mapping[str, Any]], code: int, stderr: str) -> StartResult:
+    said: dict[str, Any] = {}
+    for each in objects:
+        said |= each
+    unusable = said.get("unusable", {})
+    middleware = said.get("middleware", "")
+    if code == 0 and "names" in said:
+        return StartResult(
+            None,
+            "",
+            unusable,
+            said["full_name"],
+            said["names"],
+            said["use_sim_time"],
+            middleware,
+            said["path"],
+            said["path_fault"],
+        )
+    step = Step(said.get("step", Step.IMPORT.value))
+    if "fault" in said:
+        return StartResult(step, said["fault"], unusable, middleware=middleware)
+    if step is Step.TYPES and (last := said.get("type")):
+        return StartResult(step, "", {**unusable, last: _end(code, stderr)}, middleware=middleware)
+    return StartResult(step, _end(code, stderr), unusable, middleware=middleware)
+
+
+def _end(code: int, stderr: str) -> str:
+    """How the process ended that said no more, with its last words."""
+    how = f"the process was ended by signal {-code}" if code < 0 else f"the process ended with {code}"
+    lines = [_COLOUR.sub("", line).strip() for line in stderr.splitlines()]
+    words = next((line for line in reversed(lines) if line), "")
+    return f"{how}: {words}" if words else how

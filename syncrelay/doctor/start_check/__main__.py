@@ -1,0 +1,92 @@
+"""The process that starts the node: a plan as JSON on stdin, then an object on stdout for each step begun or done."""
+
+import json
+import os
+import sys
+from typing import Any
+
+from syncrelay.dataflow.backend import BackendName
+from syncrelay.doctor.start_check import Step
+from syncrelay.errors import RosUnavailableError, TypeImportError, UsageError
+from syncrelay.ros.environment import require_rclpy
+from syncrelay.ros.types import import_type
+
+
+def main() -> int:
+    """Try, and return 1 at the first step that fails."""
+    plan = json.load(sys.stdin)
+    try:
+        _say(Step.IMPORT)
+        require_rclpy()
+        _import_types(plan["types"])
+        _start(plan)
+    except RosUnavailableError as error:
+        _say(Step.IMPORT, fault=str(error))
+        return 1
+    return 0
+
+
+def _import_types(types: list[str]) -> None:
+    unusable: dict[str, str] = {}
+    for name in types:
+        _say(Step.TYPES, type=name, unusable=unusable)
+        try:
+            import_type(name)
+        except TypeImportError as error:
+            unusable[name] = str(error.__cause__ or error).splitlines()[0]
+    _say(Step.TYPES, type=None, unusable=unusable)
+
+
+def _start(plan: dict[str, Any]) -> None:
+    from rclpy.utilities import get_rmw_implementation_identifier  # noqa: PLC0415  after require_rclpy
+
+    from syncrelay.ros.start import make_node, resolver, start  # noqa: PLC0415  after require_rclpy
+
+    ros_args = plan["ros_args"]
+    step = Step.INIT
+    _say(step, middleware=get_rmw_implementation_identifier())
+    try:
+        context = start(ros_args, simulated=plan["use_sim_time"])
+        step = Step.NODE
+        _say(step)
+        node = make_node(plan["node"], namespace=plan["namespace"], context=context, ros_args=ros_args)
+        resolve = resolver(node, ros_args)
+        names = {name: resolve(name) for name in plan["names"]}
+    except UsageError as error:
+        _say(Step.ARGUMENTS, fault=str(error))
+        return
+    except RosUnavailableError as error:
+        _say(step, fault=str(error.__cause__ or error))
+        return
+    _say(
+        Step.NAMES,
+        full_name=node.get_fully_qualified_name(),
+        names=names,
+        use_sim_time=bool(node.get_parameter("use_sim_time").value),
+        **_path(node),
+    )
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def _path(node: Any) -> dict[str, str]:
+    """Find how messages would pass, and why not directly."""
+    from syncrelay.ros.backend_choice import VARIABLE  # noqa: PLC0415  after require_rclpy
+    from syncrelay.ros.librcl.check import LibrclUnusableError, checked_backend  # noqa: PLC0415  after require_rclpy
+
+    if os.environ.get(VARIABLE) == BackendName.RCLPY.value:
+        return {"path": BackendName.RCLPY.value, "path_fault": ""}
+    try:
+        checked_backend(node)
+    except LibrclUnusableError as error:
+        return {"path": BackendName.RCLPY.value, "path_fault": str(error)}
+    return {"path": BackendName.LIBRCL.value, "path_fault": ""}
+
+
+def _say(step: Step, **facts: Any) -> None:
+    sys.stdout.write(json.dumps({"step": step.value, **facts}) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

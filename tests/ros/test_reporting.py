@@ -1,0 +1,142 @@
+"""Where findings are seen: /diagnostics, topics for plotting, `--explain`, HTTP."""
+
+import signal
+import socket
+import struct
+
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.processes import wait_until
+from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play, stream
+from tests.ros.stage import Collector, Stage
+from tests.ros.status import findings
+from tests.ros.streams import merged
+
+pytestmark = pytest.mark.ros
+
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+FLOAT = "std_msgs/msg/Float64"
+_STORE = get_typestore(Stores.ROS2_JAZZY)
+_RIG = merged(stream("/camera", hz=10), stream("/lidar", hz=10, shift_ms=7))
+
+
+def statuses(collector: Collector) -> dict[str, tuple[int, str, dict[str, str]]]:
+    """The newest status of each name: its level, message and values."""
+    newest = collector.payloads("/diagnostics")[-1:]
+    arrays = [_STORE.deserialize_cdr(payload, DIAGNOSTICS) for payload in newest]
+    return {
+        each.name: (each.level, each.message, {pair.key: pair.value for pair in each.values})
+        for array in arrays
+        for each in array.status
+    }
+
+
+def test_diagnostics_have_a_status_for_each_group(stage: Stage):
+    good = {"policy": "approximate_time", "slop": "20ms", "topics": inputs(PAIR)}
+    text = config(
+        {
+            "front": good,
+            "rear": {**good, "slop": "1ms"},
+            "side": {**good, "topics": inputs({"/a": VECTOR, "/b": VECTOR})},
+        }
+    )
+    stage.relay(text)
+    collector = stage.collector({"/diagnostics": DIAGNOSTICS})
+    play(stage, _RIG)
+    seen: list[dict[str, tuple[int, str, dict[str, str]]]] = []
+    wait_until(
+        lambda: bool(seen.append(statuses(collector))) or [level for level, _, _ in seen[-1].values()] == [0, 2, 3],
+        "OK of the group that works, ERROR of the one whose slop is too small, STALE of the one that gets nothing",
+    )
+    front_status, rear, side = seen[-1].values()
+    assert list(seen[-1]) == ["syncrelay: front", "syncrelay: rear", "syncrelay: side"]
+    assert front_status[1].endswith("at the 95th percentile")
+    assert float(front_status[2]["/camera rate (Hz)"]) > 5
+    assert front_status[2]["span p95 (ms)"] == "7.00"
+    assert rear[1] == "the nearest sets span 7 ms, over slop 1 ms"
+    assert rear[2]["suggestion"].startswith("write `slop: 7ms`, which would give ")
+    assert rear[2]["finding"] == "over_slop"
+    assert side[1].startswith("nobody publishes /a ")
+
+
+def test_figures_are_published_for_plotting_if_they_are_asked_for(stage: Stage):
+    topics = {
+        "/syncrelay/front/sets_hz": FLOAT,
+        "/syncrelay/front/span_ms": FLOAT,
+        "/syncrelay/front/latency_ms": FLOAT,
+    }
+    collector = stage.collector(topics)
+    stage.relay(front(top={"diagnostics": {"scalars": True}}))
+    play(stage, _RIG)
+    spans = [struct.unpack("<d", payload[4:12])[0] for payload in collector.wait_for("/syncrelay/front/span_ms", 2)]
+    assert spans[-1] == pytest.approx(7.0)
+    assert all(collector.wait_for(topic, 2) for topic in topics)
+
+
+def test_nothing_is_published_about_the_relay_if_that_is_asked_for(stage: Stage):
+    collector = stage.collector()
+    relay = stage.relay(front(top={"diagnostics": None}))
+    wait_until(lambda: bool(findings(relay)), "a first look")
+    assert not collector.endpoints("/diagnostics", kind="publisher", node="/syncrelay")
+
+
+def test_a_run_that_explains_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
+    play_later = stage.player(PAIR)
+    relay = stage.relay(front(), "--explain", "12")
+    play_later.match()
+    play_later.start(_RIG, speed=1)
+    assert_looked_at_a_healthy_rig(relay)
+
+
+def test_a_run_that_explains_exits_with_1_and_what_to_do(stage: Stage):
+    relay = stage.relay(front(), "--explain", "6")
+    assert relay.wait() == 1
+    assert relay.stdout.splitlines()[:2] == [
+        f"front: error: no other node was found on domain {stage.domain} (discovery range LOCALHOST) [alone]",
+        (
+            "    start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
+            " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`"
+        ),
+    ]
+
+
+def test_a_port_that_is_taken_is_an_error_that_says_so(stage: Stage):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        address = "{}:{}".format(*taken.getsockname())
+        relay = stage.relay(front(top={"metrics": {"listen": address}}))
+        assert relay.wait() == 1
+    assert relay.said[-1] == (
+        f"syncrelay: cannot listen on {address}: another process uses it; set another `listen` in `metrics`, or write"
+        " `metrics: null` to run without"
+    )
+
+
+def test_without_metrics_nothing_listens(stage: Stage):
+    relay = stage.relay(front(top={"metrics": None}))
+    relay.wait_for_log("front: waiting for")
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+    assert "http://" not in relay.stderr
+
+
+def test_clients_that_stall_keep_no_message_and_no_answer_back(stage: Stage):
+    relay = stage.relay(front())
+    play(stage, _RIG)
+    wait_until(lambda: bool(findings(relay)), "a first look")
+    host, port = relay.stderr.split("http://")[1].split("/")[0].split(":")
+    stalled = [socket.create_connection((host, int(port))) for _ in range(10)]
+    for client in stalled:
+        client.sendall(b"GET /status HTTP/1.1\r\nHost:")
+    try:
+        wait_until(lambda: "healthy" in findings(relay), "an answer beside the clients that stall")
+    finally:
+        for client in stalled:
+            client.close()
+
+
+def test_json_lines_carry_the_finding(stage: Stage):
+    relay = stage.relay(front(), "--log-format", "json")
+    relay.wait_for_log('"group": "front", "finding": "alone"}')

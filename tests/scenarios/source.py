@@ -1,0 +1,161 @@
+"""A process that plays streams in real time. Run as `python -m tests.scenarios.source FILE`; see streams.py.
+
+Each line of stdin is the number of an act, which begins at once. It ends when stdin does.
+"""
+
+import heapq
+import math
+import os
+import random
+import select
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import rclpy
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from tests.ros.cdr_messages import vector
+from tests.ros.message_types import import_type
+from tests.scenarios.streams import Stream, from_json
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+_LONGEST_SLEEP_S = 0.1
+# A driver that did not get the CPU for so long has lost the sample: it does not send it late.
+_LOST_S = 0.1
+
+
+class _Sampler:
+    """The samples of one stream, one after another; times are seconds after the play began."""
+
+    def __init__(self, stream: Stream, *, now: float) -> None:
+        self.stream = stream
+        self._chance = random.Random(stream.topic)
+        self._number = max(0, math.ceil(now * stream.hz))
+        self._sent = now
+        self._stamp = 0.0
+
+    def next(self) -> tuple[float, float, float]:
+        """When to send the next message, when its sample was taken, and its stamp in seconds of the play."""
+        stream, chance = self.stream, self._chance
+        sampled = self._number / stream.hz + stream.phase_ms / 1000
+        sampled += chance.uniform(-stream.wobble_ms, stream.wobble_ms) / 1000
+        sent = sampled + (stream.late_ms + chance.uniform(-stream.jitter_ms, stream.jitter_ms)) / 1000
+        if stream.batch_ms:
+            sent = math.ceil(sent * 1000 / stream.batch_ms) * stream.batch_ms / 1000
+        if self._number % stream.repeat == 0:
+            self._stamp = sampled + sampled * stream.ppm / 1e6 + stream.shift_ms / 1000
+        self._number += 1
+        self._sent = max(sent, self._sent)
+        return self._sent, sampled, self._stamp
+
+
+class _Graph:
+    """The nodes and publishers that there are."""
+
+    def __init__(self) -> None:
+        self._nodes: dict[str, Node] = {}
+        self._publishers: dict[tuple[str, ...], Publisher] = {}
+
+    def change(self, streams: Sequence[Stream]) -> None:
+        """Let there be the publishers of these streams and no other."""
+        wanted = {_key(stream): stream for stream in streams}
+        for key in self._publishers.keys() - wanted.keys():
+            self._nodes[key[0]].destroy_publisher(self._publishers.pop(key))
+        for name in self._nodes.keys() - {stream.driver for stream in streams}:
+            self._nodes.pop(name).destroy_node()
+        for key in wanted.keys() - self._publishers.keys():
+            self._publishers[key] = self._publisher(wanted[key])
+
+    def publisher(self, stream: Stream) -> Publisher:
+        return self._publishers[_key(stream)]
+
+    def _publisher(self, stream: Stream) -> Publisher:
+        profile = QoSProfile(
+            depth=100,
+            reliability=ReliabilityPolicy[stream.reliability.upper()],
+            durability=DurabilityPolicy[stream.durability.upper()],
+        )
+        if stream.driver not in self._nodes:
+            namespace, _, name = stream.driver.rpartition("/")
+            self._nodes[stream.driver] = rclpy.create_node(
+                name, namespace=namespace, start_parameter_services=False, enable_rosout=False
+            )
+        return self._nodes[stream.driver].create_publisher(import_type(stream.type), stream.topic, profile)
+
+
+def _key(stream: Stream) -> tuple[str, ...]:
+    return stream.driver, stream.topic, stream.type, stream.reliability, stream.durability
+
+
+class _Source:
+    def __init__(self, streams: Sequence[Stream]) -> None:
+        self._streams = streams
+        self._graph = _Graph()
+        self._samplers: dict[Stream, _Sampler] = {}
+        self._due: list[tuple[float, float, int, Stream, float]] = []
+        self._count = 0
+        self._began = 0.0
+        self._clocks: dict[str, int] = {}
+
+    def begin(self, act: str) -> None:
+        active = [stream for stream in self._streams if act in stream.acts]
+        self._graph.change(active)
+        if not self._clocks:
+            self._began = time.monotonic()
+            self._clocks = {"wall": time.time_ns(), "boot": time.monotonic_ns()}
+            now = 0.0
+        else:
+            now = time.monotonic() - self._began
+        ended = self._samplers.keys() - set(active)
+        self._due = [entry for entry in self._due if entry[3] not in ended]
+        heapq.heapify(self._due)
+        kept = {stream: sampler for stream, sampler in self._samplers.items() if stream not in ended}
+        self._samplers = {stream: kept.get(stream) or _Sampler(stream, now=now) for stream in active if stream.hz}
+        for stream in self._samplers.keys() - kept.keys():
+            self._push(stream)
+
+    def send_what_is_due(self) -> float:
+        """Publish it; for how many seconds there is nothing more to do."""
+        while self._due:
+            left = self._began + self._due[0][0] - time.monotonic()
+            if left > 0:
+                return min(left, _LONGEST_SLEEP_S)
+            *_, stream, stamp = heapq.heappop(self._due)
+            self._push(stream)
+            if left < -_LOST_S:
+                continue
+            ns = 0 if stream.clock == "zero" else self._clocks[stream.clock] + round(stamp * 1e9)
+            self._graph.publisher(stream).publish(vector(ns))
+        return _LONGEST_SLEEP_S
+
+    def _push(self, stream: Stream) -> None:
+        self._count += 1
+        send, sampled, stamp = self._samplers[stream].next()
+        heapq.heappush(self._due, (send, sampled, self._count, stream, stamp))
+
+
+def main() -> None:
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    source = _Source(from_json(Path(sys.argv[1]).read_text()))
+    # Without a buffer, which would hold the next line where select sees nothing.
+    stdin = os.fdopen(sys.stdin.fileno(), "rb", buffering=0, closefd=False)
+    pause = 0.0
+    while True:
+        if select.select([stdin], [], [], pause)[0]:
+            line = stdin.readline()
+            if not line:
+                break
+            source.begin(line.decode().strip())
+        pause = source.send_what_is_due()
+    rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,53 @@
+"""What the sensors of a scenario send: one row for each stream, as a value that travels to the source as JSON."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+from tests.ros.cdr_messages import VECTOR
+
+POINT = "geometry_msgs/msg/PointStamped"
+"""Another type with the same fields as VECTOR: its messages are the same bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A sensor's messages in some acts of a play. Without an act in which it is named, its publisher is gone.
+
+    Samples are taken on one grid for all streams: at multiples of the period, `phase_ms` later. Stamps tell the time
+    of the sample by the stream's `clock` (`wall`, `boot` or `zero`), which is `shift_ms` off and runs `ppm` too fast.
+    A message is sent `late_ms` after its sample, give or take `jitter_ms`; with `batch_ms`, all of such a time at once.
+    A rate of 0 is a publisher that sends nothing.
+    """
+
+    topic: str
+    hz: float
+    acts: str = "123"
+    node: str = ""
+    phase_ms: float = 0
+    wobble_ms: float = 0
+    """How far a sample may be from its place on the grid."""
+    clock: str = "wall"
+    shift_ms: float = 0
+    ppm: float = 0
+    repeat: int = 1
+    """How many messages share a stamp."""
+    late_ms: float = 2
+    jitter_ms: float = 1
+    batch_ms: float = 0
+    type: str = VECTOR
+    reliability: str = "reliable"
+    durability: str = "volatile"
+
+    @property
+    def driver(self) -> str:
+        """The name of the node that sends it."""
+        return self.node or f"{self.topic.rpartition('/')[2]}_driver"
+
+
+def as_json(streams: Sequence[Stream]) -> str:
+    return json.dumps([asdict(stream) for stream in streams])
+
+
+def from_json(text: str) -> list[Stream]:
+    return [Stream(**row) for row in json.loads(text)]

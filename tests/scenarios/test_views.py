@@ -1,0 +1,64 @@
+"""The relay, `--explain` and `doctor --live` look at the same rigs at the same time, and come to the same verdict."""
+
+import json
+import re
+import sys
+
+import pytest
+
+from tests.ros.configs import config
+from tests.ros.processes import wait_until
+from tests.ros.stage import Stage
+from tests.ros.status import findings
+from tests.scenarios import rigs_flow, rigs_graph, rigs_stamps
+from tests.scenarios.play import Scenario, Theatre, group_of
+from tests.scenarios.streams import Stream
+
+pytestmark = pytest.mark.ros
+
+_WELL = {"well": rigs_flow.RIGS["well"], "well_with_map": rigs_flow.RIGS["well_with_map"]}
+_BROKEN = {
+    "stamps_of_zero": rigs_stamps.RIGS["stamps_of_zero"],
+    "gps_time": rigs_stamps.RIGS["gps_time"],
+    "never_near": rigs_stamps.RIGS["never_near"],
+    "elsewhere": rigs_graph.RIGS["elsewhere"],
+    "camera_best_effort": Scenario(
+        streams=[Stream("camera", 10, reliability="best_effort"), Stream("lidar", 10)],
+        inputs={"camera": {"qos": {"reliability": "reliable"}}},
+        first="incompatible_qos",
+    ),
+}
+_RIGS = {**_WELL, **_BROKEN}
+# What else is truly so for a while on a machine that is busy, whoever looks.
+_BUSY = {"too_slow"}
+_SECONDS = "12"
+
+
+def test_all_views_come_to_the_same_verdict(stage: Stage):
+    theatre = Theatre(stage, _RIGS)
+    path = stage.folder / "looked-at.yaml"
+    # The relay's own outputs are none of what is looked at.
+    looked_at = {name: {**group_of(name, rig), "output_prefix": f"/looked_at/{name}"} for name, rig in _RIGS.items()}
+    path.write_text(config(looked_at, node={"name": "looker"}))
+    syncrelay = [sys.executable, "-m", "syncrelay"]
+    explain = stage.start("explain", [*syncrelay, "--config", str(path), "--explain", _SECONDS])
+    live = ["--live", "--seconds", _SECONDS, "--json"]
+    doctor = stage.start("doctor", [*syncrelay, "doctor", "--config", str(path), *live])
+    for name, rig in _RIGS.items():
+        code = rig.first or "healthy"
+        wait_until(lambda name=name, code=code: code in findings(theatre.file.relay, name), f"{code} of {name}")
+    assert explain.wait() == 1
+    for name, rig in _RIGS.items():
+        said = set(re.findall(rf"^{name}: .* \[(\w+)\]$", explain.stdout, re.MULTILINE))
+        assert said - _BUSY == {rig.first or "healthy"}, explain.stdout
+    assert doctor.wait() == 1
+    diagnoses = json.loads(doctor.stdout)["diagnoses"]
+    for name, rig in _BROKEN.items():
+        assert rig.first in {each["code"] for each in diagnoses if _is_about(each, name)}, diagnoses
+    for name in _WELL:
+        assert not [each for each in diagnoses if _is_about(each, name) and each["code"] not in _BUSY]
+
+
+def _is_about(diagnosis: dict[str, str], group: str) -> bool:
+    """Whether it names the group or one of its topics."""
+    return re.search(rf"(?<!\w){group}(?!\w)", json.dumps(diagnosis)) is not None
