@@ -1,6 +1,5 @@
 """A policy that is an engine class and a model of its options, as docs/policies.md has it, is known everywhere."""
 
-from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -18,8 +17,7 @@ from syncrelay.config.keys import Duration
 from syncrelay.config.models import Group, Inputs, Topic, Topics
 from syncrelay.config.schema import json_schema
 from syncrelay.explain import Code
-from syncrelay.sync import ExactTime, Message, Outcome
-from syncrelay.sync.optional import OptionalInputs
+from syncrelay.sync import ApproximateEpsilonTime
 from tests.bag.making import write_mcap
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -28,47 +26,39 @@ from tests.ros.streams import MS, jittery, merged
 _TOPICS = ("/left", "/right")
 
 
-class SameSlot(ExactTime):
-    """Messages whose stamps fall into one slot of time are a set."""
+class WithinGap(ApproximateEpsilonTime):
+    """The oldest messages are a set if their stamps lie less than a gap apart."""
 
-    def __init__(self, *, n_inputs: int, queue_size: int, slot_ns: int) -> None:
-        super().__init__(n_inputs=n_inputs, queue_size=queue_size)
-        self._slot_ns = slot_ns
-
-    def for_required(self, required: Sequence[bool]) -> tuple["SameSlot", OptionalInputs]:
-        _, stage = super().for_required(required)
-        return SameSlot(n_inputs=sum(required), queue_size=self._queue_size, slot_ns=self._slot_ns), stage
-
-    def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
-        return super().feed(place, stamp // self._slot_ns, message)
+    def __init__(self, *, n_inputs: int, queue_size: int, gap_ns: int) -> None:
+        super().__init__(n_inputs=n_inputs, queue_size=queue_size, epsilon_ns=max(0, gap_ns - 1))
 
 
-class SameSlotGroup(Group):
-    """Sets of stamps in one slot of time."""
+class WithinGapGroup(Group):
+    """Sets of stamps less than a gap apart."""
 
-    policy: Literal["same_slot"] = Field(description="Sets of stamps in one slot of time.")
-    slot: Duration = Field(description="Length of a slot.", examples=["20ms"])
+    policy: Literal["within_gap"] = Field(description="Sets of stamps less than a gap apart.")
+    gap: Duration = Field(description="The gap.", examples=["20ms"])
     topics: tuple[Topic, ...] = Topics
 
     @property
     def tolerance(self) -> Tolerance:
-        return Tolerance("slot", self.slot)
+        return Tolerance("gap", self.gap)
 
-    def build_policy(self, _inputs: Inputs) -> SameSlot:
-        return SameSlot(n_inputs=len(self.topics), queue_size=self.queue_size, slot_ns=self.slot)
+    def build_policy(self, _inputs: Inputs) -> WithinGap:
+        return WithinGap(n_inputs=len(self.topics), queue_size=self.queue_size, gap_ns=self.gap)
 
 
 @pytest.fixture(autouse=True)
-def _same_slot(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(policies, "GROUP_MODELS", (*policies.GROUP_MODELS, SameSlotGroup))
+def _within_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(policies, "GROUP_MODELS", (*policies.GROUP_MODELS, WithinGapGroup))
 
 
-def _text(slot: str, **keys: str) -> str:
-    return config({"fused": _keys(slot=slot, **keys)})
+def _text(gap: str, **keys: str) -> str:
+    return config({"fused": _keys(gap=gap, **keys)})
 
 
 def _keys(**keys: str) -> dict[str, Any]:
-    return {"policy": "same_slot", "topics": inputs(dict.fromkeys(_TOPICS, VECTOR)), **keys}
+    return {"policy": "within_gap", "topics": inputs(dict.fromkeys(_TOPICS, VECTOR)), **keys}
 
 
 def _recording(folder: Path) -> Path:
@@ -78,13 +68,15 @@ def _recording(folder: Path) -> Path:
 
 def test_its_options_are_read_and_checked_and_in_the_schema():
     (group,) = load_text(_text("50ms")).groups
-    assert isinstance(group.options, SameSlotGroup)
-    assert group.options.slot == 50 * MS
-    with pytest.raises(ConfigError, match=r"fused\.slot: unknown unit `parsecs`"):
+    assert isinstance(group.options, WithinGapGroup)
+    assert group.options.gap == 50 * MS
+    with pytest.raises(ConfigError, match=r"fused\.gap: unknown unit `parsecs`"):
         load_text(_text("50 parsecs"))
-    with pytest.raises(ConfigError, match=r"fused\.age_penalty: same_slot has no `age_penalty`, only approximate_time"):
+    with pytest.raises(
+        ConfigError, match=r"fused\.age_penalty: within_gap has no `age_penalty`, only approximate_time"
+    ):
         load_text(_text("50ms", age_penalty="0.2"))
-    assert Draft7Validator(json_schema()).is_valid({"version": 1, "groups": {"fused": _keys(slot="50ms")}})
+    assert Draft7Validator(json_schema()).is_valid({"version": 1, "groups": {"fused": _keys(gap="50ms")}})
     assert not Draft7Validator(json_schema()).is_valid({"version": 1, "groups": {"fused": _keys(slop="50ms")}})
 
 
@@ -94,14 +86,14 @@ def test_a_recording_is_analyzed_by_it_and_drawn(tmp_path: Path):
         analysis = analyze(recording, text, wire(load_text(text), recording))
     (group,) = analysis.groups
     assert group.suggestion.now < group.suggestion.possible
-    assert [change.key for change in group.suggestion.changes] == ["slot"]
+    assert [change.key for change in group.suggestion.changes] == ["gap"]
     (found,) = group.findings
     assert found.finding.code is Code.OVER_SLOP
-    assert "slot 1 ms" in found.finding.text
-    assert "`slot: " in found.finding.suggestion
+    assert "gap 1 ms" in found.finding.text
+    assert "`gap: " in found.finding.suggestion
     page = as_html(str(bag), analysis)
-    assert "same_slot" in page
-    assert "slot: " in page
+    assert "within_gap" in page
+    assert "gap: " in page
 
 
 @pytest.mark.parametrize("model", policies.GROUP_MODELS, ids=lambda model: model.__name__)

@@ -82,7 +82,7 @@ def _too_wide(tolerance: Tolerance, nearest: Distribution) -> str:
         return f"no stamps are equal: the nearest sets span {widths}"
     if tolerance.key == "max_age":
         return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
-    return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
+    return f"the nearest sets span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}"
 
 
 def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution, trials: Trials) -> Iterator[Tried]:
@@ -96,7 +96,7 @@ def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution,
         policy = (Change("policy", tolerance.wider_policy),) if tolerance.wider_policy else ()
         if tried := trials.try_out((*policy, Change(tolerance.key, wider))):
             yield tried
-    if tolerance.key == "slop":
+    if facts.trigger is None:
         yield from filter(None, (trials.gives_enough((each,)) for each in constant_offsets(trials)))
 
 

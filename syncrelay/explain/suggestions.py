@@ -8,8 +8,7 @@ from statistics import median
 from typing import Any, Final, NamedTuple, TypeAlias
 
 from syncrelay.config import GroupConfig
-from syncrelay.config.models import PacedTopic
-from syncrelay.config.policies import ApproximateTimeGroup
+from syncrelay.config.file import file_format
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
@@ -43,7 +42,6 @@ _MESSAGES_A_POLL: Final = 20_000
 _LEAST_DISTANCE: Final = 1_000_000
 # Of a period: so near to one another are messages of one moment received.
 _SAME: Final = 0.15
-_DURATIONS: Final = frozenset(("slop", "max_age", "max_wait", "offset"))
 
 
 class Change(NamedTuple):
@@ -275,8 +273,9 @@ def changed(config: GroupConfig, changes: Changes) -> GroupConfig:
     options, topics = config.options, list(config.topics)
     values = {each.key: _parsed(each) for each in changes if each.input is None}
     if "policy" in values:
-        paced = tuple(PacedTopic.model_construct(**dict(topic)) for topic in options.topics)
-        options = ApproximateTimeGroup.model_construct(**{**dict(options), **values, "topics": paced})
+        form, policy = file_format(), values["policy"]
+        of_policy = tuple(form.topics[policy].model_construct(**dict(topic)) for topic in options.topics)
+        options = form.groups[policy].model_construct(**{**dict(options), **values, "topics": of_policy})
     elif values:
         options = options.model_copy(update=values)
     for each in changes:
@@ -286,9 +285,14 @@ def changed(config: GroupConfig, changes: Changes) -> GroupConfig:
 
 
 def _parsed(change: Change) -> Any:
-    if change.key in _DURATIONS:
-        return parse_duration(change.value)
-    return int(change.value) if change.key == "queue_size" else change.value
+    match change.key:
+        case "policy":
+            return change.value
+        case "queue_size":
+            return int(change.value)
+        case _:
+            # A policy's tolerance, whatever its key, `max_wait` or `offset`.
+            return parse_duration(change.value)
 
 
 def _queue(size: int) -> Change:
