@@ -21,8 +21,10 @@ from syncrelay.sync.messages import DropReason
 from syncrelay.sync.queues import LONGEST_QUEUE
 
 _SECOND: Final = 1_000_000_000
-# A try takes some milliseconds: of the input that sets the pace so many messages, of all together so many.
+# A try takes some milliseconds: so many messages of the input that sets the pace, and so many of all together ...
 _PIVOTS: Final = 100
+# ... or those of so long, as late ones take.
+_AT_LEAST: Final = 5 * _SECOND
 _MOST_MESSAGES: Final = 4_000
 _KEPT: Final = 2_000
 # From fewer possible sets nothing can be told.
@@ -66,6 +68,16 @@ class Tried:
     given: int
     now: int
     possible: int
+
+
+class Verdict(NamedTuple):
+    """What helps, and whether the file's values may miss sets: not where what came can be told to give all it could."""
+
+    tried: tuple[Tried, ...]
+    may_miss: bool = True
+
+
+UNTRIED: Final = Verdict(())
 
 
 class TryBudget:
@@ -136,25 +148,26 @@ class Evaluator:
         now: int,
         within: int | None = None,
         optional: int | None = None,
-    ) -> tuple[Tried, ...]:
+    ) -> Verdict:
         """Return what `propose` finds, now and then for each `about`; nothing new once the budget is spent.
 
         What was found on many messages stands as long as it helps, with the figures of now. See Trials for
         `within` and `optional`.
         """
-        at, holds, found = self._found.get(about, _NOTHING)
+        at, holds, verdict = self._found.get(about, _NOTHING)
         if 0 <= now - at < holds:
-            return found
+            return verdict
         if not self._is_shared:
             self._budget.refill()
         if self._budget.is_spent:
-            return found
+            return verdict
         trials = Trials(self._config, self._recent, self._budget, within=within, optional=optional)
-        before = found if holds == _HOLDS else ()
+        before = verdict.tried if holds == _HOLDS else ()
         again = tuple(tried for each in before if (tried := trials.gives_enough(each.changes)) is not None)
         found = again if before and len(again) == len(before) else tuple(propose(trials))
-        self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), found)
-        return found
+        verdict = Verdict(found, may_miss=trials.may_miss)
+        self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), verdict)
+        return verdict
 
 
 class _Found(NamedTuple):
@@ -162,10 +175,10 @@ class _Found(NamedTuple):
 
     at: int
     holds: int
-    tried: tuple[Tried, ...]
+    verdict: Verdict
 
 
-_NOTHING: Final = _Found(0, 0, ())
+_NOTHING: Final = _Found(0, 0, UNTRIED)
 
 
 class Trials:
@@ -206,6 +219,12 @@ class Trials:
         self._counted = self.pivot if optional is None else optional
         self._now = self._run(())
 
+    @property
+    def may_miss(self) -> bool:
+        """Whether sets may be missed that other values would give."""
+        is_certain = len(self.stamps[self.pivot]) >= 2 * _FEWEST
+        return not (is_certain and (len(self.spans) < _FEWEST or self._is_enough(self._now)))
+
     def try_out(self, changes: Changes, *, need: int | None = None) -> Tried | None:
         """Return what changes give if that is enough, with a longer queue where they need one; else None.
 
@@ -235,8 +254,10 @@ class Trials:
 
     def _run(self, changes: Changes) -> int:
         self._budget.spend(len(self._arrivals))
-        counts = dry_run(changed(self.config, changes), self._arrivals).counts[self._counted]
-        completed = counts.matched + counts.dropped.get(DropReason.THINNED, 0)
+        run = dry_run(changed(self.config, changes), self._arrivals)
+        counts = run.counts[self._counted]
+        # A message that is held may be in many sets.
+        completed = max(run.held[self._counted], counts.matched + counts.dropped.get(DropReason.THINNED, 0))
         return min(completed, len(self.spans))
 
     def _possible(self, among: Sequence[int], within: int | None) -> Distribution:
@@ -256,7 +277,7 @@ class Trials:
 def _last(pairs: Sequence[Sequence[tuple[int, int]]], pacemaker: int) -> tuple[Arrival, ...]:
     """Return the messages that came since so many of the input that sets the pace, in the order of receipt."""
     since = pairs[pacemaker][-_PIVOTS:]
-    begin = since[0][1] if since else 0
+    begin = min(since[0][1], since[-1][1] - _AT_LEAST) if since else 0
     came = [
         Arrival(index, stamp, received)
         for index, each in enumerate(pairs)

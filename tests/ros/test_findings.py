@@ -63,7 +63,7 @@ def test_sets_that_leave_without_an_optional_input_are_told(stage: Stage):
     assert_logged(
         relay,
         r"\[WARN\] .* front: 100 % of the sets leave without /imu after waiting 100 ms for it: no message of it has"
-        r" come; look at its publisher\n",
+        r" come; check its publisher\n",
     )
 
 

@@ -162,7 +162,7 @@ FOUND = {
             "messages come on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as too_far"
             " and 3 were dropped as late; of /lidar none came lately"
         ),
-        "try a larger `queue_size`; `syncrelay doctor --live` looks at the graph and at the stamps",
+        "run `syncrelay doctor --config FILE --live`, which checks the graph and the stamps",
     ),
     "a start": (
         Code.STARTING,
