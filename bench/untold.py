@@ -6,7 +6,7 @@ import sys
 from collections import deque
 
 from syncrelay.cli import main
-from syncrelay.ros.group import GroupRelay
+from syncrelay.dataflow.group import GroupRelay
 from syncrelay.ros.monitor import Monitor
 
 
@@ -17,5 +17,5 @@ def _note_nothing(group):
 
 
 GroupRelay._watch = _note_nothing
-Monitor.look = Monitor.look_in_turn = lambda _: None
+Monitor.evaluate = Monitor.evaluate_in_turn = lambda _: None
 sys.exit(main(["--config", sys.argv[1]]))

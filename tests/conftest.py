@@ -58,8 +58,8 @@ def ros_domain() -> Iterator[int]:
 
 
 @pytest.fixture
-def receive_path() -> str:
-    """The path of the relay's messages; tests marked `both_paths` run on each."""
+def backend() -> str:
+    """The backend that the relay's messages pass through; tests marked `both_backends` run on each."""
     return "direct"
 
 
@@ -70,7 +70,7 @@ def figures(record_property: Callable[[str, object], None]) -> Callable[[str], N
 
 
 @pytest.fixture
-def stage(tmp_path: Path, ros_domain: int, receive_path: str) -> Iterator[Stage]:
+def stage(tmp_path: Path, ros_domain: int, backend: str) -> Iterator[Stage]:
     """Starts players, relays and collectors on a domain of their own, and ends them all."""
-    with running_stage(tmp_path, ros_domain, receive_path) as opened:
+    with running_stage(tmp_path, ros_domain, backend) as opened:
         yield opened

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from syncrelay.logs import LOGGER, configure
 from syncrelay.printable import one_entry, printable, printable_lines
-from syncrelay.ros.logs import LOGGER, configure
 from tests.hostile_names import assert_shown_safely, hostile_name
 
 _ANYTHING = st.text(st.characters())

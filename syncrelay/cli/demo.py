@@ -20,12 +20,12 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.tally import GroupPlan, Tally
 from syncrelay.config import GroupConfig, load_text
 from syncrelay.config.policies import ApproximateTimeGroup
-from syncrelay.ros.logs import LOGGER, configure
+from syncrelay.logs import LOGGER, configure
 from syncrelay.ros.snapshot import RelaySnapshot
 
 if TYPE_CHECKING:
+    from syncrelay.rig.processes import Rig
     from syncrelay.ros.relay import Relay
-    from syncrelay.ros.rig.processes import Rig
 
 _TITLE = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
 _STARTING = "Starting a simulated camera, lidar and IMU ..."
@@ -63,7 +63,7 @@ def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopReque
 
 def prepare_ros() -> None:
     """Import rclpy with this process kept to its machine; raises RosUnavailableError where ROS cannot be used."""
-    from syncrelay.ros.domain import require_domain
+    from syncrelay.environment.domain import require_domain
     from syncrelay.ros.environment import require_rclpy
 
     os.environ.update(isolation(os.environ))
@@ -77,8 +77,8 @@ def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: in
     Time counts from when every sensor publishes: how long their start takes is the machine's affair. None if it was
     stopped before.
     """
-    from syncrelay.ros.rig.discovery import quick_discovery
-    from syncrelay.ros.rig.processes import Rig
+    from syncrelay.environment.quick_discovery import quick_discovery
+    from syncrelay.rig.processes import Rig
 
     stop.defer()
     with quick_discovery(), Rig(seed=seed) as rig:

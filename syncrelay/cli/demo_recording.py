@@ -12,8 +12,8 @@ from syncrelay.bag.qos import Profile
 from syncrelay.cdr import patch_stamp
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.printable import printable
-from syncrelay.ros.rig.scene import SCENES
-from syncrelay.ros.rig.schedule import SENSORS, schedule
+from syncrelay.rig.scene import SCENES
+from syncrelay.rig.schedule import SENSORS, schedule
 
 _SECOND: Final = 1_000_000_000
 # Any time would do; always the same makes the same recording.

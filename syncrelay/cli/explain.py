@@ -18,7 +18,7 @@ def explain(relay: "Relay", seconds: float, *, stop: StopRequest) -> int:
     end = began + seconds
     while not stop.requested and (left := end - time.monotonic()) > 0:
         relay.step(left)
-    reports = relay.look()
+    reports = relay.evaluate()
     return conclude(reports, time.monotonic() - began, unjudged=relay.monitor.unjudged)
 
 

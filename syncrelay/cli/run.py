@@ -45,8 +45,8 @@ def run(
     cannot be used.
     """
     from syncrelay.config import load, where
+    from syncrelay.logs import LOGGER, configure
     from syncrelay.ros.environment import require_rclpy
-    from syncrelay.ros.logs import LOGGER, configure
 
     configure(log_level, log_format)
     # Before they are read: what changes while the relay starts is seen too.
@@ -71,8 +71,8 @@ def run(
             config_path=", ".join(config_paths),
             groups=groups or None,
             ros_args=ros_args,
-            beat=heartbeat.beat if heartbeat else None,
-            purpose=Purpose.RELAY if explain_s is None else Purpose.LOOK,
+            on_turn=heartbeat.beat if heartbeat else None,
+            purpose=Purpose.RELAY if explain_s is None else Purpose.OBSERVE,
         ) as relay,
         files,
     ):
@@ -99,7 +99,7 @@ def run(
 
 def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str], groups: Sequence[str]) -> None:
     """Take on the files as they were read again; whatever is wrong with them, the relay keeps its configuration."""
-    from syncrelay.ros.logs import LOGGER
+    from syncrelay.logs import LOGGER
 
     try:
         config = read.result()
@@ -114,7 +114,7 @@ def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str],
 
 
 def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:
-    from syncrelay.ros.logs import LOGGER
+    from syncrelay.logs import LOGGER
 
     if not named:
         return nullcontext()
@@ -130,7 +130,7 @@ def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]
 
     Raises ListenError where the port that it asks for cannot be had.
     """
-    from syncrelay.ros.logs import LOGGER
+    from syncrelay.logs import LOGGER
     from syncrelay.status import Server
 
     if listen is None:

@@ -6,7 +6,7 @@ from typing import Final
 
 from syncrelay.config.wording import did_you_mean, quoted
 from syncrelay.doctor.diagnosis import Diagnosis, know, mend
-from syncrelay.ros.domain import domain_of, no_domain
+from syncrelay.environment.domain import domain_of, no_domain
 
 RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 # DDS: 250 UDP ports for each domain, from 7400 on.

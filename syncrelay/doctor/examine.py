@@ -23,7 +23,7 @@ from syncrelay.doctor.shared_memory import check_shared_memory
 from syncrelay.doctor.stamps import Matched, check_stamps
 from syncrelay.doctor.start import check_start
 from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
-from syncrelay.ros.domain import domain_of
+from syncrelay.environment.domain import domain_of
 from syncrelay.ros.sighting import Sighting
 from syncrelay.ros.trial import Plan, Trial, try_out
 

@@ -26,38 +26,38 @@ _NS_PER_MS: Final = 1e6
 _NS_PER_SECOND: Final = 1e9
 
 
-class Telling:
+class Reporters:
     """Publishes what the file asks for, as far as DDS lets it; what it refuses is tried again at each report."""
 
     def __init__(self, node: Any, entities: Entities) -> None:
         self._node = node
         self._entities = entities
         self._wanted: tuple[str, ...] = ()
-        self._tellers: dict[str, Diagnostics | Scalars] = {}
+        self._reporters: dict[str, Diagnostics | Scalars] = {}
         self._said: set[str] = set()
 
-    def adopt(self, config: Config, groups: Sequence[str]) -> None:
+    def configure(self, config: Config, groups: Sequence[str]) -> None:
         """Publish what this file asks for of these groups from now on; what was published before goes on."""
         asked = config.diagnostics if self._entities.purpose is Purpose.RELAY else None
         self._wanted = () if asked is None else (_ALL, *groups) if asked.scalars else (_ALL,)
-        for key in [key for key in self._tellers if key not in self._wanted]:
-            self._tellers.pop(key).close()
+        for key in [key for key in self._reporters if key not in self._wanted]:
+            self._reporters.pop(key).close()
         self._make()
 
     def publish(self, reports: Sequence[GroupReport]) -> None:
         """Publish the state of all groups."""
         self._make()
-        if (diagnostics := self._tellers.get(_ALL)) is not None:
+        if (diagnostics := self._reporters.get(_ALL)) is not None:
             diagnostics.publish(reports)
         for report in reports:
-            if (scalars := self._tellers.get(report.facts.name)) is not None:
+            if (scalars := self._reporters.get(report.facts.name)) is not None:
                 scalars.publish([report])
 
     def _make(self) -> None:
         for key in self._wanted:
-            if key not in self._tellers:
+            if key not in self._reporters:
                 try:
-                    self._tellers[key] = self._made(key)
+                    self._reporters[key] = self._made(key)
                 except RefusedError as error:
                     self._say_once(str(error))
 

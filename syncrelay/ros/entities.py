@@ -16,10 +16,10 @@ _ROSOUT: Final = ("/rosout", "rcl_interfaces/msg/Log")
 
 
 class Purpose(Enum):
-    """What a node is there for: to relay, or to look only, which publishes nothing."""
+    """What a node is for: to relay, or to observe only, which publishes nothing."""
 
     RELAY = "relay"
-    LOOK = "look"
+    OBSERVE = "observe"
 
 
 class RefusedError(Exception):
@@ -53,7 +53,7 @@ class Entities:
     def __init__(self, node: Any, purpose: Purpose) -> None:
         self._node = node
         self.purpose = purpose
-        """Where it is to look, nobody asks for publishers."""
+        """Where it is to observe, nobody asks for publishers."""
         self._left_to_the_loop = _LeftToTheReceiveLoop()
         # An entity of the node itself, which never ends, stands for itself.
         self._holders: dict[str, dict[Any, str]] = {}

@@ -7,7 +7,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 
-from syncrelay.ros.domain import require_domain
+from syncrelay.environment.domain import require_domain
 from syncrelay.ros.environment import keep_stdout, log_arguments
 
 

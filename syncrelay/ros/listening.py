@@ -15,14 +15,14 @@ from rclpy.qos import QoSReliabilityPolicy
 from syncrelay.cdr import read_stamp
 from syncrelay.config import QosOverrides
 from syncrelay.config.interfaces import Interfaces
+from syncrelay.dataflow.backend import Content, RclBackend, Source
+from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import RosUnavailableError, TypeImportError
 from syncrelay.printable import printable
+from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.graph import is_nameless, topics_in
 from syncrelay.ros.hidden_node import join
-from syncrelay.ros.path import Content, Path, Source
-from syncrelay.ros.path_choice import VARIABLE, choose_path
 from syncrelay.ros.qos import input_profile
-from syncrelay.ros.receive import ReceiveLoop
 from syncrelay.ros.types import begins_with_header, import_type
 
 _NODE: Final = "_syncrelay_init"
@@ -70,7 +70,9 @@ def listen(*, seconds: float) -> Heard:
     node = None
     try:
         node = join(context, _NODE)
-        listener = _Listener(node, choose_path(os.environ.get(VARIABLE), node=node, context=context), seconds=seconds)
+        listener = _Listener(
+            node, choose_backend(os.environ.get(VARIABLE), node=node, context=context), seconds=seconds
+        )
         return listener.run()
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"the graph cannot be listened to: {error}") from error
@@ -83,12 +85,12 @@ def listen(*, seconds: float) -> Heard:
 class _Listener:
     """Subscribes to what it finds, as the relay would, and notes what comes."""
 
-    def __init__(self, node: Any, path: Path, *, seconds: float) -> None:
-        self._node, self._path = node, path
+    def __init__(self, node: Any, backend: RclBackend, *, seconds: float) -> None:
+        self._node, self._backend = node, backend
         now = time.monotonic_ns()
         self._due, self._end = now, now + round(seconds * _SECOND)
         self._loop = ReceiveLoop(
-            path.watch(), now=time.monotonic_ns, deadline=lambda: min(self._due, self._end), expire=self._turn
+            backend.watch(), now=time.monotonic_ns, deadline=lambda: min(self._due, self._end), expire=self._turn
         )
         self._topics: dict[str, HeardTopic] = {}
         self._relayed: set[str] = set()
@@ -156,7 +158,7 @@ class _Listener:
             self._count += 1
 
         subscription = self._node.create_subscription(message_type, topic.name, _never_called, profile, raw=True)
-        source = self._path.source(subscription, take)
+        source = self._backend.source(subscription, take)
         self._subscribed.append((subscription, source))
         self._loop.add(source, _give_up)
 

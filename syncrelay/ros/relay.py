@@ -1,4 +1,4 @@
-"""The node: subscribes to what the file names as it appears, and keeps its groups at work."""
+"""The relay: a ROS node and its threads, and what its main thread does turn by turn."""
 
 import gc
 import logging
@@ -8,45 +8,39 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
-from rclpy.clock import JumpThreshold
-from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
-from syncrelay.config import Config, ConfigError, GroupConfig
-from syncrelay.config.wording import counted
-from syncrelay.errors import ReloadError, SyncRelayError
+from syncrelay.config import Config
+from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.environment.transport import apply_transport
+from syncrelay.errors import SyncRelayError
 from syncrelay.explain import GroupReport, recent
-from syncrelay.ros.bugs import Bugs
-from syncrelay.ros.diagnostics import Telling
+from syncrelay.logs import name_after
+from syncrelay.ros.backend_choice import VARIABLE, choose_backend
+from syncrelay.ros.bindings import GroupBinding, GroupBindings
+from syncrelay.ros.clock import WaitingClock
+from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
-from syncrelay.ros.group import GroupRelay
-from syncrelay.ros.logs import RosoutHandler, name_after
-from syncrelay.ros.monitor import LOOK_S, Monitor
-from syncrelay.ros.path_choice import VARIABLE, choose_path
-from syncrelay.ros.receive import ReceiveLoop
+from syncrelay.ros.groups import Groups, require_distinct_names
+from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
-from syncrelay.ros.start import make_node, resolver, start
-from syncrelay.ros.transport import apply_transport
-from syncrelay.ros.wakeup import Wakeup
-from syncrelay.ros.wirings import Wiring, Wirings
+from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
+from syncrelay.ros.surroundings import Surroundings
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import DropReason
+from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
 
-# Changes of the graph are looked for this often while something is missing, so that a rig that starts loses
-# little ...
-_EAGER_LOOK_S = 0.1
-# ... and this often when all is there.
-_LOOK_S = 1.0
-# Whoever asks for the state every second or two sees all groups as of the last second.
+# The graph is polled this often while something is missing, so that a rig that starts loses little ...
+_EAGER_POLL_S = 0.1
+# ... and this often when nothing is missing.
+_POLL_S = 1.0
+# While the state is asked for every second or two, all groups are evaluated every second.
 _ASKED_S = 3.0
-# Discovery takes a few tenths of a second: before that, everything would be reported as missing.
-_GRACE_S = 2.0
-# What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
-_CLOCK_JUMP = Duration(nanoseconds=-1_000_000_000)
 # What fails again at once must not take all of a core.
 _AFTER_FAILURE_S = 0.1
 # How long an end may take to see that reliable subscribers have what was published on all outputs. They say so
@@ -57,8 +51,8 @@ _ACKNOWLEDGE_NS = 300_000_000
 class Relay:
     """A node that relays the groups of a file; a context manager that runs its receive thread.
 
-    Made on the main thread, whose turns at `step` look at the graph. Data flows on a thread of its own;
-    parameters and the clock are served on a third.
+    Made on the main thread, whose turns at `step` poll the graph. Data flows on a thread of its own; parameters and
+    the clock are served on a third.
     """
 
     def __init__(
@@ -68,15 +62,15 @@ class Relay:
         config_path: str = "",
         groups: Collection[str] | None = None,
         ros_args: Sequence[str] = (),
-        beat: Callable[[], None] | None = None,
+        on_turn: Callable[[], None] | None = None,
         purpose: Purpose = Purpose.RELAY,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
 
-        Whose purpose is to look has all but publishers: sets leave to nowhere.
+        One that only observes has everything but publishers.
 
-        Raises ConfigError where remaps make the file's names meet, UsageError where ROS does not take `ros_args`.
-        `config_path` is what `state` calls the file. `beat` is called on the receive thread for as long as that
+        Raises ConfigError where remaps give two topics one name, UsageError where ROS rejects `ros_args`.
+        `config_path` is what `state` calls the file. `on_turn` is called on the receive thread for as long as that
         turns, once a second at least.
         """
         apply_transport(config.node.transport, os.environ)
@@ -84,61 +78,67 @@ class Relay:
         self.node = make_node(
             config.node.name, namespace=config.node.namespace, context=self._context, ros_args=ros_args
         )
-        self._resolve = resolver(self.node, ros_args)
-        self._config, self._names = config, groups
+        resolve = resolver(self.node, ros_args)
         try:
-            self._require_distinct_names(config)
+            require_distinct_names(config, groups, resolve)
         except SyncRelayError:
             self._leave()
             raise
         name_after(self.node.get_logger().name)
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
-        self._sim_time = bool(self.node.get_parameter("use_sim_time").value)
-        # Nanoseconds of a clock that only measures waiting: ROS time if simulated, else one that never jumps.
-        self._now: Callable[[], int] = self._simulated_now if self._sim_time else time.monotonic_ns
-        path = choose_path(os.environ.get(VARIABLE), node=self.node, context=self._context)
-        self.receive_path = path.name
+        self._clock = WaitingClock(self.node)
+        backend = choose_backend(os.environ.get(VARIABLE), node=self.node, context=self._context)
+        self.backend = backend.name
         self._bugs = Bugs()
         self._loop = ReceiveLoop(
-            path.watch(),
-            now=self._now,
-            expire=self._expire,
-            beat=beat,
-            contain=lambda error: self._bugs.tell("receiving", error),
+            backend.watch(),
+            now=self._clock.now,
+            expire=lambda now: self._groups.expire(now),  # noqa: PLW0108  the groups come after the loop
+            on_turn=on_turn,
+            contain=lambda error: self._bugs.log("receiving", error),
         )
-        self._graph_changes = path.graph_changes(self.node)
+        self._graph_changes = backend.graph_changes(self.node)
         entities = Entities(self.node, purpose)
-        self._wirings = Wirings(entities=entities, node=self.node, path=path, loop=self._loop)
-        self._telling = Telling(self.node, entities)
-        self.monitor = Monitor((), node=self.node, loop=self._loop, simulated=self._sim_time, bugs=self._bugs)
-        self._take_on(config)
-        self._reloads = 0
-        self._refused_reloads = 0
-        self._reload_error: str | None = None
+        bindings = GroupBindings(entities=entities, node=self.node, backend=backend, loop=self._loop)
+        self._reporters = Reporters(self.node, entities)
+        self._surroundings = Surroundings(self.node, purpose)
+        self.monitor = Monitor(
+            node=self.node,
+            loop=self._loop,
+            surroundings=self._surroundings,
+            simulated=self._clock.is_simulated,
+            bugs=self._bugs,
+        )
+        self._groups = Groups(
+            config,
+            chosen=groups,
+            node=self.node,
+            resolve=resolve,
+            bindings=bindings,
+            loop=self._loop,
+            clock=self._clock,
+            changed=lambda config: self._report_on(bindings, config),
+        )
         self._config_path = config_path
         self._phase = Phase.STARTING
         self._asked = -_ASKED_S
-        self._next_look = time.monotonic() + LOOK_S
-        # What each group was last said to wait for; None of one that runs.
-        self._announced: dict[str, str | None] = {}
+        self._next_evaluation = time.monotonic() + EVALUATE_S
         self._started = time.monotonic()
         self._wake = Wakeup()
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
         self._services = SingleThreadedExecutor(context=self._context)
         self._services.add_node(self.node)
         self._receiving: Future[None] | None = None
-        self._jump_handle: Any = None
 
     def __enter__(self) -> Self:
-        # What there is by now stays: the garbage collector need not look through all modules for each few messages.
+        # What exists by now stays: the garbage collector need not search all modules again and again.
         gc.collect()
         gc.freeze()
         self._receiving = self._threads.submit(self._loop.run)
         self._receiving.add_done_callback(lambda _: self._wake.set())
         self._threads.submit(self._serve)
-        if self._sim_time:
-            self._follow_clock()
+        self._clock.follow(jumped_back=self._groups.clock_jumped_back, ticked=self._groups.clock_ticked)
         return self
 
     def __exit__(
@@ -147,111 +147,71 @@ class Relay:
         self.close()
 
     def reload(self, config: Config) -> None:
-        """Run the groups of a file that was read again: those that are as before go on, with all that they hold.
-
-        A group that failed begins anew. On the main thread. Whatever it raises, the groups of the file before go on:
-        ReloadError where the file asks for what needs a restart, or for a publisher that DDS does not make,
-        ConfigError where remaps make its names meet.
-        """
-        _require_same_node(self._config, config)
-        self._require_distinct_names(config)
-        before = self._wirings.groups
-        try:
-            self._take_on(config)
-        except BaseException:
-            if self._wirings.groups != before:
-                self._take_on(self._config)
-            raise
-        self._config = config
-        kept = {group.config.name for group in self._wirings.groups if group in before}
-        self._announced = {name: said for name, said in self._announced.items() if name in kept}
-        self._reloads += 1
-        self._reload_error = None
-        # What is new is to be told of at once.
-        self._next_look = time.monotonic()
-        begin = len(self._wirings.groups) - len(kept)
-        go_on = f"{counted(len(kept), 'group')} {'goes' if len(kept) == 1 else 'go'} on"
-        _LOG.info("the file was read again: %s, %d %s", go_on, begin, "begins" if begin == 1 else "begin")
+        """Run the groups of a file that was read again. On the main thread; raises as `Groups.reload`."""
+        self._groups.reload(config)
+        # New groups are to be evaluated at once.
+        self._next_evaluation = time.monotonic()
 
     def refuse_reload(self, reason: str) -> None:
-        """Tell in `state` that a reload failed, and why."""
-        self._reload_error = reason
-        self._refused_reloads += 1
+        """Report in `state` that a reload failed, and why."""
+        self._groups.refuse_reload(reason)
 
-    def _chosen(self, config: Config) -> list[GroupConfig]:
-        return [each for each in config.groups if self._names is None or each.name in self._names]
-
-    def _require_distinct_names(self, config: Config) -> None:
-        """Hold the names after all remaps to what is asked of a file's own; raises ConfigError."""
-        problems = config.names.problems(self._resolve, groups=[each.name for each in self._chosen(config)])
-        if problems:
-            raise ConfigError(problems)
-
-    def _take_on(self, config: Config) -> None:
-        running = [group for group in self._wirings.groups if group.failure is None]
-        chosen = self._chosen(config)
-        as_before = [next((group for group in running if group.config == each), None) for each in chosen]
-        self._wirings.wire(
-            [group or GroupRelay(each, now=self._now) for group, each in zip(as_before, chosen, strict=True)]
-        )
-        limited = [group for group in self._wirings.groups if group.config.options.max_wait is not None]
-        # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
-        self._loop.deadline = None if self._sim_time or not limited else lambda: _next_deadline(limited)
-        self._loop.wake()
-        self.monitor.watch(self._wirings.all)
-        self._telling.adopt(config, [group.config.name for group in self._wirings.groups])
+    def _report_on(self, bindings: GroupBindings, config: Config) -> None:
+        self.monitor.watch(bindings.all)
+        self._reporters.configure(config, [group.config.name for group in bindings.groups])
 
     def wake(self) -> None:
         """Have `step` return at once. Safe in a signal handler."""
         self._wake.set()
 
-    def step(self, timeout_s: float = _LOOK_S) -> None:
-        """Look at the graph, then rest until the next look is due, `timeout_s` at most, or until `wake`."""
+    def step(self, timeout_s: float = _POLL_S) -> None:
+        """Poll the graph, evaluate groups, then rest until one of them is due, `timeout_s` at most, or until `wake`."""
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
-        with self._bugs.contained("looking at the graph"):
-            self._look_at_graph()
-            self._announce()
-        if (now := time.monotonic()) >= self._next_look:
-            with self._bugs.contained("looking at the groups"):
-                self._look(self.monitor.look if self._is_watched(now) else self.monitor.look_in_turn)
-        is_waiting = any(wiring.waiting_for for wiring in self._wirings.all)
-        until_look = max(0.0, self._next_look - time.monotonic())
-        rest_s, began = min(timeout_s, until_look, _EAGER_LOOK_S if is_waiting else _LOOK_S), time.monotonic()
+        with self._bugs.contained("polling the graph"):
+            self._poll_graph()
+            self._groups.announce()
+        if (now := time.monotonic()) >= self._next_evaluation:
+            with self._bugs.contained("evaluating the groups"):
+                self._evaluate(self.monitor.evaluate if self._is_watched(now) else self.monitor.evaluate_in_turn)
+        is_waiting = any(binding.waiting_for for binding in self._groups.bindings.all)
+        until_evaluation = max(0.0, self._next_evaluation - time.monotonic())
+        rest_s, began = min(timeout_s, until_evaluation, _EAGER_POLL_S if is_waiting else _POLL_S), time.monotonic()
         self._wake.wait(rest_s)
-        self.monitor.overslept(time.monotonic() - began - rest_s)
+        too_long_s = time.monotonic() - began - rest_s
+        self.monitor.standstills.overslept(round(too_long_s * 1e9), now=time.time_ns())
 
-    def _look_at_graph(self) -> None:
+    def _poll_graph(self) -> None:
         has_changed = self._graph_changes.seen()
-        for topic_input in self._wirings.inputs:
-            if has_changed or topic_input.is_due:
-                with self._bugs.contained(f"looking at {topic_input.name}"):
-                    topic_input.look()
+        for topic in self._groups.bindings.topics:
+            if has_changed or topic.is_due:
+                with self._bugs.contained(f"polling {topic.name}"):
+                    topic.poll()
         if has_changed:
-            self.monitor.graph_changed()
+            self._surroundings.forget()
 
     def _is_watched(self, now: float) -> bool:
-        """Whether somebody wants all groups every second: who plots them, or asks for the state."""
-        plotted = self._config.diagnostics is not None and self._config.diagnostics.scalars
+        """Whether all groups are wanted every second: to plot them, or because the state is asked for."""
+        plotted = self._groups.config.diagnostics is not None and self._groups.config.diagnostics.scalars
         return plotted or now - self._asked < _ASKED_S
 
-    def look(self) -> tuple[GroupReport, ...]:
-        """Look at all groups now, tell of it, and give what there is to say."""
-        return self._look(self.monitor.look)
+    def evaluate(self) -> tuple[GroupReport, ...]:
+        """Evaluate all groups now, and return and publish their reports."""
+        return self._evaluate(self.monitor.evaluate)
 
-    def _look(self, look: Callable[[], None]) -> tuple[GroupReport, ...]:
-        self._next_look = time.monotonic() + LOOK_S
+    def _evaluate(self, evaluate: Callable[[], None]) -> tuple[GroupReport, ...]:
+        self._next_evaluation = time.monotonic() + EVALUATE_S
         try:
-            look()
+            evaluate()
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
         self._phase = Phase.RUNNING
-        self._telling.publish(self.monitor.reports)
+        self._reporters.publish(self.monitor.reports)
         return self.monitor.reports
 
     def state(self) -> RelayState:
-        """What there is to tell of the relay, as of its last look. Any thread."""
+        """The state of the relay, as last evaluated. Any thread."""
         self._asked = now = time.monotonic()
         return RelayState(
             node=self.node.get_fully_qualified_name(),
@@ -259,11 +219,11 @@ class Relay:
             phase=self._phase,
             uptime_s=now - self._started,
             turned_s=now - self._loop.turned,
-            receives_by=self.receive_path.value,
+            receives_by=self.backend.value,
             groups=self.monitor.reports,
-            reloads=self._reloads,
-            refused_reloads=self._refused_reloads,
-            reload_error=self._reload_error,
+            reloads=self._groups.reloads,
+            refused_reloads=self._groups.refused_reloads,
+            reload_error=self._groups.reload_error,
             unjudged=self.monitor.unjudged,
         )
 
@@ -281,12 +241,11 @@ class Relay:
         if receiving is not None:
             self._loop.stop()
             receiving.result()
-            for group in self._wirings.groups:
-                group.flush(DropReason.SHUTDOWN)
+            self._groups.flush(DropReason.SHUTDOWN)
             deadline = time.monotonic_ns() + _ACKNOWLEDGE_NS
-            for topic_input in self._wirings.inputs:
-                with self._bugs.contained(f"ending {topic_input.name}"):
-                    topic_input.wait_until_acknowledged(deadline)
+            for topic in self._groups.bindings.topics:
+                with self._bugs.contained(f"ending {topic.name}"):
+                    topic.outputs.wait_until_acknowledged(deadline)
         return self._snapshot()
 
     def close(self) -> None:
@@ -294,25 +253,16 @@ class Relay:
         try:
             self.drain()
         finally:
-            self._leave_graph()
-
-    def _leave_graph(self) -> None:
-        if self._jump_handle is not None:
-            self._jump_handle.unregister()
-        self._services.shutdown()
-        self._threads.shutdown()
-        self._loop.close()
-        _LOG.removeHandler(self._rosout)
-        self._leave()
+            self._clock.close()
+            self._services.shutdown()
+            self._threads.shutdown()
+            self._loop.close()
+            _LOG.removeHandler(self._rosout)
+            self._leave()
 
     def _leave(self) -> None:
         self.node.destroy_node()
         self._context.try_shutdown()
-
-    def _flow(self, wiring: Wiring) -> str:
-        """The names after all remaps: those that the graph shows."""
-        topics = zip(wiring.inputs, wiring.group.config.topics, strict=True)
-        return ", ".join(f"{each.name} -> {self.node.resolve_topic_name(topic.output)}" for each, topic in topics)
 
     def _serve(self) -> None:
         while self._context.ok():
@@ -321,68 +271,13 @@ class Relay:
                 return
             time.sleep(_AFTER_FAILURE_S)
 
-    def _follow_clock(self) -> None:
-        clock = self.node.get_clock()
-        forward = Duration(nanoseconds=1)
-        threshold = JumpThreshold(min_forward=forward, min_backward=_CLOCK_JUMP, on_clock_change=True)
-
-        def changed(jump: Any) -> None:
-            if jump.delta <= _CLOCK_JUMP:
-                self._loop.call(self._flush_jump)
-            elif any(group.config.options.max_wait is not None for group in self._wirings.groups):
-                self._loop.call(lambda: self._expire(self._now()))
-
-        self._jump_handle = clock.create_jump_callback(threshold, post_callback=changed)
-
-    def _flush_jump(self) -> None:
-        _LOG.warning("the clock jumped back: everything buffered is dropped as time_jump")
-        for group in self._wirings.groups:
-            group.flush(DropReason.TIME_JUMP)
-
-    def _simulated_now(self) -> int:
-        return int(self.node.get_clock().now().nanoseconds)
-
-    def _expire(self, now: int) -> None:
-        for group in self._wirings.groups:
-            group.expire(now)
-
     def _snapshot(self) -> RelaySnapshot:
-        return RelaySnapshot(tuple(_describe(wiring) for wiring in self._wirings.all))
-
-    def _announce(self) -> None:
-        """Say once what each group waits for, and once that it runs."""
-        for wiring in self._wirings.all:
-            name, waiting_for = wiring.group.config.name, wiring.waiting_for
-            if waiting_for and time.monotonic() - self._started < _GRACE_S:
-                continue
-            if name in self._announced and self._announced[name] == waiting_for:
-                continue
-            self._announced[name] = waiting_for
-            text = f"waiting for {waiting_for}" if waiting_for else f"running: {self._flow(wiring)}"
-            _LOG.info("%s: %s", name, text, extra={"group": name})
+        return RelaySnapshot(tuple(_describe(binding) for binding in self._groups.bindings.all))
 
 
-def _require_same_node(running: Config, asked: Config) -> None:
-    """Raise ReloadError for what a running relay cannot take on."""
-    for name, before, now in (
-        ("node", running.node, asked.node),
-        ("metrics", running.listen, asked.listen),
-    ):
-        if before != now:
-            raise ReloadError(f"`{name}` cannot change while the relay runs: restart it")
-
-
-def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:
-    try:
-        deadlines = [group.engine.next_deadline() for group in groups]
-    except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
-        deadlines = [group.next_deadline() for group in groups]
-    return min((deadline for deadline in deadlines if deadline is not None), default=None)
-
-
-def _describe(wiring: Wiring) -> GroupSnapshot:
-    group = wiring.group
-    inputs = zip(group.config.topics, wiring.inputs, group.counts(), strict=True)
+def _describe(binding: GroupBinding) -> GroupSnapshot:
+    group = binding.group
+    inputs = zip(group.config.topics, binding.inputs, group.counts(), strict=True)
     return GroupSnapshot(
         name=group.config.name,
         inputs=tuple(
@@ -390,12 +285,12 @@ def _describe(wiring: Wiring) -> GroupSnapshot:
                 topic=topic.topic,
                 output=topic.output,
                 counts=counts,
-                publishers=topic_input.publisher_count,
-                subscribed=topic_input.subscribed,
+                publishers=sum(publisher.type == topic.type for publisher in each.topic.publishers),
+                subscribed=each.topic.profile is not None,
             )
-            for topic, topic_input, counts in inputs
+            for topic, each, counts in inputs
         ),
         sets=group.engine.sets,
         recent=recent(group.last),
-        waiting_for=wiring.waiting_for,
+        waiting_for=binding.waiting_for,
     )

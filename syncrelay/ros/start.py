@@ -1,5 +1,6 @@
-"""The relay's node: rclpy started with what the file and the command line say, and in words what ROS refuses of it."""
+"""The relay's node: rclpy started as the file and the command line say, and its log on /rosout."""
 
+import logging
 import os
 import re
 from collections.abc import Callable, Sequence
@@ -12,12 +13,12 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from syncrelay.config.wording import quoted
+from syncrelay.environment.domain import require_domain
 from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
-from syncrelay.printable import printable
-from syncrelay.ros.domain import require_domain
+from syncrelay.printable import one_entry, printable
 from syncrelay.ros.environment import keep_stdout, log_arguments
 
-# Where in rcl's sources it gave up: that tells its authors something, not whoever wrote the arguments.
+# Where in rcl's sources it gave up: of use to its authors, not to the user.
 _PLACE_IN_RCL: Final = re.compile(r", at [^ ,]+:\d+")
 # What rcl says of arguments, and of nothing else.
 _OF_ARGUMENTS: Final = re.compile(
@@ -29,9 +30,9 @@ _OF_ARGUMENTS: Final = re.compile(
 def start(ros_args: Sequence[str], *, simulated: bool) -> Context:
     """Start rclpy in a context of its own, signals left alone; `simulated` time is what the file asks for.
 
-    Raises UsageError where ROS does not take the arguments, RosUnavailableError where it does not start.
+    Raises UsageError where ROS rejects the arguments, RosUnavailableError where it does not start.
     """
-    # The file's wish stands before the command line's, which so has the last word. Our own log is on stderr:
+    # The file's wish comes before the command line's, which has the last word. Our own log is on stderr:
     # the same lines from rcl would double it.
     wish = ["-p", "use_sim_time:=true"] if simulated else []
     ours = ["--ros-args", "--disable-stdout-logs", *log_arguments(), *wish, "--"]
@@ -43,7 +44,7 @@ def start(ros_args: Sequence[str], *, simulated: bool) -> Context:
             args=[*ours, "--ros-args", *ros_args], context=context, signal_handler_options=SignalHandlerOptions.NO
         )
     except _rclpy.UnknownROSArgsError as error:
-        raise _not_taken(ros_args, f"{error} is unknown") from error
+        raise _rejected(ros_args, f"{error} is unknown") from error
     except _rclpy.RCLError as error:
         raise _refused(f"rclpy does not start: {error}", ros_args) from error
     return context
@@ -55,9 +56,9 @@ def make_node(name: str, *, namespace: str, context: Context, ros_args: Sequence
         return rclpy.create_node(name, namespace=namespace, context=context)
     except NameValidationException as error:
         what, name, *_ = (line.strip(" '") for line in str(error).splitlines())
-        raise _not_taken(ros_args, f"{what} {quoted(name)}") from error
+        raise _rejected(ros_args, f"{what} {quoted(name)}") from error
     except ParameterException as error:
-        raise _not_taken(ros_args, str(error)) from error
+        raise _rejected(ros_args, str(error)) from error
     except _rclpy.RCLError as error:
         raise _refused(f"no node starts: {error}", ros_args) from error
 
@@ -72,20 +73,41 @@ def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:
         try:
             return str(node.resolve_topic_name(name))
         except _rclpy.RCLError as error:
-            raise _not_taken(ros_args, f"of the topic {quoted(name)} they make none: {error}") from error
+            raise _rejected(ros_args, f"they give the topic {quoted(name)} a name that ROS rejects: {error}") from error
 
     return resolve
 
 
+class RosoutHandler(logging.Handler):
+    """Passes records on to a node's logger, which publishes them on /rosout and writes ROS's log file."""
+
+    def __init__(self, node_logger: Any) -> None:
+        super().__init__()
+        # rclpy refuses two severities from one line of code, hence a line for each.
+        self._emit_at = {
+            logging.DEBUG: lambda text: node_logger.debug(text),  # noqa: PLW0108
+            logging.INFO: lambda text: node_logger.info(text),  # noqa: PLW0108
+            logging.WARNING: lambda text: node_logger.warning(text),  # noqa: PLW0108
+            logging.ERROR: lambda text: node_logger.error(text),  # noqa: PLW0108
+            logging.CRITICAL: lambda text: node_logger.fatal(text),  # noqa: PLW0108
+        }
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(one_entry(record.getMessage()))
+        except Exception:  # noqa: BLE001  logging never raises, as with every handler
+            self.handleError(record)
+
+
 def _refused(words: str, ros_args: Sequence[str]) -> SyncRelayError:
     of_arguments = _OF_ARGUMENTS.search(words)
-    return _not_taken(ros_args, of_arguments.group()) if of_arguments else RosUnavailableError(words)
+    return _rejected(ros_args, of_arguments.group()) if of_arguments else RosUnavailableError(words)
 
 
-def _not_taken(ros_args: Sequence[str], reason: str) -> UsageError:
+def _rejected(ros_args: Sequence[str], reason: str) -> UsageError:
     words = printable(" ".join(ros_args))
     why = printable(_PLACE_IN_RCL.sub("", reason))
     return UsageError(
-        f"ROS does not take --ros-args {words}: {why}\n"
+        f"ROS rejects --ros-args {words}: {why}\n"
         "  remaps are written -r FROM:=TO, parameters -p NAME:=VALUE, a namespace -r __ns:=/NAMESPACE"
     )

@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 from syncrelay.cdr import read_stamp
 from syncrelay.cdr_fields import UnreadableFieldError, field_reader
 from syncrelay.config import StampField, StampSource
+from syncrelay.dataflow.backend import Content
 from syncrelay.errors import TypeImportError
-from syncrelay.ros.path import Content
 
 StampReader: TypeAlias = Callable[[Content], int | None]
 """From a payload to its stamp in nanoseconds; None where none can be read."""
@@ -57,7 +57,7 @@ def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:
     try:
         return field_reader(_fields_of, name.replace("/msg/", "/"), path)
     except UnreadableFieldError as error:
-        raise TypeImportError(f"{name} has no field {path} to go by: {error}") from error
+        raise TypeImportError(f"{name} has no usable field {path}: {error}") from error
 
 
 def _fields_of(name: str) -> Mapping[str, str]:

@@ -124,7 +124,7 @@ def test_it_can_be_stopped_before_the_sensors_publish(stage):
 def test_it_fails_if_no_set_came(stage):
     never = "itertools.repeat(schedule.Shot(0, 0, 1 << 62))"
     stage.before_each_sensor(
-        f"import itertools; from syncrelay.ros.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
+        f"import itertools; from syncrelay.rig import schedule; schedule.schedule = lambda *_, **__: {never}"
     )
     demo = stage.start("demo", [*_DEMO, "--seconds", "1"])
     assert demo.wait() == 1

@@ -5,7 +5,7 @@ from rosbags.highlevel import AnyReader
 
 from syncrelay.cdr import read_stamp
 from syncrelay.cli.demo import shipped_config
-from syncrelay.ros.rig.schedule import SENSORS
+from syncrelay.rig.schedule import SENSORS
 from tests.cli.command import run, run_python
 from tests.ros.summary import read_summary
 

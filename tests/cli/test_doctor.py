@@ -245,7 +245,7 @@ def test_a_start_that_fails_for_a_reason_nobody_thought_of_is_shown_with_its_wor
 @pytest.mark.ros
 def test_arguments_that_ros_does_not_take_are_shown(base):
     _, found = examine(base, "--ros-args", "-r", "nonsense")
-    assert found["ros_args"]["what"].startswith("ROS does not take --ros-args -r nonsense:")
+    assert found["ros_args"]["what"].startswith("ROS rejects --ros-args -r nonsense:")
 
 
 @pytest.fixture

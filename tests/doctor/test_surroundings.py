@@ -11,7 +11,7 @@ from syncrelay.doctor.folders import Written, check_folders
 from syncrelay.doctor.network import Interface, check_network
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile, check_shared_memory
 from syncrelay.doctor.transport import Transport, check_transport, uses_shared_memory
-from syncrelay.ros.domain import domain_of
+from syncrelay.environment.domain import domain_of
 
 MEND, KNOW = Severity.MEND, Severity.KNOW
 

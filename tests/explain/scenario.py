@@ -24,9 +24,9 @@ from syncrelay.explain import (
     GroupFacts,
     GroupWatch,
     InputGraph,
+    Judge,
     Severity,
     Standstill,
-    problems,
 )
 from syncrelay.sync import Match, Message, Outcome
 
@@ -150,7 +150,8 @@ def run(
     place = 0
     shown = publishers or (lambda topic, _: tuple(each.endpoint for each in sources if each.topic == topic))
     for second in range(1, seconds + 1):
-        if _until(stops, float(second)) > second:
+        # Who polls asks the thread that takes messages, and waits for it.
+        if _until([*stops, *starved], float(second)) > second:
             continue
         while place < len(taken) and taken[place][0] <= second:
             at, received, index, stamp = taken[place]
@@ -208,6 +209,7 @@ class _Relay:
         self._names = [(topic.topic, topic.output) for topic in config.topics]
         self._driver = EngineDriver(config, self._leave)
         self._watch = GroupWatch(config, began=BEGAN)
+        self._judge = Judge()
         self._log = FindingLog()
         self._arrived: tuple[list[tuple[int, int]], ...] = tuple([] for _ in config.topics)
         self._sent: list[tuple[tuple[int | None, ...], int]] = []
@@ -251,8 +253,8 @@ class _Relay:
         waited = max(self._waits[-10:])
         self._waits.append(0)
         self.facts = self._watch.facts(graph, now=now, **{"waited": waited, "standstill": worst, **more})
-        found = problems(self.facts)
+        found = self._judge.judge(self.facts)
         self.found.append((second, found))
-        for remark in self._log.look(self.facts, found):
+        for remark in self._log.remarks(self.facts, found):
             code = remark.code and remark.code.value
             self.lines.append(Line(second, remark.severity is not Severity.OK, remark.text, code))

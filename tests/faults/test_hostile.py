@@ -11,7 +11,7 @@ from tests.ros import relaying
 from tests.ros.cdr_messages import NS_PER_SECOND, VECTOR, padded
 from tests.ros.configs import LOSSLESS, config, inputs
 from tests.ros.frames import Frame
-from tests.ros.stage import Stage, both_paths
+from tests.ros.stage import Stage, both_backends
 from tests.ros.status import ANY_PORT
 from tests.ros.streams import BEGIN, at, merged
 
@@ -36,9 +36,9 @@ _GROUPS = {
 }
 
 
-@both_paths
+@both_backends
 @pytest.mark.timeout(chosen(short=300, long=1200))
-def test_messages_that_are_none_are_counted_and_right_sets_leave_afterwards(stage: Stage, receive_path: str, figures):
+def test_messages_that_are_none_are_counted_and_right_sets_leave_afterwards(stage: Stage, backend: str, figures):
     aligned = {f"/{group}{topic}": VECTOR for group in _GROUPS for topic in _PAIR}
     recording = merged(at("/camera", *range(0, 1000, 20)), at("/lidar", *range(2, 1000, 20)))
     hostile = [
@@ -72,7 +72,7 @@ def test_messages_that_are_none_are_counted_and_right_sets_leave_afterwards(stag
     assert relay.running()
     total = fates[0] + fates[1]
     figures(
-        f"{_MESSAGES} hostile messages to {len(_GROUPS)} groups ({receive_path}): {total['malformed']} counted as"
+        f"{_MESSAGES} hostile messages to {len(_GROUPS)} groups ({backend}): {total['malformed']} counted as"
         f" malformed, {total['unstamped']} as unstamped, the rest have a stamp; then all {len(expected)} right sets"
     )
 

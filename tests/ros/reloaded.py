@@ -33,7 +33,7 @@ class ReloadedFile:
         wait_until(lambda: self.count("reloads") == before + 1, "the file to be read")
 
     def refuse(self, text: str) -> str:
-        """Write a file that is to be left aside; why it was."""
+        """Write a file that is to be refused; why it was."""
         self.write(text)
         before = self.count("refused_reloads")
         self.relay.send(signal.SIGHUP)

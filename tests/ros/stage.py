@@ -18,8 +18,8 @@ from tests.ros.shared_memory import left_of
 _CHECKOUT = Path(__file__).parents[2]
 _PACKAGE = Path(syncrelay.__file__).parents[1]
 
-both_paths = pytest.mark.parametrize("receive_path", ["direct", "rclpy"])
-"""For what must be so whichever way messages pass through rcl."""
+both_backends = pytest.mark.parametrize("backend", ["direct", "rclpy"])
+"""For what must be so whichever backend messages pass through."""
 
 
 class Player:
@@ -106,10 +106,10 @@ class Collector:
 class Stage:
     """Starts the processes of one test on one domain."""
 
-    def __init__(self, folder: Path, domain: int, receive_path: str = "direct") -> None:
+    def __init__(self, folder: Path, domain: int, backend: str = "direct") -> None:
         self.folder, self.domain = folder, domain
         self.environment = ros_environment(domain=domain, folder=folder, python_path=[_PACKAGE, _CHECKOUT])
-        self.environment["SYNCRELAY_RECEIVE"] = receive_path
+        self.environment["SYNCRELAY_RECEIVE"] = backend
         self._processes: list[Process] = []
         self._segments: set[Path] = set()
 
@@ -159,7 +159,7 @@ class Stage:
 
     def before_each_sensor(self, statements: str) -> None:
         """Have each sensor of a rig that is started from now on run these statements before all else."""
-        self._before("syncrelay.ros.rig", statements)
+        self._before("syncrelay.ros.sensor", statements)
 
     def before_each_relay(self, statements: str) -> None:
         """Have each relay that is started from now on run these statements before all else."""
@@ -196,8 +196,8 @@ class Stage:
 
 
 @contextmanager
-def running_stage(folder: Path, domain: int, receive_path: str = "direct") -> Iterator[Stage]:
-    stage = Stage(folder, domain, receive_path)
+def running_stage(folder: Path, domain: int, backend: str = "direct") -> Iterator[Stage]:
+    stage = Stage(folder, domain, backend)
     try:
         yield stage
     finally:

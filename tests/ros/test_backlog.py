@@ -8,10 +8,10 @@ from syncrelay.sync import ApproximateTime
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, config, inputs, outputs
-from tests.ros.stage import Stage, both_paths
+from tests.ros.stage import Stage, both_backends
 from tests.ros.streams import MS, jittery, merged
 
-pytestmark = [pytest.mark.ros, both_paths]
+pytestmark = [pytest.mark.ros, both_backends]
 
 _PAIR = {"/imu": VECTOR, "/lidar": VECTOR}
 _OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)

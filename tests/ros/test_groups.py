@@ -11,11 +11,11 @@ from tests.ros.cdr_messages import VECTOR, stamps_of
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs, outputs
 from tests.ros.frames import Frame
 from tests.ros.processes import wait_until
-from tests.ros.stage import Stage, both_paths
+from tests.ros.stage import Stage, both_backends
 from tests.ros.streams import MS, at, jittery, merged
 from tests.ros.summary import read_summary
 
-pytestmark = [pytest.mark.ros, both_paths]
+pytestmark = [pytest.mark.ros, both_backends]
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 _PAIR_OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)

@@ -34,7 +34,7 @@ def _init(stage: Stage, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
 
 
-@pytest.mark.parametrize("receive_path", ["direct", "rclpy"])
+@pytest.mark.parametrize("backend", ["direct", "rclpy"])
 def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     reliable = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
     lossy = stage.player({"/imu": VECTOR, "/log": STRING}, reliability="best_effort")

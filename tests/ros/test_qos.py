@@ -8,10 +8,10 @@ from tests.ros import relaying
 from tests.ros.cdr_messages import NS_PER_SECOND, VECTOR
 from tests.ros.configs import config, inputs, outputs
 from tests.ros.frames import Frame
-from tests.ros.stage import Collector, Stage, both_paths
+from tests.ros.stage import Collector, Stage, both_backends
 from tests.ros.streams import BEGIN, at, merged
 
-pytestmark = [pytest.mark.ros, both_paths]
+pytestmark = [pytest.mark.ros, both_backends]
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 _PAIR_OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)

@@ -12,9 +12,9 @@ from tests.ros import recordings, relaying
 from tests.ros.cdr_messages import stamp_of
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs, outputs
 from tests.ros.frames import Frame
-from tests.ros.stage import Stage, both_paths
+from tests.ros.stage import Stage, both_backends
 
-pytestmark = [pytest.mark.ros, pytest.mark.real_data, both_paths]
+pytestmark = [pytest.mark.ros, pytest.mark.real_data, both_backends]
 
 _MS = 1_000_000
 

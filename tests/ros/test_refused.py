@@ -10,7 +10,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.reloaded import ReloadedFile
-from tests.ros.stage import Collector, Stage, both_paths
+from tests.ros.stage import Collector, Stage, both_backends
 from tests.ros.status import ANY_PORT, findings, wait_for_finding
 from tests.ros.streams import at, jittery, merged
 
@@ -45,7 +45,7 @@ def _wait_for_outputs(collector: Collector, outputs: dict[str, str]) -> None:
     wait_until(lambda: all(seen(output) == [name] for output, name in outputs.items()), f"{outputs}")
 
 
-@both_paths
+@both_backends
 def test_a_reload_exchanges_the_outputs_of_two_types_and_other_groups_lose_nothing(stage: Stage):
     recording = merged(*(jittery(topic, period_ms=10, jitter_ms=0, count=600, seed=1) for topic in _PAIR))
     file = ReloadedFile(stage, front=_FRONT, swap=_SWAP)
@@ -88,7 +88,7 @@ rclpy.create_node = create_node_with_others
 """
 
 
-@both_paths
+@both_backends
 def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stage):
     recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
     stage.before_each_relay(_OTHERS)
@@ -119,7 +119,7 @@ def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stag
     assert ">>> [rcutils" not in file.relay.stderr
 
 
-def test_a_file_with_an_output_that_dds_refuses_is_left_aside_and_all_goes_on(stage: Stage):
+def test_a_file_with_an_output_that_dds_refuses_is_refused_and_the_running_groups_stay(stage: Stage):
     recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
     stage.before_each_relay(_OTHERS)
     file = ReloadedFile(stage, front=_FRONT, swap=_SWAP)
@@ -141,7 +141,7 @@ import syncrelay.explain as explain
 from syncrelay.config import GroupConfig
 from syncrelay.sync.group import SyncGroup
 
-add, engine, judge, made = SyncGroup.add, GroupConfig.engine, explain.problems, {}
+add, engine, judge, made = SyncGroup.add, GroupConfig.engine, explain.Judge.judge, {}
 
 def failing_add(self, message, *, now):
     if message.stamp % 1000 == 7 and self._is_limited:
@@ -155,17 +155,17 @@ def failing_engine(self):
         raise OverflowError("too large to be an engine")
     return engine(self)
 
-def failing_judge(facts):
+def failing_judge(self, facts):
     if facts.name == "unjudged":
         raise ZeroDivisionError("no rate")
-    return judge(facts)
+    return judge(self, facts)
 
 SyncGroup.add, GroupConfig.engine = failing_add, failing_engine
-explain.problems = failing_judge
+explain.Judge.judge = failing_judge
 """
 
 
-@both_paths
+@both_backends
 def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_on(stage: Stage):
     stage.before_each_relay(_FAILING)
     recording = merged(*(at(topic, 0, 10, 20.000007, 30) for topic in _PAIR))
@@ -184,8 +184,40 @@ def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_o
     assert "internal_error" not in findings(file.relay)
     assert file.relay.stderr.count("Traceback") == 1
     file.reload(front=_FRONT, failing=failing)
-    assert "the file was read again: 1 group goes on, 1 begins" in file.relay.stderr
+    assert "reloaded: 1 group unchanged, 1 group started" in file.relay.stderr
     relaying.conclude(player, collector, recording, of_failing)
+
+
+# The first set's second message. One more is published at the start, when librcl has to prove itself.
+_FAILING_PUBLISH = """
+from syncrelay.ros.librcl.rcl import Rcl
+
+init = Rcl.__init__
+
+def failing_init(self):
+    init(self)
+    publish, calls = self.publish, []
+    self.publish = lambda *words: calls.append(1) or (1 if len(calls) == 3 else publish(*words))
+
+Rcl.__init__ = failing_init
+"""
+
+
+def test_a_message_that_rcl_does_not_publish_is_told_and_the_next_ones_leave(stage: Stage):
+    stage.before_each_relay(_FAILING_PUBLISH)
+    recording = merged(*(at(topic, 0, 10, 20) for topic in _PAIR))
+    relay = stage.relay(config({"front": _FRONT}, metrics=ANY_PORT))
+    collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
+    player.match()
+    collector.process.wait_until(
+        lambda: all(collector.endpoints(each, kind="publisher", node="/syncrelay") for each in _ALIGNED), "outputs"
+    )
+    player.play(recording)
+    relay.wait_for_log("front: a message could not be published on /front/lidar: rcl_publish_serialized_message failed")
+    relay.wait_for_log("front: publishing on /front/lidar again; 1 message was not published")
+    assert "Traceback" not in relay.stderr
+    collector.wait_for("/front/camera", 3)
+    collector.wait_for("/front/lidar", 2)
 
 
 @pytest.mark.parametrize("name", ["impossible", "half_possible"])
@@ -219,5 +251,5 @@ def test_a_group_that_cannot_be_judged_is_relayed_and_others_are_judged(stage: S
     relaying.conclude(player, collector, recording, aligned)
     assert len(relaying.sets_within(recording, collector, aligned)) == 3
     wait_for_finding(relay, "healthy")
-    relay.wait_for_log("a bug in syncrelay while looking at unjudged; the relay goes on")
+    relay.wait_for_log("a bug in syncrelay while evaluating unjudged; the relay keeps running")
     assert relay.stderr.count("ZeroDivisionError: no rate") == 1

@@ -20,7 +20,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import Process, wait_until
 from tests.ros.reloaded import ReloadedFile
-from tests.ros.stage import Stage, both_paths
+from tests.ros.stage import Stage, both_backends
 from tests.ros.status import ANY_PORT, status
 from tests.ros.streams import at, jittery, merged
 
@@ -34,7 +34,7 @@ def _rear(*, topics: tuple[str, ...] = ("/camera", "/lidar"), **keys: Any) -> di
     return {"policy": "exact_time", "topics": inputs(dict.fromkeys(topics, VECTOR), qos=LOSSLESS), **keys}
 
 
-@both_paths
+@both_backends
 def test_an_unchanged_group_loses_and_doubles_nothing_while_others_come_change_and_go(stage: Stage):
     camera = jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1)
     recording = merged(camera, jittery("/lidar", period_ms=10, jitter_ms=2, count=2000, seed=2))
@@ -154,7 +154,7 @@ def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
     assert [group["name"] for group in state["groups"]] == ["front", "rear"]
     assert state["relay"]["config"] == f"{file.path}, {second}"
     second.write_text(config({"rear": _rear(), "left": _rear(output_prefix="/left")}))
-    file.relay.wait_for_log("the file was read again: 2 groups go on, 1 begins")
+    file.relay.wait_for_log("reloaded: 2 groups unchanged, 1 group started")
     file.write(config({"left": _FRONT}, metrics=ANY_PORT))
     file.relay.wait_for_log(f"of {file.path} too: give one of them another name")
 
@@ -189,7 +189,7 @@ def test_a_watched_file_that_changes_while_the_relay_starts_is_read_again(stage:
     path.write_text(config({"front": _FRONT}))
     changed = config({"front": _FRONT, "rear": _rear()})
     relay = stage.start("relay", [sys.executable, "-c", _CHANGED_AS_IT_STARTS, str(path), changed])
-    relay.wait_for_log("the file was read again: 1 group goes on, 1 begins")
+    relay.wait_for_log("reloaded: 1 group unchanged, 1 group started")
 
 
 def _command(stage: Stage, relay: Process) -> subprocess.CompletedProcess[str]:

@@ -14,8 +14,8 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from syncrelay.cdr import read_stamp
-from syncrelay.ros.rig.discovery import quick_discovery
-from syncrelay.ros.rig.schedule import SENSORS, schedule
+from syncrelay.environment.quick_discovery import quick_discovery
+from syncrelay.rig.schedule import SENSORS, schedule
 from tests.ros.processes import children_of, wait_until
 from tests.ros.shared_memory import left_of, segments_of
 
@@ -76,7 +76,7 @@ def test_the_camera_is_triggered_by_the_lidar_and_stamps_twelve_milliseconds_ahe
 
 
 def sensor(stage, name, start):
-    argv = [sys.executable, "-m", "syncrelay.ros.rig", name, "--seed=3", f"--start={start}"]
+    argv = [sys.executable, "-m", "syncrelay.ros.sensor", name, "--seed=3", f"--start={start}"]
     return stage.start(name, argv)
 
 
@@ -141,7 +141,7 @@ def test_a_sensor_ends_at_a_signal_and_leaves_nothing_in_shared_memory(stage, nu
 
 _HOLD_RIG = """
 import select, sys
-from syncrelay.ros.rig.processes import Rig
+from syncrelay.rig.processes import Rig
 with Rig(seed=1) as rig:
     while not select.select([sys.stdin], [], [], 0.1)[0]:
         rig.check()
@@ -196,7 +196,7 @@ def test_a_sensor_that_dies_is_named(holder):
 
 _AWAIT_RIG = """
 import time
-from syncrelay.ros.rig import processes
+from syncrelay.rig import processes
 processes._UP_WITHIN_S = 10
 processes.UP = "never said"
 with processes.Rig(seed=1) as rig:

@@ -21,11 +21,11 @@ from tests.ros.cdr_messages import (
 )
 from tests.ros.configs import LOSSLESS, config, inputs, outputs
 from tests.ros.frames import Frame
-from tests.ros.stage import Stage, both_paths
+from tests.ros.stage import Stage, both_backends
 from tests.ros.streams import BEGIN, MS, at, merged
 from tests.ros.summary import read_summary
 
-pytestmark = [pytest.mark.ros, both_paths]
+pytestmark = [pytest.mark.ros, both_backends]
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 _PAIR_OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)

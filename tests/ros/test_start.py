@@ -69,7 +69,7 @@ def _started(ros_args: list[str]) -> str:
         (["-p", "use_sim_time:=maybe"], "'maybe' of type 'STRING', expecting type 'BOOL'"),
         (["-r", f"__ns:=/{_LONG}"], "topic length should not exceed"),
         (["-r", f"__node:={_LONG}{_LONG}"], "node name length should not exceed '255'"),
-        (["-r", f"/x:=/{_LONG}{_LONG}"], "of the topic `/x` they make none"),
+        (["-r", f"/x:=/{_LONG}{_LONG}"], "they give the topic `/x` a name that ROS rejects"),
         (["-r", "nonsense"], "Couldn't parse remap rule: '-r nonsense'"),
         (["--params-file", "/nowhere.yaml"], "Error opening YAML file"),
         (["-e", "enclave"], "Enclave name is not valid"),
@@ -80,7 +80,7 @@ def _started(ros_args: list[str]) -> str:
 def test_arguments_that_ros_does_not_take_are_usage(ros_args, said):
     with pytest.raises(UsageError) as raised:
         _started(ros_args)
-    assert str(raised.value).startswith("ROS does not take --ros-args -")
+    assert str(raised.value).startswith("ROS rejects --ros-args -")
     assert said in str(raised.value)
     assert "/project/" not in str(raised.value)
 
@@ -99,7 +99,7 @@ def test_of_any_arguments_there_comes_a_node_or_a_sentence():
         except UsageError as error:
             said.append(str(error))
     assert 0 < len(said) < 300
-    assert all(text.startswith("ROS does not take --ros-args ") for text in said)
+    assert all(text.startswith("ROS rejects --ros-args ") for text in said)
     assert all("\x1b" not in text for text in said)
 
 
@@ -113,7 +113,7 @@ def test_a_domain_that_is_none_is_refused_before_dds_ends_the_process(domain, mo
 @pytest.mark.parametrize(
     ("words", "environ", "code", "said"),
     [
-        (["--ros-args", "-p", "use_sim_time:=maybe"], {}, 2, "syncrelay: ROS does not take --ros-args -p"),
+        (["--ros-args", "-p", "use_sim_time:=maybe"], {}, 2, "syncrelay: ROS rejects --ros-args -p"),
         ([], {"ROS_DOMAIN_ID": "300"}, 69, "syncrelay: ROS_DOMAIN_ID=300 is no domain"),
         (["--ros-args", "-r", "/front/a:=/a"], {}, 1, "the default output `/a`, remapped from `/front/a`, is an input"),
     ],

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from syncrelay.ros.transport import LARGE_MESSAGES, apply_transport
+from syncrelay.environment.transport import LARGE_MESSAGES, apply_transport
 from tests.ros import relaying
 from tests.ros.cdr_messages import IMAGE, header, serialize
 from tests.ros.configs import LOSSLESS, config, inputs, outputs
@@ -30,7 +30,7 @@ def test_what_the_environment_names_stands(variable, caplog):
     environ = {variable: "mine"}
     apply_transport("large_messages", environ)
     assert environ == {variable: "mine"}
-    assert f"`transport: large_messages` is left aside: {variable}=mine stands" in caplog.text
+    assert f"`transport: large_messages` has no effect: the environment has {variable}=mine" in caplog.text
 
 
 @pytest.mark.ros

@@ -1,4 +1,4 @@
-"""Which groups the relay looks at: all of a few, of many some in turn, and all while somebody watches."""
+"""Which groups the relay evaluates: all of a few, of many some in turn, and all while somebody watches."""
 
 from collections.abc import Iterator
 
@@ -40,73 +40,75 @@ def _loaded(folder, names, **keys):
     return load(str(path))
 
 
-def _seen(relay):
-    """When each group was looked at last."""
+def _evaluated_at(relay):
+    """When each group was evaluated last."""
     return {report.facts.name: report.facts.figures.now for report in relay.monitor.reports}
 
 
-def _after_a_look(relay):
-    """Names of those that the relay looks at when it next looks at any."""
-    before = _seen(relay)
-    wait_until(lambda: relay.step() or _seen(relay) != before, "a look")
-    return [name for name, seen in _seen(relay).items() if seen != before.get(name)]
+def _evaluated_next(relay):
+    """Names of those that the relay evaluates next."""
+    before = _evaluated_at(relay)
+    wait_until(lambda: relay.step() or _evaluated_at(relay) != before, "an evaluation")
+    return [name for name, seen in _evaluated_at(relay).items() if seen != before.get(name)]
 
 
-def test_of_many_groups_some_are_looked_at_at_a_time_and_none_is_left_out(relay_of):
+def test_of_many_groups_some_are_evaluated_at_a_time_and_none_is_left_out(relay_of):
     relay = relay_of(_GROUPS)
-    assert len(_after_a_look(relay)) == _GROUPS
-    looked_at = [_after_a_look(relay) for _ in range(6)]
-    assert [len(names) for names in looked_at] == [10] * 6
-    for names in zip(*[iter(looked_at)] * 2, strict=True):
-        assert set().union(*names) == set(_seen(relay))
+    assert len(_evaluated_next(relay)) == _GROUPS
+    evaluated = [_evaluated_next(relay) for _ in range(6)]
+    assert [len(names) for names in evaluated] == [10] * 6
+    for names in zip(*[iter(evaluated)] * 2, strict=True):
+        assert set().union(*names) == set(_evaluated_at(relay))
 
 
-def test_of_very_many_none_waits_for_more_than_four_looks(relay_of):
+def test_of_very_many_none_waits_for_more_than_four_evaluations(relay_of):
     relay = relay_of(61)
-    _after_a_look(relay)
-    assert set().union(*(_after_a_look(relay) for _ in range(4))) == set(_seen(relay))
+    _evaluated_next(relay)
+    assert set().union(*(_evaluated_next(relay) for _ in range(4))) == set(_evaluated_at(relay))
 
 
-def test_a_few_are_looked_at_every_time(relay_of):
+def test_a_few_are_evaluated_every_time(relay_of):
     relay = relay_of(10)
-    assert [len(_after_a_look(relay)) for _ in range(3)] == [10] * 3
+    assert [len(_evaluated_next(relay)) for _ in range(3)] == [10] * 3
 
 
 def test_whoever_asks_for_the_state_sees_all_as_they_are(relay_of):
     relay = relay_of(_GROUPS)
-    _after_a_look(relay)
-    assert len(_after_a_look(relay)) == 10
+    _evaluated_next(relay)
+    assert len(_evaluated_next(relay)) == 10
     relay.state()
-    assert len(_after_a_look(relay)) == _GROUPS
+    assert len(_evaluated_next(relay)) == _GROUPS
 
 
 def test_whoever_plots_them_sees_all_as_they_are(relay_of):
     relay = relay_of(_GROUPS, diagnostics={"scalars": True})
-    assert [len(_after_a_look(relay)) for _ in range(3)] == [_GROUPS] * 3
+    assert [len(_evaluated_next(relay)) for _ in range(3)] == [_GROUPS] * 3
 
 
-def test_groups_that_a_reload_brings_are_looked_at_at_once(relay_of, tmp_path):
+def test_groups_that_a_reload_brings_are_evaluated_at_once(relay_of, tmp_path):
     relay = relay_of(_GROUPS)
-    _after_a_look(relay)
-    names = [*_seen(relay), "new"]
+    _evaluated_next(relay)
+    names = [*_evaluated_at(relay), "new"]
     relay.reload(_loaded(tmp_path, names))
-    assert "new" in _after_a_look(relay)
-    assert list(_seen(relay)) == names
+    assert "new" in _evaluated_next(relay)
+    assert list(_evaluated_at(relay)) == names
 
 
 def test_a_report_stands_until_the_next_one_is_there(relay_of, monkeypatch):
     relay = relay_of(3)
-    _after_a_look(relay)
-    look_at, there = relay.monitor._look_at, []  # noqa: SLF001  no other moment is within a look
-    monkeypatch.setattr(relay.monitor, "_look_at", lambda *of: there.append(len(_seen(relay))) or look_at(*of))
-    _after_a_look(relay)
+    _evaluated_next(relay)
+    evaluate, there = relay.monitor._evaluate_group, []  # noqa: SLF001  no other moment is within an evaluation
+    monkeypatch.setattr(
+        relay.monitor, "_evaluate_group", lambda *of: there.append(len(_evaluated_at(relay))) or evaluate(*of)
+    )
+    _evaluated_next(relay)
     assert there == [3] * 3
 
 
-def test_a_group_that_cannot_be_looked_at_is_named_and_its_last_report_is_gone(relay_of, monkeypatch):
+def test_a_group_that_cannot_be_evaluated_is_named_and_its_last_report_is_gone(relay_of, monkeypatch):
     relay = relay_of(2)
-    _after_a_look(relay)
+    _evaluated_next(relay)
     assert relay.state().unjudged == ()
-    monkeypatch.setattr(relay.monitor, "_look_at", lambda *_: {}["no such"])
-    relay.look()
-    assert (relay.state().unjudged, _seen(relay)) == (("g0", "g1"), {})
+    monkeypatch.setattr(relay.monitor, "_evaluate_group", lambda *_: {}["no such"])
+    relay.evaluate()
+    assert (relay.state().unjudged, _evaluated_at(relay)) == (("g0", "g1"), {})

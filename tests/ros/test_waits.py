@@ -37,7 +37,7 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
             may_turn.wait(DEADLINE_S)
 
     player = stage.player(_FRONT | _REAR)
-    with Relay(load_text(_FILE), beat=turn) as relay:
+    with Relay(load_text(_FILE), on_turn=turn) as relay:
 
         def sets_of(*counts: int) -> bool:
             relay.step(0)
@@ -46,7 +46,7 @@ def test_only_groups_whose_messages_waited_are_told_that_the_relay_is_too_slow(s
         def told() -> dict[str, bool]:
             return {
                 report.facts.name: any(finding.code is Code.TOO_SLOW for finding in report.findings)
-                for report in relay.look()
+                for report in relay.evaluate()
             }
 
         wait_until(lambda: relay.step(0) or all(each.subscribed for each in _inputs(relay)), "the subscriptions")

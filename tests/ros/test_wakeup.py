@@ -5,14 +5,14 @@ import signal
 import subprocess
 import sys
 
-from syncrelay.ros.wakeup import Wakeup
+from syncrelay.wakeup import Wakeup
 from tests.ros.processes import wait_until
 
 _SIGNALS = 3_000
 # Its handler ends the rest, as the relay's does. In the place of a Wakeup a threading.Event hangs soon.
 _RESTS = f"""
 import signal
-from syncrelay.ros.wakeup import Wakeup
+from syncrelay.wakeup import Wakeup
 
 wakeup, seen = Wakeup(), 0
 

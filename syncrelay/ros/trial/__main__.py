@@ -5,9 +5,9 @@ import os
 import sys
 from typing import Any
 
+from syncrelay.dataflow.backend import BackendName
 from syncrelay.errors import RosUnavailableError, TypeImportError, UsageError
 from syncrelay.ros.environment import require_rclpy
-from syncrelay.ros.path import PathName
 from syncrelay.ros.trial import Step
 from syncrelay.ros.types import import_type
 
@@ -71,16 +71,16 @@ def _start(plan: dict[str, Any]) -> None:
 
 def _path(node: Any) -> dict[str, str]:
     """Find how messages would pass, and why not directly."""
-    from syncrelay.ros.direct.check import DirectPathUnusableError, checked_path  # noqa: PLC0415  after require_rclpy
-    from syncrelay.ros.path_choice import VARIABLE  # noqa: PLC0415  after require_rclpy
+    from syncrelay.ros.backend_choice import VARIABLE  # noqa: PLC0415  after require_rclpy
+    from syncrelay.ros.librcl.check import LibrclUnusableError, checked_backend  # noqa: PLC0415  after require_rclpy
 
-    if os.environ.get(VARIABLE) == PathName.RCLPY.value:
-        return {"path": PathName.RCLPY.value, "path_fault": ""}
+    if os.environ.get(VARIABLE) == BackendName.RCLPY.value:
+        return {"path": BackendName.RCLPY.value, "path_fault": ""}
     try:
-        checked_path(node)
-    except DirectPathUnusableError as error:
-        return {"path": PathName.RCLPY.value, "path_fault": str(error)}
-    return {"path": PathName.DIRECT.value, "path_fault": ""}
+        checked_backend(node)
+    except LibrclUnusableError as error:
+        return {"path": BackendName.RCLPY.value, "path_fault": str(error)}
+    return {"path": BackendName.LIBRCL.value, "path_fault": ""}
 
 
 def _say(step: Step, **facts: Any) -> None:

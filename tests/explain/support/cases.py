@@ -3,7 +3,7 @@
 from groups import IMAGE, MS, NOW, S, a_group, an_input
 
 from syncrelay.explain import Distribution, Endpoint, Mismatch, Tolerance
-from syncrelay.explain.drift import Drift
+from syncrelay.explain.clocks import Drift
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 

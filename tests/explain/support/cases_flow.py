@@ -6,6 +6,13 @@ from groups import MS, NOW, S, a_group, a_silent_group, an_input
 from syncrelay.explain import Code, Distribution, Severity, Standstill
 from syncrelay.sync.messages import DropReason
 
+HELD_UP = {"bursts": 1, "held": 2 * S, "held_up": [(NOW - 4 * S, NOW - 2 * S)]}
+
+
+def held_up(begin, end):
+    return camera(figures={"bursts": 1, "held": end - begin, "held_up": [(begin, end)]})
+
+
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
     "a queue that is too short": (
@@ -29,7 +36,7 @@ FOUND = {
             camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
         ),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check whether /usb_cam sends it, and how late it comes",
+        "check how late /camera comes",
     ),
     "an optional input whose stamps fit no set": (
         Code.WAITING_FOR_OPTIONAL,
@@ -80,17 +87,51 @@ FOUND = {
         Severity.WARN,
         without_camera(delay=104 * MS, nearest=Distribution([3 * MS] * 100)),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check whether /usb_cam sends it, and how late it comes",
+        "check how late /camera comes",
     ),
     "messages that were held up": (
         Code.BURSTS,
         Severity.WARN,
         a_group(camera(figures={"bursts": 4, "held": 2900 * MS}), LIDAR),
-        "4 times in the last 10 s messages of /camera came at once, up to 2.9 s late",
+        "4 times in the last 10 s messages of /camera arrived in a burst, up to 2.9 s late",
         (
-            "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
-            " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; else see whether /usb_cam sends"
-            " in bursts, or a recorder stood still"
+            "check whether /usb_cam sends in bursts; if it runs on another machine, check the network: after a loss,"
+            " reliable publishers send again only every 3 s by default, configs/fast_heartbeats.xml makes them faster"
+        ),
+    ),
+    "messages of all inputs that were held up together": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(held_up(NOW - 4 * S, NOW - 2 * S), an_input("/lidar", figures=HELD_UP)),
+        "once in the last 10 s messages of all inputs arrived in a burst, up to 2 s late",
+        "check whether this machine, a player or what connects them stood still",
+    ),
+    "messages of two inputs of three that were held up together": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(held_up(NOW - 3 * S, NOW - S), an_input("/lidar", figures=HELD_UP), an_input("/imu")),
+        "once in the last 10 s messages of /camera and /lidar arrived in a burst, up to 2 s late",
+        "check whether this machine, a player or what connects them stood still",
+    ),
+    "messages that were recorded in a burst": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(held_up(NOW - 3 * S, NOW - S), LIDAR, is_recorded=True),
+        "once in the last 10 s messages of /camera arrived in a burst, up to 2 s late",
+        "check whether /usb_cam sent in bursts, or the recorder received it late",
+    ),
+    "a standstill in which messages were missed": (
+        Code.TOO_SLOW,
+        Severity.WARN,
+        a_group(
+            camera(figures={"longest_pause": 3 * S, "last_received": NOW - S}),
+            LIDAR,
+            standstill=Standstill(NOW - S, 3 * S),
+        ),
+        "the relay stood still for 3 s",
+        (
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group"
         ),
     ),
     "a message that DDS lost": (
@@ -98,7 +139,7 @@ FOUND = {
         Severity.WARN,
         a_group(camera(lost=1), LIDAR),
         "DDS lost 1 message of /camera on the way here in the last 10 s",
-        "look at the network and the load; what /usb_cam offers as reliable, `qos: auto` asks for again",
+        "check the network and the CPU load; if /usb_cam is reliable, `qos: auto` has it send again",
     ),
     "a relay that does not keep up": (
         Code.TOO_SLOW,
@@ -129,8 +170,8 @@ FOUND = {
         Code.SLOWED,
         Severity.WARN,
         a_group(camera(figures={"pace_hz": 1.0, "slowed_from_hz": 10.0}), LIDAR),
-        "/camera comes at 1 Hz, it came at 10 Hz",
-        "look at /usb_cam: its settings, its load, and the network on the way",
+        "/camera has slowed from 10 Hz to 1 Hz",
+        "check /usb_cam: its settings, its load, and the network to it",
     ),
     "few sets": (
         Code.FEW_SETS,
@@ -159,8 +200,8 @@ FOUND = {
             an_input("/lidar", figures={"fed": 0}),
         ),
         (
-            "messages come on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as too_far"
-            " and 3 were dropped as late; of /lidar none came lately"
+            "messages arrive on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as"
+            " too_far and 3 were dropped as late; of /lidar none came lately"
         ),
         "run `syncrelay doctor --config FILE --live`, which checks the graph and the stamps",
     ),

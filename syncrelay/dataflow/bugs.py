@@ -1,0 +1,37 @@
+"""Unexpected exceptions: each is logged once with its traceback, and the relay keeps running."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+_LOG = logging.getLogger("syncrelay")
+
+# An error whose text differs every time is logged no more often than this.
+_MOST: Final = 100
+
+
+class Bugs:
+    """Keeps the parts of the relay's work apart. Any thread."""
+
+    def __init__(self) -> None:
+        self._logged: set[tuple[str, str]] = set()
+
+    @contextmanager
+    def contained(self, what: str) -> Iterator[None]:
+        """Log an exception in a part of the work, and go on; `what` completes "a bug in syncrelay while"."""
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001  it is logged, and nothing else depends on it
+            self.log(what, error)
+
+    def log(self, what: str, error: Exception) -> None:
+        """Log an exception, the first time."""
+        key = (what, repr(error))
+        if key not in self._logged and len(self._logged) < _MOST:
+            self._logged.add(key)
+            _LOG.error(
+                "a bug in syncrelay while %s; the relay keeps running. Please report it with these lines and your file",
+                what,
+                exc_info=error,
+            )

@@ -1,0 +1,271 @@
+"""One group at work: payloads in, matched sets out on the group's publishers. Lives on the receive thread."""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from syncrelay.config import GroupConfig
+from syncrelay.config.wording import counted
+from syncrelay.dataflow.backend import Outlet, PublishError
+from syncrelay.explain import Code, RecentDrop
+from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
+from syncrelay.sync.counts import InputCounts
+
+_LOG = logging.getLogger("syncrelay")
+
+# Enough for the widest terminal's strip of recent sets.
+_RECENT = 256
+# What is kept between two evaluations: at 1 kHz they may be 10 s apart.
+_WATCHED = 10_000
+# What is held while a group is suspended, which takes some tenths of a second.
+_HELD = 10_000
+
+
+class Batch(NamedTuple):
+    """What came and left since the last evaluation, oldest first.
+
+    `arrivals` are stamps and times of receipt of each input, `sets` the sets' stamps and their latencies, `keys` what
+    the newest messages are matched by, `last` what left last of all; times in nanoseconds. `counts` and `n_sets` are
+    those since the group began.
+    """
+
+    arrivals: tuple[deque[tuple[int, int]], ...]
+    sets: deque[tuple[tuple[int | None, ...], int]]
+    keys: tuple[Hashable, ...]
+    counts: tuple[InputCounts, ...]
+    n_sets: int
+    last: tuple[tuple[int | None, ...] | RecentDrop, ...]
+
+
+class Unpublished(NamedTuple):
+    """How many messages of an input could not be published one after the other, and why the last one could not."""
+
+    messages: int
+    why: str
+
+
+class _StoppedEngine:
+    """Stands in for an engine that failed or is suspended: gives nothing. The counts stay as they were.
+
+    Of what comes it holds the newest `most` messages, with the reason of one that is to be rejected.
+    """
+
+    def __init__(self, sets: int, counts: tuple[InputCounts, ...], *, most: int = 0) -> None:
+        self.sets = sets
+        self.held: deque[tuple[Message, DropReason | None]] = deque(maxlen=most)
+        self._counts = counts
+
+    def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002  an engine's signature
+        self.held.append((message, None))
+        return ()
+
+    def reject(self, message: Message, reason: DropReason) -> Drop:
+        self.held.append((message, reason))
+        return Drop(message, reason)
+
+    def expire(self, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002
+        return ()
+
+    def flush(self, reason: DropReason) -> Sequence[Drop]:  # noqa: ARG002
+        return ()
+
+    def next_deadline(self) -> int | None:
+        return None
+
+    def counts(self) -> tuple[InputCounts, ...]:
+        return self._counts
+
+
+class GroupRelay:
+    """Feeds a group's engine and publishes the sets that it gives.
+
+    An exception stops this group and no other: the caller of `receive` calls `fail`, all else does so itself.
+    """
+
+    def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
+        self.config = config
+        self.engine: SyncGroup | _StoppedEngine = config.engine()
+        self.failure: str | None = None
+        """What stopped it; None of one that works."""
+        self.last: deque[tuple[int | None, ...] | RecentDrop] = deque(maxlen=_RECENT)
+        """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
+        self.unpublished: dict[int, Unpublished] = {}
+        """The inputs of which the last message could not be published."""
+        self._now = now
+        self._n_inputs = len(config.topics)
+        self._keys: list[Hashable] = [None] * self._n_inputs
+        self._watch()
+        self._restamped = [False] * len(config.topics)
+        self._outlets: list[Outlet | None] = [None] * len(config.topics)
+        self._suspended: SyncGroup | _StoppedEngine = self.engine
+        self._held_by = _StoppedEngine(0, ())
+        self._was_connected: list[bool] = []
+
+    def connect(self, index: int, outlet: Outlet, *, restamped: bool) -> None:
+        """Publish one input's messages through an outlet from now on.
+
+        `restamped` says that its payloads begin with a Header, whose stamp the set's common stamp replaces.
+        """
+        self._outlets[index] = outlet
+        self._restamped[index] = restamped
+
+    def suspend(self) -> None:
+        """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
+        counts = self.counts()
+        self._suspended = self.engine
+        self.engine = self._held_by = _StoppedEngine(self.engine.sets, counts, most=_HELD)
+        self._outlets, self._was_connected = [None] * self._n_inputs, [outlet is not None for outlet in self._outlets]
+
+    def resume(self) -> None:
+        """Go on with all that was held. Where an outlet is missing now, all is dropped: sets would lack a message."""
+        if self.failure is not None:
+            return
+        self.engine = self._suspended
+        lacks = any(
+            was_connected and outlet is None
+            for was_connected, outlet in zip(self._was_connected, self._outlets, strict=True)
+        )
+        if lacks:
+            self.flush(DropReason.SHUTDOWN)
+        try:
+            for message, reason in self._held_by.held:
+                self._conclude(self._resumed(message, DropReason.SHUTDOWN if lacks else reason))
+        except Exception as error:  # noqa: BLE001  it is this group's alone
+            self.fail(error)
+
+    def _resumed(self, message: Message, reason: DropReason | None) -> Sequence[Match | Drop]:
+        if reason is not None:
+            return (self.engine.reject(message, reason),)
+        return self.engine.add(message, now=self._now())
+
+    def receive(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable = None) -> None:
+        """Take in a message of one input, whose stamp is None where it, or the key, cannot be read; times in ns."""
+        if stamp is None:
+            self._conclude([self.engine.reject(Message(index, 0, (payload, received)), DropReason.MALFORMED)])
+            return
+        self._arrivals[index].append((stamp, received))
+        self._keys[index] = key
+        self._conclude(self.engine.add(Message(index, stamp, (payload, received), key), now=self._now()))
+
+    def watched(self) -> Batch:
+        """Give what came and left since this was last asked for, and all counts."""
+        arrivals, sets = self._arrivals, self._sets
+        self._watch()
+        return Batch(arrivals, sets, tuple(self._keys), self.counts(), self.engine.sets, tuple(self.last))
+
+    def _watch(self) -> None:
+        self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
+        self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
+
+    def expire(self, now: int) -> None:
+        """Let go what has waited long enough."""
+        try:
+            self._conclude(self.engine.expire(now=now))
+        except Exception as error:  # noqa: BLE001  it is this group's alone
+            self.fail(error)
+
+    def flush(self, reason: DropReason) -> None:
+        """Drop all that is buffered."""
+        try:
+            self._conclude(self.engine.flush(reason))
+        except Exception as error:  # noqa: BLE001
+            self.fail(error)
+
+    def next_deadline(self) -> int | None:
+        """When `expire` wants to be called next."""
+        try:
+            return self.engine.next_deadline()
+        except Exception as error:  # noqa: BLE001
+            self.fail(error)
+            return None
+
+    def counts(self) -> tuple[InputCounts, ...]:
+        """Where the messages of each input went."""
+        try:
+            return self.engine.counts()
+        except Exception as error:  # noqa: BLE001
+            self.fail(error)
+            return self.engine.counts()
+
+    def fail(self, error: Exception) -> None:
+        """Stop for good, and say so once, with the traceback."""
+        if self.failure is not None:
+            return
+        self.failure = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        _LOG.error(
+            "%s: a bug in syncrelay stopped this group; other groups keep running. "
+            "Please report it with these lines and your file",
+            self.config.name,
+            exc_info=error,
+            extra={"group": self.config.name, "finding": Code.INTERNAL_ERROR.value},
+        )
+        self.engine = _StoppedEngine(self.engine.sets, self._last_counts())
+
+    def _last_counts(self) -> tuple[InputCounts, ...]:
+        """Count once more, as far as what failed still can."""
+        with suppress(Exception):
+            self.engine.flush(DropReason.SHUTDOWN)
+        with suppress(Exception):
+            return self.engine.counts()
+        return self.config.engine().counts()
+
+    def _conclude(self, outcomes: Sequence[Match | Drop]) -> None:
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                newest = self._send(outcome)
+                stamps = outcome.stamps
+                self._sets.append((stamps, time.time_ns() - newest))
+                self.last.append(stamps)
+            else:
+                message = outcome.message
+                self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
+
+    def _send(self, match: Match) -> int:
+        """Publish a set; when its newest message was received."""
+        newest = 0
+        for message in match.messages:
+            if message is None:
+                continue
+            # As it was fed: what DDS received, and when, in nanoseconds of the system clock.
+            payload, received = message.payload
+            newest = max(newest, received)
+            outlet = self._outlets[message.input]
+            if outlet is None:
+                continue
+            try:
+                if match.stamp is not None and self._restamped[message.input]:
+                    outlet.send_stamped(payload, match.stamp)
+                else:
+                    outlet.send(payload)
+            except PublishError as error:
+                self._not_published(message.input, outlet, str(error))
+            else:
+                if self.unpublished:
+                    self._published(message.input, outlet)
+        return newest
+
+    def _not_published(self, index: int, outlet: Outlet, why: str) -> None:
+        before = self.unpublished.get(index)
+        self.unpublished[index] = Unpublished(1 + (before.messages if before else 0), why)
+        if before is None:
+            _LOG.error(
+                "%s: a message could not be published on %s: %s; trying again with the next one",
+                self.config.name,
+                outlet.topic,
+                why,
+                extra={"group": self.config.name, "finding": Code.REFUSED_BY_DDS.value},
+            )
+
+    def _published(self, index: int, outlet: Outlet) -> None:
+        recovered = self.unpublished.pop(index, None)
+        if recovered is not None:
+            _LOG.info(
+                "%s: publishing on %s again; %s not published",
+                self.config.name,
+                outlet.topic,
+                f"{counted(recovered.messages, 'message')} {'was' if recovered.messages == 1 else 'were'}",
+                extra={"group": self.config.name},
+            )

@@ -1,0 +1,143 @@
+"""What the relay observes of itself: pauses, waits, losses, and clocks that step or stop. Times in nanoseconds."""
+
+import time
+from collections import deque
+from typing import Final
+
+from syncrelay.explain import STEP_NS, ClockState, Standstill, Step
+
+# What was lost, and what had to wait, is reported for the last ten evaluations.
+_RECENT: Final = 10
+# So many evaluations after a publisher was found, its first messages have arrived.
+_SETTLING: Final = 2
+# A clock that is set moves at once; one that is slewed only runs faster or slower.
+_STEP_NS: Final = 100_000_000
+_READINGS: Final = 3
+_TOLD_NS: Final = 30_000_000_000
+# A /clock at 1 Hz stands still for a second between two ticks.
+_CLOCK_STOPPED_NS: Final = 2_500_000_000
+
+
+class Standstills:
+    """How long the process got no turn, as a thread sees it that rested longer than it should."""
+
+    def __init__(self) -> None:
+        self._recent: deque[Standstill | None] = deque(maxlen=_RECENT)
+        self._longest_now: Standstill | None = None
+
+    def overslept(self, ns: int, *, now: int) -> None:
+        """Note by how much a rest that ends now was too long."""
+        standstill = Standstill(now, ns)
+        if self._longest_now is None or standstill.ns > self._longest_now.ns:
+            self._longest_now = standstill
+
+    def observe(self) -> None:
+        """Begin the next evaluation."""
+        self._recent.append(self._longest_now)
+        self._longest_now = None
+
+    @property
+    def longest(self) -> Standstill | None:
+        """The longest of the last evaluations."""
+        return max(filter(None, self._recent), key=lambda each: each.ns, default=None)
+
+
+class Waits:
+    """How long messages of a topic waited for the relay."""
+
+    def __init__(self) -> None:
+        self._recent: deque[int] = deque(maxlen=_RECENT)
+
+    def observe(self, waited: int) -> None:
+        """Take the longest wait since the last evaluation."""
+        self._recent.append(waited)
+
+    @property
+    def longest(self) -> int:
+        """The longest of the last evaluations."""
+        return max(self._recent, default=0)
+
+
+class Losses:
+    """What DDS lost of a topic. A new publisher is first heard in mid-stream, which is no loss."""
+
+    def __init__(self) -> None:
+        self._totals: deque[int] = deque(maxlen=_RECENT)
+        self._publishers = 0
+        self._settling = 0
+
+    def observe(self, total: int, *, publishers: int) -> None:
+        """Take the total lost since the subscription was made, and how many publishers there are."""
+        if publishers > self._publishers or (self._totals and total < self._totals[-1]):
+            self._settling = _SETTLING
+        if self._settling:
+            self._settling -= 1
+            self._totals.clear()
+        self._publishers = publishers
+        self._totals.append(total)
+
+    @property
+    def recent(self) -> int:
+        """How many were lost in the last evaluations."""
+        return self._totals[-1] - self._totals[0] if self._totals else 0
+
+
+class SystemClock:
+    """Whether the system's clock was set."""
+
+    def __init__(self) -> None:
+        self._offset = _offset()
+        self._step: Step | None = None
+
+    def has_stepped(self, now: int) -> bool:
+        """Whether it was set since this was last asked."""
+        before, self._offset = self._offset, _offset()
+        by = self._offset - before
+        if abs(by) >= STEP_NS:
+            self._step = Step(now, by)
+        return abs(by) > _STEP_NS
+
+    def last_step(self, now: int) -> Step | None:
+        """Return when it was last set and by how much, for half a minute; half a second at least."""
+        return self._step if self._step and 0 <= now - self._step.at < _TOLD_NS else None
+
+
+def _offset() -> int:
+    """How far the system's clock is ahead of the monotonic one."""
+    # Of a few readings the quickest: a thread that lost its turn between the two clocks would see a step.
+    return min(_reading() for _ in range(_READINGS))[1]
+
+
+def _reading() -> tuple[int, int]:
+    before = time.monotonic_ns()
+    system = time.time_ns()
+    after = time.monotonic_ns()
+    return after - before, system - (before + after) // 2
+
+
+class SimulatedClock:
+    """Whether simulated time moves, and what it was when messages were received."""
+
+    def __init__(self) -> None:
+        self._moved_at = time.time_ns()
+        self._now = (self._moved_at, 0)
+        self._rate = 1.0
+        self.is_steady = False
+        """Whether it has run on since the evaluation before: only then is it known what it was in between."""
+        self.state = ClockState(received=False)
+
+    def observe(self, simulated: int, *, now: int) -> None:
+        """Take the simulated time of now, 0 before the first."""
+        before_at, before = self._now
+        self.is_steady = 0 < before <= simulated and before_at < now
+        self._rate = (simulated - before) / (now - before_at) if self.is_steady else 1.0
+        if simulated != before:
+            self._moved_at = now
+        self._now = (now, simulated)
+        still = now - self._moved_at
+        self.state = ClockState(simulated != 0, still if still >= _CLOCK_STOPPED_NS else None)
+
+    def at(self, received: int) -> int:
+        """Return the simulated time at which a message was received since the last evaluation but one."""
+        now, simulated = self._now
+        return simulated - round((now - received) * self._rate)

@@ -1,0 +1,173 @@
+"""The receive loop: one thread that takes every message as bytes and hands it on, in the order of arrival.
+
+rclpy's executors rebuild their wait set for every callback, which is most of the cost of a small message.
+Here a wake drains all sources that are ready.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+from syncrelay.dataflow.backend import Source, Watch
+from syncrelay.dataflow.backlog import Backlog
+
+_Result = TypeVar("_Result")
+
+# An idle loop turns at least this often.
+_LONGEST_REST_NS = 1_000_000_000
+# A turn that fails and is repeated at once must not take all of a core.
+_AFTER_FAILURE_S = 0.01
+
+
+class ReceiveLoop:
+    """Drains sources of one backend on the thread that calls `run`.
+
+    Only `call`, `wake`, `stop` and the attributes may be used from other threads. `expire` is called with the time of
+    `now`, in nanoseconds, when that is due, and `on_turn` at every turn, at least once a second. `contain` takes an
+    exception that nobody else did, and the loop goes on; without it, the loop ends and `run` raises it.
+    """
+
+    def __init__(
+        self,
+        watch: Watch,
+        *,
+        now: Callable[[], int],
+        expire: Callable[[int], None],
+        deadline: Callable[[], int | None] | None = None,
+        on_turn: Callable[[], None] | None = None,
+        contain: Callable[[Exception], None] | None = None,
+    ) -> None:
+        self._watch = watch
+        self._now = now
+        self.deadline = deadline
+        """Says when `expire` wants to be called next, by the clock of `now`; None while it never does.
+
+        Asked at every turn; wake the loop after replacing it.
+        """
+        self.turned = time.monotonic()
+        """When the loop last turned."""
+        self._expire = expire
+        self._on_turn = on_turn
+        self._contain = contain
+        self._sources: dict[Source, Callable[[Exception], None]] = {}
+        self._backlog = Backlog()
+        self._calls: deque[tuple[Future[Any], Callable[[], None]]] = deque()
+        self._stopping = False
+        self._ended = False
+
+    def call(self, function: Callable[[], _Result]) -> "Future[_Result]":
+        """Have `function` called between two messages on the loop's thread; its result comes in the future.
+
+        A call that the loop ends before is cancelled.
+        """
+        future: Future[_Result] = Future()
+
+        def perform() -> None:
+            try:
+                result = function()
+            except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+
+        self._calls.append((future, perform))
+        if self._ended:
+            self._cancel_calls()
+        else:
+            self.wake()
+        return future
+
+    def wake(self) -> None:
+        """Have the loop check its calls and deadlines now."""
+        self._watch.wake()
+
+    def stop(self) -> None:
+        """Have `run` take what has arrived, carry out the calls still due, and return."""
+        self._stopping = True
+        self.wake()
+
+    def add(self, source: Source, failed: Callable[[Exception], None]) -> None:
+        """Drain one more source. On the loop's thread, or before it runs.
+
+        `failed` hears on the loop's thread what kept it from giving its messages; by then it is removed.
+        """
+        self._watch.add(source)
+        self._sources[source] = failed
+
+    def remove(self, source: Source) -> None:
+        """Take what a source has, then stop draining it: it may be destroyed. On the loop's thread."""
+        self._backlog.deliver_until(time.time_ns(), self._sources)
+        self._leave(source)
+
+    def _leave(self, source: Source) -> None:
+        self._backlog.forget(source)
+        if self._sources.pop(source, None) is not None:
+            self._watch.remove(source)
+
+    def run(self) -> None:
+        """Receive until `stop` is called."""
+        try:
+            while not self._stopping:
+                self._guarded(self._receive)
+                if not self._stopping:
+                    time.sleep(_AFTER_FAILURE_S)
+            for last in (self._take_what_came, self._backlog.deliver_held, self._carry_out_calls):
+                self._guarded(last)
+        finally:
+            self._ended = True
+            self._cancel_calls()
+
+    def _guarded(self, function: Callable[[], None]) -> None:
+        try:
+            function()
+        except Exception as error:
+            if self._contain is None:
+                raise
+            self._contain(error)
+
+    def _receive(self) -> None:
+        while not self._stopping:
+            if self._calls:
+                self._carry_out_calls()
+            deadline = self.deadline
+            longest = _LONGEST_REST_NS if deadline is None else self._expire_due(deadline)
+            self._backlog.deliver(self._watch.wait(0 if self._backlog.held else longest))
+            if self._backlog.failed:
+                self._end_failed()
+            self.turned = time.monotonic()
+            if self._on_turn is not None:
+                self._on_turn()
+
+    def _take_what_came(self) -> None:
+        self._backlog.deliver_until(time.time_ns(), self._sources)
+
+    def _end_failed(self) -> None:
+        """Stop draining what failed, and pass the error to who added it."""
+        failed, self._backlog.failed = self._backlog.failed, {}
+        for source, error in failed.items():
+            failed_of = self._sources.get(source)
+            if failed_of is not None:
+                self._leave(source)
+                failed_of(error)
+
+    def close(self) -> None:
+        """Free what the loop holds of rcl. After `run` has returned."""
+        self._watch.close()
+
+    def _carry_out_calls(self) -> None:
+        while self._calls:
+            self._calls.popleft()[1]()
+
+    def _cancel_calls(self) -> None:
+        while self._calls:
+            self._calls.popleft()[0].cancel()
+
+    def _expire_due(self, deadline: Callable[[], int | None]) -> int:
+        """Let go what is due; give the nanoseconds until the next deadline, a on_turn at most."""
+        due, now = deadline(), self._now()
+        if due is not None and now >= due:
+            self._expire(now)
+            due, now = deadline(), self._now()
+        return _LONGEST_REST_NS if due is None else min(max(0, due - now), _LONGEST_REST_NS)

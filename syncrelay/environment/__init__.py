@@ -1,0 +1,1 @@
+"""What ROS and Fast DDS read from the environment, without importing either."""

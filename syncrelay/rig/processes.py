@@ -1,0 +1,98 @@
+"""The rig's sensors as child processes of this one."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from types import TracebackType
+from typing import IO, Self
+
+from syncrelay.errors import SyncRelayError
+from syncrelay.rig.schedule import SENSORS
+
+UP = "publishes"
+"""What a sensor says as soon as its publisher is there."""
+
+# A sensor is up in 3 s and leaves DDS in 0.2 s; on a busy machine both take long.
+_UP_WITHIN_S = 60.0
+_END_WITHIN_S = 10.0
+
+
+class Rig:
+    """Runs every sensor in a process of its own while entered.
+
+    However this process ends, SIGKILL included, the sensors' stdin ends with it, and so do they: in an order
+    that leaves nothing in /dev/shm.
+    """
+
+    def __init__(self, *, seed: int) -> None:
+        self._seed = seed
+        self._sensors: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+        self._up_by = 0.0
+
+    def __enter__(self) -> Self:
+        start = time.time_ns()
+        self._up_by = time.monotonic() + _UP_WITHIN_S
+        for name in SENSORS:
+            talk = tempfile.TemporaryFile()
+            self._sensors[name] = (_start(name, seed=self._seed, start=start, talk=talk), talk)
+        return self
+
+    def is_up(self) -> bool:
+        """Whether every sensor publishes. Raises SyncRelayError for one that does not in a minute, else as `check`."""
+        self.check()
+        late = {name: said for name, (_, talk) in self._sensors.items() if UP not in (said := _all_of(talk))}
+        if late and time.monotonic() > self._up_by:
+            words = "".join(f"\n{name}: {said[-2000:]}" for name, said in late.items() if said)
+            raise SyncRelayError(f"the rig's {', '.join(late)} did not publish within {_UP_WITHIN_S:.0f} s{words}")
+        return not late
+
+    def check(self) -> None:
+        """Raise RuntimeError when a sensor has ended by itself, with the end of what it said."""
+        for name, (process, talk) in self._sensors.items():
+            code = process.poll()
+            if code is not None:
+                raise RuntimeError(f"the rig's {name} ended with exit code {code}: {_all_of(talk)[-2000:]}")
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for process, _ in self._sensors.values():
+            assert process.stdin is not None  # noqa: S101 - a pipe was asked for
+            process.stdin.close()
+        deadline = time.monotonic() + _END_WITHIN_S
+        for process, talk in self._sensors.values():
+            _await_end(process, deadline)
+            talk.close()
+
+
+def _start(name: str, *, seed: int, start: int, talk: IO[bytes]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "syncrelay.ros.sensor",
+            name,
+            f"--seed={seed}",
+            f"--start={start}",
+            "--until-stdin-ends",
+        ],
+        stdin=subprocess.PIPE,
+        stdout=talk,
+        stderr=talk,
+        process_group=0,  # Control-C is for the demo, which ends the rig in its own order
+    )
+
+
+def _all_of(talk: IO[bytes]) -> str:
+    # Not by its position, which the sensor writes at too.
+    return os.pread(talk.fileno(), os.fstat(talk.fileno()).st_size, 0).decode(errors="replace").strip()
+
+
+def _await_end(process: subprocess.Popen[bytes], deadline: float) -> None:
+    try:
+        process.wait(max(0, deadline - time.monotonic()))
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

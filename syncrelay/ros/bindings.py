@@ -1,0 +1,179 @@
+"""Which groups run, and on which topics: how others take their place while messages flow."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from syncrelay.config import TopicConfig
+from syncrelay.dataflow.backend import RclBackend
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.errors import ReloadError
+from syncrelay.ros.entities import Entities, RefusedError
+from syncrelay.ros.inputs import TopicInput
+from syncrelay.ros.outputs import InputBinding
+from syncrelay.sync import DropReason
+
+_Key: TypeAlias = tuple[str, str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class GroupBinding:
+    """A group and its inputs, each bound to the topic that feeds it."""
+
+    group: GroupRelay
+    inputs: tuple[InputBinding, ...]
+
+    @property
+    def waiting_for(self) -> str | None:
+        """What keeps the group from giving sets, in words."""
+        if self.group.failure is not None:
+            return "a reload or restart: a bug stopped it"
+        required = [each for each in self.inputs if self.group.config.topics[each.index].required]
+        return ", ".join(filter(None, (each.missing for each in required))) or None
+
+
+class GroupBindings:
+    """All groups that run, in the file's order; one input per topic, however many use it and whatever they call it."""
+
+    def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop) -> None:
+        self.all: tuple[GroupBinding, ...] = ()
+        self._entities = entities
+        self._node = node
+        self._backend = backend
+        self._loop = loop
+        self._topics: dict[_Key, TopicInput] = {}
+
+    @property
+    def groups(self) -> list[GroupRelay]:
+        """The groups alone."""
+        return [binding.group for binding in self.all]
+
+    @property
+    def topics(self) -> list[TopicInput]:
+        """Each topic once."""
+        return list(self._topics.values())
+
+    def run(self, groups: Sequence[GroupRelay]) -> None:
+        """Run these groups and no other; those that ran already are left as they are. On the main thread.
+
+        New groups begin and others end between two messages; but where DDS lets the new have their topics only when
+        the old are gone, those end first. Raises TypeImportError for a field that a type does not have, and
+        ReloadError where DDS does not make a publisher, with all as it was.
+        """
+        running = {binding.group: binding for binding in self.all}
+        topics = dict(self._topics)
+        bindings = tuple(running.get(group) or self._binding(group, topics) for group in groups)
+        begun = [each for binding in bindings if binding.group not in running for each in binding.inputs]
+        ended = [binding for group, binding in running.items() if group not in groups]
+        used = {each.topic for binding in bindings for each in binding.inputs}
+        unused = [topic for topic in self.topics if topic not in used]
+        if running:
+            self._exchange(ended, unused, begun)
+        else:
+            _switch(ended, begun)
+        # From here on these run, whatever becomes of the end of the others.
+        self._topics = {key: topic for key, topic in topics.items() if topic in used}
+        self.all = bindings
+        for topic in used:
+            topic.try_again()
+        self._end_publishers(_inputs_of(ended))
+        for topic in unused:
+            topic.close()
+
+    def _exchange(
+        self, ended: Sequence[GroupBinding], unused: Sequence[TopicInput], begun: Sequence[InputBinding]
+    ) -> None:
+        """Make the publishers of those who begin, and exchange the groups."""
+        ending = {each.publisher for each in _inputs_of(ended)} | {topic.entity for topic in unused}
+        try:
+            late = [each for each in begun if not self._has_publisher(each, ending)]
+            if late:
+                self._free_topics(ended, unused, late)
+            self._loop.call(lambda: _switch(ended, begun)).result()
+        except BaseException as error:
+            self._end_publishers(begun)
+            if isinstance(error, RefusedError):
+                raise ReloadError(str(error)) from error
+            raise
+
+    def _has_publisher(self, binding: InputBinding, ending: set[Any]) -> bool:
+        """Make a publisher; False where it can be made only when these end. Raises RefusedError."""
+        try:
+            binding.topic.make_publisher(binding)
+        except RefusedError:
+            if not self._entities.frees(binding.output, ending):
+                raise
+            return False
+        return True
+
+    def _free_topics(
+        self, ended: Sequence[GroupBinding], unused: Sequence[TopicInput], late: Sequence[InputBinding]
+    ) -> None:
+        """End what holds the topics of those who are late, then make their publishers, or else the old ones again."""
+        ending = _inputs_of(ended)
+        wanted = {self._node.resolve_topic_name(each.output) for each in late}
+        self._loop.call(lambda: _suspend(ended)).result()
+        try:
+            self._end_publishers([each for each in ending if each.publisher and each.publisher.topic_name in wanted])
+            for topic in unused:
+                if topic.name in wanted:
+                    topic.close()
+            for each in late:
+                each.topic.make_publisher(each)
+        except BaseException:
+            self._end_publishers(late)
+            for each in ending:
+                each.topic.make_publisher_or_report(each)
+            self._loop.call(lambda: _resume(ended)).result()
+            raise
+
+    def _end_publishers(self, bindings: Sequence[InputBinding]) -> None:
+        for each in bindings:
+            if each.publisher is not None:
+                publisher, each.publisher = each.publisher, None
+                self._entities.end(publisher)
+
+    def _binding(self, group: GroupRelay, topics: dict[_Key, TopicInput]) -> GroupBinding:
+        inputs = enumerate(self._topic(config, topics) for config in group.config.topics)
+        return GroupBinding(group, tuple(topic.bind(group, index) for index, topic in inputs))
+
+    def _topic(self, config: TopicConfig, topics: dict[_Key, TopicInput]) -> TopicInput:
+        name = self._node.resolve_topic_name(config.topic)
+        key = (name, config.type, repr(config.qos))
+        if key not in topics:
+            topics[key] = TopicInput(
+                config, name=name, entities=self._entities, node=self._node, backend=self._backend, loop=self._loop
+            )
+        return topics[key]
+
+
+def _inputs_of(bindings: Sequence[GroupBinding]) -> list[InputBinding]:
+    return [each for binding in bindings for each in binding.inputs]
+
+
+# These run on the loop's thread, or before that runs.
+
+
+def _switch(ended: Sequence[GroupBinding], begun: Sequence[InputBinding]) -> None:
+    """End some groups and begin others."""
+    for each in _inputs_of(ended):
+        each.topic.detach(each.group)
+    for binding in ended:
+        binding.group.flush(DropReason.SHUTDOWN)
+    for each in begun:
+        each.topic.attach(each)
+
+
+def _suspend(ended: Sequence[GroupBinding]) -> None:
+    """Let nothing more leave by publishers that end before their groups do; what comes is held."""
+    for binding in ended:
+        binding.group.suspend()
+
+
+def _resume(ended: Sequence[GroupBinding]) -> None:
+    """Have groups that were to end go on, by the publishers that they have now."""
+    for each in _inputs_of(ended):
+        each.topic.connect([each])
+    for binding in ended:
+        binding.group.resume()

@@ -1,0 +1,42 @@
+"""The clock by which messages wait: ROS time where that is simulated, else one that never jumps."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.clock import JumpThreshold
+from rclpy.duration import Duration
+
+# What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
+_JUMP = Duration(nanoseconds=-1_000_000_000)
+_FORWARD = Duration(nanoseconds=1)
+
+
+class WaitingClock:
+    """A node's clock, as its parameter `use_sim_time` has it."""
+
+    def __init__(self, node: Any) -> None:
+        self._clock = node.get_clock()
+        self._handle: Any = None
+        self.is_simulated = bool(node.get_parameter("use_sim_time").value)
+        self.now: Callable[[], int] = self._simulated_now if self.is_simulated else time.monotonic_ns
+        """The time in nanoseconds, to measure waiting only."""
+
+    def _simulated_now(self) -> int:
+        return int(self._clock.now().nanoseconds)
+
+    def follow(self, *, jumped_back: Callable[[], None], ticked: Callable[[], None]) -> None:
+        """Call one of these at each change of simulated time, on the thread that serves the node, until `close`."""
+        if not self.is_simulated:
+            return
+
+        def changed(jump: Any) -> None:
+            (jumped_back if jump.delta <= _JUMP else ticked)()
+
+        threshold = JumpThreshold(min_forward=_FORWARD, min_backward=_JUMP, on_clock_change=True)
+        self._handle = self._clock.create_jump_callback(threshold, post_callback=changed)
+
+    def close(self) -> None:
+        """Follow the clock no longer."""
+        if self._handle is not None:
+            self._handle.unregister()

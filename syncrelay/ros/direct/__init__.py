@@ -1,1 +1,0 @@
-"""The direct path: serialized messages taken and published in librcl, without a copy in Python."""

@@ -1,0 +1,170 @@
+"""The groups of the file: which of them run, and how a reload puts those of another file in their place."""
+
+import logging
+import time
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, Final
+
+from syncrelay.config import Config, ConfigError, GroupConfig
+from syncrelay.config.wording import counted
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.errors import ReloadError
+from syncrelay.ros.bindings import GroupBindings
+from syncrelay.ros.clock import WaitingClock
+from syncrelay.sync import DropReason
+
+_LOG = logging.getLogger("syncrelay")
+
+# Discovery takes a few tenths of a second: before that, everything would be reported as missing.
+_GRACE_S: Final = 2.0
+
+
+class Groups:
+    """Runs the groups of a file. On the main thread, where nothing else is said."""
+
+    def __init__(
+        self,
+        config: Config,
+        *,
+        chosen: Collection[str] | None,
+        node: Any,
+        resolve: Callable[[str], str],
+        bindings: GroupBindings,
+        loop: ReceiveLoop,
+        clock: WaitingClock,
+        changed: Callable[[Config], None],
+    ) -> None:
+        """Run the groups with the names `chosen`, None for all.
+
+        `changed` is called with the file whenever other groups run. `resolve` gives a topic's name after all remaps.
+        """
+        self.config = config
+        self.bindings = bindings
+        self.reloads = 0
+        self.refused_reloads = 0
+        self.reload_error: str | None = None
+        self._names = chosen
+        self._node = node
+        self._resolve = resolve
+        self._loop = loop
+        self._clock = clock
+        self._changed = changed
+        # What each group was last said to wait for; None of one that runs.
+        self._announced: dict[str, str | None] = {}
+        self._started = time.monotonic()
+        self._run(config)
+
+    def reload(self, config: Config) -> None:
+        """Run the groups of a file that was read again.
+
+        Unchanged groups keep their queues; those that failed start again. Whatever it raises, the groups
+        of the file before keep running: ReloadError where the file asks for what needs a restart, or for a publisher
+        that DDS does not make, ConfigError where remaps make its names meet.
+        """
+        _require_same_node(self.config, config)
+        require_distinct_names(config, self._names, self._resolve)
+        before = self.bindings.groups
+        try:
+            self._run(config)
+        except BaseException:
+            if self.bindings.groups != before:
+                self._run(self.config)
+            raise
+        self.config = config
+        kept = {group.config.name for group in self.bindings.groups if group in before}
+        self._announced = {name: said for name, said in self._announced.items() if name in kept}
+        self.reloads += 1
+        self.reload_error = None
+        started = len(self.bindings.groups) - len(kept)
+        _LOG.info("reloaded: %s unchanged, %s started", counted(len(kept), "group"), counted(started, "group"))
+
+    def refuse_reload(self, reason: str) -> None:
+        """Remember that a reload failed, and why."""
+        self.reload_error = reason
+        self.refused_reloads += 1
+
+    def _run(self, config: Config) -> None:
+        running = [group for group in self.bindings.groups if group.failure is None]
+        chosen = _chosen(config, self._names)
+        unchanged = [next((group for group in running if group.config == each), None) for each in chosen]
+        self.bindings.run(
+            [group or GroupRelay(each, now=self._clock.now) for group, each in zip(unchanged, chosen, strict=True)]
+        )
+        limited = self._limited
+        # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
+        asks = bool(limited) and not self._clock.is_simulated
+        self._loop.deadline = (lambda: _next_deadline(limited)) if asks else None
+        self._loop.wake()
+        self._changed(config)
+
+    @property
+    def _limited(self) -> list[GroupRelay]:
+        return [group for group in self.bindings.groups if group.config.options.max_wait is not None]
+
+    def announce(self) -> None:
+        """Log once what each group waits for, and once that it runs."""
+        for binding in self.bindings.all:
+            name, waiting_for = binding.group.config.name, binding.waiting_for
+            if waiting_for and time.monotonic() - self._started < _GRACE_S:
+                continue
+            if name in self._announced and self._announced[name] == waiting_for:
+                continue
+            self._announced[name] = waiting_for
+            # The names after all remaps, as the graph shows them.
+            pairs = [(each.topic.name, self._node.resolve_topic_name(each.output)) for each in binding.inputs]
+            flow = ", ".join(f"{topic} -> {output}" for topic, output in pairs)
+            text = f"waiting for {waiting_for}" if waiting_for else f"running: {flow}"
+            _LOG.info("%s: %s", name, text, extra={"group": name})
+
+    def expire(self, now: int) -> None:
+        """Let go what has waited long enough. On the loop's thread."""
+        for group in self.bindings.groups:
+            group.expire(now)
+
+    def flush(self, reason: DropReason) -> None:
+        """Drop all that is buffered. On the loop's thread, or after it."""
+        for group in self.bindings.groups:
+            group.flush(reason)
+
+    def clock_jumped_back(self) -> None:
+        """Drop what is buffered, as the clock starts again. On any thread."""
+        self._loop.call(self._flush_jump)
+
+    def _flush_jump(self) -> None:
+        _LOG.warning("the clock jumped back; buffered messages were dropped as time_jump")
+        self.flush(DropReason.TIME_JUMP)
+
+    def clock_ticked(self) -> None:
+        """Expire what is due by the clock. On any thread."""
+        if self._limited:
+            self._loop.call(lambda: self.expire(self._clock.now()))
+
+
+def require_distinct_names(config: Config, chosen: Collection[str] | None, resolve: Callable[[str], str]) -> None:
+    """Check the names of the chosen groups after all remaps as those of the file; raises ConfigError."""
+    problems = config.names.problems(resolve, groups=[each.name for each in _chosen(config, chosen)])
+    if problems:
+        raise ConfigError(problems)
+
+
+def _chosen(config: Config, names: Collection[str] | None) -> list[GroupConfig]:
+    return [each for each in config.groups if names is None or each.name in names]
+
+
+def _require_same_node(running: Config, asked: Config) -> None:
+    """Raise ReloadError for what a running relay cannot change."""
+    for name, before, now in (
+        ("node", running.node, asked.node),
+        ("metrics", running.listen, asked.listen),
+    ):
+        if before != now:
+            raise ReloadError(f"`{name}` cannot change while the relay runs: restart it")
+
+
+def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:
+    try:
+        deadlines = [group.engine.next_deadline() for group in groups]
+    except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
+        deadlines = [group.next_deadline() for group in groups]
+    return min((deadline for deadline in deadlines if deadline is not None), default=None)

@@ -1,0 +1,89 @@
+"""Memory of messages: lent to one payload at a time, and back in the pool when nobody holds that payload."""
+
+from ctypes import byref, c_uint8
+from typing import Final
+
+from syncrelay.ros.librcl.rcl import Rcl, SerializedMessage
+
+# A queue gives back one memory for each that it takes in, so a few keep a steady stream from allocating. What a
+# burst took beyond them is freed.
+_SPARE: Final = 8
+
+
+class Memory:
+    """A serialized message that librcl fills, grows and publishes from."""
+
+    __slots__ = ("_capacity", "_content", "_length", "_message", "_rcl", "_whole", "pointer")
+
+    def __init__(self, rcl: Rcl) -> None:
+        """Make one without room; raises RclCallError where there is no memory."""
+        self._rcl = rcl
+        self._message = SerializedMessage()
+        self.pointer = byref(self._message)
+        allocator = rcl.default_allocator()
+        rcl.require(rcl.array_init(self.pointer, 0, byref(allocator)), "rcutils_uint8_array_init")
+        self._capacity = self._length = 0
+        self._whole = self._content = memoryview(b"")
+
+    def content(self) -> memoryview:
+        """The message's bytes where they lie: writable, and valid until the next take."""
+        # A topic's messages are nearly always as long as the one before.
+        if self._message.length != self._length or self._message.capacity != self._capacity:
+            self._look()
+        return self._content
+
+    def _look(self) -> None:
+        message = self._message
+        if message.capacity != self._capacity:
+            self._capacity = message.capacity
+            self._whole = memoryview((c_uint8 * self._capacity).from_address(message.buffer)).cast("B")
+        self._length = message.length
+        self._content = self._whole[: self._length]
+
+    def __del__(self) -> None:
+        self._rcl.array_fini(self.pointer)
+
+
+class Pool:
+    """Memories of one subscription, whose messages are of like size. Taken on one thread, given back on any."""
+
+    def __init__(self, rcl: Rcl) -> None:
+        self._rcl = rcl
+        self._spare: list[Memory] = []
+        self.made = 0
+        self.freed = 0
+
+    @property
+    def lent(self) -> int:
+        """How many memories are out."""
+        return self.made - self.freed - len(self._spare)
+
+    def lend(self) -> Memory:
+        """Return a memory that nobody else has; it is to be given back once."""
+        if self._spare:
+            return self._spare.pop()
+        self.made += 1
+        return Memory(self._rcl)
+
+    def give_back(self, memory: Memory) -> None:
+        """Keep the memory for the next, or free it."""
+        if len(self._spare) < _SPARE:
+            self._spare.append(memory)
+        else:
+            self.freed += 1
+
+
+class Payload:
+    """One message; whoever refers to it owns it, and when nobody does, its memory goes back.
+
+    So it may serve several groups and several sets, and none of them has to say when it is done.
+    """
+
+    __slots__ = ("_pool", "memory")
+
+    def __init__(self, memory: Memory, pool: Pool) -> None:
+        self.memory = memory
+        self._pool = pool
+
+    def __del__(self) -> None:
+        self._pool.give_back(self.memory)

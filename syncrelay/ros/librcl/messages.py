@@ -1,0 +1,83 @@
+"""Messages taken and published from where they lie."""
+
+from ctypes import byref
+from typing import Any, Final
+
+from syncrelay.cdr import STAMP_BYTES, write_stamp
+from syncrelay.dataflow.backend import Deliver, PublishError, Taken
+from syncrelay.ros.librcl.buffers import Payload, Pool
+from syncrelay.ros.librcl.rcl import NOTHING_TAKEN, MessageInfo, Rcl, RclCallError, pointer
+
+# More than any history holds.
+_ALL: Final = 2**62
+
+
+class LibrclSource:
+    """A subscription drained by librcl."""
+
+    def __init__(self, rcl: Rcl, pool: Pool, subscription: Any, deliver: Deliver) -> None:
+        self.deliver = deliver
+        self.waited = 0
+        self.pending = 0
+        """How many messages DDS has reported: asking librcl once more costs nearly as much as a message."""
+        self._pool = pool
+        self.address: Final[int] = subscription.handle.pointer
+        # It owns what the address points to.
+        self._subscription = subscription
+        self._pointer = pointer(self.address)
+        self._rcl = rcl
+        self._call = rcl.take
+        self._info = MessageInfo()
+        self._info_pointer = byref(self._info)
+        self._next = self._pool.lend()
+
+    def take(self) -> Taken | None:
+        """Take its oldest message; None if none is pending. Raises RclCallError."""
+        if not self.pending:
+            return None
+        memory = self._next
+        code = self._call(self._pointer, memory.pointer, self._info_pointer, None)
+        if code:
+            if code != NOTHING_TAKEN:
+                self._rcl.require(code, "rcl_take_serialized_message")
+            # A full history has replaced some of those that were pending.
+            self.pending = 0
+            return None
+        self.pending -= 1
+        self._next = self._pool.lend()
+        return self._info.received_timestamp, Payload(memory, self._pool), memory.content()
+
+    def force_poll(self) -> None:
+        """Have `take` ask librcl until there are no more."""
+        self.pending = _ALL
+
+
+class LibrclOutlet:
+    """A publisher that librcl sends through."""
+
+    def __init__(self, rcl: Rcl, publisher: Any) -> None:
+        self._rcl = rcl
+        self._call = rcl.publish
+        self.topic: str = publisher.topic_name
+        # It owns what the address points to.
+        self._publisher = publisher
+        self._pointer = pointer(publisher.handle.pointer)
+
+    def send(self, payload: Payload) -> None:
+        """Publish a payload unchanged. Raises PublishError."""
+        code = self._call(self._pointer, payload.memory.pointer, None)
+        if code:
+            try:
+                self._rcl.require(code, "rcl_publish_serialized_message")
+            except RclCallError as error:
+                raise PublishError(str(error)) from error
+
+    def send_stamped(self, payload: Payload, stamp: int) -> None:
+        """Publish a payload with this stamp, and put its own back: another set may hold it too."""
+        content = payload.memory.content()
+        own = bytes(content[STAMP_BYTES])
+        write_stamp(content, stamp)
+        try:
+            self.send(payload)
+        finally:
+            content[STAMP_BYTES] = own

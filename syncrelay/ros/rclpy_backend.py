@@ -1,0 +1,128 @@
+"""rclpy's own raw take and publish: payloads are bytes, copied in and out."""
+
+import time
+from typing import Any
+
+from rclpy.guard_condition import GuardCondition
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+
+from syncrelay.cdr import patch_stamp
+from syncrelay.dataflow.backend import BackendName, Deliver, PublishError, Ready, Taken
+
+
+class RclpySource:
+    """A subscription drained through rclpy."""
+
+    def __init__(self, subscription: Any, deliver: Deliver) -> None:
+        self.deliver = deliver
+        self.waited = 0
+        self.handle = subscription.handle
+        self._type = subscription.msg_type
+
+    def take(self) -> Taken | None:
+        """Take its oldest message; None if there is none."""
+        taken = self.handle.take_message(self._type, True)  # noqa: FBT003  rclpy's signature
+        if taken is None:
+            return None
+        payload, meta = taken
+        return meta["received_timestamp"], payload, payload
+
+    def force_poll(self) -> None:
+        """Change nothing: it always polls."""
+
+
+class RclpyOutlet:
+    """A publisher of bytes."""
+
+    def __init__(self, publisher: Any) -> None:
+        self.topic = publisher.topic_name
+        self._publish = publisher.handle.publish_raw
+
+    def send(self, payload: bytes) -> None:
+        """Publish a payload unchanged. Raises PublishError."""
+        try:
+            self._publish(payload)
+        except _rclpy.RCLError as error:
+            raise PublishError(str(error)) from error
+
+    def send_stamped(self, payload: bytes, stamp: int) -> None:
+        """Publish a copy of the payload with this stamp."""
+        self.send(patch_stamp(payload, stamp))
+
+
+class WaitSetWatch:
+    """Waits on an rcl wait set, in which all sources are named again for every wait."""
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+        self._sources: list[RclpySource] = []
+        self._wait_set: Any = None
+        self._guard = GuardCondition(callback=None, callback_group=None, context=context)
+
+    def add(self, source: RclpySource) -> None:
+        """Watch one more source."""
+        self._sources.append(source)
+        self._wait_set = None
+
+    def remove(self, source: RclpySource) -> None:
+        """Watch it no longer."""
+        self._sources.remove(source)
+        self._wait_set = None
+
+    def wait(self, timeout_ns: int) -> Ready:
+        """Wait until a source has messages, for the timeout at most, or until a wake."""
+        if self._wait_set is None:
+            self._wait_set = _rclpy.WaitSet(len(self._sources), 1, 0, 0, 0, 0, self._context.handle)
+        wait_set = self._wait_set
+        # rcl forgets the entities that were not ready.
+        wait_set.clear_entities()
+        wait_set.add_guard_condition(self._guard.handle)
+        for source in self._sources:
+            wait_set.add_subscription(source.handle)
+        # Of what comes while it waits, only one source's may be seen: the next poll is sure of it.
+        seen_until = time.time_ns()
+        wait_set.wait(timeout_ns)
+        ready = [source for index, source in enumerate(self._sources) if wait_set.is_ready("subscription", index)]
+        return ready, seen_until
+
+    def wake(self) -> None:
+        """Have `wait` return. Any thread."""
+        self._guard.trigger()
+
+    def close(self) -> None:
+        """Free the wait set."""
+        self._wait_set = None
+        self._guard.destroy()
+
+
+class NoGraphEvents:
+    """rclpy does not report changes of the graph, so there may always be some."""
+
+    def seen(self) -> bool:
+        """Whether anything may have changed: always."""
+        return True
+
+
+class RclpyBackend:
+    """Takes and publishes bytes through rclpy: what works wherever rclpy does."""
+
+    name = BackendName.RCLPY
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def source(self, subscription: Any, deliver: Deliver) -> RclpySource:
+        """Drain a raw rclpy subscription from now on."""
+        return RclpySource(subscription, deliver)
+
+    def outlet(self, publisher: Any) -> RclpyOutlet:
+        """Publish through an rclpy publisher."""
+        return RclpyOutlet(publisher)
+
+    def watch(self) -> WaitSetWatch:
+        """Make a watch, with no sources yet."""
+        return WaitSetWatch(self._context)
+
+    def graph_changes(self, node: Any) -> NoGraphEvents:  # noqa: ARG002  the protocol's signature
+        """Follow the graph as a node sees it."""
+        return NoGraphEvents()

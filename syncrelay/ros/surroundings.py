@@ -1,0 +1,100 @@
+"""What the graph shows around the inputs of groups: who publishes them, who takes their outputs, what was meant."""
+
+import time
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from syncrelay.config.wording import counted
+from syncrelay.explain import Endpoint, InputGraph, Refusal
+from syncrelay.ros import graph
+from syncrelay.ros.entities import Purpose
+from syncrelay.ros.outputs import InputBinding
+
+
+class _Around(NamedTuple):
+    """What is asked of the graph only when that has changed."""
+
+    output: str
+    subscribers: tuple[Endpoint, ...]
+    rivals: tuple[Endpoint, ...]
+    alike: tuple[str, ...]
+
+
+class Surroundings:
+    """Keeps what the graph shows around each input until the graph changes. On the main thread."""
+
+    def __init__(self, node: Any, purpose: Purpose) -> None:
+        self._node = node
+        self._publishes = purpose is Purpose.RELAY
+        self._bindings: frozenset[InputBinding] = frozenset()
+        self._around: dict[InputBinding, _Around] = {}
+        self._rivals_since: dict[InputBinding, int] = {}
+
+    def watch(self, bindings: Iterable[InputBinding]) -> None:
+        """Forget all but these."""
+        self._bindings = frozenset(bindings)
+        self._around.clear()
+        self._rivals_since = {each: since for each, since in self._rivals_since.items() if each in self._bindings}
+
+    def forget(self) -> None:
+        """Poll the graph again for each, as it has changed."""
+        self._around.clear()
+
+    def of(self, binding: InputBinding, *, lost: int) -> InputGraph:
+        """Return what there is around an input, of whose messages so many were lost."""
+        around = self._around.get(binding)
+        if around is None:
+            around = self._around[binding] = self._poll(binding)
+        topic = binding.topic
+        return InputGraph(
+            name=topic.name,
+            output=around.output,
+            publishers=topic.publishers,
+            subscribers=around.subscribers,
+            rivals=around.rivals,
+            rivals_since=self._rivals_since.get(binding, 0),
+            alike=around.alike,
+            not_importable=topic.not_importable,
+            not_readable=binding.not_readable,
+            refusal=binding.refusal or _unpublished(binding, around.output),
+            lost=lost,
+        )
+
+    def _poll(self, binding: InputBinding) -> _Around:
+        node, topic = self._node, binding.topic
+        output = node.resolve_topic_name(binding.output)
+        publishers = node.get_publishers_info_by_topic(output)
+        # For one that only observes, the relay itself, which has its name, is no rival.
+        own = int(binding.publisher is not None) if self._publishes else len(publishers)
+        rivals = graph.others(publishers, than=node.get_fully_qualified_name(), own=own)
+        if rivals:
+            self._rivals_since.setdefault(binding, time.time_ns())
+        else:
+            self._rivals_since.pop(binding, None)
+        return _Around(
+            output=output,
+            subscribers=graph.subscribers(node.get_subscriptions_info_by_topic(output), topic.profile)
+            if topic.profile is not None
+            else (),
+            rivals=rivals,
+            alike=() if topic.publishers else self._alike(topic.name, topic.type),
+        )
+
+    def _alike(self, name: str, type_name: str) -> tuple[str, ...]:
+        """Find what may have been meant: our own outputs are not it."""
+        outputs = {self._node.resolve_topic_name(binding.output) for binding in self._bindings}
+        published = [
+            (topic, types)
+            for topic, types in graph.topics_in(self._node).items()
+            if topic not in outputs and self._node.count_publishers(topic)
+        ]
+        return graph.topics_alike(name, type_name, published)
+
+
+def _unpublished(binding: InputBinding, output: str) -> Refusal | None:
+    """What rcl did not publish last."""
+    last = binding.group.unpublished.get(binding.index)
+    if last is None:
+        return None
+    why = f"{last.why} ({counted(last.messages, 'message')} so far)"
+    return Refusal("publish", output, binding.topic.type, why=why)

@@ -1,0 +1,107 @@
+"""The order in which the backlog hands on what its sources have."""
+
+import random
+from collections import deque
+
+import pytest
+
+from syncrelay.dataflow.backlog import Backlog
+
+
+class _Source:
+    """Gives (time, payload) pairs, the first first."""
+
+    def __init__(self, delivered: list, *messages: tuple[int, str]):
+        self.messages = deque(messages)
+        self.waited = 0
+        self.deliver = lambda payload, _content, _received: delivered.append(payload)
+
+    def take(self):
+        if not self.messages:
+            return None
+        received, payload = self.messages.popleft()
+        return received, payload, b""
+
+    def force_poll(self):
+        pass
+
+
+def test_messages_of_all_sources_leave_by_their_time_of_receipt():
+    delivered: list[str] = []
+    sources = [_Source(delivered, (1, "a"), (4, "b")), _Source(delivered, (2, "A"), (3, "B"), (5, "C"))]
+    Backlog().deliver((sources, 10))
+    assert delivered == ["a", "A", "B", "b", "C"]
+
+
+def test_what_came_after_the_look_waits_for_the_next_one():
+    delivered: list[str] = []
+    backlog = Backlog()
+    slow, fast = _Source(delivered), _Source(delivered, (1, "a"), (6, "b"))
+    backlog.deliver(([fast], 5))
+    assert delivered == ["a"]
+    assert backlog.held == {fast}
+    slow.messages.append((5, "A"))
+    backlog.deliver(([slow], 10))
+    assert delivered == ["a", "A", "b"]
+    assert not backlog.held
+
+
+def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
+    delivered: list[str] = []
+    backlog = Backlog()
+    flood = _Source(delivered, *((n, f"{n}") for n in range(1000)))
+    backlog.deliver(([flood], 1000))
+    assert 0 < len(delivered) < 1000
+    while backlog.held:
+        backlog.deliver(([], 1000))
+    assert delivered == [f"{n}" for n in range(1000)]
+
+
+def test_a_slow_topic_gets_its_turn_in_a_flood():
+    delivered: list[str] = []
+    imu = _Source(delivered, *((2 * n, "imu") for n in range(10_000)))
+    camera = _Source(delivered, (99, "camera"))
+    Backlog().deliver(([imu, camera], 20_000))
+    assert delivered.index("camera") == 50
+
+
+def test_a_source_that_ends_gives_what_is_held_of_it():
+    delivered: list[str] = []
+    backlog = Backlog()
+    ending, staying = _Source(delivered, (6, "a")), _Source(delivered, (7, "A"))
+    backlog.deliver(([ending, staying], 5))
+    backlog.forget(ending)
+    assert delivered == ["a"]
+    backlog.deliver(([], 10))
+    assert delivered == ["a", "A"]
+
+
+def test_messages_up_to_a_time_leave_however_many_they_are():
+    delivered: list[str] = []
+    backlog = Backlog()
+    source = _Source(delivered, *((n, f"{n}") for n in range(1000)))
+    backlog.deliver_until(900, [source])
+    assert len(delivered) == 901
+    backlog.deliver_held()
+    assert delivered == [f"{n}" for n in range(902)]
+    assert not backlog.held
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_each_source_tells_how_long_its_own_messages_waited_whenever_it_was_looked_at(seed):
+    chance = random.Random(seed)
+    backlog, delivered, waits = Backlog(), [], {}
+    sources = [_Source(delivered) for _ in range(chance.randint(1, 4))]
+    now = 0
+    for _ in range(chance.randint(1, 30)):
+        looked, now = now, now + chance.randint(1, 1000)
+        for source in sources:
+            came = sorted(chance.randint(looked, now + 5) for _ in range(chance.choice([0, 0, 1, 3])))
+            source.messages.extend((at, (source, at)) for at in came)
+        backlog.deliver(([each for each in sources if each.messages or each in backlog.held], now))
+        for source, at in delivered:
+            waits[source] = max(waits.get(source, 0), now - at)
+        delivered.clear()
+    assert {each: each.waited for each in sources if each.waited} == {
+        each: wait for each, wait in waits.items() if wait
+    }

@@ -1,0 +1,248 @@
+"""An exception in one group stops that group: its neighbours go on, and so does the thread that feeds them all."""
+
+import random
+import time
+from collections import deque
+from threading import Thread
+
+import pytest
+
+from syncrelay.config import load_text
+from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.sync import DropReason
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.processes import wait_until
+from tests.ros.streams import BEGIN, MS
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_STEPS = ("add", "reject", "expire", "flush", "counts", "next_deadline")
+
+
+def _group(name: str = "front", **keys) -> GroupRelay:
+    text = config({name: {"policy": "exact_time", "max_wait": "10ms", "topics": inputs(_PAIR), **keys}})
+    return GroupRelay(load_text(text).groups[0], now=lambda: 0)
+
+
+class _Outlet:
+    def __init__(self) -> None:
+        self.sent: list[object] = []
+
+    def send(self, payload: object) -> None:
+        self.sent.append(payload)
+
+
+class _Failing:
+    """An engine that does what another does until one of its steps fails."""
+
+    def __init__(self, engine, step: str) -> None:
+        self._engine, self._step = engine, step
+
+    def __getattr__(self, name: str):
+        if name == self._step:
+            raise ZeroDivisionError(name)
+        return getattr(self._engine, name)
+
+
+def _drive(group: GroupRelay, step: str) -> None:
+    """What the relay does with a group, in which this step of the engine takes part."""
+    match step:
+        case "add" | "reject":
+            stamp = BEGIN if step == "add" else None
+            try:
+                group.receive(0, b"late", 0, stamp)
+            except ZeroDivisionError as error:
+                group.fail(error)
+        case "expire":
+            group.expire(BEGIN)
+        case "flush":
+            group.flush(DropReason.TIME_JUMP)
+        case "counts":
+            group.counts()
+        case "next_deadline":
+            group.next_deadline()
+
+
+@pytest.mark.parametrize("failing", _STEPS)
+def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then_on(failing: str, caplog):
+    group, outlets = _group(), [_Outlet(), _Outlet()]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+        group.receive(index, b"set", 0, BEGIN)
+    assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
+    group.engine = _Failing(group.engine, failing)
+    _drive(group, failing)
+    assert group.failure == f"ZeroDivisionError: {failing}"
+    for step in _STEPS:
+        _drive(group, step)
+    for index in range(2):
+        group.receive(index, b"more", 0, BEGIN + MS)
+    assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
+    assert group.engine.sets == 1
+    if failing != "counts":
+        assert [(each.fed, each.matched, each.buffered) for each in group.counts()] == [(1, 1, 0), (1, 1, 0)]
+    told = [record for record in caplog.records if record.exc_info]
+    assert [(record.levelname, record.group, record.finding) for record in told] == [
+        ("ERROR", "front", "internal_error")
+    ]
+
+
+def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_came():
+    group, outlets = _group(), [_Outlet(), _Outlet()]
+
+    def connect() -> None:
+        for index, outlet in enumerate(outlets):
+            group.connect(index, outlet, restamped=False)
+
+    connect()
+    group.receive(0, b"before", 0, BEGIN)
+    group.suspend()
+    group.receive(1, b"meanwhile", 0, BEGIN)
+    group.receive(1, b"no stamp", 0, None)
+    group.expire(BEGIN)
+    assert group.next_deadline() is None
+    assert [outlet.sent for outlet in outlets] == [[], []]
+    connect()
+    group.resume()
+    assert [outlet.sent for outlet in outlets] == [[b"before"], [b"meanwhile"]]
+    assert [(each.fed, each.matched, sum(each.dropped.values())) for each in group.counts()] == [(1, 1, 0), (2, 1, 1)]
+
+
+def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in_part():
+    group, outlets = _group(), [_Outlet(), _Outlet()]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+    group.receive(0, b"before", 0, BEGIN)
+    group.suspend()
+    group.receive(1, b"meanwhile", 0, BEGIN)
+    group.connect(1, outlets[1], restamped=False)
+    group.resume()
+    assert [outlet.sent for outlet in outlets] == [[], []]
+    assert [(each.fed, each.dropped) for each in group.counts()] == [(1, {DropReason.SHUTDOWN: 1})] * 2
+
+
+class _FailingOutlet(_Outlet):
+    """Fails for one message."""
+
+    topic = "/front/lidar"
+
+    def __init__(self, payload: object) -> None:
+        super().__init__()
+        self._refused = payload
+
+    def send(self, payload: object) -> None:
+        if payload == self._refused:
+            raise PublishError("no memory")
+        super().send(payload)
+
+
+def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_goes_on(caplog):
+    caplog.set_level("INFO")
+    group, outlets = _group(), [_Outlet(), _FailingOutlet(b"2")]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+    told = []
+    for n in range(4):
+        for index in range(2):
+            group.receive(index, b"%d" % n, 0, BEGIN + n * MS)
+        told.append(dict(group.unpublished))
+    assert told == [{}, {}, {1: (1, "no memory")}, {}]
+    assert [outlet.sent for outlet in outlets] == [[b"0", b"1", b"2", b"3"], [b"0", b"1", b"3"]]
+    assert group.failure is None
+    assert [record.message for record in caplog.records] == [
+        "front: a message could not be published on /front/lidar: no memory; trying again with the next one",
+        "front: publishing on /front/lidar again; 1 message was not published",
+    ]
+
+
+class _Source:
+    """Gives messages, and fails where an exception stands in the place of one."""
+
+    def __init__(self, *messages: bytes | Exception) -> None:
+        self.messages = deque(messages)
+        self.deliver = lambda *_: None
+        self.waited = 0
+
+    def take(self):
+        if not self.messages:
+            return None
+        message = self.messages.popleft()
+        if isinstance(message, Exception):
+            raise message
+        return 0, message, message
+
+    def force_poll(self) -> None:
+        pass
+
+
+class _Watch:
+    """Has all sources ready at each turn, and fails now and then."""
+
+    def __init__(self, chance: random.Random) -> None:
+        self._chance = chance
+        self.sources: list[_Source] = []
+
+    def add(self, source: _Source) -> None:
+        self.sources.append(source)
+
+    def remove(self, source: _Source) -> None:
+        self.sources.remove(source)
+
+    def wait(self, _: int):
+        _fail_at_times(self._chance)
+        return list(self.sources), time.time_ns()
+
+    def wake(self) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+def _fail_at_times(chance: random.Random) -> None:
+    if chance.random() < 0.1:
+        raise chance.choice([ZeroDivisionError, OSError, MemoryError, RecursionError])("by chance")
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
+    """Whatever fails around them, all messages of the other sources are delivered in order, and all calls are made."""
+    chance = random.Random(seed)
+    told: list[Exception] = []
+    loop = ReceiveLoop(
+        _Watch(chance),
+        now=lambda: 0,
+        expire=lambda _: _fail_at_times(chance),
+        deadline=lambda: _fail_at_times(chance) or chance.choice([None, 0]),
+        on_turn=lambda: _fail_at_times(chance),
+        contain=told.append,
+    )
+    sound = [_Source(*(b"%d" % n for n in range(200))) for _ in range(3)]
+    delivered: dict[_Source, list[bytes]] = {source: [] for source in sound}
+    for source in sound:
+        source.deliver = lambda payload, *_, source=source: delivered[source].append(payload)
+        loop.add(source, told.append)
+    ailing, lost = _Source(b"a", OSError("gone"), b"b"), []
+    loop.add(ailing, lost.append)
+    thread = Thread(target=loop.run)
+    thread.start()
+    for n in range(20):
+        assert loop.call(lambda n=n: n).result(timeout=60) == n
+        with pytest.raises(KeyError):
+            loop.call(lambda: {}["no such"]).result(timeout=60)
+    wait_until(lambda: not any(source.messages for source in sound), "all messages")
+    loop.stop()
+    thread.join(timeout=60)
+    assert not thread.is_alive()
+    assert [str(error) for error in lost] == ["gone"]
+    assert all(messages == [b"%d" % n for n in range(200)] for messages in delivered.values())
+    assert told
+
+
+def test_without_somebody_to_tell_the_loop_raises_what_failed():
+    chance = random.Random(1)
+    loop = ReceiveLoop(_Watch(chance), now=lambda: 0, expire=lambda _: None)
+    with pytest.raises((ZeroDivisionError, OSError, MemoryError, RecursionError)):
+        loop.run()

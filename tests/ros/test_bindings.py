@@ -1,0 +1,271 @@
+"""Groups exchanged for others while DDS refuses some of what they need: all of the new run, or all of the old."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from threading import Thread
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from syncrelay.config import StampField, load_text
+from syncrelay.errors import ReloadError
+from syncrelay.explain import Refusal
+from tests.ros.configs import config
+from tests.ros.processes import wait_until
+
+rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+entities = pytest.importorskip("syncrelay.ros.entities")
+choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
+GroupBindings = pytest.importorskip("syncrelay.ros.bindings").GroupBindings
+GroupRelay = pytest.importorskip("syncrelay.dataflow.group").GroupRelay
+import_type = pytest.importorskip("syncrelay.ros.types").import_type
+ReceiveLoop = pytest.importorskip("syncrelay.dataflow.receive").ReceiveLoop
+
+pytestmark = pytest.mark.ros
+
+_TYPES = tuple(f"sensor_msgs/msg/{name}" for name in ("Imu", "MagneticField", "Temperature"))
+_NAMES = ("/a", "/b", "/c", "/d", "/e", "/f")
+_AT_ONCE = {"reliability": "reliable", "durability": "volatile"}
+
+
+class _Refusing(entities.Entities):
+    """Refuses, too, what a test says."""
+
+    def __init__(self, node: Any) -> None:
+        super().__init__(node, entities.Purpose.RELAY)
+        self.refuses = lambda: False
+
+    def publisher(self, message_type: Any, topic: str, profile: Any) -> Any:
+        if self.refuses():
+            raise entities.RefusedError(Refusal("publish", topic, "any", why="no more memory"))
+        return super().publisher(message_type, topic, profile)
+
+
+@pytest.fixture(params=["direct", "rclpy"])
+def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
+    """GroupBindings of a node of this process, with a loop that runs."""
+    context = rclpy.context.Context()
+    rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
+    node = rclpy.create_node("here", context=context)
+    backend = choose_backend(request.param, node=node, context=context)
+    loop = ReceiveLoop(backend.watch(), now=lambda: 0, expire=lambda _: None)
+    refusing = _Refusing(node)
+    thread = Thread(target=loop.run)
+    thread.start()
+    bindings = GroupBindings(entities=refusing, node=node, backend=backend, loop=loop)
+    try:
+        yield SimpleNamespace(node=node, entities=refusing, bindings=bindings, backend=backend)
+    finally:
+        loop.stop()
+        thread.join()
+        loop.close()
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def _groups(**topics: list[tuple[str, str, str]]) -> list[Any]:
+    """Groups of these topics, types and outputs."""
+    named = {
+        name: {
+            "policy": "exact_time",
+            "topics": [{"topic": a, "type": t, "output": b, "qos": _AT_ONCE} for a, t, b in inputs],
+        }
+        for name, inputs in topics.items()
+    }
+    return [GroupRelay(each, now=lambda: 0) for each in load_text(config(named)).groups]
+
+
+def _poll(here: SimpleNamespace) -> None:
+    for each in here.bindings.topics:
+        each.poll()
+
+
+def _published(here: SimpleNamespace) -> dict[str, str]:
+    return {
+        each.topic_name: each.msg_type.__name__
+        for each in here.node.publishers
+        if each.topic_name not in ("/rosout", "/parameter_events")
+    }
+
+
+def _subscribed(here: SimpleNamespace) -> dict[str, str]:
+    return {each.topic_name: each.msg_type.__name__ for each in here.node.subscriptions}
+
+
+def _asked(here: SimpleNamespace) -> tuple[dict[str, str], dict[str, str]]:
+    """What the groups that run are to publish and to subscribe to."""
+    topics = [topic for group in here.bindings.groups for topic in group.config.topics]
+    types = [topic.type.split("/")[-1] for topic in topics]
+    return (
+        dict(zip([topic.output for topic in topics], types, strict=True)),
+        dict(zip([topic.topic for topic in topics], types, strict=True)),
+    )
+
+
+_IMU, _FIELD, _ = _TYPES
+_ONE = {"swap": [("/x", _IMU, "/a"), ("/y", _FIELD, "/b")]}
+_OTHER = {"swap": [("/x", _IMU, "/b"), ("/y", _FIELD, "/a")]}
+
+
+def test_what_cannot_be_made_after_the_old_ended_leaves_all_as_it_was(here):
+    here.bindings.run(_groups(**_ONE, rear=[("/x", _IMU, "/c"), ("/z", _IMU, "/d")]))
+    _poll(here)
+    before, groups = _published(here), here.bindings.groups
+    answers = iter([False, False, False, True, False, False])
+    here.entities.refuses = lambda: next(answers)
+    with pytest.raises(ReloadError, match="the relay cannot publish /a as any: no more memory"):
+        here.bindings.run([groups[1], *_groups(**_OTHER)])
+    assert _published(here) == before
+    assert here.bindings.groups == groups
+    here.entities.refuses = lambda: False
+    here.bindings.run([groups[1], *_groups(**_OTHER)])
+    assert _published(here) == {"/b": "Imu", "/a": "MagneticField", "/c": "Imu", "/d": "Imu"}
+
+
+def test_what_could_be_made_neither_anew_nor_again_is_told_and_made_at_a_later_poll(here):
+    here.bindings.run(_groups(**_ONE))
+    _poll(here)
+    binding = here.bindings.all[0]
+    answers = iter([False, False, True, True, True])
+    here.entities.refuses = lambda: next(answers)
+    with pytest.raises(ReloadError):
+        here.bindings.run(_groups(**_OTHER))
+    assert here.bindings.all == (binding,)
+    assert [each.refusal is not None for each in binding.inputs] == [True, True]
+    assert binding.waiting_for is not None
+    here.entities.refuses = lambda: False
+    for each in here.bindings.topics:
+        each.try_again()
+        assert each.is_due
+    _poll(here)
+    assert _published(here) == {"/a": "Imu", "/b": "MagneticField"}
+    assert not any(each.refusal for each in binding.inputs)
+
+
+def test_a_subscription_is_made_when_what_held_its_topic_has_ended(here):
+    imu = here.bindings
+    imu.run(_groups(**_ONE))
+    _poll(here)
+    holder = here.entities.publisher(next(iter(here.node.publishers)).msg_type, "/later", 10)
+    imu.run([*imu.groups, *_groups(late=[("/later", _IMU, "/c"), ("/z", _IMU, "/d")])])
+    _poll(here)
+    late = imu.all[1]
+    assert late.inputs[0].refusal.held_as == "rcl_interfaces/msg/ParameterEvent"
+    assert "/later" not in _subscribed(here)
+    here.entities.end(holder)
+    late.inputs[0].topic.try_again()
+    _poll(here)
+    assert late.inputs[0].refusal is None
+    assert _subscribed(here)["/later"] == "Imu"
+
+
+def test_what_others_in_the_process_made_is_refused_in_the_words_of_dds(here):
+    here.node.create_publisher(import_type(_FIELD), "/a", 10)
+    here.bindings.run(_groups(**_ONE))
+    _poll(here)
+    binding = here.bindings.all[0]
+    refusal = binding.inputs[0].refusal
+    assert refusal.held_as is None
+    assert "incompatible type" in refusal.why
+    assert binding.inputs[1].refusal is None
+
+
+def test_a_topic_that_gives_no_messages_any_more_is_subscribed_anew_and_told(here):
+    sources, source = [], here.backend.source
+    here.backend.source = lambda *of: sources.append(source(*of)) or sources[-1]
+    here.bindings.run(_groups(**_ONE))
+    _poll(here)
+    binding = here.bindings.all[0]
+    failing = binding.inputs[0].topic
+    publisher = here.node.create_publisher(import_type(_IMU), "/x", 10)
+    sources[0].take = lambda: {}["no such"]
+    wait_until(lambda: publisher.publish(import_type(_IMU)()) or failing.is_due, "the source to fail")
+    # No refusal of rcl's: it is a bug, which whoever looks tells with its traceback.
+    with pytest.raises(KeyError):
+        failing.poll()
+    assert failing.refusal.why == "'no such'"
+    assert binding.inputs[1].refusal is None
+    assert "/x" not in _subscribed(here)
+    failing.try_again()
+    failing.poll()
+    assert failing.refusal is None
+    wait_until(
+        lambda: publisher.publish(import_type(_IMU)()) or binding.group.counts()[0].fed > 0,
+        "messages of the new source",
+    )
+
+
+def test_a_field_that_a_type_does_not_have_stops_the_one_input_that_asks_for_it(here):
+    groups = {"right": [("/x", _IMU, "/a"), ("/y", _IMU, "/b")], "wrong": [("/x", _IMU, "/c"), ("/y", _IMU, "/d")]}
+    right, wrong = _groups(**groups)
+    first, second = wrong.config.topics
+    # As where the type is installed only after the file was checked.
+    unread = replace(first, stamp=StampField(field="no.such"))
+    wrong = GroupRelay(replace(wrong.config, topics=(unread, second)), now=lambda: 0)
+    here.bindings.run([right, wrong])
+    publishers = [here.node.create_publisher(import_type(_IMU), name, 10) for name in ("/x", "/y")]
+    _poll(here)
+    first, second = here.bindings.all
+    assert first.waiting_for is None
+    assert second.waiting_for == "the field of /x that the file names"
+    assert second.inputs[0].not_readable.startswith(f"{_IMU} has no usable field no.such: ")
+    assert second.inputs[0].topic.is_due
+    sent = import_type(_IMU)()
+
+    def fed(group: Any) -> list[bool]:
+        return [each.fed > 0 for each in group.counts()]
+
+    wait_until(lambda: [each.publish(sent) for each in publishers] and all(fed(right)), "messages")
+    wait_until(lambda: publishers[1].publish(sent) or fed(wrong) == [False, True], "messages of the other input")
+
+
+def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:
+    """Groups that make a right file: no topic of theirs has two types, nor comes in and goes out."""
+    came = {
+        name: _TYPES[place % 3] if chance.random() < 0.8 else chance.choice(_TYPES)
+        for place, name in enumerate(_NAMES)
+        if chance.random() < 0.7 or place < 2
+    }
+    outputs = [*sorted(set(_NAMES) - came.keys()), "/g", "/h", "/i", "/j"]
+    chance.shuffle(outputs)
+    groups: dict[str, list[tuple[str, str, str]]] = {}
+    for name in chance.sample(("one", "two", "three"), k=chance.randrange(1, 4)):
+        inputs = chance.sample(sorted(came), k=2)
+        if len(outputs) >= len(inputs):
+            groups[name] = [(each, came[each], outputs.pop()) for each in inputs]
+    return groups
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here, seed: int):
+    """The entities of the node are those of the groups that run, whatever their topics were before as which types."""
+    chance = random.Random(seed)
+    # It keeps its topics, and so its publishers and subscriptions.
+    staying = _groups(stays=[("/s", _IMU, "/so"), ("/t", _FIELD, "/to")])
+    here.bindings.run(staying)
+    _poll(here)
+    kept = {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
+    refused = 0
+    for _ in range(40):
+        before = here.bindings.groups
+        likelihood = chance.choice([0, 0, 0.1, 0.5])
+        here.entities.refuses = lambda likelihood=likelihood: chance.random() < likelihood
+        asked = [*staying, *_groups(**_any_groups(chance))]
+        try:
+            here.bindings.run(asked)
+        except ReloadError:
+            refused += 1
+            assert here.bindings.groups == before
+        else:
+            assert here.bindings.groups == asked
+        _poll(here)
+        here.entities.refuses = lambda: False
+        for each in here.bindings.topics:
+            each.try_again()
+        _poll(here)
+        assert (_published(here), _subscribed(here)) == _asked(here)
+        assert not any(each.missing and "DDS" in each.missing for each in here.bindings.topics)
+        assert kept <= {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
+    assert refused
