@@ -250,7 +250,8 @@ def _unexplained(facts: GroupFacts) -> Finding:
         Code.UNEXPLAINED,
         Severity.ERROR,
         f"messages arrive on all inputs, but no set leaves: {fates}",
-        "try a larger `queue_size`; `syncrelay doctor --live` checks the graph and the stamps",
+        rules_matching.more_sets(facts, Code.UNEXPLAINED)
+        or "run `syncrelay doctor --config FILE --live`, which checks the graph and the stamps",
     )
 
 

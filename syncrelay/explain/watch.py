@@ -32,14 +32,15 @@ class GroupWatch:
         self._trigger = (
             config.inputs.index_of(config.options.trigger) if config.options.policy == "latest_time" else None
         )
-        # Keys are not kept: what is matched by them cannot be run again.
-        self._evaluator = Evaluator(config, budget) if config.options.policy != "equal_key" else None
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
             began=began,
             trigger=self._trigger,
         )
+        # Keys are not kept: what is matched by them cannot be run again.
+        is_keyed = config.options.policy == "equal_key"
+        self._evaluator = None if is_keyed else Evaluator(config, self._observation.recent, budget)
 
     def add(
         self,
@@ -59,8 +60,6 @@ class GroupWatch:
         self._counts = tuple(counts)
         if keys is not None:
             self._keys = keys
-        if self._evaluator is not None:
-            self._evaluator.add(arrivals)
         self._observation.add(arrivals, sets, counts, total_sets, by_clock=by_clock, now=now)
 
     def facts(
