@@ -65,23 +65,31 @@ class Arrival(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class DryRun:
-    """What a group would have made of messages. `spans` are those of its sets, offsets added, in nanoseconds."""
+    """What a group would have made of messages.
+
+    `spans` are those of its sets, offsets added, in nanoseconds; `held` is how many of them have each input.
+    """
 
     sets: int
     counts: tuple[InputCounts, ...]
     spans: tuple[int, ...]
+    held: tuple[int, ...]
 
 
 def dry_run(group: GroupConfig, arrivals: Iterable[Arrival]) -> DryRun:
     """Return what a group would have made of messages that came in this order, with nobody waiting at the end."""
     spans: list[int] = []
+    held = [0] * len(group.topics)
     offsets = [topic.offset_ns for topic in group.topics]
 
     def take(outcomes: Sequence[Outcome], _now: int) -> None:
         for outcome in outcomes:
             if isinstance(outcome, Match):
-                there = [each.stamp + offsets[each.input] for each in outcome.messages if each is not None]
-                spans.append(max(there) - min(there))
+                there = [each for each in outcome.messages if each is not None]
+                stamps = [each.stamp + offsets[each.input] for each in there]
+                spans.append(max(stamps) - min(stamps))
+                for each in there:
+                    held[each.input] += 1
 
     driver = EngineDriver(group, take)
     now = 0
@@ -89,4 +97,4 @@ def dry_run(group: GroupConfig, arrivals: Iterable[Arrival]) -> DryRun:
         now = arrival.received
         driver.feed(arrival)
     driver.finish(now)
-    return DryRun(driver.engine.sets, driver.engine.counts(), tuple(spans))
+    return DryRun(driver.engine.sets, driver.engine.counts(), tuple(spans), tuple(held))

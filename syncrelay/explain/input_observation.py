@@ -23,6 +23,8 @@ _JUMP_NS: Final = 1_000_000_000
 _SILENT_NS: Final = 5_000_000_000
 _SILENT_PERIODS: Final = 5
 _LAST_MESSAGES: Final = 200
+# So many are kept to try values on.
+_TRIED_MESSAGES: Final = 2_000
 # Of a slow input, so many messages tell the rate, however long ago they came.
 _RATE_FROM: Final = 5
 _DRIFT_POINTS: Final = 300
@@ -131,8 +133,8 @@ class InputObservation:
             fed=fed,
             dropped=dropped,
             received=self._received[:],
-            stamps=self._stamps[:],
-            delays=self._delays[:],
+            stamps=self._stamps[-_LAST_MESSAGES:],
+            delays=self._delays[-_LAST_MESSAGES:],
             drift=self._drift,
             duplicates=duplicates,
             out_of_order=out_of_order,
@@ -146,6 +148,10 @@ class InputObservation:
             swings=swings,
             swung_by=swung_by,
         )
+
+    def recent(self) -> Arrivals:
+        """Give the last messages that have stamps, more than those of the figures, none from before a clock jumped."""
+        return [(stamp, stamp + delay) for stamp, delay in zip(self._stamps, self._delays, strict=True)]
 
     def _forget(self) -> None:
         """Start afresh: a clock jumped, that of the stamps or this machine's."""
@@ -189,8 +195,8 @@ class InputObservation:
 
     def _measure(self, stamped: Arrivals, stamps: Sequence[int], delays: list[int]) -> None:
         """Measure delays, drift and bursts, from messages that have stamps."""
-        keep_last(self._stamps, stamps, _LAST_MESSAGES)
-        keep_last(self._delays, delays, _LAST_MESSAGES)
+        keep_last(self._stamps, stamps, _TRIED_MESSAGES)
+        keep_last(self._delays, delays, _TRIED_MESSAGES)
         self._find_bursts(stamped, delays)
         # What came fastest was held up least: the least delay tells more of the clock than of the load.
         self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, min(delays)))

@@ -112,6 +112,10 @@ class Observation:
         )
         return group, inputs
 
+    def recent(self) -> Sequence[Arrivals]:
+        """Give the last messages of each input that have stamps, to try values on."""
+        return [each.recent() for each in self._inputs]
+
     def _begin_anew(self, now: int) -> None:
         """Bear that this machine's clock was set back: what lies in the future now would count for ever."""
         self._polls.clear()

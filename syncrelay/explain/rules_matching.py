@@ -1,6 +1,7 @@
 """Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from itertools import islice
 from statistics import median_low
 from typing import Final
 
@@ -13,7 +14,16 @@ from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, c
 from syncrelay.explain.nearest import signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import other_clock
-from syncrelay.explain.suggestions import Change, Changes, Trials, Tried, constant_offsets, with_headroom
+from syncrelay.explain.suggestions import (
+    UNTRIED,
+    Change,
+    Changes,
+    Trials,
+    Tried,
+    Verdict,
+    constant_offsets,
+    with_headroom,
+)
 from syncrelay.sync.messages import DropReason
 
 # A share of the slowest input's messages that could have no set, and from how many on it means something.
@@ -93,9 +103,11 @@ def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution,
     # What is far apart although others are near has no partner: a wider slop would pair what does not belong together.
     is_far = trials.spans.quantile(0.99) > tolerance.ns and not next(constant_offset(facts), None)
     if is_far and nearest.share_over(parse_duration(wider)) <= _MISSED:
-        policy = (Change("policy", tolerance.wider_policy),) if tolerance.wider_policy else ()
-        if tried := trials.try_out((*policy, Change(tolerance.key, wider))):
-            yield tried
+        others = (tolerance.wider_policy, trials.config.options.patient_policy)
+        policies: list[Changes] = [] if tolerance.wider_policy else [()]
+        policies += [(Change("policy", each),) for each in others if each]
+        values = ((*policy, Change(tolerance.key, wider)) for policy in policies)
+        yield from islice(filter(None, map(trials.try_out, values)), 1)
     if facts.trigger is None:
         yield from filter(None, (trials.gives_enough((each,)) for each in constant_offsets(trials)))
 
@@ -169,6 +181,8 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         return  # what waits for a partner of another clock overflows any queue
     within = facts.tolerance.ns if facts.tolerance else None
     found = _tried(facts, (Code.SHORT_QUEUE, index), lambda trials: _long_enough(needed, trials), within=within)
+    if not found.may_miss:
+        return
     yield Finding(
         Code.SHORT_QUEUE,
         Severity.ERROR if facts.is_silent else Severity.WARN,
@@ -179,7 +193,7 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     )
 
 
-def _long_enough(needed: int, trials: Trials) -> Iterator[Tried]:
+def _long_enough(needed: int | None, trials: Trials) -> Iterator[Tried]:
     """Yield a longer queue that helps."""
     if tried := trials.try_out((), need=needed):
         yield tried
@@ -188,7 +202,12 @@ def _long_enough(needed: int, trials: Trials) -> Iterator[Tried]:
 def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find an optional input that sets leave without; the causes that are told are those that were seen."""
     missing = facts.figures.missing[index]
-    if an_input.required or missing <= _MISSING or not facts.figures.rate_hz:
+    if an_input.required or not facts.figures.rate_hz:
+        return
+    # A slow optional input can be in no more sets than it has messages, and one may still be on its way.
+    could_hz = min(facts.figures.rate_hz, an_input.figures.usual_hz or facts.figures.rate_hz)
+    had_hz = (1 - missing) * facts.figures.rate_hz + 2 * SECOND / _WATCHED
+    if missing <= _MISSING or had_hz >= (1 - _MISSING) * could_hz:
         return
     if missing * facts.figures.sets_since_without[index] >= _BACK:
         return
@@ -205,14 +224,14 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
 
 def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[str, str]:
     """Tell an input that is away, stamps that fit no set, and messages that come after theirs has left."""
-    unknown = "", f"check whether {nodes(an_input)} sends it, and how late it comes"
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
     if (away := _away(facts, an_input)) is not None:
         return away
+    about, behind = (Code.WAITING_FOR_OPTIONAL, index), _behind(facts, an_input)
+    within = tolerance.ns if tolerance else None
     if tolerance is None or len(nearest) < _FEWEST:
-        return unknown
-    behind = _behind(facts, an_input)
-    about = (Code.WAITING_FOR_OPTIONAL, index)
+        found = _tried(facts, about, lambda trials: _long_enough(None, trials), optional=index, within=within)
+        return "", _advice(facts, found, name) or f"check how late {name} comes"
     if abs(behind) > max(SECOND, tolerance.ns):
         offset = Change("offset", words.exactly(behind + an_input.offset), index)
         found = _tried(facts, about, lambda trials: filter(None, [trials.gives_enough((offset,))]), optional=index)
@@ -234,13 +253,17 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
             f": it comes {words.duration(behind)} after the others, too late",
             f"check what holds {name} up{_or(_advice(facts, found, name))}",
         )
-    return unknown
+    found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=within)
+    return "", _advice(facts, found, name) or f"check how late {name} comes"
 
 
 def _waits_enough(index: int, trials: Trials) -> Iterator[Tried]:
     """Yield a wait for an optional input that helps: what it is later by, and what that scatters by."""
     others = [median_low(each) for other, each in enumerate(trials.delays) if other != index and each]
     if not others or not trials.delays[index]:
+        return
+    if tried := trials.try_out(()):
+        yield tried
         return
     late = Distribution([delay - min(others) for delay in trials.delays[index]])
     wait = parse_duration(with_headroom(late))
@@ -281,25 +304,30 @@ def few_sets(facts: GroupFacts) -> Found:
     if facts.possible_hz * _WATCHED < _POSSIBLE * SECOND or figures.rate_hz >= _FEW * facts.possible_hz:
         return
     pacemaker = facts.pacemaker
-    within = facts.tolerance.ns if facts.tolerance else None
-    found = _tried(facts, (Code.FEW_SETS, None), lambda trials: _more_sets(facts, trials), within=within)
     yield Finding(
         Code.FEW_SETS,
         Severity.WARN,
         f"{words.figure(figures.rate_hz)} of {words.figure(facts.possible_hz)} possible sets leave per second;"
         f" {fates(pacemaker)}",
-        _advice(facts, found),
+        more_sets(facts, Code.FEW_SETS),
     )
 
 
+def more_sets(facts: GroupFacts, code: Code) -> str | None:
+    """Say what to write where a finding of this code has no cause that is known; None where nothing was found."""
+    within = facts.tolerance.ns if facts.tolerance and not facts.is_silent else None
+    return _advice(facts, _tried(facts, (code, None), lambda trials: _more_sets(facts, trials), within=within))
+
+
 def _more_sets(facts: GroupFacts, trials: Trials) -> Iterator[Tried]:
-    """Yield the first that helps: a longer queue, a policy that waits for what comes late, a longer wait."""
+    """Yield the first that helps: a longer queue, a policy that waits for what comes late, a longer wait, and more."""
     patient_policy = trials.config.options.patient_policy
     patient = ((Change("policy", patient_policy),),) if patient_policy else ()
     waits = (2 * facts.max_wait, 4 * facts.max_wait) if facts.max_wait else ()
     longer = tuple((Change("max_wait", words.at_least(wait)),) for wait in waits)
-    if tried := next(filter(None, (trials.try_out(each) for each in ((), *patient, *longer))), None):
-        yield tried
+    wider = ((Change(facts.tolerance.key, with_headroom(trials.spans)),),) if facts.tolerance and trials.spans else ()
+    values = ((), *patient, *longer, *(wider if facts.is_silent else ()))
+    yield from islice(filter(None, map(trials.try_out, values)), 1)
 
 
 def _tried(
@@ -309,20 +337,23 @@ def _tried(
     *,
     within: int | None = None,
     optional: int | None = None,
-) -> tuple[Tried, ...]:
+) -> Verdict:
     if facts.evaluator is None:
-        return ()
+        return UNTRIED
     return facts.evaluator.best(about, propose, now=facts.figures.now, within=within, optional=optional)
 
 
-def _advice(facts: GroupFacts, found: Sequence[Tried], optional: str | None = None) -> str | None:
+def _advice(facts: GroupFacts, verdict: Verdict, optional: str | None = None) -> str | None:
     """Say what to write and what it would give: sets, or those with an optional input."""
-    if not found:
+    if not verdict.tried:
         return None
     sets = "possible sets" if optional is None else f"sets with {optional}"
-    first, *others = found
+    first, *others = verdict.tried
     gives = f"which would give {first.given} of {first.possible} {sets} (now {first.now})"
-    more = "".join(f", or {_written(facts, each.changes)}, which would give {each.given}" for each in others)
+    more = "".join(
+        f", or, if both are measured at the same time, {_written(facts, each.changes)}, which would give {each.given}"
+        for each in others
+    )
     return f"write {_written(facts, first.changes)}, {gives}{more}"
 
 

@@ -11,7 +11,7 @@ from syncrelay.config import GroupConfig
 from syncrelay.config.file import file_format
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
-from syncrelay.explain.distribution import Distribution, keep_last, no_values
+from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.dry_run import Arrival, dry_run
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.nearest import NearestSpans, greatest_age, signed_distances, tightest_span
@@ -19,10 +19,11 @@ from syncrelay.sync.messages import DropReason
 from syncrelay.sync.queues import LONGEST_QUEUE
 
 _SECOND: Final = 1_000_000_000
-# A try takes some milliseconds: of the input that sets the pace so many messages, of all together so many.
+# A try takes some milliseconds: so many messages of the input that sets the pace, and so many of all together ...
 _PIVOTS: Final = 100
+# ... or those of so long, as late ones take.
+_AT_LEAST: Final = 5 * _SECOND
 _MOST_MESSAGES: Final = 4_000
-_KEPT: Final = 2_000
 # From fewer possible sets nothing can be told.
 _FEWEST: Final = 5
 # All possible sets but one, which may still wait for what comes next, or but this share.
@@ -65,6 +66,16 @@ class Tried:
     possible: int
 
 
+class Verdict(NamedTuple):
+    """What helps, and whether the file's values may miss sets: not where what came can be told to give all it could."""
+
+    tried: tuple[Tried, ...]
+    may_miss: bool = True
+
+
+UNTRIED: Final = Verdict(())
+
+
 class TryBudget:
     """How many messages may be run through engines until the next poll, by all groups that share it."""
 
@@ -85,45 +96,17 @@ class TryBudget:
         return self._left <= 0
 
 
-class RecentArrivals:
-    """Stamps and times of receipt of the last messages of each input."""
-
-    def __init__(self, n_inputs: int) -> None:
-        self._stamps = [no_values() for _ in range(n_inputs)]
-        self._received = [no_values() for _ in range(n_inputs)]
-
-    def add(self, arrivals: Sequence[Arrivals]) -> None:
-        """Take what came since the last call."""
-        for came, kept_stamps, kept_received in zip(arrivals, self._stamps, self._received, strict=True):
-            if came:
-                stamps, received = zip(*came, strict=True)
-                keep_last(kept_stamps, stamps, _KEPT)
-                keep_last(kept_received, received, _KEPT)
-
-    def of_input(self, index: int) -> list[tuple[int, int]]:
-        """Return stamps and times of receipt of one input, oldest first, none from before a clock jumped back."""
-        pairs = list(zip(self._stamps[index], self._received[index], strict=True))
-        falls = [
-            place
-            for place, (before, after) in enumerate(pairwise(pairs), start=1)
-            if after[1] < before[1] or (after[0] and after[0] < before[0] - _SECOND)
-        ]
-        return pairs[falls[-1] :] if falls else pairs
-
-
 class Evaluator:
-    """Tries values for a group on its last messages. What it found is kept while the same is asked."""
+    """Tries values for a group on its last messages, as `recent` gives them. Keeps what it found for a while."""
 
-    def __init__(self, config: GroupConfig, budget: TryBudget | None = None) -> None:
+    def __init__(
+        self, config: GroupConfig, recent: Callable[[], Sequence[Arrivals]], budget: TryBudget | None = None
+    ) -> None:
         self._config = config
-        self._recent = RecentArrivals(len(config.topics))
+        self._recent = recent
         self._budget = budget or TryBudget()
         self._is_shared = budget is not None
         self._found: dict[Hashable, _Found] = {}
-
-    def add(self, arrivals: Sequence[Arrivals]) -> None:
-        """Take what came since the last call."""
-        self._recent.add(arrivals)
 
     def best(
         self,
@@ -133,25 +116,26 @@ class Evaluator:
         now: int,
         within: int | None = None,
         optional: int | None = None,
-    ) -> tuple[Tried, ...]:
+    ) -> Verdict:
         """Return what `propose` finds, now and then for each `about`; nothing new once the budget is spent.
 
         What was found on many messages stands as long as it helps, with the figures of now. See Trials for
         `within` and `optional`.
         """
-        at, holds, found = self._found.get(about, _NOTHING)
+        at, holds, verdict = self._found.get(about, _NOTHING)
         if 0 <= now - at < holds:
-            return found
+            return verdict
         if not self._is_shared:
             self._budget.refill()
         if self._budget.is_spent:
-            return found
-        trials = Trials(self._config, self._recent, self._budget, within=within, optional=optional)
-        before = found if holds == _HOLDS else ()
+            return verdict
+        trials = Trials(self._config, self._recent(), self._budget, within=within, optional=optional)
+        before = verdict.tried if holds == _HOLDS else ()
         again = tuple(tried for each in before if (tried := trials.gives_enough(each.changes)) is not None)
         found = again if before and len(again) == len(before) else tuple(propose(trials))
-        self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), found)
-        return found
+        verdict = Verdict(found, may_miss=trials.may_miss)
+        self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), verdict)
+        return verdict
 
 
 class _Found(NamedTuple):
@@ -159,10 +143,10 @@ class _Found(NamedTuple):
 
     at: int
     holds: int
-    tried: tuple[Tried, ...]
+    verdict: Verdict
 
 
-_NOTHING: Final = _Found(0, 0, ())
+_NOTHING: Final = _Found(0, 0, UNTRIED)
 
 
 class Trials:
@@ -176,7 +160,7 @@ class Trials:
     def __init__(
         self,
         config: GroupConfig,
-        recent: RecentArrivals,
+        recent: Sequence[Arrivals],
         budget: TryBudget,
         *,
         within: int | None = None,
@@ -186,21 +170,26 @@ class Trials:
         self._budget = budget
         self._trigger = config.trigger
         required = [index for index, topic in enumerate(config.topics) if topic.required]
-        pairs = [recent.of_input(index) for index in range(len(config.topics))]
-        pacemaker = min(required, key=lambda index: _rate(pairs[index])) if self._trigger is None else self._trigger
-        self._arrivals = _last(pairs, pacemaker)
+        pacemaker = min(required, key=lambda index: _rate(recent[index])) if self._trigger is None else self._trigger
+        self._arrivals = _last(recent, pacemaker)
         self.stamps: list[list[int]] = [[] for _ in config.topics]
         self.delays: list[list[int]] = [[] for _ in config.topics]
         for each in self._arrivals:
-            if each.stamp:
-                self.stamps[each.input].append(each.stamp + config.topics[each.input].offset_ns)
-                self.delays[each.input].append(each.received - each.stamp - config.topics[each.input].offset_ns)
+            stamp = (each.stamp or 0) + config.topics[each.input].offset_ns
+            self.stamps[each.input].append(stamp)
+            self.delays[each.input].append(each.received - stamp)
         among = self.among = required if optional is None else [*required, optional]
         slowest = min(among, key=lambda index: len(self.stamps[index]))
         self.pivot: int = slowest if self._trigger is None else self._trigger
         self.spans = self._possible(among, within)
         self._counted = self.pivot if optional is None else optional
         self._now = self._run(())
+
+    @property
+    def may_miss(self) -> bool:
+        """Whether sets may be missed that other values would give."""
+        is_certain = len(self.stamps[self.pivot]) >= 2 * _FEWEST
+        return not (is_certain and (len(self.spans) < _FEWEST or self._is_enough(self._now)))
 
     def try_out(self, changes: Changes, *, need: int | None = None) -> Tried | None:
         """Return what changes give if that is enough, with a longer queue where they need one; else None.
@@ -231,8 +220,10 @@ class Trials:
 
     def _run(self, changes: Changes) -> int:
         self._budget.spend(len(self._arrivals))
-        counts = dry_run(changed(self.config, changes), self._arrivals).counts[self._counted]
-        completed = counts.matched + counts.dropped.get(DropReason.THINNED, 0)
+        run = dry_run(changed(self.config, changes), self._arrivals)
+        counts = run.counts[self._counted]
+        # A message that is held may be in many sets.
+        completed = max(run.held[self._counted], counts.matched + counts.dropped.get(DropReason.THINNED, 0))
         return min(completed, len(self.spans))
 
     def _possible(self, among: Sequence[int], within: int | None) -> Distribution:
@@ -249,13 +240,13 @@ class Trials:
         return Distribution([span for span in spans if within is None or span <= within])
 
 
-def _last(pairs: Sequence[Sequence[tuple[int, int]]], pacemaker: int) -> tuple[Arrival, ...]:
+def _last(recent: Sequence[Arrivals], pacemaker: int) -> tuple[Arrival, ...]:
     """Return the messages that came since so many of the input that sets the pace, in the order of receipt."""
-    since = pairs[pacemaker][-_PIVOTS:]
-    begin = since[0][1] if since else 0
+    since = recent[pacemaker][-_PIVOTS:]
+    begin = min(since[0][1], since[-1][1] - _AT_LEAST) if since else 0
     came = [
         Arrival(index, stamp, received)
-        for index, each in enumerate(pairs)
+        for index, each in enumerate(recent)
         for place, (stamp, received) in enumerate(each)
         # What is held until there is a newer one may have come long before.
         if received >= begin or place == len(each) - 1 or each[place + 1][1] >= begin
@@ -299,7 +290,7 @@ def _queue(size: int) -> Change:
     return Change("queue_size", str(size))
 
 
-def _rate(pairs: Sequence[tuple[int, int]]) -> float:
+def _rate(pairs: Arrivals) -> float:
     return (len(pairs) - 1) / max(1, pairs[-1][1] - pairs[0][1]) if pairs else 0.0
 
 

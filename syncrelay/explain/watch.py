@@ -21,14 +21,15 @@ class GroupWatch:
         self.config = config
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
-        # Keys are not kept: what is matched by them cannot be run again.
-        self._evaluator = Evaluator(config, budget) if config.options.by_stamp else None
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
             began=began,
             trigger=config.trigger,
         )
+        # Keys are not kept: what is matched by them cannot be run again.
+        by_stamp = config.options.by_stamp
+        self._evaluator = Evaluator(config, self._observation.recent, budget) if by_stamp else None
 
     def add(
         self,
@@ -48,8 +49,6 @@ class GroupWatch:
         self._counts = tuple(counts)
         if keys is not None:
             self._keys = keys
-        if self._evaluator is not None:
-            self._evaluator.add(arrivals)
         self._observation.add(arrivals, sets, counts, total_sets, by_clock=by_clock, now=now)
 
     def facts(

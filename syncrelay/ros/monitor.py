@@ -146,7 +146,7 @@ class Monitor:
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)
-        for remark in log.remarks(facts, found):
+        for remark in log.remarks(facts, found, judge.explained(facts)):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 

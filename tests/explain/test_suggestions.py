@@ -80,8 +80,8 @@ def test_a_slop_is_suggested_with_the_longer_queue_that_it_needs():
 def test_an_offset_is_offered_beside_the_slop_where_the_distance_is_constant():
     told, cured = rig(replace(CAMERA, hz=5, clock=lambda _: -0.08), replace(LIDAR, hz=5), slop="20ms")
     assert re.search(
-        r"write `slop: 85ms`, which would give (\d+) of (\d+) possible sets \(now 0\), or `offset: 80ms` at /camera,"
-        r" which would give \d+$",
+        r"write `slop: 85ms`, which would give (\d+) of (\d+) possible sets \(now 0\), or, if both are measured at the"
+        r" same time, `offset: 80ms` at /camera, which would give \d+$",
         told.first.text,
     )
     assert_cured(cured, offered=2)

@@ -36,7 +36,7 @@ FOUND = {
             camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
         ),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check whether /usb_cam sends it, and how late it comes",
+        "check how late /camera comes",
     ),
     "an optional input whose stamps fit no set": (
         Code.WAITING_FOR_OPTIONAL,
@@ -87,7 +87,7 @@ FOUND = {
         Severity.WARN,
         without_camera(delay=104 * MS, nearest=Distribution([3 * MS] * 100)),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check whether /usb_cam sends it, and how late it comes",
+        "check how late /camera comes",
     ),
     "messages that were held up": (
         Code.BURSTS,
@@ -203,7 +203,7 @@ FOUND = {
             "messages arrive on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as"
             " too_far and 3 were dropped as late; of /lidar none came lately"
         ),
-        "try a larger `queue_size`; `syncrelay doctor --live` checks the graph and the stamps",
+        "run `syncrelay doctor --config FILE --live`, which checks the graph and the stamps",
     ),
     "a start": (
         Code.STARTING,
