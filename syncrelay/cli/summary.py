@@ -39,5 +39,5 @@ def _fates(counts: InputCounts) -> str:
         reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
         text += f" ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})"
     if counts.needed_queue is not None:
-        text += f"; a match needed what had overflowed: queue_size {counts.needed_queue} would have held it"
+        text += "; some left the full queue before their partners came"
     return text

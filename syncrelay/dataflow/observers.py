@@ -4,7 +4,7 @@ import time
 from collections import deque
 from typing import Final
 
-from syncrelay.explain import Standstill
+from syncrelay.explain import STEP_NS, ClockState, Standstill, Step
 
 # What was lost, and what had to wait, is reported for the last ten evaluations.
 _RECENT: Final = 10
@@ -13,6 +13,7 @@ _SETTLING: Final = 2
 # A clock that is set moves at once; one that is slewed only runs faster or slower.
 _STEP_NS: Final = 100_000_000
 _READINGS: Final = 3
+_TOLD_NS: Final = 30_000_000_000
 # A /clock at 1 Hz stands still for a second between two ticks.
 _CLOCK_STOPPED_NS: Final = 2_500_000_000
 
@@ -86,11 +87,19 @@ class SystemClock:
 
     def __init__(self) -> None:
         self._offset = _offset()
+        self._step: Step | None = None
 
-    def has_stepped(self) -> bool:
+    def has_stepped(self, now: int) -> bool:
         """Whether it was set since this was last asked."""
         before, self._offset = self._offset, _offset()
-        return abs(self._offset - before) > _STEP_NS
+        by = self._offset - before
+        if abs(by) >= STEP_NS:
+            self._step = Step(now, by)
+        return abs(by) > _STEP_NS
+
+    def last_step(self, now: int) -> Step | None:
+        """Return when it was last set and by how much, for half a minute; half a second at least."""
+        return self._step if self._step and 0 <= now - self._step.at < _TOLD_NS else None
 
 
 def _offset() -> int:
@@ -107,15 +116,28 @@ def _reading() -> tuple[int, int]:
 
 
 class SimulatedClock:
-    """Whether simulated time moves."""
+    """Whether simulated time moves, and what it was when messages were received."""
 
     def __init__(self) -> None:
-        self._time = -1
         self._moved_at = time.time_ns()
+        self._now = (self._moved_at, 0)
+        self._rate = 1.0
+        self.is_steady = False
+        """Whether it has run on since the evaluation before: only then is it known what it was in between."""
+        self.state = ClockState(received=False)
 
-    def observe(self, simulated: int, *, now: int) -> int | None:
-        """Return for how long the simulated time has stood still, None if it moves."""
-        if simulated != self._time:
-            self._time, self._moved_at = simulated, now
+    def observe(self, simulated: int, *, now: int) -> None:
+        """Take the simulated time of now, 0 before the first."""
+        before_at, before = self._now
+        self.is_steady = 0 < before <= simulated and before_at < now
+        self._rate = (simulated - before) / (now - before_at) if self.is_steady else 1.0
+        if simulated != before:
+            self._moved_at = now
+        self._now = (now, simulated)
         still = now - self._moved_at
-        return still if still >= _CLOCK_STOPPED_NS else None
+        self.state = ClockState(simulated != 0, still if still >= _CLOCK_STOPPED_NS else None)
+
+    def at(self, received: int) -> int:
+        """Return the simulated time at which a message was received since the last evaluation but one."""
+        now, simulated = self._now
+        return simulated - round((now - received) * self._rate)

@@ -3,9 +3,11 @@
 Pure: values in, values out. The running relay and the analysis of recordings both ask here.
 """
 
-from syncrelay.explain.distribution import Distribution
+from syncrelay.explain.clocks import STEP_NS, Step
+from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
+    ClockState,
     Endpoint,
     GraphSnapshot,
     GroupFacts,
@@ -17,18 +19,20 @@ from syncrelay.explain.facts import (
     Tolerance,
 )
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.find import explanation, find, problems
 from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Code, Finding, Severity
-from syncrelay.explain.histogram import BOUNDS_NS, Histogram
+from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
 from syncrelay.explain.rules_graph import no_other_node
+from syncrelay.explain.suggestions import TryBudget
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [
     "BOUNDS_NS",
+    "STEP_NS",
     "Arrival",
+    "ClockState",
     "Code",
     "Distribution",
     "DryRun",
@@ -45,6 +49,7 @@ __all__ = [
     "InputFacts",
     "InputFigures",
     "InputGraph",
+    "Judge",
     "Mismatch",
     "Observation",
     "RecentDrop",
@@ -53,12 +58,14 @@ __all__ = [
     "SentSets",
     "Severity",
     "Standstill",
+    "Step",
     "Tolerance",
+    "TryBudget",
     "dry_run",
     "explanation",
-    "find",
     "in_words",
+    "judge",
     "no_other_node",
-    "problems",
     "recent",
+    "with_ok",
 ]

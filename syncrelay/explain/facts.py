@@ -1,10 +1,12 @@
 """What is known of a group at one moment: the file's values, what was observed, what the graph shows."""
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
+from syncrelay.explain.suggestions import Evaluator
 from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
@@ -136,15 +138,27 @@ class Standstill(NamedTuple):
     ns: int
 
 
+class ClockState(NamedTuple):
+    """The clock of a node with use_sim_time: whether /clock was ever received, and for how long it has stood still.
+
+    `stopped` is in nanoseconds, None while the clock moves.
+    """
+
+    received: bool
+    stopped: int | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class GroupFacts:
     """A group. Durations in nanoseconds.
 
     `tolerance` is None where stamps may be any distance apart, as with `equal_key`. `by_stamp` says whether stamps are
     what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest of the
-    others, which may serve again. `clock_stopped` is for how long the simulated time stands still, None if it does
-    not; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
+    others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
+    and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
+    graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
     late; `failure` what stopped the group for good; `empty_graph` the graph, where it holds no node but our own.
+    `evaluator` tries other values of the file on the last messages, None where they cannot be run again.
     """
 
     name: str
@@ -158,10 +172,13 @@ class GroupFacts:
     max_wait: int | None = None
     every: int = 1
     least_period: int | None = None
-    clock_stopped: int | None = None
+    clock: ClockState | None = None
+    clock_set: Step | None = None
+    is_recorded: bool = False
     waited: int = 0
     standstill: Standstill | None = None
     failure: str | None = None
+    evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
 
     @property
@@ -185,6 +202,10 @@ class GroupFacts:
             return self.inputs[self.trigger]
         return min((each for each in self.inputs if each.required), key=lambda each: each.figures.rate_hz)
 
+    def lag(self, index: int) -> int | None:
+        """Return how long after their stamps an input's messages come, in nanoseconds; None if no clock can tell."""
+        return None if self.clock and not self.clock.received else self.inputs[index].figures.delay
+
     def is_held(self, index: int) -> bool:
         """Whether the latest message of this input is held and serves until there is a newer one."""
         return self.trigger is not None and index != self.trigger
@@ -197,5 +218,9 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        last = self.figures.began if self.figures.last_set is None else self.figures.last_set
-        return self.figures.now - last >= self.silent_after
+        return self.silent_for >= self.silent_after
+
+    @property
+    def silent_for(self) -> int:
+        """For how long no set has left."""
+        return self.figures.now - (self.figures.began if self.figures.last_set is None else self.figures.last_set)

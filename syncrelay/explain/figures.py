@@ -6,9 +6,8 @@ from operator import sub
 from statistics import median_low
 from typing import Final
 
-from syncrelay.explain.distribution import NOTHING, Distribution
-from syncrelay.explain.drift import Drift
-from syncrelay.explain.histogram import EMPTY, Histogram
+from syncrelay.explain.clocks import Drift, Step
+from syncrelay.explain.distribution import EMPTY, NOTHING, Distribution, Histogram
 from syncrelay.sync.messages import DropReason
 
 _SHOWN_SETS: Final = 100
@@ -19,12 +18,13 @@ class InputFigures:
     """One input; times and durations in nanoseconds, counts over the window.
 
     `usual_hz` is the rate of the last messages while they came, 0 of too few to tell. `pace_hz` is the rate by the
-    median period, `slowed_from_hz` the steady pace that the input had before it fell to less than half of it, None if
-    it has not. Of the last messages, oldest first, `received` holds when they came, `stamps` and `delays`, the times of
-    receipt minus the stamps, leave out stamps of 0. `nearest` holds, of an optional input, the spans of the tightest
-    sets with it, whenever its messages came. `bursts` counts how often messages were held up and came at once, `held`
-    is for how long at most, `held_up` from when to when, each time. `fell_by` and `fell_at` tell of the last backward
-    jump of its stamps.
+    median period, `slowed_from_hz` the steady pace that the input had before it slowed down, None if it has not. Of the
+    last messages, oldest first, `received` holds when they came, `stamps` and `delays`, the times of receipt minus the
+    stamps, leave out stamps of 0. `nearest` holds, of an optional input, the spans of the tightest sets with it,
+    whenever its messages came. `bursts` counts how often messages were held up and came at once, `held` is for how long
+    at most, `held_up` from when to when, each time. `fell_by` and `fell_at` tell of the last backward jump of its
+    stamps, `stepped` of a lasting step of them against the times of receipt in the last half minute; `swings` counts
+    how often they stepped there and back, `swung_by` is how far.
     """
 
     rate_hz: float = 0.0
@@ -45,6 +45,9 @@ class InputFigures:
     held_up: Sequence[tuple[int, int]] = ()
     fell_by: int | None = None
     fell_at: int | None = None
+    stepped: Step | None = None
+    swings: int = 0
+    swung_by: int = 0
 
     # Worked out when they are asked for, which is not at every look.
 
@@ -81,10 +84,10 @@ def _steps(times: Sequence[int]) -> Sequence[int]:
 class GroupFigures:
     """A group. `best_hz` is the rate of the input that sets the pace: no more sets are possible.
 
-    `spans` and `latencies` are those of the last sets. `nearest` holds the span of the tightest set that each
-    message of the input that sets the pace could have had, `nearest_since` those measured after the last set;
-    `missing` is the share of the window's sets, 0 to 1, that each input was missing from, `sets_since_without` how many
-    sets had it since. `resumed` is when the first
+    `spans` and `latencies` are those of the last sets. `nearest` holds the span of the tightest set that each of the
+    last messages of the input that sets the pace could have had, measured since `nearest_from`, and since an input last
+    changed its pace; `nearest_since` those measured after the last set. `missing` is the share of the window's sets, 0
+    to 1, that each input was missing from, `sets_since_without` how many sets had it since. `resumed` is when the first
     set left after a silence.
     """
 
@@ -101,6 +104,7 @@ class GroupFigures:
     latencies: Distribution = NOTHING
     nearest: Distribution = NOTHING
     nearest_since: Distribution = NOTHING
+    nearest_from: int = 0
     missing: tuple[float, ...] = ()
     sets_since_without: tuple[int, ...] = ()
 

@@ -1,12 +1,12 @@
-"""When to say that a group is silent: not at once, not at every look, and once when it is over."""
+"""When to say that a group is silent: not at once, not at every poll, and once when it is over."""
 
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from syncrelay.explain import words
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.find import explanation
 from syncrelay.explain.findings import Code, Finding, Severity
+from syncrelay.explain.judge import explanation
 
 _SECOND: Final = 1_000_000_000
 _LONGEST_PAUSE: Final = 600 * _SECOND
@@ -26,7 +26,7 @@ class Remark(NamedTuple):
 
 
 class FindingLog:
-    """Turns the findings of one group, look by look, into what is worth saying."""
+    """Turns the findings of one group, poll by poll, into what is worth saying."""
 
     def __init__(self) -> None:
         self._quiet_since: int | None = None
@@ -36,15 +36,15 @@ class FindingLog:
         self._well_since = 0
         self._warned: dict[tuple[Code, int | None], _Warning] = {}
 
-    def look(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
-        """Yield what is to be said now; of findings, what is remarkable is enough."""
+    def remarks(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
+        """Yield what is to be said now; findings that all is well may be left out."""
         now = facts.figures.now
         if facts.is_silent:
             yield from self._silent(facts, explanation(findings), now)
             return
         if self._quiet_since is not None:
             if self._told:
-                yield Remark(Severity.OK, f"sets leave again, after {words.seconds(now - self._quiet_since)}", None)
+                yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}", None)
             self._quiet_since, self._told, self._well_since = None, False, now
         yield from self._warnings(findings, now)
 
@@ -60,6 +60,9 @@ class FindingLog:
         self._pause = min(2 * self._pause, _LONGEST_PAUSE) if self._pause else now - self._quiet_since
         self._tell_again = now + self._pause
         self._told = True
+        # What explains a silence needs no line of its own when the silence is over.
+        warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
+        warning.told, warning.holds, warning.seen = True, False, now
         quiet = words.seconds(now - self._quiet_since)
         ever = "no set" if facts.figures.last_set is None else "no more sets"
         yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", finding.code)
@@ -78,7 +81,7 @@ class FindingLog:
         for (code, _), warning in self._warned.items():
             if warning.holds and now - warning.seen >= _OVER:
                 warning.holds = False
-                yield Remark(Severity.OK, f"over for {words.seconds(now - warning.seen)}: {warning.text}", code)
+                yield Remark(Severity.OK, f"resolved {words.seconds(now - warning.seen)} ago: {warning.text}", code)
 
 
 class _Warning:

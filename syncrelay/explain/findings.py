@@ -28,23 +28,27 @@ class Code(Enum):
     ALONE = "alone"
     NO_PUBLISHER = "no_publisher"
     INCOMPATIBLE_QOS = "incompatible_qos"
+    NO_CLOCK = "no_clock"
     CLOCK_STOPPED = "clock_stopped"
+    TOO_SLOW = "too_slow"
     SILENT = "silent"
     MALFORMED = "malformed"
     UNSTAMPED = "unstamped"
+    SEVERAL_PUBLISHERS = "several_publishers"
+    CLOCK_STEP = "clock_step"
+    CLOCK_DRIFT = "clock_drift"
     OTHER_CLOCK = "other_clock"
     NO_COMMON_KEY = "no_common_key"
+    SLOWED = "slowed"
     BURSTS = "bursts"
+    TIME_JUMP = "time_jump"
+    MESSAGES_LOST = "messages_lost"
     OVER_SLOP = "over_slop"
     SHORT_QUEUE = "short_queue"
     WAITING_FOR_OPTIONAL = "waiting_for_optional"
-    TIME_JUMP = "time_jump"
-    MESSAGES_LOST = "messages_lost"
-    TOO_SLOW = "too_slow"
-    SLOWED = "slowed"
+    CONSTANT_OFFSET = "constant_offset"
     OUT_OF_ORDER = "out_of_order"
     DUPLICATES = "duplicates"
-    CLOCK_DRIFT = "clock_drift"
     FEW_SETS = "few_sets"
     SUBSCRIBER_QOS = "subscriber_qos"
     OUTPUT_TAKEN = "output_taken"
@@ -57,7 +61,8 @@ class Code(Enum):
 class Finding:
     """One thing that is so: a sentence with its figures, and what to do, None where nothing is to be done.
 
-    `input` is the index of the input that it is about, None where it is about the group.
+    `input` is the index of the input that it is about, None where it is about the group. `explains` is False where it
+    is too small to explain other findings.
     """
 
     code: Code
@@ -65,6 +70,7 @@ class Finding:
     text: str
     suggestion: str | None = None
     input: int | None = None
+    explains: bool = True
 
 
 Found: TypeAlias = Iterator[Finding]

@@ -1,16 +1,15 @@
 """What is seen of one input over its last messages: rate, delay, jitter, drift, faults of its stamps."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from operator import lt, sub
+from statistics import median
 from typing import Final, NamedTuple, TypeAlias
 
-from syncrelay.explain.bursts import AT_ONCE, LEAST_HELD_NS, Burst, bursts
-from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.drift import Drift, drift
+from syncrelay.explain.clocks import Drift, StampSteps, drift
+from syncrelay.explain.distribution import Distribution, keep_last, no_values
 from syncrelay.explain.figures import InputFigures
-from syncrelay.explain.last import keep_last, no_values
-from syncrelay.explain.pace import Pace
+from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, Pace, bursts
 from syncrelay.sync.messages import DropReason
 
 Arrivals: TypeAlias = Sequence[tuple[int, int]]
@@ -27,8 +26,10 @@ _LAST_MESSAGES: Final = 200
 # Of a slow input, so many messages tell the rate, however long ago they came.
 _RATE_FROM: Final = 5
 _DRIFT_POINTS: Final = 300
-# It costs more than all the rest, and changes slowly.
+# It costs more than all the rest, and of many points it changes slowly.
 _DRIFT_EVERY: Final = 5
+_FEW_POINTS: Final = 12
+_PERIODS: Final = 20
 
 
 class _Faults(NamedTuple):
@@ -52,35 +53,60 @@ class InputObservation:
         self._faults: deque[_Faults] = deque()
         self._bursts: deque[Burst] = deque()
         self._newest_arrivals: deque[tuple[int, int]] = deque(maxlen=AT_ONCE)
+        self._newest_delays: deque[int] = deque(maxlen=AT_ONCE)
         self._points: deque[tuple[int, int]] = deque(maxlen=_DRIFT_POINTS)
         self._points_seen = 0
         self._drift: Drift | None = None
         self._newest: int | None = None
         self._fell: tuple[int, int] | None = None
+        self._steps = StampSteps()
+        self._is_simulated = False
 
-    def add(self, arrivals: Arrivals) -> bool:
-        """Take what came; whether its stamps have fallen back by more than a second."""
+    def add(self, arrivals: Arrivals, *, by_clock: Callable[[int], int] | None = None) -> bool:
+        """Take what came; whether its stamps have fallen back by more than a second.
+
+        `by_clock` tells what time a simulated clock showed at a time of receipt.
+        """
         if not arrivals:
             return False
         stamps, received = zip(*arrivals, strict=True)
         last = received[-1]
-        if self._received and last < self._received[-1]:
+        was_simulated, self._is_simulated = self._is_simulated, by_clock is not None
+        if (self._received and last < self._received[-1]) or was_simulated is not self._is_simulated:
             self._forget()
+            self._steps.forget()
         if self._first is None or last < self._first:
             self._first = received[0]
         duplicates, out_of_order, fallen = self._judge(stamps, received)
-        if fallen:
+        all_received = received
+        # A stamp of 0 was never set: it tells nothing of a clock.
+        stamped = [arrival for arrival in arrivals if arrival[0]] if 0 in stamps else arrivals
+        if stamped and stamped is not arrivals:
+            stamps, received = zip(*stamped, strict=True)
+        delays = list(map(sub, map(by_clock, received) if by_clock else received, stamps)) if stamped else []
+        if delays:
+            self._steps.add(received, delays, period=self._period)
+        # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
+        if fallen and not self._steps.swings(last)[0]:
             self._forget()
         while self._faults and self._faults[0].at <= last - WINDOW_NS:
             self._faults.popleft()
         self._faults.append(_Faults(last, duplicates, out_of_order))
-        keep_last(self._received, received, _LAST_MESSAGES)
-        self._pace.look(self._received)
-        # A stamp of 0 was never set: it tells nothing of a clock.
-        stamped = [arrival for arrival in arrivals if arrival[0]] if 0 in stamps else arrivals
-        if stamped:
-            self._measure(stamped)
+        keep_last(self._received, all_received, _LAST_MESSAGES)
+        before = self._pace.slowed_from
+        self._pace.observe(self._received)
+        if before != self._pace.slowed_from:
+            # The least delay of fewer messages is greater: that is no drift.
+            self._points.clear()
+            self._drift = None
+        if delays:
+            self._measure(stamped, stamps, delays)
         return fallen
+
+    @property
+    def slowed_from_hz(self) -> float | None:
+        """The steady pace that the input had before it slowed down, None if it has not."""
+        return self._pace.slowed_from
 
     def add_nearest(self, spans: Sequence[int]) -> None:
         """Take the spans of the tightest sets with this input."""
@@ -95,6 +121,7 @@ class InputObservation:
             if at > now - WINDOW_NS:
                 duplicates += repeated
                 out_of_order += late
+        swings, swung_by = self._steps.swings(now)
         bursts = [each for each in self._bursts if each.at > now - WINDOW_NS]
         return InputFigures(
             rate_hz=rate_hz,
@@ -115,6 +142,9 @@ class InputObservation:
             held_up=[(each.at - each.held, each.at) for each in bursts],
             fell_by=fell_by,
             fell_at=fell_at,
+            stepped=self._steps.last(now),
+            swings=swings,
+            swung_by=swung_by,
         )
 
     def _forget(self) -> None:
@@ -124,6 +154,7 @@ class InputObservation:
         self._faults.clear()
         self._bursts.clear()
         self._newest_arrivals.clear()
+        self._newest_delays.clear()
         self._points.clear()
         self._drift = None
 
@@ -151,26 +182,30 @@ class InputObservation:
         self._newest = newest
         return duplicates, out_of_order, fallen
 
-    def _measure(self, stamped: Arrivals) -> None:
+    def _period(self) -> float:
+        """Give the median of the last periods, 0 of too few."""
+        last = self._received[-_PERIODS:]
+        return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0
+
+    def _measure(self, stamped: Arrivals, stamps: Sequence[int], delays: list[int]) -> None:
         """Measure delays, drift and bursts, from messages that have stamps."""
-        stamps, received = zip(*stamped, strict=True)
         keep_last(self._stamps, stamps, _LAST_MESSAGES)
-        delays = list(map(sub, received, stamps))
         keep_last(self._delays, delays, _LAST_MESSAGES)
         self._find_bursts(stamped, delays)
         # What came fastest was held up least: the least delay tells more of the clock than of the load.
         self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, min(delays)))
         self._points_seen += 1
-        if self._points_seen % _DRIFT_EVERY == 0:
+        if len(self._points) < _FEW_POINTS or self._points_seen % _DRIFT_EVERY == 0:
             self._drift = drift(self._points)
 
     def _find_bursts(self, stamped: Arrivals, delays: Sequence[int]) -> None:
         while self._bursts and self._bursts[0].at <= stamped[-1][1] - WINDOW_NS:
             self._bursts.popleft()
         before = list(self._newest_arrivals)
+        all_delays = [*self._newest_delays, *delays]
         self._newest_arrivals.extend(stamped)
-        delays = [*(received - stamp for stamp, received in before), *delays]
-        if max(delays) - min(delays) >= LEAST_HELD_NS:
+        self._newest_delays.extend(delays[-AT_ONCE:])
+        if max(all_delays) - min(all_delays) >= LEAST_HELD_NS:
             self._bursts.extend(bursts([*before, *stamped]))
 
     def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:

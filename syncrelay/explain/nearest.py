@@ -4,6 +4,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
+from syncrelay.explain.distribution import Distribution
+
 # More than comes between two looks, at 1 kHz; what an input piles up while another is silent is cut to this.
 _KEPT = 5_000
 
@@ -28,6 +30,21 @@ def greatest_age(sides: Sides) -> int | None:
     """Return how much older than a message the latest not newer one of the others is at most, None if one has none."""
     ages = [before for before, _ in sides if before is not None]
     return max(ages) if len(ages) == len(sides) else None
+
+
+def signed_distances(stamps: Sequence[int], others: Sequence[int]) -> Distribution:
+    """Return how far after each stamp the nearest of the others is, less than 0 where it is before; in order both.
+
+    Only of stamps that have one on either side.
+    """
+    places = [bisect_left(others, stamp) for stamp in stamps]
+    return Distribution(
+        [
+            min(others[place] - stamp, others[place - 1] - stamp, key=abs)
+            for stamp, place in zip(stamps, places, strict=True)
+            if 0 < place < len(others)
+        ]
+    )
 
 
 class NearestSpans:

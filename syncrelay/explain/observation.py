@@ -1,16 +1,15 @@
 """What is seen of a group over its last seconds: rates, spans, latencies, delays, misses; fed every second or few."""
 
+from bisect import bisect_left
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import repeat
 from operator import add, sub
 from typing import Any, Final, NamedTuple, TypeAlias
 
-from syncrelay.explain.distribution import Distribution
+from syncrelay.explain.distribution import Distribution, Tallied, keep_last, no_values
 from syncrelay.explain.figures import GroupFigures, InputFigures
-from syncrelay.explain.histogram import Tallied
 from syncrelay.explain.input_observation import WINDOW_NS, Arrivals, InputObservation
-from syncrelay.explain.last import keep_last, no_values
 from syncrelay.explain.nearest import NearestSpans, greatest_age, tightest_span
 from syncrelay.sync.counts import InputCounts
 
@@ -20,6 +19,9 @@ SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
 _SECOND: Final = 1_000_000_000
 _LAST_SETS: Final = 500
 _SILENCE: Final = 5 * _SECOND
+# Of a slow input so many of the last messages tell, however long ago they came.
+_NEAREST_WINDOW: Final = 60 * _SECOND
+_FEWEST_NEAREST: Final = 20
 
 
 class Observation:
@@ -38,7 +40,7 @@ class Observation:
         self._trigger = trigger
         self._inputs = [InputObservation() for _ in offsets_ns]
         nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in offsets_ns)
-        self._looks = deque([_Look(began, nothing, 0, 0, (0,) * len(nothing))])
+        self._polls = deque([_Poll(began, nothing, 0, 0, (0,) * len(nothing))])
         self._span_histogram, self._latency_histogram = Tallied(), Tallied()
         self._last_set: int | None = None
         self._resumed: int | None = None
@@ -51,24 +53,37 @@ class Observation:
             for index, needed in enumerate(required)
             if not needed and trigger is None
         }
-        self._nearest, self._nearest_since = no_values(), no_values()
+        self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
+        self._paces: list[float | None] = [None] * len(offsets_ns)
         self._sets_since_without = [0] * len(offsets_ns)
 
     def add(
-        self, arrivals: Sequence[Arrivals], sets: SentSets, counts: Sequence[InputCounts], total_sets: int, *, now: int
+        self,
+        arrivals: Sequence[Arrivals],
+        sets: SentSets,
+        counts: Sequence[InputCounts],
+        total_sets: int,
+        *,
+        by_clock: Callable[[int], int] | None = None,
+        now: int,
     ) -> None:
         """Take what came and left since the last call, and the engine's counts as they are now."""
-        if self._looks and now < self._looks[-1].at:
+        if self._polls and now < self._polls[-1].at:
             self._begin_anew(now)
         stamps = list(zip(*(stamps for stamps, _ in sets), strict=True)) or [()] * len(self._inputs)
         missing = tuple([each.count(None) for each in stamps])
-        self._looks.append(_Look(now, tuple(counts), total_sets, len(sets), missing))
+        self._polls.append(_Poll(now, tuple(counts), total_sets, len(sets), missing))
         if len(self._required) < len(self._inputs):
             self._sets_since_without = list(map(_since_without, self._sets_since_without, stamps))
-        while len(self._looks) > 1 and self._looks[1].at <= now - WINDOW_NS:
-            self._looks.popleft()
-        fallen = [each.add(new) for each, new in zip(self._inputs, arrivals, strict=True)]
-        self._measure_nearest(arrivals, has_jumped=any(fallen))
+        while len(self._polls) > 1 and self._polls[1].at <= now - WINDOW_NS:
+            self._polls.popleft()
+        fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self._inputs, arrivals, strict=True)]
+        paces = [each.slowed_from_hz for each in self._inputs]
+        if paces != self._paces:
+            # What was measured before says nothing of how it is now.
+            self._paces = paces
+            self._forget_nearest()
+        self._measure_nearest(arrivals, now, has_jumped=any(fallen))
         if sets:
             spans = [self._span(stamps) for stamps, _ in sets] if any(missing) else self._spans_of_whole(stamps)
             self._take_sets(spans, [latency for _, latency in sets], now)
@@ -80,7 +95,7 @@ class Observation:
         group = GroupFigures(
             now=now,
             began=self._began,
-            sets=self._looks[-1].sets if self._looks else 0,
+            sets=self._polls[-1].sets if self._polls else 0,
             rate_hz=self._rate_hz(),
             best_hz=min(inputs[index].rate_hz for index in counted),
             last_set=self._last_set,
@@ -91,6 +106,7 @@ class Observation:
             latencies=Distribution(self._latencies[:]),
             nearest=Distribution(self._nearest[:]),
             nearest_since=Distribution(self._nearest_since[:]),
+            nearest_from=self._nearest_at[0] if self._nearest_at else now,
             missing=self._missing(now),
             sets_since_without=tuple(self._sets_since_without),
         )
@@ -98,12 +114,17 @@ class Observation:
 
     def _begin_anew(self, now: int) -> None:
         """Bear that this machine's clock was set back: what lies in the future now would count for ever."""
-        self._looks.clear()
+        self._polls.clear()
+        self._forget_nearest()
         self._began = min(self._began, now)
         self._last_set = None if self._last_set is None else now
         self._resumed = None if self._resumed is None else now
 
-    def _measure_nearest(self, arrivals: Sequence[Arrivals], *, has_jumped: bool) -> None:
+    def _forget_nearest(self) -> None:
+        for kept in (self._nearest, self._nearest_at, self._nearest_since):
+            del kept[:]
+
+    def _measure_nearest(self, arrivals: Sequence[Arrivals], now: int, *, has_jumped: bool) -> None:
         if has_jumped:
             del self._nearest_since[:]
             for spans in (self._nearest_spans, *self._with_optional.values()):
@@ -118,16 +139,23 @@ class Observation:
                 [shifted[index] for index in self._required], pivot=self._required.index(pivot)
             )
             keep_last(self._nearest, measured, _LAST_SETS)
+            keep_last(self._nearest_at, [now] * len(measured), _LAST_SETS)
+            self._forget_old_nearest(now)
             keep_last(self._nearest_since, measured, _LAST_SETS)
         for optional, spans in self._with_optional.items():
             among = [*self._required, optional]
             pivot = among.index(self._slowest(among))
             self._inputs[optional].add_nearest(spans.add([shifted[index] for index in among], pivot=pivot))
 
+    def _forget_old_nearest(self, now: int) -> None:
+        old = bisect_left(self._nearest_at, now - _NEAREST_WINDOW, 0, max(0, len(self._nearest_at) - _FEWEST_NEAREST))
+        if old:
+            del self._nearest[:old], self._nearest_at[:old]
+
     def _slowest(self, among: Sequence[int]) -> int:
         """Give the input of these of which the fewest came in the window."""
-        last = self._looks[-1].counts
-        before = [each.fed for each in self._looks[0].counts] if len(self._looks) > 1 else [0] * len(last)
+        last = self._polls[-1].counts
+        before = [each.fed for each in self._polls[0].counts] if len(self._polls) > 1 else [0] * len(last)
         return min(among, key=lambda index: last[index].fed - before[index])
 
     def _take_sets(self, spans: Sequence[int], latencies: Sequence[int], now: int) -> None:
@@ -141,8 +169,8 @@ class Observation:
         self._latency_histogram.add(latencies)
 
     def _saw_none_before(self) -> bool:
-        """Whether no set left in the look before this one: two looks may be as far apart as a silence is long."""
-        return len(self._looks) > 1 and not self._looks[-2].sent
+        """Whether no set left at the poll before this one: two polls may be as far apart as a silence is long."""
+        return len(self._polls) > 1 and not self._polls[-2].sent
 
     def _spans_of_whole(self, stamps: Sequence[Sequence[Any]]) -> list[int]:
         """Measure sets that miss none, input by input: at a quarter of the cost."""
@@ -157,26 +185,26 @@ class Observation:
         return max(there) - min(there)
 
     def _rate_hz(self) -> float:
-        if not self._looks:
+        if not self._polls:
             return 0.0
-        first, last = self._looks[0], self._looks[-1]
+        first, last = self._polls[0], self._polls[-1]
         if self._resumed is not None and first.at < self._resumed < last.at:
-            first = next(look for look in self._looks if look.at >= self._resumed)
+            first = next(poll for poll in self._polls if poll.at >= self._resumed)
         return (last.sets - first.sets) * _SECOND / max(1, last.at - first.at)
 
     def _missing(self, now: int) -> tuple[float, ...]:
         if len(self._required) == len(self._inputs):
             return (0.0,) * len(self._inputs)
-        recent = [look for look in self._looks if look.at > now - WINDOW_NS]
-        sent = max(1, sum(look.sent for look in recent))
-        return tuple(sum(look.missing[index] for look in recent) / sent for index in range(len(self._inputs)))
+        recent = [poll for poll in self._polls if poll.at > now - WINDOW_NS]
+        sent = max(1, sum(poll.sent for poll in recent))
+        return tuple(sum(poll.missing[index] for poll in recent) / sent for index in range(len(self._inputs)))
 
     def _input_figures(self, index: int, now: int) -> InputFigures:
-        if not self._looks:
+        if not self._polls:
             return InputFigures()
-        before, after = self._looks[0].counts[index], self._looks[-1].counts[index]
+        before, after = self._polls[0].counts[index], self._polls[-1].counts[index]
         gone = {reason: count - before.dropped.get(reason, 0) for reason, count in after.dropped.items()}
-        seconds = (self._looks[-1].at - self._looks[0].at) / _SECOND
+        seconds = (self._polls[-1].at - self._polls[0].at) / _SECOND
         return self._inputs[index].figures(
             fed=after.fed - before.fed, dropped={reason: n for reason, n in gone.items() if n}, seconds=seconds, now=now
         )
@@ -188,7 +216,7 @@ def _since_without(before: int, stamps: Sequence[int | None]) -> int:
     return before + len(stamps) if last is None else last
 
 
-class _Look(NamedTuple):
+class _Poll(NamedTuple):
     """What there was at one call: the counts until then, and of the sets that left since the one before."""
 
     at: int

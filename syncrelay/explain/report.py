@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import NamedTuple, Self
 
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.find import with_ok
 from syncrelay.explain.findings import Finding
+from syncrelay.explain.judge import with_ok
 from syncrelay.sync.messages import DropReason
 
 

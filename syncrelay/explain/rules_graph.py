@@ -15,6 +15,11 @@ _NO_MESSAGE: Final = 5 * SECOND
 _LEASE: Final = 20 * SECOND
 # A relay that ends in order while its successor starts is gone by then.
 _ENDING: Final = 3 * SECOND
+# What stopped so nearly as long ago as the sets did, and by more than a period or two, has stopped them.
+_AS_LONG: Final = 0.8
+_MISSED_PERIODS: Final = 2
+# Inputs that fell silent within this time did so together.
+_TOGETHER: Final = 2 * SECOND
 # A pause that is so many times the longest before it is news.
 _PAUSES: Final = 3
 
@@ -193,41 +198,87 @@ def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Fou
             )
 
 
+def no_clock(facts: GroupFacts) -> Found:
+    """Find that time is simulated and that nobody has told it."""
+    if facts.clock is not None and not facts.clock.received and facts.clock.stopped is not None:
+        yield Finding(
+            Code.NO_CLOCK,
+            Severity.ERROR if facts.is_silent else Severity.WARN,
+            f"no /clock has been received for {words.seconds(facts.clock.stopped)}, and the relay runs with"
+            " use_sim_time: nothing that waits expires",
+            "start what publishes /clock, such as `ros2 bag play --clock`, or run without use_sim_time",
+        )
+
+
 def clock_stopped(facts: GroupFacts) -> Found:
-    """Find that simulated time does not pass."""
-    if facts.clock_stopped is not None:
+    """Find that simulated time does not pass any more."""
+    if facts.clock is not None and facts.clock.received and facts.clock.stopped is not None:
         yield Finding(
             Code.CLOCK_STOPPED,
             Severity.ERROR if facts.is_silent else Severity.WARN,
-            f"/clock has stood still for {words.seconds(facts.clock_stopped)}: nothing that waits expires",
+            f"/clock has stood still for {words.seconds(facts.clock.stopped)}: nothing that waits expires",
             "start or resume what publishes /clock, or run without use_sim_time",
         )
 
 
-def silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find publishers that send nothing, or nothing any more."""
+def silent(facts: GroupFacts) -> Found:
+    """Find publishers that send nothing, or nothing any more; one finding where all inputs stopped together."""
+    found = [
+        finding for index in facts.required_first if (finding := _silent(facts, index, facts.inputs[index])) is not None
+    ]
+    quiet = [facts.figures.now - each.figures.last_received for each in facts.inputs if each.figures.last_received]
+    if 1 < len(found) == len(quiet) == len(facts.inputs) and max(quiet) - min(quiet) < _TOGETHER:
+        yield Finding(
+            Code.SILENT,
+            max(each.severity for each in found),
+            f"all inputs have been silent for {words.seconds(min(quiet))}",
+            "check whether recording was paused"
+            if facts.is_recorded
+            else "check whether their publishers are still running, and the network to them",
+        )
+    else:
+        yield from found
+
+
+def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | None:
     fitting = [each for each in an_input.graph.publishers if each.type == an_input.type and not each.mismatch]
     now, figures = facts.figures.now, an_input.figures
-    if not fitting or facts.clock_stopped is not None:
-        return
+    if not fitting:
+        return None
     node, quiet = fitting[0].node, now - (figures.last_received or now)
     if an_input.counts.fed == 0 and now - facts.figures.began >= _NO_MESSAGE:
-        yield Finding(
+        return Finding(
             Code.SILENT,
             blocks(facts, an_input),
-            f"{node} publishes {an_input.name}, but no message has come",
-            f"see with `ros2 topic hz {an_input.name}` whether {node} sends; if it does, ask `syncrelay doctor`",
+            f"{node} publishes {an_input.name}, but no message has arrived",
+            f"check with `ros2 topic hz {an_input.name}` whether {node} is sending; if so, run `syncrelay doctor"
+            " --config FILE --live`",
             index,
         )
-    elif quiet >= _NO_MESSAGE and not figures.rate_hz and not (facts.is_held(index) and _is_enough(facts, an_input)):
-        until_then = f"; until then it came at {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
-        yield Finding(
-            Code.SILENT,
-            blocks(facts, an_input),
-            f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
-            f"look at {node}, which {_is_there(quiet)}{_or_hold_longer(facts, index)}",
-            index,
-        )
+    if not _is_silent(facts, an_input, quiet) or (facts.is_held(index) and _is_enough(facts, an_input)):
+        return None
+    until_then = f"; until then it came at {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
+    return Finding(
+        Code.SILENT,
+        blocks(facts, an_input),
+        f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
+        f"check whether recording of {an_input.name} stopped"
+        if facts.is_recorded
+        else f"check {node}, which {_is_there(quiet)}{_or_hold_longer(facts, index)}",
+        index,
+    )
+
+
+def _is_silent(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
+    """Whether nothing comes, by this input's rate, or for about as long as no set has left."""
+    usual = an_input.figures.usual_hz
+    if (
+        facts.is_silent
+        and quiet >= _AS_LONG * facts.silent_for
+        and (not usual or quiet * usual > _MISSED_PERIODS * SECOND)
+    ):
+        return True
+    return quiet >= _NO_MESSAGE and not an_input.figures.rate_hz
 
 
 def _is_there(quiet: int) -> str:

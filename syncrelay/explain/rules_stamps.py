@@ -1,31 +1,49 @@
-"""Findings about stamps: unset, of another clock, too far apart, falling, drifting."""
+"""Findings about stamps: unset, of another clock, falling, drifting."""
 
+from collections.abc import Sequence
 from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.drift import apart
-from syncrelay.explain.facts import GroupFacts, InputFacts, Tolerance
+from syncrelay.explain.clocks import Drift, apart
+from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
 from syncrelay.sync.messages import DropReason
 
 # Stamps that are off by more come from another clock, or are older than a queue should hold.
 _OTHER_CLOCK: Final = SECOND
 _TOLD_JUMP: Final = 30 * SECOND
-# A share of the slowest input's messages that could have no set, and from how many on it means something.
-_MISSED: Final = 0.05
-_FEWEST: Final = 5
-# Where messages were held up, what is apart tells of slop only if it is most.
-_MOST: Final = 0.5
 # Below this drift is noise: so much apart since it was watched, so long watched, so much more than it bends.
 _DRIFTED: Final = 5_000_000
 _DRIFT_WATCHED: Final = 20 * SECOND
 _DRIFT_BENDS: Final = 8
 # A message in a hundred whose stamp repeats or comes late is no reason to call anyone.
 _FAULTY: Final = 0.01
+_SOME: Final = 0.02
+_MOST: Final = 0.5
 # What a computation may take; stamps that are older are those of another clock.
 _LATENCY: Final = 10 * SECOND
+# No machine runs for longer without a boot, nor has its clock been set before 1971.
+_BOOT: Final = 365 * 86_400 * SECOND
+# How close, how far behind UTC, and what it is. GPS time began in 1980 and has no leap seconds, TAI has 37 more.
+_EPOCHS: Final = (
+    (30 * SECOND, 315_964_800 * SECOND, "GPS time, which counts from 1980"),
+    (SECOND // 2, -37 * SECOND, "TAI, the time of PTP clocks, which is 37 s ahead of UTC"),
+    (SECOND // 2, -18 * SECOND, "GPS time, which is 18 s ahead of UTC"),
+)
+_ZONE: Final = 1800 * SECOND
+_MOST_ZONES: Final = 28
+# Stamps that swing there and back are those of two clocks.
+_FEWEST_SWINGS: Final = 2
+# Drift tells sooner if it is great.
+_DRIFTED_SOON: Final = 25_000_000
+_DRIFT_SOON: Final = 5 * SECOND
+# An input that drifts by so much less than another has the better clock.
+_EVIDENTLY: Final = 0.2
+# A drift explains what is apart if it made so great a part of the tolerance.
+_MATTERS: Final = 0.5
+_STEPPED_ALIKE: Final = SECOND // 2
+_SLEW: Final = "check what set the clock {where}; NTP and chrony can be told to slew it instead"
 
 
 def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -37,6 +55,7 @@ def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} are cut short, or not of its type",
             f"see that {nodes(an_input)} has the same version of {an_input.type} as is installed here",
             index,
+            explains=_matters(facts, an_input, count),
         )
 
 
@@ -49,7 +68,13 @@ def unstamped(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} have stamp 0",
             f"have {nodes(an_input)} set header.stamp, or write `stamp: receive` at {an_input.name}",
             index,
+            explains=_matters(facts, an_input, count),
         )
+
+
+def _matters(facts: GroupFacts, an_input: InputFacts, count: int) -> bool:
+    """Return whether so many messages of no use may explain others: most explain a silence, some explain losses."""
+    return count >= (_MOST if facts.is_silent else _SOME) * an_input.figures.fed
 
 
 def _blocks_if_most(facts: GroupFacts, an_input: InputFacts, count: int) -> Severity:
@@ -73,22 +98,41 @@ def other_clock(facts: GroupFacts) -> Found:
     behind = known[odd] - usual
     if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0):
         return
-    name, offset = facts.inputs[odd].name, facts.inputs[odd].offset
+    an_input, offset = facts.inputs[odd], facts.inputs[odd].offset
     others = [facts.inputs[index].name for index in known if index != odd]
-    side = "behind" if behind > 0 else "ahead of"
+    whose = others[0] if len(others) == 1 else "the other inputs"
+    apart_by = f"are {words.span_of_time(abs(behind))} {'behind' if behind > 0 else 'ahead of'} those of {whose}"
     shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
+    if epoch := _epoch(an_input, behind):
+        text = f"stamps of {an_input.name}{shifted} {apart_by}: they {epoch}"
+        suggestion = f"have {nodes(an_input)} stamp with the host's time, or write `stamp: receive` at {an_input.name}"
+    else:
+        text = f"stamps of {an_input.name}{shifted} {apart_by}"
+        suggestion = (
+            f"synchronize the clocks of their machines, or write `offset: {words.exactly(behind + offset)}` at"
+            f" {an_input.name}{_wait_for_it(facts, behind, an_input.name)}"
+        )
+    yield Finding(Code.OTHER_CLOCK, Severity.ERROR, text, suggestion, odd)
+
+
+def _wait_for_it(facts: GroupFacts, behind: int, name: str) -> str:
     needed = max((each.counts.needed_queue or 0 for each in facts.inputs), default=0)
     may_be_late = needed > facts.queue_size and 0 < behind < _LATENCY
-    wait = f"; if {name} really takes that long to come, write `queue_size: {needed}`" if may_be_late else ""
-    yield Finding(
-        Code.OTHER_CLOCK,
-        Severity.ERROR,
-        f"stamps of {name}{shifted} are {words.duration(abs(behind))} {side} those of"
-        f" {others[0] if len(others) == 1 else 'the other inputs'}",
-        f"synchronize the clocks of their machines, or write `offset: {words.exactly(behind + offset)}` at"
-        f" {name}{wait}",
-        odd,
-    )
+    return f"; if {name} really takes that long to come, write `queue_size: {needed}`" if may_be_late else ""
+
+
+def _epoch(an_input: InputFacts, behind: int) -> str:
+    """Say which time stamps seem to tell, that are so far behind those of others; nothing if it is no known one."""
+    newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
+    if 0 < newest < _BOOT and behind > _BOOT:
+        return "count from boot or the start of a simulation, not from 1970"
+    for epoch, off, what in _EPOCHS:
+        if abs(behind - off) < epoch:
+            return f"look like {what}"
+    zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
+    if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < SECOND:
+        return "look like local time, not UTC"
+    return ""
 
 
 def no_common_key(facts: GroupFacts) -> Found:
@@ -104,62 +148,88 @@ def no_common_key(facts: GroupFacts) -> Found:
     )
 
 
-def over_slop(facts: GroupFacts) -> Found:
-    """Find that the sets that could be had are too wide for the file."""
-    tolerance = facts.tolerance
-    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
-    if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
+def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find that the stamps of those who publish an input conflict."""
+    figures = an_input.figures
+    publishers = [each for each in an_input.graph.publishers if each.type == an_input.type]
+    if not facts.by_stamp or len(publishers) < 2:  # noqa: PLR2004  one alone conflicts with nobody
         return
-    over = nearest.share_over(tolerance.ns)
-    if facts.is_silent and over > 1 - _MISSED:
-        text, suggestion = _too_wide(facts, tolerance, nearest), _wide_enough(facts, tolerance, nearest)
-        yield Finding(Code.OVER_SLOP, Severity.ERROR, text, suggestion)
-    elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
-        text, suggestion = _often_too_wide(facts, tolerance, nearest)
-        yield Finding(Code.OVER_SLOP, Severity.WARN, text, suggestion)
+    disorder = figures.out_of_order + (0 if facts.is_held(index) else figures.duplicates)
+    if figures.swings >= _FEWEST_SWINGS:
+        conflict = f"their stamps are {words.duration(figures.swung_by)} apart"
+    elif disorder > _FAULTY * figures.fed:
+        conflict = f"{counted(disorder, figures.fed)} messages repeat a stamp or arrived out of stamp order"
+    else:
+        return
+    *first, last = [each.node for each in publishers]
+    who = f"{', '.join(first)} and {last} {'all' if len(first) > 1 else 'both'}"
+    yield Finding(
+        Code.SEVERAL_PUBLISHERS,
+        blocks(facts, an_input),
+        f"{who} publish {an_input.name}: {conflict}",
+        "give each publisher its own topic, or stop all but one",
+        index,
+        explains=figures.swings >= _FEWEST_SWINGS or _matters(facts, an_input, disorder),
+    )
 
 
-def _come_at_once(facts: GroupFacts) -> bool:
-    """Whether what is measured as far apart may only have been held up: a wider slop would pair what came together."""
-    return any(each.required and each.figures.bursts for each in facts.inputs)
+def clock_step(facts: GroupFacts) -> Found:
+    """Find a clock that was set: this machine's, that of one input, or the one that stamps them all."""
+    now = facts.figures.now
+    if facts.clock_set is not None:
+        text = f"this machine's clock was set {_forward(facts.clock_set.by)}, {_ago(now, facts.clock_set.at)}"
+        yield Finding(Code.CLOCK_STEP, Severity.WARN, text, _SLEW.format(where="here"))
+        return
+    if not facts.by_stamp:
+        return
+    stepped = [(index, each.figures.stepped) for index, each in enumerate(facts.inputs) if each.figures.stepped]
+    steps = [step.by for _, step in stepped if step]
+    if 1 < len(steps) == len(facts.inputs) and max(steps) - min(steps) < _STEPPED_ALIKE:
+        at = max(step.at for _, step in stepped if step)
+        text = f"stamps of all inputs jumped {_forward(steps[0])} against this machine's clock, {_ago(now, at)}"
+        yield Finding(Code.CLOCK_STEP, Severity.WARN, text, _SLEW.format(where="on the machine that stamps them"))
+        return
+    for index, step in stepped:
+        if step is not None:
+            an_input = facts.inputs[index]
+            yield Finding(
+                Code.CLOCK_STEP,
+                blocks(facts, an_input),
+                f"stamps of {an_input.name} jumped {_forward(step.by)}, {_ago(now, step.at)}; those of the other inputs"
+                " did not",
+                _SLEW.format(where=f"of {nodes(an_input)}"),
+                index,
+            )
 
 
-def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> tuple[str, str]:
-    missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
-    name = facts.pacemaker.name
-    if facts.policy == "exact_time":
-        # Others do have equal stamps: a wider slop would pair what does not belong together.
-        lost = "look for messages that a driver leaves out or the network loses"
-        return f"{missed} {name} have no partner of an equal stamp", lost
-    farther = f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
-    return farther, _wide_enough(facts, tolerance, nearest)
+def _forward(by: int) -> str:
+    return f"{'forward' if by > 0 else 'back'} by {words.duration(abs(by))}"
 
 
-def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
-    least, most = words.duration(nearest.quantile(0)), words.duration(nearest.quantile(0.95))
-    widths = least if least == most else f"{least} to {most}"
-    if facts.policy == "exact_time":
-        return f"no stamps are equal: the nearest sets span {widths}"
-    if tolerance.key == "max_age":
-        return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
-    return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
-
-
-def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
-    most, nearly_all = words.at_least(nearest.quantile(0.95)), words.at_least(nearest.quantile(0.99))
-    policy = "`policy: approximate_time` and " if facts.policy == "exact_time" else ""
-    less = "" if most == nearly_all else f", `{tolerance.key}: {most}` would match 95 %"
-    return f"write {policy}`{tolerance.key}: {nearly_all}`, which would match 99 %{less}"
+def _ago(now: int, at: int) -> str:
+    return f"{words.seconds(max(0, now - at))} ago"
 
 
 def time_jump(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find, without blame, that stamps fell back."""
+    """Find that stamps fell back; without blame, unless they do so again and again."""
     now, figures = facts.figures.now, an_input.figures
-    if figures.fell_at is not None and figures.fell_by is not None and now - figures.fell_at < _TOLD_JUMP:
-        ago = words.seconds(max(0, now - figures.fell_at))
-        text = f"stamps of {an_input.name} fell by {words.duration(figures.fell_by)} {ago} ago: the group began anew"
+    if facts.by_stamp and figures.swings >= _FEWEST_SWINGS:
         yield Finding(
-            Code.TIME_JUMP, Severity.OK, text, "a recording that is looped does this, or a reset clock", index
+            Code.TIME_JUMP,
+            blocks(facts, an_input),
+            f"timestamps of {an_input.name} jump back and forth by {words.duration(figures.swung_by)}",
+            f"check whether {nodes(an_input)} stamps by two clocks, or two nodes publish {an_input.name}",
+            index,
+        )
+    elif figures.fell_at is not None and figures.fell_by is not None and now - figures.fell_at < _TOLD_JUMP:
+        yield Finding(
+            Code.TIME_JUMP,
+            Severity.OK,
+            f"timestamps of {an_input.name} jumped back {words.duration(figures.fell_by)},"
+            f" {_ago(now, figures.fell_at)}; matching restarted",
+            "a looped recording does this, or a clock that was reset",
+            index,
+            explains=False,
         )
 
 
@@ -167,10 +237,8 @@ def out_of_order(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages that came after one of a later stamp."""
     count = an_input.figures.out_of_order
     if facts.by_stamp and count > _FAULTY * an_input.figures.fed:
-        text = (
-            f"{counted(count, an_input.figures.fed)} messages of {an_input.name} came out of the order of their stamps"
-        )
-        yield Finding(Code.OUT_OF_ORDER, Severity.WARN, text, _who_disorders(an_input), index)
+        text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} arrived out of stamp order"
+        yield Finding(Code.OUT_OF_ORDER, Severity.WARN, text, f"check how {nodes(an_input)} stamps and sends", index)
 
 
 def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -178,29 +246,52 @@ def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     count = an_input.figures.duplicates
     if facts.by_stamp and not facts.is_held(index) and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} repeat the stamp before them"
-        yield Finding(Code.DUPLICATES, Severity.WARN, text, _who_disorders(an_input), index)
-
-
-def _who_disorders(an_input: InputFacts) -> str:
-    if len(an_input.graph.publishers) > 1:
-        return f"{len(an_input.graph.publishers)} publish it, {nodes(an_input)}: give each a topic of its own"
-    return f"see how {nodes(an_input)} stamps its messages"
+        yield Finding(Code.DUPLICATES, Severity.WARN, text, f"check how {nodes(an_input)} stamps its messages", index)
 
 
 def clock_drift(facts: GroupFacts) -> Found:
-    """Find two inputs whose stamps run at different speeds."""
-    known = [(each.figures.drift, index) for index, each in enumerate(facts.inputs) if each.figures.drift]
-    if not facts.by_stamp or len(known) < 2:  # noqa: PLR2004  one alone cannot drift apart
+    """Find the input whose stamps drift away from the others' median; of two that may be either, both."""
+    drifts = {index: each.figures.drift for index, each in enumerate(facts.inputs) if each.figures.drift}
+    if not facts.by_stamp or len(drifts) < 2:  # noqa: PLR2004  one alone cannot drift apart
         return
-    (slow, slowest), (fast, fastest) = max(known), min(known)
-    between = apart(slow, fast)
-    if between.watched_ns >= _DRIFT_WATCHED and between.drifted_ns >= max(_DRIFTED, _DRIFT_BENDS * between.bend_ns):
-        name, other = facts.inputs[slowest].name, facts.inputs[fastest].name
-        yield Finding(
-            Code.CLOCK_DRIFT,
-            Severity.WARN,
-            f"stamps of {name} lose {words.duration(between.slope * SECOND)} a second against those of {other}"
-            f" ({words.figure(between.slope * 1e6)} ppm)",
-            "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
-            slowest,
-        )
+    known = {index: drift for index, drift in drifts.items() if drift is not None}
+    between = {
+        index: apart(drift, _median([known[other] for other in known if other != index]))
+        for index, drift in known.items()
+    }
+    most = max(abs(each.slope) for each in between.values())
+    # Of those that are as far from the others, the one whose stamps run least like this machine's clock.
+    odd = max(
+        (index for index, each in between.items() if abs(each.slope) >= (1 - _EVIDENTLY) * most),
+        key=lambda index: abs(known[index].slope),
+    )
+    found = between[odd]
+    enough = _DRIFTED if found.watched_ns >= _DRIFT_WATCHED else _DRIFTED_SOON
+    drifted = abs(found.drifted_ns)
+    if found.watched_ns < _DRIFT_SOON or drifted < max(enough, _DRIFT_BENDS * found.bend_ns):
+        return
+    others = [index for index in known if index != odd]
+    is_evident = len(others) > 1 or abs(known[others[0]].slope) < _EVIDENTLY * abs(known[odd].slope)
+    a_second = f"{words.duration(abs(found.slope) * SECOND)} a second"
+    ppm = words.figure(abs(found.slope) * 1e6)
+    name = facts.inputs[odd].name
+    against = facts.inputs[others[0]].name if len(others) == 1 else "the other inputs"
+    text = (
+        f"stamps of {name} {'lose' if found.slope > 0 else 'gain'} {a_second} against those of {against} ({ppm} ppm)"
+        if is_evident
+        else f"stamps of {name} and {against} drift apart by {a_second} ({ppm} ppm)"
+    )
+    gone = abs(found.slope) * (facts.figures.now - facts.figures.began)
+    yield Finding(
+        Code.CLOCK_DRIFT,
+        Severity.WARN,
+        text,
+        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
+        odd if is_evident else None,
+        # A clock that is off by a few ppm is not why stamps lie far apart today.
+        explains=facts.tolerance is not None and gone >= _MATTERS * facts.tolerance.ns,
+    )
+
+
+def _median(drifts: Sequence[Drift]) -> Drift:
+    return sorted(drifts)[(len(drifts) - 1) // 2]

@@ -1,24 +1,39 @@
 """A group of the file under observation: what came and left, and from it, at any moment, the facts."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 
 from syncrelay.config import GroupConfig
-from syncrelay.explain.facts import GraphSnapshot, GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
+from syncrelay.explain.clocks import Step
+from syncrelay.explain.facts import (
+    ClockState,
+    GraphSnapshot,
+    GroupFacts,
+    InputFacts,
+    InputGraph,
+    Standstill,
+    Tolerance,
+)
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
+from syncrelay.explain.suggestions import Evaluator, TryBudget
 from syncrelay.sync.counts import InputCounts
 
 
 class GroupWatch:
-    """Gathers what is known of a group, from `began` on; times are nanoseconds of one clock."""
+    """Gathers what is known of a group, from `began` on; times are nanoseconds of one clock.
 
-    def __init__(self, config: GroupConfig, *, began: int) -> None:
+    `budget` bounds what is tried out for suggestions, together with other groups; without it each try is bounded alone.
+    """
+
+    def __init__(self, config: GroupConfig, *, began: int, budget: TryBudget | None = None) -> None:
         self.config = config
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
         self._trigger = (
             config.inputs.index_of(config.options.trigger) if config.options.policy == "latest_time" else None
         )
+        # Keys are not kept: what is matched by them cannot be run again.
+        self._evaluator = Evaluator(config, budget) if config.options.policy != "equal_key" else None
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
@@ -34,20 +49,28 @@ class GroupWatch:
         total_sets: int,
         *,
         keys: Sequence[Hashable] | None = None,
+        by_clock: Callable[[int], int] | None = None,
         now: int,
     ) -> None:
-        """Take what came and left since the last call; see Observation. `keys` are the newest messages'."""
+        """Take what came and left since the last call; see Observation. `keys` are the newest messages'.
+
+        `by_clock` tells, where time is simulated, what its clock showed at a time of receipt.
+        """
         self._counts = tuple(counts)
         if keys is not None:
             self._keys = keys
-        self._observation.add(arrivals, sets, counts, total_sets, now=now)
+        if self._evaluator is not None:
+            self._evaluator.add(arrivals)
+        self._observation.add(arrivals, sets, counts, total_sets, by_clock=by_clock, now=now)
 
     def facts(
         self,
         graph: Sequence[InputGraph],
         *,
         now: int,
-        clock_stopped: int | None = None,
+        clock: ClockState | None = None,
+        clock_set: Step | None = None,
+        is_recorded: bool = False,
         waited: int = 0,
         standstill: Standstill | None = None,
         failure: str | None = None,
@@ -80,10 +103,13 @@ class GroupWatch:
             max_wait=options.max_wait,
             every=options.every,
             least_period=options.max_rate,
-            clock_stopped=clock_stopped,
+            clock=clock,
+            clock_set=clock_set,
+            is_recorded=is_recorded,
             waited=waited,
             standstill=standstill,
             failure=failure,
+            evaluator=self._evaluator,
             empty_graph=empty_graph,
         )
 

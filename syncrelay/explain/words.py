@@ -23,6 +23,16 @@ def seconds(nanoseconds: float) -> str:
     return f"{count / 60:.0f} min" if count < 6000 else f"{_digits(count / 3600)} h"  # noqa: PLR2004
 
 
+def span_of_time(nanoseconds: float) -> str:
+    """Return a time that may be of any length: 37.2 s, 12 min, 2 h, 3 days, 10 years."""
+    days = nanoseconds / 86_400_000_000_000
+    if days >= 2 * 365:
+        return f"{days / 365.2425:.0f} years"
+    if days >= 2:  # noqa: PLR2004  one is still told in hours
+        return f"{days:.0f} days"
+    return duration(nanoseconds) if nanoseconds < 100_000_000_000 else seconds(nanoseconds)  # noqa: PLR2004
+
+
 def rate(hertz: float) -> str:
     """Return a rate with its unit, such as 19.9 Hz."""
     return f"{figure(hertz)} Hz"

@@ -15,8 +15,9 @@ from syncrelay.explain import (
     GraphSnapshot,
     GroupReport,
     GroupWatch,
+    Judge,
     Severity,
-    problems,
+    TryBudget,
 )
 from syncrelay.ros.bindings import GroupBinding
 from syncrelay.ros.surroundings import Surroundings
@@ -36,7 +37,8 @@ _LONGEST_TURN: Final = 4
 
 class _Watched(NamedTuple):
     watch: GroupWatch
-    silence: FindingLog
+    judge: Judge
+    log: FindingLog
 
 
 class Monitor:
@@ -58,6 +60,7 @@ class Monitor:
         self.standstills = Standstills()
         self._system_clock = SystemClock()
         self._empty_graph: GraphSnapshot | None = None
+        self._try_budget = TryBudget()
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -76,7 +79,7 @@ class Monitor:
         self._bindings = bindings
         self._watched = {
             binding.group: self._watched.get(binding.group)
-            or _Watched(GroupWatch(binding.group.config, began=now), FindingLog())
+            or _Watched(GroupWatch(binding.group.config, began=now, budget=self._try_budget), Judge(), FindingLog())
             for binding in bindings
         }
         topics = dict.fromkeys(each.topic for binding in bindings for each in binding.inputs)
@@ -100,40 +103,44 @@ class Monitor:
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
         waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
         now = time.time_ns()
+        self._try_budget.refill()
         # Messages are received by the system's clock: a step of it is no wait.
-        has_stepped = self._system_clock.has_stepped()
+        has_stepped = self._system_clock.has_stepped(now)
         for recent, waited in zip(self._waits.values(), waits, strict=True):
             recent.observe(0 if has_stepped else waited)
         self.standstills.observe()
-        stopped = self._clock.observe(self._node.get_clock().now().nanoseconds, now=now) if self._clock else None
+        if self._clock is not None:
+            self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
         for topic, losses in self._losses.items():
             losses.observe(topic.lost(), publishers=len(topic.publishers))
         self._empty_graph = self._surroundings.empty_graph()
         for binding, batch in zip(bindings, batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
                 try:
-                    self._evaluate_group(binding, batch, now, stopped)
+                    self._evaluate_group(binding, batch, now)
                 except Exception:
                     # Else an old report would stand for ever.
                     self._reports.pop(binding.group, None)
                     raise
 
-    def _evaluate_group(self, binding: GroupBinding, batch: Batch, now: int, stopped: int | None) -> None:
-        watch, silence = self._watched[binding.group]
-        watch.add(batch.arrivals, batch.sets, batch.counts, batch.n_sets, keys=batch.keys, now=now)
+    def _evaluate_group(self, binding: GroupBinding, batch: Batch, now: int) -> None:
+        watch, judge, log = self._watched[binding.group]
+        by_clock = self._clock.at if self._clock and self._clock.is_steady else None
+        watch.add(batch.arrivals, batch.sets, batch.counts, batch.n_sets, keys=batch.keys, by_clock=by_clock, now=now)
         shown = [self._surroundings.of(each, lost=self._losses[each.topic].recent) for each in binding.inputs]
         facts = watch.facts(
             shown,
             now=now,
-            clock_stopped=stopped,
+            clock=self._clock.state if self._clock else None,
+            clock_set=self._system_clock.last_step(now),
             waited=max(self._waits[each.topic].longest for each in binding.inputs),
             standstill=self.standstills.longest,
             failure=binding.group.failure,
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
         )
-        found = problems(facts)
+        found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)
-        for remark in silence.look(facts, found):
+        for remark in log.remarks(facts, found):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 

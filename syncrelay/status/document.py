@@ -81,7 +81,7 @@ def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
         "offset_ms": _ms(each.offset),
         "rate_hz": round(figures.rate_hz, 3),
         "age_ms": _ms(None if figures.last_received is None else facts.figures.now - figures.last_received),
-        "lag_ms": _ms(figures.delay),
+        "lag_ms": _ms(facts.lag(index)),
         "jitter_ms": _ms(figures.jitter),
         "drift_ppm": figures.drift and round(figures.drift.slope * 1e6, 1),
         "received": counts.fed,

@@ -77,4 +77,4 @@ class ApproximateEpsilonTime(Policy):
             return
         for place, queue in enumerate(self._queues):
             if queue not in near:
-                self._losses.miss(place, queue.stamps, oldest, self._epsilon)
+                self._losses.miss(place, queue.stamps, oldest, before=self._epsilon, after=self._epsilon)

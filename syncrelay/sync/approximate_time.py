@@ -289,7 +289,7 @@ class ApproximateTime(Policy):
         """See whether what would have matched the only message of an input had overflowed."""
         for head, place in self._heads:
             if head > start:
-                self._losses.miss(place, self._stamps[place], start, self._slop)
+                self._losses.miss(place, self._stamps[place], start, before=self._slop, after=self._slop)
 
     def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
         """Drop heads while there is no candidate."""

@@ -100,7 +100,7 @@ class ApproximateTimeEager(Policy):
             return
         for place, stamps in enumerate(self._stamps):
             if stamps and stamps[0] > stamp + self._slop:
-                self._losses.miss(place, stamps, stamp, self._slop)
+                self._losses.miss(place, stamps, stamp, before=self._slop, after=self._slop)
         self._drop_too_far(outcomes)
 
     def _drop_too_far(self, outcomes: list[Outcome]) -> None:

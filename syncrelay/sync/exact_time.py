@@ -75,7 +75,7 @@ class ExactTime(Policy):
         if oldest == stamp:
             for other in range(self.n_inputs):
                 if other != place:
-                    self._losses.miss(other, self._order[1:], stamp, 0)
+                    self._losses.miss(other, self._order[1:], stamp, before=0, after=0)
         else:
             for other, message in enumerate(self._sets[oldest]):
                 if message is not None:

@@ -152,7 +152,7 @@ class LatestTime(Policy):
         for place, queue in enumerate(self._queues):
             if queue.stamps and queue.stamps[0] > stamp:
                 age = stamp if self._max_age is None else self._max_age
-                self._losses.miss(place, queue.stamps, stamp, age)
+                self._losses.miss(place, queue.stamps, stamp, before=age, after=0)
 
     def _emit(self, positions: Sequence[int | None], stamp: int, outcomes: list[Outcome]) -> None:
         members: list[Message | None] = []

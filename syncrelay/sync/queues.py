@@ -1,6 +1,6 @@
 """Queues in stamp order, and what is known of a queue that was too short."""
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right, insort
 from collections.abc import Sequence
 
 from syncrelay.sync.messages import Message
@@ -51,26 +51,33 @@ class Losses:
     __slots__ = ("_lost", "needed")
 
     def __init__(self, n_inputs: int) -> None:
-        self._lost: list[int | None] = [None] * n_inputs
+        self._lost: list[list[int]] = [[] for _ in range(n_inputs)]
         self.needed: list[int | None] = [None] * n_inputs
 
     def forget(self) -> None:
         """Start afresh, but keep what was needed."""
-        self._lost = [None] * len(self._lost)
+        self._lost = [[] for _ in self._lost]
 
     def lose(self, place: int, stamp: int) -> None:
         """Note that the queue of `place` dropped its oldest message, of this stamp."""
-        self._lost[place] = stamp
+        lost = self._lost[place]
+        insort(lost, stamp)
+        if len(lost) > 2 * LONGEST_QUEUE:
+            del lost[:LONGEST_QUEUE]
 
-    def miss(self, place: int, stamps: Sequence[int], wanted: int, reach: int) -> None:
+    def miss(self, place: int, stamps: Sequence[int], wanted: int, *, before: int, after: int) -> None:
         """Note that a message of stamp `wanted` found only newer ones in this queue, `stamps`.
 
-        Nothing comes of it unless the queue lost one that was not older than `wanted` by more than `reach`.
-        The length is that of a queue back to `wanted`, at the mean rate of what is in it, and one more.
+        Nothing comes of it unless the queue lost one that was older by no more than `before`, or newer by no more than
+        `after`. The length is that of a queue that would still hold it, and one more: a set may wait for the next.
         """
         lost = self._lost[place]
-        if lost is not None and wanted - reach <= lost < stamps[0]:
-            self.need(place, 2 + (stamps[-1] - wanted) * len(stamps) // (stamps[-1] - lost))
+        position = bisect_right(lost, wanted)
+        if position and lost[position - 1] >= wanted - before:
+            position -= 1
+        elif position == len(lost) or lost[position] > wanted + after:
+            return
+        self.need(place, len(lost) - position + len(stamps) + 1)
 
     def need(self, place: int, length: int) -> None:
         """Note that a queue of this length would have held what was missed."""

@@ -4,12 +4,12 @@ import pytest
 
 from syncrelay.cli.boundary import AT_FAULT, DONE
 from syncrelay.cli.explain import conclude
-from syncrelay.explain import GroupReport, problems
+from syncrelay.explain import GroupReport, judge
 from tests.explain.support.groups import NOW, S, a_group, an_input
 
 
 def _report(facts) -> GroupReport:
-    return GroupReport(facts, tuple(problems(facts)))
+    return GroupReport(facts, judge(facts))
 
 
 def test_where_all_groups_are_healthy_the_code_is_0_and_nothing_decided_it(capsys: pytest.CaptureFixture[str]):

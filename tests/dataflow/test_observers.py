@@ -6,7 +6,7 @@ import pytest
 
 from syncrelay.dataflow import observers
 from syncrelay.dataflow.observers import Losses, SimulatedClock, Standstills, SystemClock, Waits
-from syncrelay.explain import Standstill
+from syncrelay.explain import ClockState, Standstill
 
 _SECOND = 1_000_000_000
 
@@ -53,20 +53,49 @@ def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publisher
     assert losses.recent == recent
 
 
-def test_a_clock_that_was_set_has_stepped_once(monkeypatch):
+def test_a_clock_that_was_set_has_stepped_once_and_is_told_for_half_a_minute(monkeypatch):
     ahead = [0]
     monkeypatch.setattr(observers.time, "time_ns", lambda: time.monotonic_ns() + ahead[0])
     clock = SystemClock()
-    assert not clock.has_stepped()
-    for step in (5 * _SECOND, -5 * _SECOND):
+    assert not clock.has_stepped(0)
+    for at, step in ((10 * _SECOND, 5 * _SECOND), (20 * _SECOND, -5 * _SECOND)):
         ahead[0] += step
-        assert [clock.has_stepped(), clock.has_stepped()] == [True, False]
+        assert [clock.has_stepped(at), clock.has_stepped(at)] == [True, False]
+        told = clock.last_step(at + 29 * _SECOND)
+        assert told is not None
+        assert (told.at, told.by) == (at, pytest.approx(step, abs=_SECOND // 2))
+        assert clock.last_step(at + 30 * _SECOND) is None
 
 
 def test_simulated_time_stands_still_when_it_did_not_move_for_more_than_two_ticks_at_1_hz():
     clock = SimulatedClock()
     now = time.time_ns()
-    assert clock.observe(7, now=now) is None
-    assert clock.observe(7, now=now + 2 * _SECOND) is None
-    assert clock.observe(7, now=now + 3 * _SECOND) == 3 * _SECOND
-    assert clock.observe(8, now=now + 4 * _SECOND) is None
+    seen = []
+    for simulated, seconds in ((7, 0), (7, 2), (7, 3), (8, 4)):
+        clock.observe(simulated, now=now + seconds * _SECOND)
+        seen.append(clock.state)
+    assert seen == [ClockState(received=True, stopped=ns) for ns in (None, None, 3 * _SECOND, None)]
+
+
+def test_a_simulated_clock_that_nobody_tells_was_never_received():
+    clock = SimulatedClock()
+    clock.observe(0, now=time.time_ns() + 7 * _SECOND)
+    assert not clock.state.received
+    assert clock.state.stopped == pytest.approx(7 * _SECOND, rel=0.1)
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0, 10.0])
+def test_simulated_time_is_known_for_the_messages_between_two_evaluations(rate):
+    clock = SimulatedClock()
+    for second in (1, 2, 3):
+        clock.observe(round(second * rate * _SECOND), now=second * _SECOND)
+    assert clock.is_steady
+    assert clock.at(2_500_000_000) == round(2.5 * rate * _SECOND)
+
+
+@pytest.mark.parametrize(("before", "after"), [(0, 5), (5, 4)])
+def test_a_simulated_clock_that_began_or_was_set_back_tells_nothing_of_the_time_before(before, after):
+    clock = SimulatedClock()
+    clock.observe(before * _SECOND, now=_SECOND)
+    clock.observe(after * _SECOND, now=2 * _SECOND)
+    assert not clock.is_steady

@@ -7,7 +7,7 @@ import pytest
 from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.graph import check_clock, check_graph, check_own_name
 from syncrelay.doctor.groups import check_groups, check_sizes
-from syncrelay.explain import Code, Endpoint, GraphSnapshot, GroupReport, problems
+from syncrelay.explain import Code, Endpoint, GraphSnapshot, GroupReport, judge
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import IMAGE, NOW, S, a_group, a_silent_group, an_input
 
@@ -16,7 +16,7 @@ GRAPH = GraphSnapshot(3, "SUBNET", ("/camera_driver",), 3)
 
 
 def report(facts):
-    return GroupReport(facts, tuple(problems(facts)))
+    return GroupReport(facts, tuple(judge(facts)))
 
 
 def unpublished(name, **facts):
@@ -48,7 +48,7 @@ def test_nodes_that_are_found_but_do_not_get_through_are_not_taken_for_absent():
     assert "let UDP ports 8150 to 8399 through" in found.fix
     unreached = Endpoint("a publisher whose node is not known yet", IMAGE, is_named=False)
     facts = a_silent_group(silent(publishers=(unreached,)), an_input("/lidar"))
-    assert [each.code for each in problems(facts)] == [Code.SILENT]
+    assert [each.code for each in judge(facts)] == [Code.SILENT]
     assert list(check_groups([report(facts)], [])) == []
 
 

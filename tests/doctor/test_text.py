@@ -9,7 +9,7 @@ from syncrelay.doctor.discovery import Discovery, check_discovery
 from syncrelay.doctor.examine import Observed
 from syncrelay.doctor.groups import check_groups
 from syncrelay.doctor.text import diagnosis_lines, observed_lines, verdict
-from syncrelay.explain import Endpoint, GraphSnapshot, GroupReport, problems
+from syncrelay.explain import Endpoint, GraphSnapshot, GroupReport, judge
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import S, a_group, a_silent_group, an_input
 
@@ -107,7 +107,7 @@ def test_the_readme_shows_what_is_printed():
         figures={"rate_hz": 199.8, "delay": 2 * MS},
     )
     facts = a_silent_group(camera, lidar, imu)
-    reports = (GroupReport(facts, tuple(problems(facts))),)
+    reports = (GroupReport(facts, tuple(judge(facts))),)
     graph = GraphSnapshot(110, "SUBNET", ("/camera_driver", "/imu_driver", "/ouster"), 7)
     found = worst_first(
         [*check_discovery(Discovery({"ROS_DOMAIN_ID": "110"}, (32768, 60999))), *check_groups(reports, ())]

@@ -6,8 +6,8 @@ from collections import deque
 import pytest
 from groups import MS, S
 
-from syncrelay.explain.bursts import Burst, bursts
 from syncrelay.explain.input_observation import InputObservation
+from syncrelay.explain.rhythm import Burst, bursts
 
 
 def _stream(first, last, *, period=10 * MS, delay=MS):

@@ -5,7 +5,7 @@ import random
 import pytest
 from groups import BEGAN, MS, S
 
-from syncrelay.explain.drift import Drift, apart, drift
+from syncrelay.explain.clocks import Drift, apart, drift
 
 
 def points(delay, *, n=120, noise=0.0):
@@ -35,7 +35,7 @@ def test_an_epoch_costs_no_nanoseconds():
     assert drift(points(lambda second: second)).slope == pytest.approx(1e-9)
 
 
-@pytest.mark.parametrize("n", [0, 1, 9])
+@pytest.mark.parametrize("n", [0, 1, 5])
 def test_few_points_tell_nothing(n):
     assert drift(points(lambda second: second * MS, n=n)) is None
 

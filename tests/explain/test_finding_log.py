@@ -3,7 +3,7 @@
 import pytest
 from groups import BEGAN, NOW, S, a_group, an_input
 
-from syncrelay.explain import Code, Finding, FindingLog, GroupFacts, Severity, in_words, problems
+from syncrelay.explain import Code, Finding, FindingLog, GroupFacts, Severity, in_words, judge
 from syncrelay.explain.finding_log import Remark
 
 DEAD = {"publishers": (), "figures": {"last_received": None, "rate_hz": 0.0}}
@@ -18,7 +18,7 @@ def at(second: float, *, last_set: float | None, **facts) -> GroupFacts:
 
 
 def looked(silence, facts):
-    return list(silence.look(facts, problems(facts)))
+    return list(silence.remarks(facts, judge(facts)))
 
 
 def told(silence, seconds, *, last_set):
@@ -45,7 +45,7 @@ def test_a_silence_is_said_with_its_reason_and_what_to_do():
 def test_its_end_is_said_once():
     silence = FindingLog()
     looked(silence, at(5, last_set=None))
-    assert looked(silence, at(9, last_set=8.9)) == [Remark(Severity.OK, "sets leave again, after 9 s", None)]
+    assert looked(silence, at(9, last_set=8.9)) == [Remark(Severity.OK, "recovered after 9 s", None)]
     assert looked(silence, at(10, last_set=9.9)) == []
 
 
@@ -77,7 +77,7 @@ def warned(silence, seconds, *findings):
     facts = [a_group(figures={"now": NOW + second * S, "last_set": NOW + second * S}) for second in seconds]
     lines = []
     for second, each in zip(seconds, facts, strict=True):
-        lines += [(second, remark.text) for remark in silence.look(each, findings)]
+        lines += [(second, remark.text) for remark in silence.remarks(each, findings)]
     return lines
 
 
@@ -96,7 +96,7 @@ def test_a_warning_of_each_input_is_said():
 def test_a_warning_that_comes_back_within_a_minute_is_not_said_again():
     silence = FindingLog()
     assert len(warned(silence, range(10), REPEATS)) == 1
-    assert warned(silence, range(10, 60)) == [(19, "over for 10 s: stamps repeat")]
+    assert warned(silence, range(10, 60)) == [(19, "resolved 10 s ago: stamps repeat")]
     assert warned(silence, range(60, 100), REPEATS) == []
 
 
@@ -104,7 +104,7 @@ def test_the_end_of_a_warning_is_said_once_in_its_last_words():
     silence = FindingLog()
     warned(silence, range(10), REPEATS)
     warned(silence, [10], Finding(Code.DUPLICATES, Severity.WARN, "stamps repeat still", None, 0))
-    assert warned(silence, range(11, 40)) == [(20, "over for 10 s: stamps repeat still")]
+    assert warned(silence, range(11, 40)) == [(20, "resolved 10 s ago: stamps repeat still")]
 
 
 def test_what_did_not_last_has_no_end_to_say():

@@ -3,7 +3,7 @@
 import pytest
 
 from syncrelay.explain import BOUNDS_NS
-from syncrelay.explain.histogram import EMPTY, Tallied
+from syncrelay.explain.distribution import EMPTY, Tallied
 
 
 def test_the_bounds_are_round_and_rise():

@@ -1,4 +1,4 @@
-from syncrelay.explain.last import keep_last, no_values
+from syncrelay.explain.distribution import keep_last, no_values
 
 
 def test_the_newest_are_kept_in_order():

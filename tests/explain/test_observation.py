@@ -338,7 +338,7 @@ def test_memory_does_not_grow_with_time():
 
     def held():
         observation = stage.observation
-        kept = [observation._looks, observation._spans, observation._latencies, observation._nearest]  # noqa: SLF001  memory is the promise
+        kept = [observation._polls, observation._spans, observation._latencies, observation._nearest]  # noqa: SLF001  memory is the promise
         for each in observation._inputs:  # noqa: SLF001
             kept += [each._stamps, each._received, each._delays, each._faults, each._points]  # noqa: SLF001
         return sum(map(len, kept))

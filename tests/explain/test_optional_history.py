@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from groups import BEGAN, MS, S
 
 from syncrelay.config import load_text
-from syncrelay.explain import Code, GroupWatch, InputGraph, find
+from syncrelay.explain import Code, Endpoint, GroupWatch, InputGraph, judge
 from syncrelay.sync import Match, Message
 
 _SLOP = 20 * MS
@@ -27,7 +27,9 @@ groups:
       - {{topic: /b, type: sensor_msgs/msg/Imu}}
       - {{topic: /c, type: sensor_msgs/msg/Imu, required: false}}
 """
-_GRAPH = [InputGraph(topic, f"/front{topic}") for topic in ("/a", "/b", "/c")]
+_GRAPH = [
+    InputGraph(topic, f"/front{topic}", (Endpoint("/driver", "sensor_msgs/msg/Imu"),)) for topic in ("/a", "/b", "/c")
+]
 
 
 @dataclass
@@ -91,7 +93,7 @@ def _findings(history: _History):
         watch.add(arrivals, sent, engine.counts(), engine.sets, now=at)
         arrivals, sent = tuple(deque() for _ in range(3)), deque()
         facts = watch.facts(_GRAPH, now=at)
-        yield at, next((each for each in find(facts) if each.code is Code.WAITING_FOR_OPTIONAL), None)
+        yield at, next((each for each in judge(facts) if each.code is Code.WAITING_FOR_OPTIONAL), None)
 
 
 def test_no_cause_is_named_that_did_not_hold():
@@ -104,7 +106,7 @@ def test_no_cause_is_named_that_did_not_hold():
             cause = finding.text.partition(": ")[2]
             if "too late" in cause:
                 assert history.came_too_late(), (seed, finding)
-                assert "`max_wait`" in finding.suggestion
+                assert finding.suggestion.startswith("check what holds /c up")
             elif "span" in cause:
                 assert abs(history.shift) > _SLOP, (seed, finding)
             elif "behind" in cause or "ahead" in cause:

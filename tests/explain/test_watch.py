@@ -4,7 +4,7 @@ import pytest
 from groups import BEGAN, IMAGE, MS, S
 
 from syncrelay.config import load_text
-from syncrelay.explain import Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
+from syncrelay.explain import ClockState, Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
 from syncrelay.sync.counts import InputCounts
 
 REFUSAL = Refusal("publish", "/front/lidar", IMAGE, held_as="std_msgs/msg/Int64")
@@ -93,8 +93,20 @@ def test_what_came_becomes_facts_with_the_newest_keys():
     group = watch("policy: equal_key\n    key: header.frame_id")
     counts = (InputCounts(1, 0, {}, 1), InputCounts(0, 0, {}, 0))
     group.add([[(BEGAN, BEGAN + MS)], []], [], counts, 0, keys=("k7", None), now=BEGAN + S)
-    found = group.facts(GRAPH, now=BEGAN + S, clock_stopped=4 * S, waited=5, failure="KeyError: 7")
+    found = group.facts(
+        GRAPH, now=BEGAN + S, clock=ClockState(received=True, stopped=4 * S), waited=5, failure="KeyError: 7"
+    )
     assert [each.counts for each in found.inputs] == list(counts)
     assert [each.key for each in found.inputs] == ["k7", None]
     assert found.inputs[0].figures.delay == MS
-    assert (found.clock_stopped, found.waited, found.failure) == (4 * S, 5, "KeyError: 7")
+    assert (found.clock and found.clock.stopped, found.waited, found.failure) == (4 * S, 5, "KeyError: 7")
+
+
+def test_how_late_messages_are_is_told_by_one_clock():
+    group = watch("policy: exact_time")
+    came = [(5 * S + n * 100 * MS, BEGAN + n * 100 * MS + 7 * MS) for n in range(10)]
+    counts = group.config.engine().counts()
+    group.add([came, came], [], counts, 0, by_clock=lambda received: received - BEGAN + 5 * S, now=BEGAN + S)
+    simulated = ClockState(received=True)
+    assert group.facts(GRAPH, now=BEGAN + S, clock=simulated).lag(0) == 7 * MS
+    assert group.facts(GRAPH, now=BEGAN + S, clock=ClockState(received=False)).lag(0) is None

@@ -49,6 +49,21 @@ def test_what_people_watch_is_in_seconds_minutes_or_hours(seconds, text):
 
 
 @pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.063, "63 ms"),
+        (37.2, "37.2 s"),
+        (180, "3 min"),
+        (7200, "2 h"),
+        (3 * 86_400, "3 days"),
+        (315_964_782, "10 years"),
+    ],
+)
+def test_a_time_of_any_length_is_read_at_a_glance(seconds, text):
+    assert words.span_of_time(seconds * S) == text
+
+
+@pytest.mark.parametrize(
     ("hertz", "text"), [(19.94, "19.9 Hz"), (10.0, "10 Hz"), (0.104, "0.1 Hz"), (199.8, "200 Hz"), (9.998, "10 Hz")]
 )
 def test_a_rate_has_three_digits(hertz, text):

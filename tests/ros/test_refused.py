@@ -141,7 +141,7 @@ import syncrelay.explain as explain
 from syncrelay.config import GroupConfig
 from syncrelay.sync.group import SyncGroup
 
-add, engine, judge, made = SyncGroup.add, GroupConfig.engine, explain.problems, {}
+add, engine, judge, made = SyncGroup.add, GroupConfig.engine, explain.Judge.judge, {}
 
 def failing_add(self, message, *, now):
     if message.stamp % 1000 == 7 and self._is_limited:
@@ -155,13 +155,13 @@ def failing_engine(self):
         raise OverflowError("too large to be an engine")
     return engine(self)
 
-def failing_judge(facts):
+def failing_judge(self, facts):
     if facts.name == "unjudged":
         raise ZeroDivisionError("no rate")
-    return judge(facts)
+    return judge(self, facts)
 
 SyncGroup.add, GroupConfig.engine = failing_add, failing_engine
-explain.problems = failing_judge
+explain.Judge.judge = failing_judge
 """
 
 

@@ -12,7 +12,7 @@ from syncrelay.explain import (
     InputGraph,
     Mismatch,
     RecentDrop,
-    problems,
+    judge,
 )
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync import Match, Message
@@ -93,7 +93,7 @@ def _report(config: GroupConfig, sensors: Mapping[str, Sensor], seconds: int, rn
     facts = watch.facts(
         [_graph(config, index, sensor) for index, sensor in enumerate(chosen)], now=_BEGAN + seconds * S
     )
-    return GroupReport(facts, problems(facts), tuple(recent[-_RECENT:]))
+    return GroupReport(facts, judge(facts), tuple(recent[-_RECENT:]))
 
 
 def _messages(sensor: Sensor, seconds: int, rng: random.Random) -> Iterator[tuple[int, int]]:

@@ -145,7 +145,7 @@ def test_the_screen_follows_the_relay():
             async with terminal(server) as user:
                 server.show(states.silent())
                 await user.sees("/lidar/points has been silent for 18 s; until then it came at 10 Hz")
-                assert "→ look at /lidar_driver, which publishes it, or died" in user.text
+                assert "→ check /lidar_driver, which publishes it, or died" in user.text
 
     asyncio.run(look())
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds, Stream
-from syncrelay.explain.drift import drift
+from syncrelay.explain.clocks import drift
 
 _SECOND: Final = 1_000_000_000
 # A period so many times the usual one is a gap: one message or more is missing.

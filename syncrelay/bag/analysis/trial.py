@@ -8,7 +8,7 @@ import numpy as np
 
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.config import GroupConfig
-from syncrelay.explain import Code, Endpoint, Finding, GroupWatch, InputGraph, Severity, find
+from syncrelay.explain import Code, Endpoint, Finding, GroupWatch, InputGraph, Judge, Severity
 from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome
 
 _SECOND: Final = 1_000_000_000
@@ -173,6 +173,7 @@ class _Watch:
         self._run = run
         self._seen = 0
         self._watch = GroupWatch(run.group, began=begin)
+        self._judge = Judge()
         self._graph = [
             _graph_of(topic.topic, topic.output, topic.type, bool(stream.places))
             for topic, stream in zip(run.group.topics, streams, strict=True)
@@ -185,7 +186,7 @@ class _Watch:
         self._seen = len(sets)
         self._watch.add(self.arrivals, new, engine.counts(), engine.sets, keys=tuple(self.keys), now=now)
         self.arrivals = [[] for _ in self.arrivals]
-        for finding in find(self._watch.facts(self._graph, now=now)):
+        for finding in self._judge.judge(self._watch.facts(self._graph, now=now, is_recorded=True)):
             key = (finding.code, finding.input)
             self.found[key] = (finding, self.found.get(key, (finding, 0))[1] + lasting)
 

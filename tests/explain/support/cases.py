@@ -3,7 +3,7 @@
 from groups import IMAGE, MS, NOW, S, a_group, an_input
 
 from syncrelay.explain import Distribution, Endpoint, Mismatch, Tolerance
-from syncrelay.explain.drift import Drift
+from syncrelay.explain.clocks import Drift
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
 
@@ -42,6 +42,12 @@ def overflowing(needed):
 def wide(*spans_ms, **figures):
     spans = Distribution([round(each * MS) for each in spans_ms])
     return {"nearest": spans, "nearest_since": spans, **figures}
+
+
+def stamped(shift, *, delay=5 * MS, pace_hz=10.0):
+    """The figures of the last stamps of an input at 10 Hz."""
+    stamps = tuple(NOW - S * (100 - number) // 10 + shift for number in range(100))
+    return {"stamps": stamps, "delay": None, "delays": (delay,) * 100, "pace_hz": pace_hz}
 
 
 def without_camera(**figures):

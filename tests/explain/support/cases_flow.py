@@ -6,6 +6,13 @@ from groups import MS, NOW, S, a_group, a_silent_group, an_input
 from syncrelay.explain import Code, Distribution, Severity, Standstill
 from syncrelay.sync.messages import DropReason
 
+HELD_UP = {"bursts": 1, "held": 2 * S, "held_up": [(NOW - 4 * S, NOW - 2 * S)]}
+
+
+def held_up(begin, end):
+    return camera(figures={"bursts": 1, "held": end - begin, "held_up": [(begin, end)]})
+
+
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
     "a queue that is too short": (
@@ -13,14 +20,14 @@ FOUND = {
         Severity.ERROR,
         a_silent_group(overflowing(40), LIDAR),
         "90 of the last 100 messages of /camera overflowed its queue of 10 before their partners came",
-        "write `queue_size: 40`",
+        None,
     ),
     "a queue that is too short at times": (
         Code.SHORT_QUEUE,
         Severity.WARN,
         a_group(overflowing(40), LIDAR, figures={"rate_hz": 9.0}),
         "90 of the last 100 messages of /camera overflowed its queue of 10 before their partners came",
-        "write `queue_size: 40`",
+        None,
     ),
     "sets without an optional input": (
         Code.WAITING_FOR_OPTIONAL,
@@ -29,7 +36,7 @@ FOUND = {
             camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
         ),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "see whether /usb_cam sends it, and how late it comes",
+        "check whether /usb_cam sends it, and how late it comes",
     ),
     "an optional input whose stamps fit no set": (
         Code.WAITING_FOR_OPTIONAL,
@@ -39,7 +46,7 @@ FOUND = {
             "100 % of the sets leave without /camera after waiting 100 ms for it: the nearest sets with it span 40 ms"
             " to 40 ms, over slop 20 ms"
         ),
-        "write `slop: 40ms`, which would take in 99 %",
+        "check how /usb_cam stamps its messages",
     ),
     "an optional input of another clock": (
         Code.WAITING_FOR_OPTIONAL,
@@ -49,7 +56,7 @@ FOUND = {
             "100 % of the sets leave without /camera after waiting 100 ms for it: its stamps are 37.2 s behind those of"
             " the others"
         ),
-        "synchronize their clocks, or write `offset: 37.2s` at /camera",
+        "synchronize their clocks",
     ),
     "an optional input that comes late": (
         Code.WAITING_FOR_OPTIONAL,
@@ -59,38 +66,72 @@ FOUND = {
             "100 % of the sets leave without /camera after waiting 100 ms for it: it comes 300 ms after the others, too"
             " late"
         ),
-        "write a larger `max_wait`, or see what holds /camera up",
+        "check what holds /camera up",
     ),
     "an optional input that went away": (
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
         without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100), last_received=NOW - 4 * S),
         "100 % of the sets leave without /camera after waiting 100 ms for it: it has not come for 4 s",
-        "look at /usb_cam",
+        "check /usb_cam",
     ),
     "an optional input that never came": (
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
         without_camera(last_received=None),
         "100 % of the sets leave without /camera after waiting 100 ms for it: no message of it has come",
-        "look at /usb_cam",
+        "check /usb_cam",
     ),
     "an optional input that comes in time and is missing all the same": (
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
         without_camera(delay=104 * MS, nearest=Distribution([3 * MS] * 100)),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "see whether /usb_cam sends it, and how late it comes",
+        "check whether /usb_cam sends it, and how late it comes",
     ),
     "messages that were held up": (
         Code.BURSTS,
         Severity.WARN,
         a_group(camera(figures={"bursts": 4, "held": 2900 * MS}), LIDAR),
-        "4 times in the last 10 s messages of /camera came at once, up to 2.9 s late",
+        "4 times in the last 10 s messages of /camera arrived in a burst, up to 2.9 s late",
         (
-            "where the network loses packets, reliable publishers send again at their next heartbeat only, each 3 s by"
-            " default: run /usb_cam with configs/fast_heartbeats.xml, or best effort; else see whether /usb_cam sends"
-            " in bursts, or a recorder stood still"
+            "check whether /usb_cam sends in bursts; if it runs on another machine, check the network: after a loss,"
+            " reliable publishers send again only every 3 s by default, configs/fast_heartbeats.xml makes them faster"
+        ),
+    ),
+    "messages of all inputs that were held up together": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(held_up(NOW - 4 * S, NOW - 2 * S), an_input("/lidar", figures=HELD_UP)),
+        "once in the last 10 s messages of all inputs arrived in a burst, up to 2 s late",
+        "check whether this machine, a player or what connects them stood still",
+    ),
+    "messages of two inputs of three that were held up together": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(held_up(NOW - 3 * S, NOW - S), an_input("/lidar", figures=HELD_UP), an_input("/imu")),
+        "once in the last 10 s messages of /camera and /lidar arrived in a burst, up to 2 s late",
+        "check whether this machine, a player or what connects them stood still",
+    ),
+    "messages that were recorded in a burst": (
+        Code.BURSTS,
+        Severity.WARN,
+        a_group(held_up(NOW - 3 * S, NOW - S), LIDAR, is_recorded=True),
+        "once in the last 10 s messages of /camera arrived in a burst, up to 2 s late",
+        "check whether /usb_cam sent in bursts, or the recorder received it late",
+    ),
+    "a standstill in which messages were missed": (
+        Code.TOO_SLOW,
+        Severity.WARN,
+        a_group(
+            camera(figures={"longest_pause": 3 * S, "last_received": NOW - S}),
+            LIDAR,
+            standstill=Standstill(NOW - S, 3 * S),
+        ),
+        "the relay stood still for 3 s",
+        (
+            "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+            " --group"
         ),
     ),
     "a message that DDS lost": (
@@ -98,7 +139,7 @@ FOUND = {
         Severity.WARN,
         a_group(camera(lost=1), LIDAR),
         "DDS lost 1 message of /camera on the way here in the last 10 s",
-        "look at the network and the load; what /usb_cam offers as reliable, `qos: auto` asks for again",
+        "check the network and the CPU load; if /usb_cam is reliable, `qos: auto` has it send again",
     ),
     "a relay that does not keep up": (
         Code.TOO_SLOW,
@@ -129,15 +170,15 @@ FOUND = {
         Code.SLOWED,
         Severity.WARN,
         a_group(camera(figures={"pace_hz": 1.0, "slowed_from_hz": 10.0}), LIDAR),
-        "/camera comes at 1 Hz, it came at 10 Hz",
-        "look at /usb_cam: its settings, its load, and the network on the way",
+        "/camera has slowed from 10 Hz to 1 Hz",
+        "check /usb_cam: its settings, its load, and the network to it",
     ),
     "few sets": (
         Code.FEW_SETS,
         Severity.WARN,
         a_group(dropped(DropReason.LATE, 60), LIDAR, figures={"rate_hz": 4.0}),
-        "4 of 10 possible sets a second leave; of /camera's last 100 messages 60 were dropped as late",
-        "a policy or a `queue_size` that waits longer, such as `approximate_time` would give more",
+        "4 of 10 possible sets leave per second; of /camera's last 100 messages 60 were dropped as late",
+        None,
     ),
     "few sets of a trigger, told by its own messages": (
         Code.FEW_SETS,
@@ -148,8 +189,8 @@ FOUND = {
             figures={"rate_hz": 4.0},
             **AGES,
         ),
-        "4 of 10 possible sets a second leave; of /camera's last 100 messages 60 were dropped as expired",
-        "a larger `max_wait` would give more",
+        "4 of 10 possible sets leave per second; of /camera's last 100 messages 60 were dropped as expired",
+        None,
     ),
     "what nothing explains": (
         Code.UNEXPLAINED,
@@ -159,10 +200,10 @@ FOUND = {
             an_input("/lidar", figures={"fed": 0}),
         ),
         (
-            "messages come on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as too_far"
-            " and 3 were dropped as late; of /lidar none came lately"
+            "messages arrive on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as"
+            " too_far and 3 were dropped as late; of /lidar none came lately"
         ),
-        "try a larger `queue_size`; `syncrelay doctor --live` looks at the graph and at the stamps",
+        "try a larger `queue_size`; `syncrelay doctor --live` checks the graph and the stamps",
     ),
     "a start": (
         Code.STARTING,

@@ -3,7 +3,7 @@
 from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
 from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Severity
+from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Severity
 from syncrelay.sync.counts import InputCounts
 
 
@@ -161,7 +161,7 @@ FOUND = {
     "a clock that stands still": (
         Code.CLOCK_STOPPED,
         Severity.ERROR,
-        a_silent_group(clock_stopped=4 * S),
+        a_silent_group(clock=ClockState(received=True, stopped=4 * S)),
         "/clock has stood still for 4 s: nothing that waits expires",
         "start or resume what publishes /clock, or run without use_sim_time",
     ),
@@ -169,29 +169,32 @@ FOUND = {
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(counts=InputCounts(0, 0, {}, 0), figures={**ONCE, "last_received": None}), LIDAR),
-        "/usb_cam publishes /camera, but no message has come",
-        "see with `ros2 topic hz /camera` whether /usb_cam sends; if it does, ask `syncrelay doctor`",
+        "/usb_cam publishes /camera, but no message has arrived",
+        (
+            "check with `ros2 topic hz /camera` whether /usb_cam is sending; if so, run `syncrelay doctor --config FILE"
+            " --live`"
+        ),
     ),
     "nothing comes any more": (
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(figures=QUIET), LIDAR),
         "/camera has been silent for 7 s; until then it came at 10 Hz",
-        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+        "check /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
     ),
     "nothing came for long": (
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(figures={**QUIET, "last_received": NOW - 21 * S}), LIDAR),
         "/camera has been silent for 21 s; until then it came at 10 Hz",
-        "look at /usb_cam, which still publishes it",
+        "check /usb_cam, which still publishes it",
     ),
     "nothing of what is held comes any more, which always came": (
         Code.SILENT,
         Severity.WARN,
         a_group(camera(figures=QUIET), LIDAR, **AGES),
         "/camera has been silent for 7 s; until then it came at 10 Hz",
-        "look at /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+        "check /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
     ),
     "what was sent once is too old": (
         Code.SILENT,
@@ -199,7 +202,7 @@ FOUND = {
         a_silent_group(camera(figures={**ONCE, "last_received": NOW - 60 * S}), LIDAR, **HALF_A_SECOND),
         "/camera has been silent for 60 s",
         (
-            "look at /usb_cam, which still publishes it; if it is sent that rarely by design, write a larger `max_age`"
+            "check /usb_cam, which still publishes it; if it is sent that rarely by design, write a larger `max_age`"
             " than 500 ms, or none"
         ),
     ),
@@ -235,6 +238,30 @@ FOUND = {
     ),
 }
 
+FOUND |= {
+    "all inputs that fell silent together": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures=QUIET), an_input("/lidar", figures={**QUIET, "last_received": NOW - 8 * S})),
+        "all inputs have been silent for 7 s",
+        "check whether their publishers are still running, and the network to them",
+    ),
+    "a recording that was paused": (
+        Code.SILENT,
+        Severity.ERROR,
+        a_silent_group(camera(figures=QUIET), an_input("/lidar", figures=QUIET), is_recorded=True),
+        "all inputs have been silent for 7 s",
+        "check whether recording was paused",
+    ),
+    "no clock at all": (
+        Code.NO_CLOCK,
+        Severity.ERROR,
+        a_silent_group(clock=ClockState(received=False, stopped=7 * S)),
+        "no /clock has been received for 7 s, and the relay runs with use_sim_time: nothing that waits expires",
+        "start what publishes /clock, such as `ros2 bag play --clock`, or run without use_sim_time",
+    ),
+}
+
 # The code that must not be found, facts.
 QUIETLY = {
     "another relay that is about to end": (
@@ -262,7 +289,10 @@ QUIETLY = {
     "another type is no QoS": (Code.INCOMPATIBLE_QOS, a_silent_group(camera(publishers=(STRANGER,)), LIDAR)),
     "what nobody publishes is not silent": (Code.SILENT, a_silent_group(camera(publishers=(), figures=QUIET), LIDAR)),
     "what does not fit is not silent": (Code.SILENT, a_silent_group(camera(publishers=(UNFIT,), figures=QUIET), LIDAR)),
-    "silence while /clock stands": (Code.SILENT, a_silent_group(camera(figures=QUIET), LIDAR, clock_stopped=4 * S)),
+    "silence while /clock stands": (
+        Code.SILENT,
+        a_silent_group(camera(figures=QUIET), LIDAR, clock=ClockState(received=True, stopped=4 * S)),
+    ),
     "a slow input between two messages": (
         Code.SILENT,
         a_group(camera(figures={"rate_hz": 0.1, "last_received": NOW - 9 * S}), LIDAR, figures={"best_hz": 0.1}),

@@ -1,11 +1,20 @@
 """What stamps tell: facts that come to a finding, and the nearest that do not."""
 
-from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, STEADY, camera, drifting, dropped, fed, wide
+from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, STEADY, camera, drifting, dropped, fed, stamped, wide
 from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Distribution, Endpoint, Severity, Tolerance
-from syncrelay.explain.drift import Drift
+from syncrelay.explain import Code, Distribution, Endpoint, Severity, Step, Tolerance
+from syncrelay.explain.clocks import Drift
 from syncrelay.sync.messages import DropReason
+
+TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
+
+SWINGING = {"swings": 2, "swung_by": 3 * S}
+
+STEPPED = {"stepped": Step(NOW - 12 * S, -2 * S)}
+
+# Made-up facts have no messages to try values on: see test_suggestions.py for those.
+CHECK_STAMPS = "check how these topics are stamped, and whether messages are missing"
 
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
@@ -75,56 +84,56 @@ FOUND = {
         Severity.ERROR,
         a_silent_group(figures=wide(*[61] * 5, 63)),
         "the nearest sets span 61 ms to 63 ms, over slop 20 ms",
-        "write `slop: 65ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "sets wider than slop, of many widths": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(figures=wide(*range(21, 121))),
         "the nearest sets span 21 ms to 115 ms, over slop 20 ms",
-        "write `slop: 120ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "stamps that are never equal": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(figures=wide(*[0.014] * 5), policy="exact_time", tolerance=Tolerance("slop", 0)),
         "no stamps are equal: the nearest sets span 14 us",
-        "write `policy: approximate_time` and `slop: 14us`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "stamps that are equal mostly": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(figures=wide(*[0] * 90, *[33] * 10), policy="exact_time", tolerance=Tolerance("slop", 0)),
         "10 % of the last 100 messages of /camera have no partner of an equal stamp",
-        "look for messages that a driver leaves out or the network loses",
+        CHECK_STAMPS,
     ),
     "what is held is too old": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(figures=wide(*[700] * 5), **HALF_A_SECOND),
         "the latest messages are 700 ms older than the trigger's, over max_age 500 ms",
-        "write `max_age: 700ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "what is held is often too old": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(figures=wide(*[100] * 5, *[700] * 5), **HALF_A_SECOND),
         "50 % of the last 10 messages of /lidar were farther from their partners than max_age 500 ms",
-        "write `max_age: 700ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "sets wider than slop, whose messages were held up too": (
         Code.OVER_SLOP,
         Severity.ERROR,
         a_silent_group(camera(figures={"bursts": 1, "held": S}), LIDAR, figures=wide(*[61] * 5, 63)),
         "the nearest sets span 61 ms to 63 ms, over slop 20 ms",
-        "write `slop: 65ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "most sets wider than slop, whose messages were held up too": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, figures=wide(*[5] * 40, *[30] * 60)),
         "60 % of the last 100 messages of /camera were farther from their partners than slop 20 ms",
-        "write `slop: 30ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "sets wider than slop, beside an optional input that was held up": (
         Code.OVER_SLOP,
@@ -136,42 +145,112 @@ FOUND = {
             figures=wide(*[5] * 90, *[30] * 10),
         ),
         "10 % of the last 100 messages of /lidar were farther from their partners than slop 20 ms",
-        "write `slop: 30ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "some sets wider than slop": (
         Code.OVER_SLOP,
         Severity.WARN,
         a_group(figures=wide(*[5] * 90, *[30] * 10)),
         "10 % of the last 100 messages of /camera were farther from their partners than slop 20 ms",
-        "write `slop: 30ms`, which would match 99 %",
+        CHECK_STAMPS,
     ),
     "stamps that fell": (
         Code.TIME_JUMP,
         Severity.OK,
         a_group(camera(figures={"fell_by": 2900 * MS, "fell_at": NOW - 3 * S}), LIDAR),
-        "stamps of /camera fell by 2.9 s 3 s ago: the group began anew",
-        "a recording that is looped does this, or a reset clock",
+        "timestamps of /camera jumped back 2.9 s, 3 s ago; matching restarted",
+        "a looped recording does this, or a clock that was reset",
     ),
     "disorder": (
         Code.OUT_OF_ORDER,
         Severity.WARN,
         a_group(camera(figures={"out_of_order": 2}), LIDAR),
-        "2 of the last 100 messages of /camera came out of the order of their stamps",
-        "see how /usb_cam stamps its messages",
+        "2 of the last 100 messages of /camera arrived out of stamp order",
+        "check how /usb_cam stamps and sends",
     ),
     "disorder of two publishers": (
-        Code.OUT_OF_ORDER,
+        Code.SEVERAL_PUBLISHERS,
         Severity.WARN,
-        a_group(camera(figures={"out_of_order": 50}, publishers=(Endpoint("/a", IMAGE), Endpoint("/b", IMAGE))), LIDAR),
-        "50 of the last 100 messages of /camera came out of the order of their stamps",
-        "2 publish it, /a and /b: give each a topic of its own",
+        a_group(camera(figures={"out_of_order": 50}, publishers=TWO), LIDAR),
+        "/a and /b both publish /camera: 50 of the last 100 messages repeat a stamp or arrived out of stamp order",
+        "give each publisher its own topic, or stop all but one",
+    ),
+    "two publishers by two clocks": (
+        Code.SEVERAL_PUBLISHERS,
+        Severity.ERROR,
+        a_silent_group(camera(figures=SWINGING, publishers=TWO), LIDAR),
+        "/a and /b both publish /camera: their stamps are 3 s apart",
+        "give each publisher its own topic, or stop all but one",
+    ),
+    "a node that publishes twice": (
+        Code.SEVERAL_PUBLISHERS,
+        Severity.WARN,
+        a_group(camera(figures=SWINGING, publishers=(Endpoint("/a", IMAGE),) * 2), LIDAR),
+        "/a and /a both publish /camera: their stamps are 3 s apart",
+        "give each publisher its own topic, or stop all but one",
+    ),
+    "three publishers": (
+        Code.SEVERAL_PUBLISHERS,
+        Severity.WARN,
+        a_group(camera(figures=SWINGING, publishers=(*TWO, Endpoint("/c", IMAGE))), LIDAR),
+        "/a, /b and /c all publish /camera: their stamps are 3 s apart",
+        "give each publisher its own topic, or stop all but one",
+    ),
+    "one publisher of two clocks": (
+        Code.TIME_JUMP,
+        Severity.WARN,
+        a_group(camera(figures=SWINGING), LIDAR),
+        "timestamps of /camera jump back and forth by 3 s",
+        "check whether /usb_cam stamps by two clocks, or two nodes publish /camera",
+    ),
+    "one clock that stepped": (
+        Code.CLOCK_STEP,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"stepped": Step(NOW - 12 * S, 2 * S)}), LIDAR),
+        "stamps of /camera jumped forward by 2 s, 12 s ago; those of the other inputs did not",
+        "check what set the clock of /usb_cam; NTP and chrony can be told to slew it instead",
+    ),
+    "the clock of all inputs that stepped": (
+        Code.CLOCK_STEP,
+        Severity.WARN,
+        a_group(camera(figures=STEPPED), an_input("/lidar", figures=STEPPED)),
+        "stamps of all inputs jumped back by 2 s against this machine's clock, 12 s ago",
+        "check what set the clock on the machine that stamps them; NTP and chrony can be told to slew it instead",
+    ),
+    "this machine's clock that was set": (
+        Code.CLOCK_STEP,
+        Severity.WARN,
+        a_group(clock_set=Step(NOW - 12 * S, -2 * S)),
+        "this machine's clock was set back by 2 s, 12 s ago",
+        "check what set the clock here; NTP and chrony can be told to slew it instead",
     ),
     "stamps that repeat": (
         Code.DUPLICATES,
         Severity.WARN,
         a_group(camera(figures={"duplicates": 50}), LIDAR),
         "50 of the last 100 messages of /camera repeat the stamp before them",
-        "see how /usb_cam stamps its messages",
+        "check how /usb_cam stamps its messages",
+    ),
+    "a clock that drifts fast is seen soon": (
+        Code.CLOCK_DRIFT,
+        Severity.ERROR,
+        a_silent_group(drifting(0.01, watched=6 * S), STEADY, figures=wide(*[30] * 9)),
+        "stamps of /camera lose 10 ms a second against those of /lidar (10000 ppm)",
+        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
+    ),
+    "two clocks that drift apart": (
+        Code.CLOCK_DRIFT,
+        Severity.WARN,
+        a_group(drifting(0.000_1), an_input("/lidar", figures={"drift": Drift(-0.000_1, 0.0, 60 * S)})),
+        "stamps of /camera and /lidar drift apart by 200 us a second (200 ppm)",
+        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
+    ),
+    "one clock of three that drifts": (
+        Code.CLOCK_DRIFT,
+        Severity.WARN,
+        a_group(STEADY, drifting(-0.000_1), an_input("/imu", figures={"drift": Drift(0.000_01, 0.0, 60 * S)})),
+        "stamps of /camera gain 100 us a second against those of the other inputs (100 ppm)",
+        "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
     ),
     "a clock that drifts": (
         Code.CLOCK_DRIFT,
@@ -180,10 +259,28 @@ FOUND = {
         "stamps of /camera lose 100 us a second against those of /lidar (100 ppm)",
         "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
     ),
+    "stamps that lie a constant distance off, nearer to the next message's": (
+        Code.CONSTANT_OFFSET,
+        Severity.WARN,
+        a_group(camera(figures=stamped(-80 * MS, delay=85 * MS)), an_input("/lidar", figures=stamped(0))),
+        (
+            "stamps of /camera are always 80 ms behind those of /lidar received at the same time: sets may hold"
+            " messages of different moments"
+        ),
+        "check how /usb_cam stamps; if both are measured at the same time, write `offset: 80ms` at /camera",
+    ),
 }
 
 # The code that must not be found, facts.
 QUIETLY = {
+    "a constant distance that its delay explains": (
+        Code.CONSTANT_OFFSET,
+        a_group(camera(figures=stamped(0, delay=80 * MS)), an_input("/lidar", figures=stamped(0))),
+    ),
+    "a constant distance of inputs of two rates": (
+        Code.CONSTANT_OFFSET,
+        a_group(camera(figures=stamped(-80 * MS, delay=85 * MS, pace_hz=12)), an_input("/lidar", figures=stamped(0))),
+    ),
     "another clock while sets leave": (Code.OTHER_CLOCK, a_group(camera(figures={"delay": 37_205 * MS}), LIDAR)),
     "another clock that its offset makes good": (
         Code.OTHER_CLOCK,
@@ -231,7 +328,7 @@ QUIETLY = {
         a_group(camera(figures={"duplicates": 100}), LIDAR, **AGES),
     ),
     "four milliseconds of drift": (Code.CLOCK_DRIFT, a_group(drifting(0.000_066), STEADY)),
-    "a drift of a few seconds": (Code.CLOCK_DRIFT, a_group(drifting(0.002, watched=19 * S), STEADY)),
+    "a drift of a few seconds": (Code.CLOCK_DRIFT, a_group(drifting(0.001, watched=19 * S), STEADY)),
     "a delay that changes with the load": (Code.CLOCK_DRIFT, a_group(drifting(0.000_2, bend=2.0 * MS), STEADY)),
     "two clocks that drift alike": (
         Code.CLOCK_DRIFT,

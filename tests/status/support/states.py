@@ -3,7 +3,7 @@
 from typing import Any
 
 from syncrelay.config import load_text
-from syncrelay.explain import Endpoint, GroupReport, GroupWatch, InputGraph, RecentDrop, problems
+from syncrelay.explain import Endpoint, GroupReport, GroupWatch, InputGraph, RecentDrop, judge
 from syncrelay.status import Phase, RelayState
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
@@ -72,4 +72,4 @@ def _report(watch: GroupWatch, *, now: int, **publishers: Any) -> GroupReport:
     ]
     facts = watch.facts(graph, now=now)
     last = ((BEGAN, None), RecentDrop(0, BEGAN, DropReason.LATE))
-    return GroupReport(facts, problems(facts), last)
+    return GroupReport(facts, judge(facts), last)

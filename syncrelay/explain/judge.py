@@ -1,0 +1,247 @@
+"""All that is wrong with a group: causes, in the order in which they explain a silence, and what no cause explains.
+
+Rules say what they see. Many see the effects of one cause: a relay that stood still loses messages, and then queues
+seem too short, spans too wide and inputs silent. EXPLAINS is the table of who explains whom. What is explained is not
+said and suggests nothing, while its cause holds and until the messages of that time are no longer judged by.
+
+- An explained finding explains others all the same: a relay that stood still explains an input that seems slow, and so
+  the wide spans that such an input explains.
+- A finding about an optional input explains others about this input only.
+- A finding whose `explains` is False is too small to explain others.
+- If all errors of a silent group are explained, their cause is the error.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+from syncrelay.explain import rules_flow, rules_graph, rules_matching, rules_stamps, words
+from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.findings import Code, Finding, Rule, Severity, of_each_input
+from syncrelay.explain.input_observation import WINDOW_NS
+
+_CAUSE_RULES: Final[tuple[Rule, ...]] = (
+    rules_graph.internal_error,
+    of_each_input(rules_graph.refused_by_dds),
+    of_each_input(rules_graph.type_not_importable),
+    of_each_input(rules_graph.other_type),
+    rules_graph.alone,
+    rules_graph.no_publisher,
+    of_each_input(rules_graph.incompatible_qos),
+    rules_graph.no_clock,
+    rules_graph.clock_stopped,
+    rules_flow.too_slow,
+    rules_graph.silent,
+    of_each_input(rules_stamps.malformed),
+    of_each_input(rules_stamps.unstamped),
+    of_each_input(rules_stamps.several_publishers),
+    rules_stamps.clock_step,
+    rules_stamps.clock_drift,
+    rules_stamps.other_clock,
+    rules_stamps.no_common_key,
+    of_each_input(rules_flow.slowed),
+    rules_flow.bursts,
+    of_each_input(rules_stamps.time_jump),
+    of_each_input(rules_flow.messages_lost),
+)
+
+_MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
+    (Code.OVER_SLOP, rules_matching.over_slop),
+    (Code.SHORT_QUEUE, of_each_input(rules_matching.short_queue)),
+    (Code.WAITING_FOR_OPTIONAL, of_each_input(rules_matching.waiting_for_optional)),
+    (Code.CONSTANT_OFFSET, rules_matching.constant_offset),
+)
+"""What they suggest they try, which costs: they are not asked for what a cause explains."""
+
+_OTHER_RULES: Final[tuple[Rule, ...]] = (
+    of_each_input(rules_stamps.out_of_order),
+    of_each_input(rules_stamps.duplicates),
+    of_each_input(rules_graph.subscriber_qos),
+    of_each_input(rules_graph.output_taken),
+)
+
+
+class _Explained(NamedTuple):
+    """What a finding explains: in the whole group, and only where it is about the same input."""
+
+    in_group: frozenset[Code]
+    of_input: frozenset[Code] = frozenset()
+
+
+_MATCHING: Final = frozenset(
+    {
+        Code.OVER_SLOP,
+        Code.SHORT_QUEUE,
+        Code.WAITING_FOR_OPTIONAL,
+        Code.CONSTANT_OFFSET,
+        Code.FEW_SETS,
+        Code.UNEXPLAINED,
+    }
+)
+_ORDER: Final = frozenset({Code.TIME_JUMP, Code.OUT_OF_ORDER, Code.DUPLICATES})
+
+EXPLAINS: Final[Mapping[Code, _Explained]] = {
+    Code.INTERNAL_ERROR: _Explained(_MATCHING),
+    Code.ALONE: _Explained(_MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
+    Code.NO_PUBLISHER: _Explained(_MATCHING),
+    Code.TYPE_NOT_IMPORTABLE: _Explained(_MATCHING),
+    Code.NO_CLOCK: _Explained(frozenset({Code.SILENT, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED})),
+    Code.CLOCK_STOPPED: _Explained(_MATCHING | {Code.SILENT, Code.SLOWED}),
+    Code.TOO_SLOW: _Explained(
+        _MATCHING
+        | _ORDER
+        | {Code.SILENT, Code.SLOWED, Code.BURSTS, Code.MESSAGES_LOST, Code.CLOCK_DRIFT, Code.CLOCK_STEP}
+        | {Code.OTHER_CLOCK}
+    ),
+    Code.SILENT: _Explained(_MATCHING),
+    Code.MALFORMED: _Explained(_MATCHING),
+    Code.UNSTAMPED: _Explained(_MATCHING),
+    Code.SEVERAL_PUBLISHERS: _Explained(
+        _MATCHING | {Code.OTHER_CLOCK}, _ORDER | {Code.CLOCK_STEP, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}
+    ),
+    Code.TIME_JUMP: _Explained(
+        _MATCHING | {Code.OTHER_CLOCK},
+        frozenset({Code.OUT_OF_ORDER, Code.DUPLICATES, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}),
+    ),
+    Code.CLOCK_STEP: _Explained(_MATCHING | {Code.OTHER_CLOCK, Code.CLOCK_DRIFT}, _ORDER | {Code.BURSTS}),
+    Code.CLOCK_DRIFT: _Explained(_MATCHING | {Code.OTHER_CLOCK}),
+    Code.OTHER_CLOCK: _Explained(_MATCHING),
+    Code.SLOWED: _Explained(_MATCHING),
+    Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})),
+    Code.MESSAGES_LOST: _Explained(frozenset(), frozenset({Code.BURSTS})),
+}
+"""Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
+
+
+def explained_by(code: Code) -> frozenset[Code]:
+    """Return what a finding of this code may explain."""
+    explained = EXPLAINS.get(code)
+    return explained.in_group | explained.of_input if explained else frozenset()
+
+
+_SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
+    # That an input is silent is seen of now alone.
+    Code.SILENT: lambda facts: facts.figures.now,
+    Code.OVER_SLOP: lambda facts: min(facts.figures.nearest_from, facts.figures.now - WINDOW_NS),
+}
+"""Since when the messages came that a finding judges by, where that is not the usual window."""
+
+
+class _Cause(NamedTuple):
+    finding: Finding
+    at: int
+
+
+class Judge:
+    """Judges one group, poll by poll. Remembers causes that are over, as long as their effects may still be seen."""
+
+    def __init__(self) -> None:
+        self._causes: dict[tuple[Code, int | None], _Cause] = {}
+
+    def judge(self, facts: GroupFacts) -> tuple[Finding, ...]:
+        """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
+        found = [finding for rule in _CAUSE_RULES for finding in rule(facts)]
+        self._remember(found, facts)
+        for code, rule in _MATCHING_RULES:
+            if not self._is_explained(code, facts):
+                found += rule(facts)
+        found += [finding for rule in _OTHER_RULES for finding in rule(facts)]
+        if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
+            found.append(_unexplained(facts))
+        elif _is_well(found) and facts.figures.last_set is not None:
+            # Few sets are what other findings come to: they are said where there is none of those.
+            found += rules_matching.few_sets(facts)
+        return self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
+
+    def _remember(self, found: Iterable[Finding], facts: GroupFacts) -> None:
+        now = facts.figures.now
+        if self._causes:
+            longest_ago = min([now - WINDOW_NS, *(seen_since(facts) for seen_since in _SEEN_SINCE.values())])
+            self._causes = {key: cause for key, cause in self._causes.items() if longest_ago <= cause.at <= now}
+        for finding in found:
+            if finding.explains and finding.code in EXPLAINS:
+                self._causes[finding.code, finding.input] = _Cause(finding, now)
+
+    def _is_explained(self, code: Code, facts: GroupFacts) -> bool:
+        """Whether a cause that holds now explains all findings of a code."""
+        return any(
+            cause.at == facts.figures.now
+            and code in EXPLAINS[cause.finding.code].in_group
+            and (cause.finding.input is None or facts.inputs[cause.finding.input].required)
+            for cause in self._causes.values()
+        )
+
+    def _unexplained_by_others(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
+        """Return the findings that nothing explains; of a silent group an error, be it a cause that is over."""
+        roots = [(finding, self._root(finding, facts)) for finding in found]
+        said = [finding for finding, root in roots if finding is root]
+        blamed = [root for finding, root in roots if finding.severity is Severity.ERROR]
+        if blamed and not any(finding.severity is Severity.ERROR for finding in said):
+            culprit = blamed[0]
+            said = [replace(culprit, severity=Severity.ERROR), *(each for each in said if each is not culprit)]
+        return tuple(said)
+
+    def _root(self, finding: Finding, facts: GroupFacts) -> Finding:
+        """Return the cause that explains a finding and that nothing explains, or the finding itself."""
+        for cause in self._causes.values():
+            if _explains(cause, finding, facts):
+                return self._root(cause.finding, facts)
+        return finding
+
+
+def judge(facts: GroupFacts) -> tuple[Finding, ...]:
+    """Return what `Judge` says of one moment, knowing nothing of what was before."""
+    return Judge().judge(facts)
+
+
+def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
+    explained, about = EXPLAINS[cause.finding.code], cause.finding.input
+    if finding.code not in explained.in_group and finding.code not in explained.of_input:
+        return False
+    is_narrow = finding.code not in explained.in_group or (about is not None and not facts.inputs[about].required)
+    if is_narrow and about is not None and about != finding.input:
+        return False
+    now, seen_since = facts.figures.now, _SEEN_SINCE.get(finding.code)
+    since = now - WINDOW_NS if seen_since is None else seen_since(facts)
+    # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
+    return cause.at >= (max(since, now - facts.silent_after) if finding.severity is Severity.ERROR else since)
+
+
+def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Add to what is not as usual that a group is well, or starts; in figures that cost more than all rules."""
+    if not _is_well(found):
+        return found
+    if facts.figures.last_set is None:
+        since = words.seconds(facts.figures.now - facts.figures.began)
+        return (*found, Finding(Code.STARTING, Severity.OK, f"no set yet, {since} after the start"))
+    return (*found, _healthy(facts))
+
+
+def _is_well(found: Iterable[Finding]) -> bool:
+    return all(finding.severity is Severity.OK for finding in found)
+
+
+def explanation(findings: tuple[Finding, ...]) -> Finding:
+    """Return the finding that says most of a group's state: the first of the worst, the last if nothing is bad."""
+    worst = max(finding.severity for finding in findings)
+    if worst is Severity.OK:
+        return findings[-1]
+    return next(finding for finding in findings if finding.severity is worst)
+
+
+def _unexplained(facts: GroupFacts) -> Finding:
+    fates = "; ".join(rules_flow.fates(each) for each in facts.inputs)
+    return Finding(
+        Code.UNEXPLAINED,
+        Severity.ERROR,
+        f"messages arrive on all inputs, but no set leaves: {fates}",
+        "try a larger `queue_size`; `syncrelay doctor --live` checks the graph and the stamps",
+    )
+
+
+def _healthy(facts: GroupFacts) -> Finding:
+    figures = facts.figures
+    sets = f"{words.figure(figures.rate_hz)} of {words.figure(max(facts.possible_hz, figures.rate_hz))}"
+    span, latency = (words.duration(each.quantile(0.95)) for each in (figures.spans, figures.latencies))
+    text = f"{sets} possible sets a second, span {span} and latency {latency} at the 95th percentile"
+    return Finding(Code.HEALTHY, Severity.OK, text)

@@ -1,0 +1,86 @@
+"""The rhythm in which messages come: bursts after they were held up, and a pace that has slowed down."""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from operator import sub
+from statistics import median, median_low
+from typing import Final, NamedTuple
+
+LEAST_HELD_NS: Final = 500_000_000
+AT_ONCE: Final = 3
+"""So many come within one period: several messages at once, and not one that took longer."""
+
+
+class Burst(NamedTuple):
+    """The first of the messages that came at once: when it was received, and for how long it was held up."""
+
+    at: int
+    held: int
+
+
+def bursts(arrivals: Sequence[tuple[int, int]]) -> Iterator[Burst]:
+    """Yield the bursts among stamps and times of receipt, in nanoseconds, in the order of their receipt.
+
+    Of arrivals that come in parts, each begins with the last AT_ONCE of the one before: so every burst is found once.
+    """
+    if len(arrivals) <= AT_ONCE:
+        return
+    usual = median_low([after - before for (before, _), (after, _) in pairwise(arrivals)])
+    least = max(LEAST_HELD_NS, AT_ONCE * usual)
+    for before, first, last in zip(arrivals, arrivals[1:], arrivals[AT_ONCE:], strict=False):
+        held = (first[1] - first[0]) - (before[1] - before[0])
+        if held >= least and first[0] > before[0] and last[1] - first[1] < usual:
+            yield Burst(first[1], held)
+
+
+_SECOND: Final = 1_000_000_000
+# The median of so many periods is the pace of now: neither a pause nor a burst changes it.
+_PERIODS: Final = 20
+_PACES: Final = 120
+_FEWEST_PACES: Final = 10
+# What varies by more than this share of its median has no pace to fall from ...
+_STEADY: Final = 0.25
+# ... but for one poll in so many at either end, in which a busy machine held messages up.
+_ODD: Final = 10
+# Slower than this share of its pace it has slowed down, until it is faster than the other.
+_SLOWED: Final = 0.7
+_RECOVERED: Final = 0.85
+
+
+class Pace:
+    """The pace of one input, poll by poll. Remembers a steady one while the input is slower than that."""
+
+    def __init__(self) -> None:
+        self.now_hz = 0.0
+        """The pace of the last messages, 0 of too few to tell."""
+        self.slowed_from: float | None = None
+        """The steady pace that it had before it slowed down, None if it has not."""
+        self._paces: deque[float] = deque(maxlen=_PACES)
+
+    def observe(self, received: Sequence[int]) -> None:
+        """Take the times of receipt of the last messages, in nanoseconds."""
+        last = received[-_PERIODS - 1 :]
+        if len(last) <= _PERIODS:
+            self.now_hz = 0.0
+            self.slowed_from = None
+            return
+        period = median(map(sub, last[1:], last))
+        self.now_hz = _SECOND / period if period > 0 else 0.0
+        self.slowed_from = self._fell_from()
+        if self.now_hz and self.slowed_from is None:
+            self._paces.append(self.now_hz)
+
+    def _fell_from(self) -> float | None:
+        if not self.now_hz:
+            return None
+        if self.slowed_from is not None:
+            return self.slowed_from if self.now_hz < _RECOVERED * self.slowed_from else None
+        if len(self._paces) < _FEWEST_PACES or self.now_hz >= _SLOWED * max(self._paces):
+            return None
+        usual = median(self._paces)
+        odd = len(self._paces) // _ODD
+        steady = sorted(self._paces)[odd : len(self._paces) - odd]
+        if steady[-1] - steady[0] > 2 * _STEADY * usual or self.now_hz >= _RECOVERED * steady[0]:
+            return None
+        return usual if self.now_hz < _SLOWED * usual else None

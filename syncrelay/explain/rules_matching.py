@@ -1,0 +1,335 @@
+"""Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
+
+from collections.abc import Callable, Iterator, Sequence
+from statistics import median_low
+from typing import Final
+
+from syncrelay.config.units import parse_duration
+from syncrelay.explain import words
+from syncrelay.explain.distribution import Distribution
+from syncrelay.explain.facts import GroupFacts, InputFacts, Tolerance
+from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted, nodes
+from syncrelay.explain.nearest import signed_distances
+from syncrelay.explain.rules_flow import fates
+from syncrelay.explain.rules_stamps import other_clock
+from syncrelay.explain.suggestions import Change, Changes, Trials, Tried, constant_offsets, with_headroom
+from syncrelay.sync.messages import DropReason
+
+# A share of the slowest input's messages that could have no set, and from how many on it means something.
+_MISSED: Final = 0.05
+_FEWEST: Final = 5
+# Where messages were held up, what is apart tells of slop only if it is most.
+_MOST: Final = 0.5
+_MISSING: Final = 0.05
+# An input is back when so many times as many sets have it as had one without it on average before.
+_BACK: Final = 3
+# It is away when so many of its messages did not come.
+_AWAY: Final = 3
+# Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
+_FEW: Final = 0.8
+# Nearly all sets that were possible: then what a queue dropped was not missed.
+_NEARLY_ALL: Final = 0.95
+_POSSIBLE: Final = 10
+_WATCHED: Final = 10 * SECOND
+# Stamps off by so much of a period, and so constantly, may pair the wrong messages; so near is a whole period.
+_ENOUGH: Final = 20
+_OFF: Final = 0.15
+_CONSTANT: Final = 0.05
+_WHOLE: Final = 0.1
+_OTHER_CLOCK: Final = SECOND
+
+
+def over_slop(facts: GroupFacts) -> Found:
+    """Find that the sets that could be had are too wide for the file."""
+    tolerance = facts.tolerance
+    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
+    if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
+        return
+    over = nearest.share_over(tolerance.ns)
+    if facts.is_silent and over > 1 - _MISSED:
+        text, severity = _too_wide(facts, tolerance, nearest), Severity.ERROR
+    elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
+        text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
+    else:
+        return
+    found = _tried(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
+    yield Finding(
+        Code.OVER_SLOP,
+        severity,
+        text,
+        _advice(facts, found) or "check how these topics are stamped, and whether messages are missing",
+    )
+
+
+def _come_at_once(facts: GroupFacts) -> bool:
+    """Whether what is measured as far apart may only have been held up: a wider slop would pair what came together."""
+    return any(each.required and each.figures.bursts for each in facts.inputs)
+
+
+def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
+    missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
+    name = facts.pacemaker.name
+    if facts.policy == "exact_time":
+        return f"{missed} {name} have no partner of an equal stamp"
+    return f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
+
+
+def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
+    least, most = words.duration(nearest.quantile(0)), words.duration(nearest.quantile(0.95))
+    widths = least if least == most else f"{least} to {most}"
+    if facts.policy == "exact_time":
+        return f"no stamps are equal: the nearest sets span {widths}"
+    if tolerance.key == "max_age":
+        return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
+    return f"the nearest sets span {widths}, over slop {words.duration(tolerance.ns)}"
+
+
+def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution, trials: Trials) -> Iterator[Tried]:
+    """Yield a wider tolerance and constant offsets that help."""
+    if not trials.spans:
+        return
+    wider = with_headroom(trials.spans)
+    # What is far apart although others are near has no partner: a wider slop would pair what does not belong together.
+    is_far = trials.spans.quantile(0.99) > tolerance.ns and not next(constant_offset(facts), None)
+    if is_far and nearest.share_over(parse_duration(wider)) <= _MISSED:
+        policy = (Change("policy", "approximate_time"),) if facts.policy == "exact_time" else ()
+        if tried := trials.try_out((*policy, Change(tolerance.key, wider))):
+            yield tried
+    if tolerance.key == "slop":
+        yield from filter(None, (trials.gives_enough((each,)) for each in constant_offsets(trials)))
+
+
+def constant_offset(facts: GroupFacts) -> Found:
+    """Find an input whose stamps lie a constant distance off, so that messages of different moments are paired.
+
+    Of two inputs of one rate, the messages that are nearest by their stamps come whole periods apart: those that come
+    together were made together. A delay alone does not show here, as it leaves the right stamps near each other.
+    """
+    if facts.tolerance is None or facts.trigger is not None or next(other_clock(facts), None):
+        return
+    first, *others = [index for index, each in enumerate(facts.inputs) if each.required]
+    for other in others:
+        if (off := _whole_periods_off(facts, first, other)) is None:
+            continue
+        # The one that is farther from this machine's time is odd.
+        delays = {index: facts.inputs[index].figures.delay or 0 for index in (first, other)}
+        odd, right = sorted(delays, key=lambda index: -abs(delays[index] - facts.inputs[index].offset))
+        off = off if odd == other else -off
+        name, offset = facts.inputs[odd].name, Change("offset", words.exactly(facts.inputs[odd].offset - off), odd)
+        yield Finding(
+            Code.CONSTANT_OFFSET,
+            Severity.WARN,
+            f"stamps of {name} are always {words.duration(abs(off))} {'ahead of' if off > 0 else 'behind'} those of"
+            f" {facts.inputs[right].name} received at the same time: sets may hold messages of different moments",
+            f"check how {nodes(facts.inputs[odd])} stamps; if both are measured at the same time, write"
+            f" {_written(facts, (offset,))}",
+            odd,
+        )
+
+
+def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
+    """Return how far the stamps of `other` are ahead of those of `first` that come with them, None if all is well."""
+    one, two = facts.inputs[first], facts.inputs[other]
+    if not one.figures.delays or not two.figures.delays or not two.figures.pace_hz:
+        return None
+    later = two.figures.delays[-1] - two.offset - one.figures.delays[-1] + one.offset
+    period = SECOND / two.figures.pace_hz
+    if abs(later) < period / 2 or abs(later) > _OTHER_CLOCK:
+        # As nearly always, and seen without measuring.
+        return None
+    if abs(one.figures.pace_hz * period / SECOND - 1) > _CONSTANT:
+        return None
+    shifted = [[stamp + each.offset for stamp in each.figures.stamps] for each in (one, two)]
+    signed = signed_distances(*shifted)
+    if len(signed) < _ENOUGH or signed.quantile(0.95) - signed.quantile(0.05) > _CONSTANT * period:
+        return None
+    distance = signed.quantile(0.5)
+    later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
+    apart = distance + later
+    whole = round(apart / period)
+    if not whole or abs(distance) < _OFF * period or abs(apart - whole * period) > _WHOLE * period:
+        return None
+    return round(distance - whole * period)
+
+
+def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find messages that overflowed and then were missed."""
+    needed = an_input.counts.needed_queue
+    overflowed = an_input.figures.dropped.get(DropReason.OVERFLOW, 0)
+    if needed is None or not overflowed or needed <= facts.queue_size:
+        return
+    missed_hz = facts.possible_hz - facts.figures.rate_hz
+    # A set that leaves a little later than the window ends was not missed.
+    if not facts.is_silent and missed_hz * _WATCHED <= max(
+        2 * SECOND, (1 - _NEARLY_ALL) * facts.possible_hz * _WATCHED
+    ):
+        return
+    if next(other_clock(facts), None):
+        return  # what waits for a partner of another clock overflows any queue
+    within = facts.tolerance.ns if facts.tolerance else None
+    found = _tried(facts, (Code.SHORT_QUEUE, index), lambda trials: _long_enough(needed, trials), within=within)
+    yield Finding(
+        Code.SHORT_QUEUE,
+        Severity.ERROR if facts.is_silent else Severity.WARN,
+        f"{counted(overflowed, an_input.figures.fed)} messages of {an_input.name} overflowed its queue of"
+        f" {facts.queue_size} before their partners came",
+        _advice(facts, found),
+        index,
+    )
+
+
+def _long_enough(needed: int, trials: Trials) -> Iterator[Tried]:
+    """Yield a longer queue that helps."""
+    if tried := trials.try_out((), need=needed):
+        yield tried
+
+
+def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find an optional input that sets leave without; the causes that are told are those that were seen."""
+    missing = facts.figures.missing[index]
+    if an_input.required or missing <= _MISSING or not facts.figures.rate_hz:
+        return
+    if missing * facts.figures.sets_since_without[index] >= _BACK:
+        return
+    waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
+    why, what_helps = _why_without(facts, index, an_input)
+    yield Finding(
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        f"{words.share(missing)} of the sets leave without {an_input.name}{waits}{why}",
+        what_helps,
+        index,
+    )
+
+
+def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[str, str]:
+    """Tell an input that is away, stamps that fit no set, and messages that come after theirs has left."""
+    unknown = "", f"check whether {nodes(an_input)} sends it, and how late it comes"
+    name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
+    if (away := _away(facts, an_input)) is not None:
+        return away
+    if tolerance is None or len(nearest) < _FEWEST:
+        return unknown
+    behind = _behind(facts, an_input)
+    about = (Code.WAITING_FOR_OPTIONAL, index)
+    if abs(behind) > max(SECOND, tolerance.ns):
+        offset = Change("offset", words.exactly(behind + an_input.offset), index)
+        found = _tried(facts, about, lambda trials: filter(None, [trials.gives_enough((offset,))]), optional=index)
+        side = "behind" if behind > 0 else "ahead of"
+        return (
+            f": its stamps are {words.duration(abs(behind))} {side} those of the others",
+            f"synchronize their clocks{_or(_advice(facts, found, name))}",
+        )
+    if nearest.quantile(0.5) > tolerance.ns:
+        widths = f"{words.duration(nearest.quantile(0))} to {words.duration(nearest.quantile(0.95))}"
+        found = _tried(facts, about, lambda trials: _wide_enough(facts, tolerance, nearest, trials), optional=index)
+        return (
+            f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
+            _advice(facts, found, name) or f"check how {nodes(an_input)} stamps its messages",
+        )
+    if facts.max_wait is not None and behind > facts.max_wait:
+        found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=tolerance.ns)
+        return (
+            f": it comes {words.duration(behind)} after the others, too late",
+            f"check what holds {name} up{_or(_advice(facts, found, name))}",
+        )
+    return unknown
+
+
+def _waits_enough(index: int, trials: Trials) -> Iterator[Tried]:
+    """Yield a wait for an optional input that helps: what it is later by, and what that scatters by."""
+    others = [median_low(each) for other, each in enumerate(trials.delays) if other != index and each]
+    if not others or not trials.delays[index]:
+        return
+    late = Distribution([delay - min(others) for delay in trials.delays[index]])
+    wait = parse_duration(with_headroom(late))
+    for times in (1, 2, 4):
+        if tried := trials.try_out((Change("max_wait", words.at_least(times * wait)),)):
+            yield tried
+            return
+
+
+def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
+    """Say that an input does not come at all, or not any more; None if it comes."""
+    figures = an_input.figures
+    look = f"check {nodes(an_input)}"
+    if figures.last_received is None:
+        return ": no message of it has come", look
+    quiet = facts.figures.now - figures.last_received
+    usual = round(SECOND / figures.usual_hz) if figures.usual_hz else 0
+    if quiet > max(SECOND, _AWAY * usual):
+        return f": it has not come for {words.seconds(quiet)}", look
+    return None
+
+
+def _behind(facts: GroupFacts, an_input: InputFacts) -> int:
+    """Return how much later after its stamp a message comes than those of the required inputs, in nanoseconds."""
+    required = ((each.figures.delay, each.offset) for each in facts.inputs if each.required)
+    delays = [delay - offset for delay, offset in required if delay is not None]
+    own = an_input.figures.delay
+    return own - an_input.offset - median_low(delays) if own is not None and delays else 0
+
+
+def few_sets(facts: GroupFacts) -> Found:
+    """Find that far fewer sets leave than the input that sets the pace would allow."""
+    figures = facts.figures
+    # The window's rate counts a silence that is over.
+    since = max(figures.began, figures.resumed or 0)
+    if facts.is_silent or figures.last_set is None or figures.now - since < _WATCHED:
+        return
+    if facts.possible_hz * _WATCHED < _POSSIBLE * SECOND or figures.rate_hz >= _FEW * facts.possible_hz:
+        return
+    pacemaker = facts.pacemaker
+    within = facts.tolerance.ns if facts.tolerance else None
+    found = _tried(facts, (Code.FEW_SETS, None), lambda trials: _more_sets(facts, trials), within=within)
+    yield Finding(
+        Code.FEW_SETS,
+        Severity.WARN,
+        f"{words.figure(figures.rate_hz)} of {words.figure(facts.possible_hz)} possible sets leave per second;"
+        f" {fates(pacemaker)}",
+        _advice(facts, found),
+    )
+
+
+def _more_sets(facts: GroupFacts, trials: Trials) -> Iterator[Tried]:
+    """Yield the first that helps: a longer queue, a policy that waits for what comes late, a longer wait."""
+    patient = ((Change("policy", "approximate_time"),),) if facts.policy == "approximate_time_eager" else ()
+    waits = (2 * facts.max_wait, 4 * facts.max_wait) if facts.max_wait else ()
+    longer = tuple((Change("max_wait", words.at_least(wait)),) for wait in waits)
+    if tried := next(filter(None, (trials.try_out(each) for each in ((), *patient, *longer))), None):
+        yield tried
+
+
+def _tried(
+    facts: GroupFacts,
+    about: tuple[Code, int | None],
+    propose: Callable[[Trials], Iterator[Tried]],
+    *,
+    within: int | None = None,
+    optional: int | None = None,
+) -> tuple[Tried, ...]:
+    if facts.evaluator is None:
+        return ()
+    return facts.evaluator.best(about, propose, now=facts.figures.now, within=within, optional=optional)
+
+
+def _advice(facts: GroupFacts, found: Sequence[Tried], optional: str | None = None) -> str | None:
+    """Say what to write and what it would give: sets, or those with an optional input."""
+    if not found:
+        return None
+    sets = "possible sets" if optional is None else f"sets with {optional}"
+    first, *others = found
+    gives = f"which would give {first.given} of {first.possible} {sets} (now {first.now})"
+    more = "".join(f", or {_written(facts, each.changes)}, which would give {each.given}" for each in others)
+    return f"write {_written(facts, first.changes)}, {gives}{more}"
+
+
+def _written(facts: GroupFacts, changes: Changes) -> str:
+    return " and ".join(
+        f"`{each.key}: {each.value}`" + ("" if each.input is None else f" at {facts.inputs[each.input].name}")
+        for each in changes
+    )
+
+
+def _or(advice: str | None) -> str:
+    return f", or {advice}" if advice else ""

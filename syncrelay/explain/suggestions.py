@@ -1,0 +1,337 @@
+"""What other values of the file would give: the engine itself, run on the messages that came last."""
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import ceil
+from statistics import median
+from typing import Any, Final, NamedTuple, TypeAlias
+
+from syncrelay.config import GroupConfig
+from syncrelay.config.models import PacedTopic
+from syncrelay.config.policies import ApproximateTimeGroup
+from syncrelay.config.units import parse_duration
+from syncrelay.explain import words
+from syncrelay.explain.distribution import Distribution, keep_last, no_values
+from syncrelay.explain.dry_run import Arrival, dry_run
+from syncrelay.explain.input_observation import Arrivals
+from syncrelay.explain.nearest import NearestSpans, greatest_age, signed_distances, tightest_span
+from syncrelay.sync.messages import DropReason
+from syncrelay.sync.queues import LONGEST_QUEUE
+
+_SECOND: Final = 1_000_000_000
+# A try takes some milliseconds: of the input that sets the pace so many messages, of all together so many.
+_PIVOTS: Final = 100
+_MOST_MESSAGES: Final = 4_000
+_KEPT: Final = 2_000
+# From fewer possible sets nothing can be told.
+_FEWEST: Final = 5
+# All possible sets but one, which may still wait for what comes next, or but this share.
+_LEFT_OUT: Final = 0.05
+# Farther away than so many periods, or than so many times what is usual, a partner is missing: it is another one.
+_PERIODS: Final = 1.5
+_FAR_OFF: Final = 4
+# A queue that was too short is tried longer by this factor again and again; what does is suggested with a quarter more.
+_LONGER: Final = 1.5
+_HEADROOM: Final = 1.25
+# What was tried holds for so long while its finding stands: the first time for a second, then twice as long each time.
+_TRIED_AGAIN: Final = _SECOND
+_HOLDS: Final = 8 * _SECOND
+# A run costs about 3 us a message: this is some hundredths of a second.
+_MESSAGES_A_POLL: Final = 20_000
+# Less is not told apart from what a driver takes.
+_LEAST_DISTANCE: Final = 1_000_000
+# Of a period: so near to one another are messages of one moment received.
+_SAME: Final = 0.15
+_DURATIONS: Final = frozenset(("slop", "max_age", "max_wait", "offset"))
+
+
+class Change(NamedTuple):
+    """A value to write: of a group, or of one of its inputs."""
+
+    key: str
+    value: str
+    input: int | None = None
+
+
+Changes: TypeAlias = tuple[Change, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """What changes would have given: `given` messages of an input in sets in place of `now`, of `possible` ones."""
+
+    changes: Changes
+    given: int
+    now: int
+    possible: int
+
+
+class TryBudget:
+    """How many messages may be run through engines until the next poll, by all groups that share it."""
+
+    def __init__(self) -> None:
+        self._left = _MESSAGES_A_POLL
+
+    def refill(self) -> None:
+        """Begin a poll."""
+        self._left = _MESSAGES_A_POLL
+
+    def spend(self, messages: int) -> None:
+        """Take so many from what is left."""
+        self._left -= messages
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether no run may begin any more."""
+        return self._left <= 0
+
+
+class RecentArrivals:
+    """Stamps and times of receipt of the last messages of each input."""
+
+    def __init__(self, n_inputs: int) -> None:
+        self._stamps = [no_values() for _ in range(n_inputs)]
+        self._received = [no_values() for _ in range(n_inputs)]
+
+    def add(self, arrivals: Sequence[Arrivals]) -> None:
+        """Take what came since the last call."""
+        for came, kept_stamps, kept_received in zip(arrivals, self._stamps, self._received, strict=True):
+            if came:
+                stamps, received = zip(*came, strict=True)
+                keep_last(kept_stamps, stamps, _KEPT)
+                keep_last(kept_received, received, _KEPT)
+
+    def of_input(self, index: int) -> list[tuple[int, int]]:
+        """Return stamps and times of receipt of one input, oldest first, none from before a clock jumped back."""
+        pairs = list(zip(self._stamps[index], self._received[index], strict=True))
+        falls = [
+            place
+            for place, (before, after) in enumerate(pairwise(pairs), start=1)
+            if after[1] < before[1] or (after[0] and after[0] < before[0] - _SECOND)
+        ]
+        return pairs[falls[-1] :] if falls else pairs
+
+
+class Evaluator:
+    """Tries values for a group on its last messages. What it found is kept while the same is asked."""
+
+    def __init__(self, config: GroupConfig, budget: TryBudget | None = None) -> None:
+        self._config = config
+        self._recent = RecentArrivals(len(config.topics))
+        self._budget = budget or TryBudget()
+        self._is_shared = budget is not None
+        self._found: dict[Hashable, _Found] = {}
+
+    def add(self, arrivals: Sequence[Arrivals]) -> None:
+        """Take what came since the last call."""
+        self._recent.add(arrivals)
+
+    def best(
+        self,
+        about: Hashable,
+        propose: Callable[["Trials"], Iterator[Tried]],
+        *,
+        now: int,
+        within: int | None = None,
+        optional: int | None = None,
+    ) -> tuple[Tried, ...]:
+        """Return what `propose` finds, now and then for each `about`; nothing new once the budget is spent.
+
+        What was found on many messages stands as long as it helps, with the figures of now. See Trials for
+        `within` and `optional`.
+        """
+        at, holds, found = self._found.get(about, _NOTHING)
+        if 0 <= now - at < holds:
+            return found
+        if not self._is_shared:
+            self._budget.refill()
+        if self._budget.is_spent:
+            return found
+        trials = Trials(self._config, self._recent, self._budget, within=within, optional=optional)
+        before = found if holds == _HOLDS else ()
+        again = tuple(tried for each in before if (tried := trials.gives_enough(each.changes)) is not None)
+        found = again if before and len(again) == len(before) else tuple(propose(trials))
+        self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), found)
+        return found
+
+
+class _Found(NamedTuple):
+    """What was found, when, and for how long it holds."""
+
+    at: int
+    holds: int
+    tried: tuple[Tried, ...]
+
+
+_NOTHING: Final = _Found(0, 0, ())
+
+
+class Trials:
+    """Runs of a group's engine on its last messages.
+
+    What they give is measured by the sets that the input that sets the pace allows, or of those that an `optional` one
+    could be in; no wider than `within`, where it is given. `spans` are those of the tightest possible sets, `stamps`
+    and `delays` those of each input, offsets added to the stamps.
+    """
+
+    def __init__(
+        self,
+        config: GroupConfig,
+        recent: RecentArrivals,
+        budget: TryBudget,
+        *,
+        within: int | None = None,
+        optional: int | None = None,
+    ) -> None:
+        self.config = config
+        self._budget = budget
+        options = config.options
+        self._trigger = config.inputs.index_of(options.trigger) if options.policy == "latest_time" else None
+        required = [index for index, topic in enumerate(config.topics) if topic.required]
+        pairs = [recent.of_input(index) for index in range(len(config.topics))]
+        pacemaker = min(required, key=lambda index: _rate(pairs[index])) if self._trigger is None else self._trigger
+        self._arrivals = _last(pairs, pacemaker)
+        self.stamps: list[list[int]] = [[] for _ in config.topics]
+        self.delays: list[list[int]] = [[] for _ in config.topics]
+        for each in self._arrivals:
+            if each.stamp:
+                self.stamps[each.input].append(each.stamp + config.topics[each.input].offset_ns)
+                self.delays[each.input].append(each.received - each.stamp - config.topics[each.input].offset_ns)
+        among = self.among = required if optional is None else [*required, optional]
+        slowest = min(among, key=lambda index: len(self.stamps[index]))
+        self.pivot: int = slowest if self._trigger is None else self._trigger
+        self.spans = self._possible(among, within)
+        self._counted = self.pivot if optional is None else optional
+        self._now = self._run(())
+
+    def try_out(self, changes: Changes, *, need: int | None = None) -> Tried | None:
+        """Return what changes give if that is enough, with a longer queue where they need one; else None.
+
+        `need` is how long the queue should have been by what the engine saw.
+        """
+        if len(self.spans) < _FEWEST or self._is_enough(self._now):
+            return None
+        if changes and (tried := self.gives_enough(changes)) is not None:
+            return tried
+        longer = ceil(_LONGER * self.config.options.queue_size)
+        size = need if need is not None and need > self.config.options.queue_size else longer
+        while size <= LONGEST_QUEUE and not self._budget.is_spent:
+            if self._is_enough(self._run((*changes, _queue(size)))):
+                return self.gives_enough((*changes, _queue(min(LONGEST_QUEUE, ceil(size * _HEADROOM) + 1))))
+            size = ceil(_LONGER * size)
+        return None
+
+    def gives_enough(self, changes: Changes) -> Tried | None:
+        """Return what changes give if that is enough and was not without them, else None."""
+        if len(self.spans) < _FEWEST or self._is_enough(self._now):
+            return None
+        given = self._run(changes)
+        return Tried(changes, given, self._now, len(self.spans)) if self._is_enough(given) else None
+
+    def _is_enough(self, given: int) -> bool:
+        return given >= len(self.spans) - max(1, int(_LEFT_OUT * len(self.spans)))
+
+    def _run(self, changes: Changes) -> int:
+        self._budget.spend(len(self._arrivals))
+        counts = dry_run(changed(self.config, changes), self._arrivals).counts[self._counted]
+        completed = counts.matched + counts.dropped.get(DropReason.THINNED, 0)
+        return min(completed, len(self.spans))
+
+    def _possible(self, among: Sequence[int], within: int | None) -> Distribution:
+        if len(among) == 1:
+            return Distribution([0] * len(self.stamps[self.pivot]))
+        spans = NearestSpans(len(among), measure=tightest_span if self._trigger is None else greatest_age).add(
+            [self.stamps[index] for index in among], pivot=among.index(self.pivot)
+        )
+        if spans and self._trigger is None:
+            # Where most lie close together, what lies far off has lost its partner.
+            limit = _FAR_OFF * Distribution(spans).quantile(0.75)
+            limit = min(limit, round(_PERIODS * max(_period(self.stamps[i]) for i in among if i != self.pivot)))
+            spans = [span for span in spans if span <= limit]
+        return Distribution([span for span in spans if within is None or span <= within])
+
+
+def _last(pairs: Sequence[Sequence[tuple[int, int]]], pacemaker: int) -> tuple[Arrival, ...]:
+    """Return the messages that came since so many of the input that sets the pace, in the order of receipt."""
+    since = pairs[pacemaker][-_PIVOTS:]
+    begin = since[0][1] if since else 0
+    came = [
+        Arrival(index, stamp, received)
+        for index, each in enumerate(pairs)
+        for place, (stamp, received) in enumerate(each)
+        # What is held until there is a newer one may have come long before.
+        if received >= begin or place == len(each) - 1 or each[place + 1][1] >= begin
+    ]
+    return tuple(sorted(came, key=lambda each: each.received)[-_MOST_MESSAGES:])
+
+
+def with_headroom(spans: Distribution) -> str:
+    """Return the tolerance, as it stands in the file, that takes in 99 % of spans, and what they scatter by."""
+    return words.at_least(spans.quantile(0.99) + (spans.quantile(0.95) - spans.quantile(0.5)) // 2)
+
+
+def changed(config: GroupConfig, changes: Changes) -> GroupConfig:
+    """Return a group as it would be with other values in the file."""
+    options, topics = config.options, list(config.topics)
+    values = {each.key: _parsed(each) for each in changes if each.input is None}
+    if "policy" in values:
+        paced = tuple(PacedTopic.model_construct(**dict(topic)) for topic in options.topics)
+        options = ApproximateTimeGroup.model_construct(**{**dict(options), **values, "topics": paced})
+    elif values:
+        options = options.model_copy(update=values)
+    for each in changes:
+        if each.input is not None:
+            topics[each.input] = replace(topics[each.input], offset_ns=_parsed(each))
+    return replace(config, options=options, topics=tuple(topics))
+
+
+def _parsed(change: Change) -> Any:
+    if change.key in _DURATIONS:
+        return parse_duration(change.value)
+    return int(change.value) if change.key == "queue_size" else change.value
+
+
+def _queue(size: int) -> Change:
+    return Change("queue_size", str(size))
+
+
+def _rate(pairs: Sequence[tuple[int, int]]) -> float:
+    return (len(pairs) - 1) / max(1, pairs[-1][1] - pairs[0][1]) if pairs else 0.0
+
+
+def _period(stamps: Sequence[int]) -> float:
+    return median(after - before for before, after in pairwise(stamps)) if len(stamps) > 1 else 0.0
+
+
+def constant_offsets(trials: Trials) -> Iterator[Change]:
+    """Yield the offsets that would bring an input's stamps to those of the input that sets the pace.
+
+    Only of an input whose stamps lie a constant distance from its. Where the delays of both say that another message
+    than the nearest was made at that time, the distance to that one.
+    """
+    pivot = trials.pivot
+    for index in trials.among:
+        if index == pivot:
+            continue
+        distance = _constant_distance(trials.stamps[pivot], trials.stamps[index])
+        if distance is None:
+            continue
+        later = median(trials.delays[index]) - median(trials.delays[pivot])
+        period = _period(trials.stamps[index])
+        whole = round((later + distance) / period) * period
+        shift = whole - distance if abs(later + distance - whole) <= _SAME * period else -distance
+        # Of two, the one that is farther from this machine's time is odd.
+        odd = abs(median(trials.delays[index])) >= abs(median(trials.delays[pivot]))
+        at, shift = (index, shift) if odd else (pivot, -shift)
+        yield Change("offset", words.exactly(round(trials.config.topics[at].offset_ns + shift)), at)
+
+
+def _constant_distance(pivots: Sequence[int], stamps: Sequence[int]) -> int | None:
+    """Return how far after each pivot the nearest of other stamps is, None where that is not the same for most."""
+    signed = signed_distances(pivots, stamps)
+    if len(signed) < _FEWEST:
+        return None
+    middle = signed.quantile(0.5)
+    scatter = signed.quantile(0.95) - signed.quantile(0.05)
+    return middle if abs(middle) >= _LEAST_DISTANCE and 2 * scatter <= abs(middle) else None

@@ -1,0 +1,260 @@
+"""A rig in virtual time: made-up arrivals through the real engine, watched, judged and logged once a second.
+
+    told = run(Source("/camera", hz=30), Source("/lidar", hz=10), seconds=60, options={"slop": "20ms"})
+    assert told.warnings == []
+
+Seconds are those after the start; a source's message of second 1 has the stamp BEGAN + 1 s by the machine's clock.
+"""
+
+import random
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from heapq import merge
+from typing import Any
+
+import yaml
+
+from syncrelay.config import GroupConfig, load_text
+from syncrelay.explain import (
+    Arrival,
+    Endpoint,
+    EngineDriver,
+    Finding,
+    FindingLog,
+    GroupFacts,
+    GroupWatch,
+    InputGraph,
+    Judge,
+    Severity,
+    Standstill,
+)
+from syncrelay.sync import Match, Message, Outcome
+
+S = 1_000_000_000
+MS = 1_000_000
+BEGAN = 1_700_000_000 * S
+IMU = "sensor_msgs/msg/Imu"
+
+
+def always(_second: float) -> bool:
+    return True
+
+
+def nothing(_second: float) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SourceFaults:
+    """What may be wrong, or odd, with a source; functions are of the true second after the start.
+
+    `clock` is by how many seconds its stamps are ahead of the machine's clock; `stamp` makes the whole stamp, in
+    nanoseconds, from the one that there would be. `sends` says whether a message is sent at all, `hz_at` its rate.
+    `received` is when a message arrives that would arrive at that second: later where something holds it up.
+    """
+
+    clock: Callable[[float], float] = nothing
+    stamp: Callable[[int], int | None] | None = None
+    sends: Callable[[float], bool] = always
+    hz_at: Callable[[float], float] | None = None
+    received: Callable[[float], float] | None = None
+
+
+@dataclass(frozen=True)
+class Source(_SourceFaults):
+    """A publisher. `delay_ms` is from stamp to receipt; both jitters are standard deviations.
+
+    Two sources of one topic are two publishers of it.
+    """
+
+    topic: str
+    hz: float
+    delay_ms: float = 5.0
+    jitter_ms: float = 0.0
+    delay_jitter_ms: float = 0.0
+    phase_ms: float = 0.0
+    node: str = ""
+    required: bool = True
+    topic_options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def endpoint(self) -> Endpoint:
+        return Endpoint(self.node or f"{self.topic}_driver", IMU)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of the log: at which second, and whether it warns."""
+
+    second: int
+    warns: bool
+    text: str
+    code: str | None
+
+
+@dataclass(frozen=True)
+class Told:
+    """What was said: `lines` of the log, and at each second what was found, what is well left out."""
+
+    lines: list[Line]
+    found: list[tuple[int, tuple[Finding, ...]]]
+    facts: GroupFacts
+
+    @property
+    def warnings(self) -> list[Line]:
+        return [line for line in self.lines if line.warns]
+
+    @property
+    def first(self) -> Line:
+        """The first warning."""
+        return self.warnings[0]
+
+    @property
+    def codes(self) -> set[str]:
+        """The codes of all warnings that the log ever had."""
+        return {str(line.code) for line in self.warnings}
+
+    @property
+    def ever_found(self) -> set[str]:
+        """The codes of all that was ever found to be wrong, whether it lasted or not."""
+        return {each.code.value for _, found in self.found for each in found if each.severity is not Severity.OK}
+
+    def findings(self, code: str) -> list[tuple[int, Finding]]:
+        """All findings of one code, with their seconds."""
+        return [(second, each) for second, found in self.found for each in found if each.code.value == code]
+
+
+def run(
+    *sources: Source,
+    seconds: int,
+    seed: int = 0,
+    options: dict[str, Any] | None = None,
+    stops: Sequence[tuple[float, float]] = (),
+    starved: Sequence[tuple[float, float]] = (),
+    publishers: Callable[[str, float], tuple[Endpoint, ...]] | None = None,
+    facts: Callable[[float], dict[str, Any]] | None = None,
+) -> Told:
+    """Run a rig for so many seconds.
+
+    `stops` are when the whole process stands still, as by SIGSTOP, each from one second to another: what comes
+    meanwhile is received at the end. `starved` is the same of the thread that takes messages: they are received in
+    time, and lie there. `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of
+    `GroupWatch.facts`.
+    """
+    config = group_of(sources, options or {})
+    names = [topic.topic for topic in config.topics]
+    arrivals = merge(*(_arrivals(each, names, seconds, random.Random(f"{seed} {each}")) for each in sources))
+    relay = _Relay(config)
+    waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in arrivals)
+    taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)
+    place = 0
+    shown = publishers or (lambda topic, _: tuple(each.endpoint for each in sources if each.topic == topic))
+    for second in range(1, seconds + 1):
+        # Who polls asks the thread that takes messages, and waits for it.
+        if _until([*stops, *starved], float(second)) > second:
+            continue
+        while place < len(taken) and taken[place][0] <= second:
+            at, received, index, stamp = taken[place]
+            relay.take(Arrival(index, stamp, _ns(received)), now=_ns(at), waited=_ns(at) - _ns(received))
+            place += 1
+        stop = next(((begin, end) for begin, end in stops if second - 1 <= end <= second), None)
+        standstill = stop and Standstill(_ns(stop[1]), round((stop[1] - stop[0]) * S))
+        relay.poll(
+            second, [shown(name, float(second)) for name in names], standstill, (facts or (lambda _: {}))(second)
+        )
+    assert relay.facts is not None
+    return Told(relay.lines, relay.found, relay.facts)
+
+
+def group_of(sources: Sequence[Source], options: dict[str, Any]) -> GroupConfig:
+    """Return the group of a file that has a topic for each source."""
+    topics = {each.topic: {"topic": each.topic, "type": IMU, **each.topic_options} for each in sources}
+    for each in sources:
+        if not each.required:
+            topics[each.topic]["required"] = False
+    group = {"policy": "approximate_time", "topics": list(topics.values()), **options}
+    return load_text(yaml.safe_dump({"version": 1, "groups": {"front": group}}), environ={}).groups[0]
+
+
+def _ns(second: float) -> int:
+    return BEGAN + round(second * S)
+
+
+def _until(stops: Sequence[tuple[float, float]], at: float) -> float:
+    return next((end for begin, end in stops if begin <= at < end), at)
+
+
+def _arrivals(
+    source: Source, names: Sequence[str], seconds: int, chance: random.Random
+) -> Iterator[tuple[float, int, int | None]]:
+    """Yield when each message is received, its input and its stamp, in the order of receipt."""
+    index = names.index(source.topic)
+    second, last = source.phase_ms / 1000, 0.0
+    while second < seconds:
+        if source.sends(second):
+            measured = second + chance.gauss(0, source.jitter_ms / 1000)
+            stamp: int | None = _ns(measured + source.clock(second))
+            delay = max(0.0002, source.delay_ms / 1000 + chance.gauss(0, source.delay_jitter_ms / 1000))
+            at = measured + delay
+            last = max(last, at if source.received is None else source.received(at))
+            yield last, index, stamp if source.stamp is None or stamp is None else source.stamp(stamp)
+        second += 1 / (source.hz if source.hz_at is None else source.hz_at(second))
+
+
+class _Relay:
+    """What the running relay does with a group, but for DDS."""
+
+    def __init__(self, config: GroupConfig) -> None:
+        self._n_inputs = len(config.topics)
+        self._names = [(topic.topic, topic.output) for topic in config.topics]
+        self._driver = EngineDriver(config, self._leave)
+        self._watch = GroupWatch(config, began=BEGAN)
+        self._judge = Judge()
+        self._log = FindingLog()
+        self._arrived: tuple[list[tuple[int, int]], ...] = tuple([] for _ in config.topics)
+        self._sent: list[tuple[tuple[int | None, ...], int]] = []
+        self._waits: list[int] = [0]
+        self._standstills: list[Standstill | None] = []
+        self.lines: list[Line] = []
+        self.found: list[tuple[int, tuple[Finding, ...]]] = []
+        self.facts: GroupFacts | None = None
+
+    def take(self, arrival: Arrival, *, now: int, waited: int) -> None:
+        """Take one message."""
+        self._waits[-1] = max(self._waits[-1], waited)
+        if arrival.stamp is None:
+            self._driver.reject(arrival.input, arrival.received, now=now)
+            return
+        self._arrived[arrival.input].append((arrival.stamp, arrival.received))
+        self._driver.add(Message(arrival.input, arrival.stamp, arrival.received, arrival.key), now=now)
+
+    def _leave(self, outcomes: Sequence[Outcome], now: int) -> None:
+        for each in outcomes:
+            if isinstance(each, Match):
+                complete = max(message.payload for message in each.messages if message is not None)
+                self._sent.append((each.stamps, now - complete))
+
+    def poll(
+        self,
+        second: int,
+        publishers: Sequence[tuple[Endpoint, ...]],
+        standstill: Standstill | None,
+        more: dict[str, Any],
+    ) -> None:
+        """Poll as the monitor does, and write what the log is told."""
+        now = BEGAN + second * S
+        self._driver.expire(now)
+        self._standstills = [*self._standstills[-9:], standstill]
+        engine = self._driver.engine
+        self._watch.add(self._arrived, self._sent, engine.counts(), engine.sets, now=now)
+        self._arrived, self._sent = tuple([] for _ in range(self._n_inputs)), []
+        graph = [InputGraph(*name, publishers=each) for name, each in zip(self._names, publishers, strict=True)]
+        worst = max((each for each in self._standstills if each), key=lambda each: each.ns, default=None)
+        waited = max(self._waits[-10:])
+        self._waits.append(0)
+        self.facts = self._watch.facts(graph, now=now, **{"waited": waited, "standstill": worst, **more})
+        found = self._judge.judge(self.facts)
+        self.found.append((second, found))
+        for remark in self._log.remarks(self.facts, found):
+            code = remark.code and remark.code.value
+            self.lines.append(Line(second, remark.severity is not Severity.OK, remark.text, code))

@@ -1,0 +1,157 @@
+"""Causes and effects: the table itself, and that no arrivals whatever break a watch or its judge."""
+
+import pytest
+from cases import LIDAR, camera, dropped, overflowing, wide
+from groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
+from hypothesis import given
+from hypothesis import strategies as st
+
+from syncrelay.config import load_text
+from syncrelay.explain import Code, Endpoint, GroupWatch, InputGraph, Judge, Severity, Standstill, judge, with_ok
+from syncrelay.explain.clocks import Drift
+from syncrelay.explain.judge import EXPLAINS, explained_by
+from syncrelay.sync import Match, Message
+from syncrelay.sync.messages import DropReason
+
+WIDE = wide(*[5] * 40, *[30] * 60)
+SLOWED = {"pace_hz": 5.0, "slowed_from_hz": 10.0}
+
+
+def codes(found):
+    return [each.code for each in found]
+
+
+def test_no_finding_explains_itself_by_way_of_others():
+    def walk(code, path):
+        assert code not in path, [*path, code]
+        for other in explained_by(code):
+            walk(other, [*path, code])
+
+    for code in EXPLAINS:
+        walk(code, [])
+
+
+def test_what_is_explained_is_not_found_while_its_cause_is():
+    slowed = camera(figures=SLOWED)
+    assert codes(judge(a_group(slowed, LIDAR, figures=WIDE))) == [Code.SLOWED]
+    assert codes(judge(a_group(figures=WIDE))) == [Code.OVER_SLOP]
+
+
+def test_a_cause_is_remembered_while_the_messages_of_its_time_are_judged_by():
+    a_judge = Judge()
+    assert codes(a_judge.judge(a_group(figures=WIDE, waited=3 * S))) == [Code.TOO_SLOW]
+    since = {**WIDE, "nearest_from": NOW - S}
+    assert codes(a_judge.judge(a_group(figures={**since, "now": NOW + 9 * S, "last_set": NOW + 9 * S}))) == []
+    later = {**WIDE, "nearest_from": NOW + S, "now": NOW + 11 * S, "last_set": NOW + 11 * S}
+    assert codes(a_judge.judge(a_group(figures=later))) == [Code.OVER_SLOP]
+
+
+def test_a_cause_that_is_over_does_not_explain_a_silence_for_long():
+    a_judge = Judge()
+    a_judge.judge(a_group(waited=3 * S))
+    silent = {**wide(*[30] * 9), "rate_hz": 0.0, "nearest_from": NOW - S, "last_set": NOW - 4 * S}
+    (soon,) = a_judge.judge(a_group(figures={**silent, "now": NOW + 4 * S}))
+    assert (soon.code, soon.severity) == (Code.TOO_SLOW, Severity.ERROR)
+    assert codes(a_judge.judge(a_group(figures={**silent, "now": NOW + 8 * S}))) == [Code.OVER_SLOP]
+
+
+def test_the_cause_of_all_errors_of_a_silent_group_is_the_error():
+    (only,) = judge(a_silent_group(figures=wide(*[30] * 9), waited=3 * S))
+    assert (only.code, only.severity) == (Code.TOO_SLOW, Severity.ERROR)
+
+
+def test_an_explained_cause_explains_all_the_same():
+    stood = {"figures": {**SLOWED, "dropped": {DropReason.OVERFLOW: 9}}}
+    assert codes(judge(a_group(camera(**stood), LIDAR, figures=WIDE, waited=3 * S))) == [Code.TOO_SLOW]
+
+
+def test_an_optional_input_explains_nothing_of_the_others():
+    slow = camera(required=False, figures=SLOWED)
+    assert codes(judge(a_group(slow, LIDAR, an_input("/imu"), figures=WIDE))) == [Code.SLOWED, Code.OVER_SLOP]
+
+
+def test_what_is_about_one_input_explains_it_on_that_input_only():
+    two = Endpoint("/a", "sensor_msgs/msg/Image"), Endpoint("/b", "sensor_msgs/msg/Image")
+    both = camera(publishers=two, figures={"duplicates": 50}), an_input("/lidar", figures={"duplicates": 50})
+    assert codes(judge(a_group(*both))) == [Code.SEVERAL_PUBLISHERS, Code.DUPLICATES]
+
+
+def test_a_drift_of_a_few_ppm_does_not_explain_what_is_far_apart_from_the_start():
+    drifting = camera(figures={"drift": Drift(0.000_1, 0.0, 60 * S)})
+    still = an_input("/lidar", figures={"drift": Drift(0.0, 0.0, 60 * S)})
+    assert codes(judge(a_group(drifting, still, figures=WIDE))) == [Code.CLOCK_DRIFT, Code.OVER_SLOP]
+
+
+@pytest.mark.parametrize(("unset", "said"), [(10, [Code.UNSTAMPED, Code.OVER_SLOP]), (60, [Code.UNSTAMPED])])
+def test_a_silence_is_explained_by_most_messages_and_not_by_some(unset, said):
+    group = a_silent_group(dropped(DropReason.UNSTAMPED, unset), LIDAR, figures=wide(*[30] * 9))
+    assert codes(judge(group)) == said
+
+
+def test_a_short_queue_beside_another_clock_suggests_nothing():
+    group = a_silent_group(overflowing(40), an_input("/lidar", figures={"delay": 37 * S}))
+    assert codes(judge(group)) == [Code.OTHER_CLOCK]
+
+
+def test_a_standstill_explains_what_was_lost_and_seems_silent():
+    lost = camera(lost=7, figures={"longest_pause": 3 * S, "last_received": NOW - S})
+    assert codes(judge(a_group(lost, LIDAR, standstill=Standstill(NOW - S, 3 * S)))) == [Code.TOO_SLOW]
+
+
+_CONFIGS = load_text(
+    """
+version: 1
+groups:
+  front:
+    policy: approximate_time
+    slop: 20ms
+    max_wait: 100ms
+    topics:
+      - {topic: /a, type: sensor_msgs/msg/Imu}
+      - {topic: /b, type: sensor_msgs/msg/Imu}
+      - {topic: /c, type: sensor_msgs/msg/Imu, required: false}
+  held:
+    policy: latest_time
+    trigger: /d
+    max_age: 1s
+    topics:
+      - {topic: /d, type: sensor_msgs/msg/Imu, output: /x}
+      - {topic: /e, type: sensor_msgs/msg/Imu, output: /y}
+      - {topic: /f, type: sensor_msgs/msg/Imu, output: /z}
+""",
+    environ={},
+).groups
+_STAMPS = st.one_of(
+    st.sampled_from([0, 1, -1, -(2**63), 2**63 - 1, 2**31, NOW]),
+    st.integers(-(2**63), 2**63 - 1),
+    st.integers(BEGAN, BEGAN + 20 * S),
+)
+_MESSAGES = st.lists(
+    st.tuples(st.integers(0, 2), _STAMPS, st.integers(-2 * S, 4 * S), st.booleans()), min_size=1, max_size=60
+)
+
+
+@given(st.sampled_from(_CONFIGS), _MESSAGES, st.integers(0, 4), st.sampled_from([None, lambda at: at // 2]))
+def test_no_arrivals_whatever_break_a_watch_or_a_judge(config, messages, publishers, by_clock):
+    """Stamps of any size in any order; the machine's clock may be set back in between."""
+    watch, a_judge, engine = GroupWatch(config, began=BEGAN), Judge(), config.engine()
+    shown = (Endpoint("/a", "sensor_msgs/msg/Imu"),) * publishers
+    graph = [InputGraph(topic.topic, topic.output, shown) for topic in config.topics]
+    arrived, sent, now = ([], [], []), [], BEGAN
+    for index, stamp, passes, polls in messages:
+        now += passes
+        arrived[index].append((stamp, now))
+        outcomes = engine.add(Message(index, stamp, now), now=now)
+        sent += [(outcome.stamps, 0) for outcome in outcomes if isinstance(outcome, Match)]
+        if polls:
+            watch.add(arrived, sent, engine.counts(), engine.sets, by_clock=by_clock, now=now)
+            arrived, sent = ([], [], []), []
+            facts = watch.facts(graph, now=now, waited=MS)
+            found = with_ok(facts, a_judge.judge(facts))
+            said = set(codes(found))
+            assert found
+            if facts.is_silent:
+                assert any(each.severity is Severity.ERROR for each in found)
+            for finding in found:
+                if finding.explains and finding.input is None and finding.code in EXPLAINS:
+                    assert not said & explained_by(finding.code)

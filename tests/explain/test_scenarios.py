@@ -1,0 +1,297 @@
+"""What the log says first, and what it never says, of rigs in virtual time: one cause each, and its many effects."""
+
+import random
+import re
+
+import pytest
+from groups import S
+
+from syncrelay.explain import ClockState, Endpoint, Standstill, Step
+from tests.explain.scenario import IMU, Source, Told, run
+
+REAL = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
+SLOP = {"slop": "20ms"}
+
+
+def a_pair(*, seconds=60, options=SLOP, more=None, **faults) -> Told:
+    """Two inputs at 10 Hz; the second has the faults."""
+    sources = Source("/a", 10, **REAL), Source("/b", 10, **(REAL | faults))
+    return run(*sources, seconds=seconds, options=options, **(more or {}))
+
+
+def a_trio(*, seconds=60, **faults) -> Told:
+    sources = Source("/a", 10, **REAL), Source("/b", 10, **(REAL | faults)), Source("/c", 10, **REAL)
+    return run(*sources, seconds=seconds, options=SLOP)
+
+
+def all_of(**faults) -> Told:
+    """Two inputs with the same faults."""
+    return run(*(Source(topic, 10, **(REAL | faults)) for topic in ("/a", "/b")), seconds=60, options=SLOP)
+
+
+def says_only(told: Told, code: str, *texts: str) -> None:
+    """Hold that all warnings of the log have one code, and the first certain words."""
+    assert told.codes == {code}, told.warnings
+    for text in texts:
+        assert text in told.first.text
+
+
+HEALTHY = {
+    "30 Hz camera and 10 Hz lidar": (
+        [Source("/camera", 30, delay_ms=20, **REAL), Source("/lidar", 10, delay_ms=30, **REAL)],
+        {"slop": "30ms"},
+    ),
+    "200 Hz IMU, 20 Hz camera and 1 Hz GPS": (
+        [
+            Source("/imu", 200, delay_ms=2, jitter_ms=0.2, delay_jitter_ms=0.5),
+            Source("/camera", 20, delay_ms=20, **REAL),
+            Source("/gps", 1, delay_ms=80, **REAL),
+        ],
+        {"slop": "50ms", "queue_size": 450},
+    ),
+}
+
+
+@pytest.mark.parametrize(("sources", "options"), HEALTHY.values(), ids=HEALTHY)
+@pytest.mark.parametrize("seed", range(5))
+def test_nothing_is_said_of_a_healthy_rig(sources, options, seed):
+    told = run(*sources, seconds=60, seed=seed, options=options)
+    assert told.warnings == []
+    assert told.ever_found == set()
+
+
+@pytest.mark.parametrize(("sources", "options"), HEALTHY.values(), ids=HEALTHY)
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("kind", ["stops", "starved"])
+def test_of_a_relay_that_gets_too_little_cpu_only_that_is_said(sources, options, seed, kind):
+    chance = random.Random(seed)
+    at, pauses = 5.0, []
+    while at < 55:
+        pauses.append((at, at + chance.choice([0.05, 0.2, 0.6, 1.5])))
+        at = pauses[-1][1] + chance.expovariate(0.5)
+    told = run(*sources, seconds=90, seed=seed, options=options, **{kind: pauses})
+    assert told.codes <= {"too_slow"}, told.warnings
+
+
+@pytest.mark.parametrize("kind", ["stops", "starved"])
+@pytest.mark.parametrize("length", [1.5, 3.0, 8.0, 20.0])
+@pytest.mark.parametrize("hz", [1, 30])
+def test_one_stop_of_the_relay_is_blamed_on_nothing_else(kind, length, hz):
+    sources = Source("/a", hz, **REAL), Source("/b", hz / 3 if hz > 1 else 1, **REAL)
+    told = run(*sources, seconds=120, options={"slop": "30ms"}, **{kind: [(30.25, 30.25 + length)]})
+    assert told.codes <= {"too_slow"}, told.warnings
+    if length >= 3:
+        assert told.codes
+        assert any("resolved 10 s ago" in line.text for line in told.lines) or "recovered" in told.lines[-1].text
+
+
+@pytest.mark.parametrize(("rate", "seconds"), [(0.01, 60), (-0.01, 60), (0.001, 90), (0.0002, 180)])
+def test_of_three_inputs_the_one_that_drifts_is_named(rate, seconds):
+    told = a_trio(clock=lambda second: rate * second, seconds=seconds)
+    says_only(told, "clock_drift", f"stamps of /b {'gain' if rate > 0 else 'lose'}", "those of the other inputs")
+
+
+def test_of_two_inputs_the_one_that_does_not_follow_this_machines_clock_is_named():
+    says_only(a_pair(clock=lambda second: 0.001 * second), "clock_drift", "stamps of /b gain", "against those of /a")
+
+
+def test_of_two_inputs_that_both_drift_both_are_named():
+    sources = (
+        Source("/a", 10, clock=lambda second: 0.001 * second, **REAL),
+        Source("/b", 10, clock=lambda second: -0.001 * second, **REAL),
+    )
+    told = run(*sources, seconds=60, options=SLOP)
+    says_only(told, "clock_drift")
+    assert "and" in told.first.text
+    assert "drift apart by" in told.first.text
+
+
+def test_two_publishers_of_one_topic_are_both_named_with_the_distance_of_their_clocks():
+    sources = (
+        Source("/imu", 20, node="/a", **REAL),
+        Source("/imu", 20, node="/b", clock=lambda _: -3.0, phase_ms=20, **REAL),
+        Source("/camera", 10, **REAL),
+    )
+    told = run(*sources, seconds=60, options=SLOP)
+    says_only(told, "several_publishers", "/a and /b both publish /imu: their stamps are 3 s apart")
+
+
+def test_one_publisher_of_two_clocks_is_named():
+    told = a_pair(stamp=lambda stamp: stamp - 3 * S * (stamp // 100_000_000 % 2))
+    says_only(
+        told, "time_jump", "timestamps of /b jump back and forth by 3 s; check whether /b_driver stamps by two clocks"
+    )
+
+
+def test_a_looped_recording_is_no_conflict_and_no_step():
+    told = all_of(stamp=lambda stamp: stamp - (3600 if stamp % (20 * S) < 10 * S else 3610) * S)
+    assert told.warnings == []
+    (_, finding), *_ = told.findings("time_jump")
+    assert "matching restarted" in finding.text
+
+
+@pytest.mark.parametrize(("before", "after"), [(30, 15), (10, 5), (10, 6.5), (10, 1)])
+def test_an_input_that_slows_down_is_told_by_its_rates(before, after):
+    sources = (
+        Source("/a", before, hz_at=lambda second: before if second < 40 else after, **REAL),
+        Source("/b", before, **REAL),
+    )
+    told = run(*sources, seconds=110, options={"slop": "8ms", "queue_size": 50})
+    says_only(told, "slowed")
+    rates = re.match(r"/a has slowed from ([\d.]+) Hz to ([\d.]+) Hz; check /a_driver", told.first.text)
+    assert rates
+    assert [float(rate) for rate in rates.groups()] == pytest.approx([before, after], rel=0.05)
+
+
+def test_a_rate_that_wavers_between_the_limits_is_told_once():
+    def hz(second):
+        return 10 if second < 30 else 6.5 if second < 45 else 8 if int(second) % 10 < 5 else 7.5
+
+    sources = Source("/a", 10, hz_at=hz, **REAL), Source("/b", 10, **REAL)
+    told = run(*sources, seconds=120, options={"slop": "100ms"})
+    assert [line.code for line in told.lines] == ["slowed"]
+
+
+def test_an_input_that_is_faster_than_it_was_is_no_fault():
+    sources = (
+        Source("/a", 10, **REAL),
+        Source("/b", 30, hz_at=lambda second: 30 if second < 20 else 60, **REAL),
+    )
+    assert run(*sources, seconds=60, options={"slop": "30ms", "queue_size": 30}).warnings == []
+
+
+def held_until_the_tenth_second(second):
+    return second if second % 10 < 9 else second - second % 10 + 10
+
+
+def test_a_player_that_stalls_is_one_line_and_no_network():
+    told = all_of(received=held_until_the_tenth_second)
+    says_only(told, "bursts", "messages of all inputs arrived in a burst")
+    assert "network" not in told.first.text
+    assert len(told.warnings) == 1
+
+
+def test_one_input_in_bursts_is_asked_about():
+    told = a_pair(received=held_until_the_tenth_second, options={"slop": "20ms", "queue_size": 30})
+    says_only(
+        told, "bursts", "messages of /b arrived in a burst", "check whether /b_driver sends in bursts; if it runs on"
+    )
+
+
+def test_a_recording_in_bursts_has_no_network():
+    more = {"facts": lambda _: {"is_recorded": True}}
+    told = a_pair(received=held_until_the_tenth_second, options={"slop": "20ms", "queue_size": 30}, more=more)
+    says_only(told, "bursts", "or the recorder received it late")
+
+
+def test_without_any_clock_only_that_is_said():
+    more = {"facts": lambda second: {"clock": ClockState(received=False, stopped=round(second * S))}}
+    told = a_pair(more=more, seconds=30)
+    says_only(told, "no_clock", "no /clock has been received for")
+
+
+def test_a_simulation_that_is_paused_is_one_line():
+    paused = {"sends": lambda second: second < 20}
+    more = {
+        "facts": lambda second: {
+            "clock": ClockState(received=True, stopped=round((second - 20) * S) if second > 23 else None)
+        }
+    }
+    told = run(*(Source(topic, 10, **(REAL | paused)) for topic in ("/a", "/b")), seconds=60, options=SLOP, **more)
+    says_only(told, "clock_stopped", "/clock has stood still")
+
+
+@pytest.mark.parametrize(
+    ("clock", "said"),
+    [
+        (-1_700_000_000 + 5000, "54 years behind those of /a: they count from boot"),
+        (-315_964_800 + 18, "10 years behind those of /a: they look like GPS time, which counts from 1980"),
+        (37, "37 s ahead of those of /a: they look like TAI"),
+        (18, "18 s ahead of those of /a: they look like GPS time"),
+        (-7200, "2 h behind those of /a: they look like local time"),
+        (-37.2, "37.2 s behind those of /a; synchronize the clocks"),
+    ],
+)
+def test_a_clock_of_another_epoch_is_recognized(clock, said):
+    told = a_pair(clock=lambda _: clock)
+    says_only(told, "other_clock", said)
+
+
+def test_stamps_of_the_future_on_all_inputs_are_no_fault():
+    assert all_of(clock=lambda _: 5.0).warnings == []
+
+
+@pytest.mark.parametrize("by", [2.0, -2.0])
+def test_a_clock_of_all_inputs_that_steps_is_told_once_while_matching_goes_on(by):
+    told = all_of(clock=lambda second: 0.0 if second < 20 else by)
+    direction = "forward" if by > 0 else "back"
+    says_only(told, "clock_step", f"stamps of all inputs jumped {direction} by ", "against this machine's clock")
+    assert len(told.warnings) == 1
+
+
+@pytest.mark.parametrize("by", [2.0, -2.0])
+def test_the_one_input_whose_clock_steps_is_named(by):
+    told = a_trio(clock=lambda second: 0.0 if second < 20 else by, seconds=45)
+    direction = "forward" if by > 0 else "back"
+    says_only(told, "clock_step", f"stamps of /b jumped {direction} by ", "those of the other inputs did not")
+
+
+def test_a_step_that_stays_is_another_clock_in_the_end():
+    told = a_trio(clock=lambda second: 0.0 if second < 20 else 2.0, seconds=80)
+    assert [line.code for line in told.warnings][-1] == "other_clock"
+    assert told.codes == {"clock_step", "other_clock"}
+
+
+def test_this_machines_clock_that_is_set_is_told():
+    step = Step(1_700_000_020 * S, 2 * S)
+    more = {"facts": lambda second: {"clock_set": step if 20 <= second < 50 else None}}
+    says_only(a_pair(more=more), "clock_step", "this machine's clock was set forward by 2 s")
+
+
+def test_a_sensor_that_dies_and_returns_is_silent_and_then_nothing():
+    told = a_pair(sends=lambda second: not 20 < second < 35, seconds=90)
+    says_only(told, "silent", "/b has been silent for")
+    assert told.lines[-1].text.startswith("recovered after 1")
+
+
+def test_a_recorder_that_pauses_is_one_line():
+    more = {"facts": lambda _: {"is_recorded": True}}
+    sources = (Source(topic, 10, sends=lambda second: not 20 < second < 35, **REAL) for topic in ("/a", "/b"))
+    told = run(*sources, seconds=80, options=SLOP, **more)
+    says_only(told, "silent", "all inputs have been silent for 5", "check whether recording was paused")
+
+
+def test_one_message_only_is_silence():
+    says_only(a_pair(sends=lambda second: second < 0.05, seconds=40), "silent", "/b has been silent for")
+
+
+def test_stamps_of_zero_explain_the_gaps_that_they_leave():
+    says_only(
+        a_pair(stamp=lambda stamp: stamp if stamp // 100_000_000 % 5 else 0), "unstamped", "messages of /b have stamp 0"
+    )
+
+
+def test_two_messages_of_each_stamp_are_told():
+    sources = Source("/a", 10), Source("/b", 10), Source("/b", 10, phase_ms=1, stamp=lambda stamp: stamp - 1_000_000)
+    told = run(*sources, seconds=40, options=SLOP, publishers=lambda topic, _: (Endpoint(f"{topic}_driver", IMU),))
+    says_only(told, "duplicates", "messages of /b repeat the stamp before them")
+
+
+@pytest.mark.parametrize(
+    ("returns_as", "code"),
+    [
+        ((Endpoint("/new", "sensor_msgs/msg/Image"),), "other_type"),
+        ((), "no_publisher"),
+    ],
+)
+def test_a_publisher_that_goes_and_returns_as_another_is_told_by_that(returns_as, code):
+    def publishers(topic, second):
+        return returns_as if topic == "/b" and second > 20 else (Endpoint(f"{topic}_driver", IMU),)
+
+    told = a_pair(sends=lambda second: second < 20, more={"publishers": publishers})
+    says_only(told, code, "/b")
+
+
+def test_a_standstill_in_which_nothing_was_due_is_nobodys_fault():
+    more = {"facts": lambda second: {"standstill": Standstill(1_700_000_000 * S + 20 * S, S)} if second < 30 else {}}
+    assert a_pair(more=more).warnings == []
