@@ -9,7 +9,7 @@ from rich.cells import cell_len
 from syncrelay.config.wording import counted
 from syncrelay.doctor.diagnosis import Diagnosis, Severity
 from syncrelay.doctor.examine import Observed
-from syncrelay.explain import Code, InputFacts, words
+from syncrelay.explain import Code, GroupFacts, InputFacts, words
 from syncrelay.printable import printable
 
 _BOLD, _RED, _YELLOW, _DIM, _RESET = "\033[1m", "\033[31m", "\033[33m", "\033[2m", "\033[0m"
@@ -41,8 +41,8 @@ def observed_lines(observed: Observed) -> Iterator[str]:
     graph = observed.graph
     nodes, topics = counted(len(graph.nodes), "other node"), counted(graph.n_topics, "published topic")
     yield f"observed for {observed.seconds:g} s: {nodes}, {topics}"
-    inputs = {each.name: each for report in observed.reports for each in report.facts.inputs}
-    yield from aligned([_row(each) for each in inputs.values()])
+    places = {each.name: (report.facts, n) for report in observed.reports for n, each in enumerate(report.facts.inputs)}
+    yield from aligned([_row(facts, index) for facts, index in places.values()])
     for report in observed.reports:
         yield from (f"  {report.facts.name}: {each.text}" for each in report.findings if each.code is Code.HEALTHY)
 
@@ -55,10 +55,11 @@ def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
         yield f"  {'  '.join(padded)}".rstrip()
 
 
-def _row(topic: InputFacts) -> tuple[str, ...]:
-    figures = topic.figures
-    came = f"{figures.rate_hz:.1f} Hz" if figures.rate_hz else f"{topic.counts.fed} received"
-    stamps = "" if figures.delay is None else _age(figures.delay)
+def _row(facts: GroupFacts, index: int) -> tuple[str, ...]:
+    topic, lag = facts.inputs[index], facts.lag(index)
+    rate_hz = topic.figures.rate_hz
+    came = f"{rate_hz:.1f} Hz" if rate_hz else f"{topic.counts.fed} received"
+    stamps = "" if lag is None else _age(lag)
     return topic.name, topic.type, came, stamps, "; ".join(_publishers(topic)) or "no publisher"
 
 
