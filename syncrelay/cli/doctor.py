@@ -5,14 +5,15 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from logging import NullHandler
 from typing import Any, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.cli.heartbeat import VARIABLE
-from syncrelay.doctor.diagnosis import Diagnosis, Severity
-from syncrelay.doctor.examine import Examination, Request, examine
-from syncrelay.doctor.stamps import delay_of
-from syncrelay.doctor.text import diagnosis_lines, sighting_lines, verdict
+from syncrelay.doctor.diagnosis import Severity
+from syncrelay.doctor.examine import Examination, Observed, Request, examine
+from syncrelay.doctor.text import diagnosis_lines, observed_lines, verdict
+from syncrelay.logs import LOGGER
 from syncrelay.printable import printable
 
 _LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
@@ -24,27 +25,29 @@ def doctor(
     output_format: str,
     ros_args: Sequence[str],
 ) -> int:
-    """Examine, print what was found as `text` or `json`; 1 if something is to be mended, else 0."""
+    """Examine, print what was found as `text` or `json`; 1 if there are errors or warnings, else 0."""
     request = Request(dict(os.environ), VARIABLE, tuple(config_paths), tuple(ros_args), live_s)
     if live_s is not None and sys.stderr.isatty():
-        say(f"looking at the graph for {live_s:g} s ...")
+        say(f"observing the graph for {live_s:g} s ...")
+    # What it logs, the relay that observes gives as findings too.
+    LOGGER.addHandler(NullHandler())
     examination = examine(request)
     if output_format == "json":
         put(json.dumps(_as_json(examination), indent=2))
     else:
         _print_text(examination)
-    return AT_FAULT if _to_mend(examination.diagnoses) else DONE
+    return DONE if _is_ok(examination) else AT_FAULT
 
 
-def _to_mend(diagnoses: Sequence[Diagnosis]) -> bool:
-    return any(each.severity is Severity.MEND for each in diagnoses)
+def _is_ok(examination: Examination) -> bool:
+    return all(each.severity is Severity.INFO for each in examination.diagnoses)
 
 
 def _print_text(examination: Examination) -> None:
     colour = wants_colour(sys.stdout.isatty())
     put(printable(_heading(examination)))
-    if examination.sighting is not None:
-        put("\n".join(sighting_lines(examination.sighting)))
+    if examination.observed is not None:
+        put("\n".join(observed_lines(examination.observed)))
     for diagnosis in examination.diagnoses:
         put("")
         put("\n".join(diagnosis_lines(diagnosis, colour=colour)))
@@ -70,7 +73,7 @@ def _heading(examination: Examination) -> str:
 def _as_json(examination: Examination) -> dict[str, Any]:
     installation = examination.installation
     return {
-        "ok": not _to_mend(examination.diagnoses),
+        "ok": _is_ok(examination),
         "python": f"{installation.python[0]}.{installation.python[1]}",
         "rclpy": installation.version,
         "middleware": examination.middleware or None,
@@ -78,17 +81,14 @@ def _as_json(examination: Examination) -> dict[str, Any]:
         "discovery_range": examination.discovery_range,
         "receives_by": examination.path or None,
         "diagnoses": [{**asdict(each), "severity": each.severity.value} for each in examination.diagnoses],
-        "graph": _graph_as_json(examination),
+        **_observed_as_json(examination.observed),
     }
 
 
-def _graph_as_json(examination: Examination) -> dict[str, Any] | None:
-    sighting = examination.sighting
-    if sighting is None:
-        return None
-    topics = []
-    for topic in sighting.topics:
-        written = asdict(topic)
-        del written["delays"]
-        topics.append({**written, "delay_ns": delay_of(topic)})
-    return {**asdict(sighting), "topics": topics}
+def _observed_as_json(observed: Observed | None) -> dict[str, Any]:
+    if observed is None:
+        return {"graph": None, "groups": []}
+    from syncrelay.status import group_document
+
+    graph = {"seconds": observed.seconds, **asdict(observed.graph)}
+    return {"graph": graph, "groups": [group_document(report) for report in observed.reports]}

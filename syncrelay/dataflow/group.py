@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
@@ -15,6 +15,7 @@ from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
+_Result = TypeVar("_Result")
 
 # Enough for the widest terminal's strip of recent sets.
 _RECENT = 256
@@ -162,33 +163,27 @@ class GroupRelay:
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""
-        try:
-            self._conclude(self.engine.expire(now=now))
-        except Exception as error:  # noqa: BLE001  it is this group's alone
-            self.fail(error)
+        self._guarded(lambda: self._conclude(self.engine.expire(now=now)))
 
     def flush(self, reason: DropReason) -> None:
         """Drop all that is buffered."""
-        try:
-            self._conclude(self.engine.flush(reason))
-        except Exception as error:  # noqa: BLE001
-            self.fail(error)
+        self._guarded(lambda: self._conclude(self.engine.flush(reason)))
 
     def next_deadline(self) -> int | None:
         """When `expire` wants to be called next."""
-        try:
-            return self.engine.next_deadline()
-        except Exception as error:  # noqa: BLE001
-            self.fail(error)
-            return None
+        return self._guarded(lambda: self.engine.next_deadline())  # noqa: PLW0108  the engine of the second time
 
     def counts(self) -> tuple[InputCounts, ...]:
         """Where the messages of each input went."""
+        return self._guarded(lambda: self.engine.counts())  # noqa: PLW0108  as above
+
+    def _guarded(self, step: Callable[[], _Result]) -> _Result:
+        """Take a step; one that fails stops the group, and is taken again with the engine that gives nothing."""
         try:
-            return self.engine.counts()
-        except Exception as error:  # noqa: BLE001
+            return step()
+        except Exception as error:  # noqa: BLE001  it is this group's alone
             self.fail(error)
-            return self.engine.counts()
+            return step()
 
     def fail(self, error: Exception) -> None:
         """Stop for good, and say so once, with the traceback."""

@@ -6,7 +6,7 @@ from typing import Final
 
 from syncrelay.config import Config, Problem, Severity, TopicConfig, render
 from syncrelay.config.wording import all_of, counted
-from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.doctor.diagnosis import Diagnosis, error, info
 
 # The name of a check is a contract: these are older than the sentences of the file.
 _REMAP_CODES: Final = {"loop": "remap_loop", "repeated_output": "remap_outputs"}
@@ -21,26 +21,26 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
     missing = [replace(each, severity=Severity.ERROR) for each in noted if each.code == "package_missing"]
     unchecked = [problem for problem in noted if problem.code != "package_missing"]
     if errors:
-        yield mend(
+        yield error(
             "file",
             f"{counted(len(errors), 'error')} in {named}:\n{render(errors)}",
-            so="the relay refuses it and ends at once",
-            do=f"mend what is marked; to check again: syncrelay validate {together}{' '.join(files)}",
+            impact="the relay refuses the file and exits at once",
+            fix=f"fix what is marked, then check again: syncrelay validate {together}{' '.join(files)}",
         )
     if missing:
-        yield mend(
+        yield error(
             "package_missing",
-            f"types of packages that this environment does not have, in {named}:\n{render(missing)}",
-            so="the relay starts, but their groups wait until the packages are there",
-            do="build the packages with colcon for this Python, then in this shell: source install/setup.bash\n"
-            "(in the image: put them into docker/messages before it is built)",
+            f"{named}: types of packages that are not installed here:\n{render(missing)}",
+            impact="the relay starts, but their groups wait until the packages are installed",
+            fix="build the packages with colcon for this Python, then in this shell: source install/setup.bash\n"
+            "(in the image: put them into docker/messages before you build it)",
         )
     if unchecked:
-        yield know(
+        yield info(
             "not_checked",
             f"{named} could not be checked in full:\n{render(unchecked)}",
-            so="a fault in these places shows only when the relay runs",
-            do="nothing, if you are sure of them",
+            impact="an error there shows only when the relay runs",
+            fix="nothing, if you are sure of them",
         )
 
 
@@ -51,11 +51,11 @@ def check_types(config: Config, unusable: Mapping[str, str]) -> Iterator[Diagnos
         groups = all_of(
             dict.fromkeys(group.name for group in config.groups if any(topic.type == name for topic in group.topics))
         )
-        yield mend(
+        yield error(
             "type_unusable",
             f"{name} is installed but cannot be imported: {fault}",
-            so=f"nothing of {topics} is received: the group {groups} waits",
-            do=f"build {name.partition('/')[0]} anew for this Python and this ROS, and source it in this shell",
+            impact=f"no sets from {groups}: {topics} cannot be received",
+            fix=f"rebuild {name.partition('/')[0]} for this Python and this ROS, and source it in this shell",
         )
 
 
@@ -63,12 +63,12 @@ def check_remaps(config: Config, names: Mapping[str, str]) -> Iterator[Diagnosis
     """Yield what is wrong with the file only after remaps; `names` has what each name of the file becomes."""
     problems = config.names.problems(names.__getitem__, groups=[group.name for group in config.groups])
     for code in dict.fromkeys(problem.code for problem in problems):
-        yield mend(
+        yield error(
             _REMAP_CODES.get(code, f"remap_{code}"),
-            f"remaps give topics of the file names that the relay refuses:\n"
+            f"after remapping, the relay refuses these names of the file:\n"
             f"{render([problem for problem in problems if problem.code == code])}",
-            so="the relay ends at once with exit code 1; on a reload it keeps the file that it runs",
-            do="take the remap away, or give the topic another name in the file",
+            impact="the relay exits at once with code 1; on a reload it keeps the running configuration",
+            fix="remove the remap, or rename the topic in the file",
         )
 
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from syncrelay.doctor.diagnosis import Diagnosis, mend
-from syncrelay.doctor.discovery import range_of
+from syncrelay.doctor.diagnosis import Diagnosis, error
 from syncrelay.doctor.transport import uses_shared_memory
+from syncrelay.environment.domain import range_of
 
 # Measured: rclpy with Fast DDS crashes at 10 threads and runs at 30.
 _FEWEST_TASKS: Final = 30
@@ -29,27 +29,27 @@ class Isolation:
 def check_isolation(found: Isolation, environ: Mapping[str, str]) -> Iterator[Diagnosis]:
     """Yield combinations of network and memory that list topics without bringing data, and limits too low."""
     if found.task_limit is not None and found.task_limit < _FEWEST_TASKS:
-        yield mend(
+        yield error(
             "task_limit",
             f"only {found.task_limit} processes and threads are allowed here ({found.task_limit_of})",
-            so=f"rclpy crashes as it starts its threads; it needs {_FEWEST_TASKS}",
-            do="raise the limit (Docker: --pids-limit 64, compose: pids_limit: 64, shell: ulimit -u)",
+            impact=f"rclpy crashes when it starts its threads: it needs {_FEWEST_TASKS}",
+            fix="raise the limit (Docker: --pids-limit 64, compose: pids_limit: 64, shell: ulimit -u)",
         )
     if found.container is None or not (found.host_network and found.private_shm):
         return
     if uses_shared_memory(environ):
-        yield mend(
+        yield error(
             "private_shm",
             f"this container has the host's network but a /dev/shm of its own ({found.container})",
-            so="Fast DDS takes nodes outside for neighbours and offers them shared memory that they cannot see:\n"
-            "their topics are listed but bring no data",
-            do="export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    in the container; or share the memory, as the same user:\n"
+            impact="Fast DDS takes nodes outside for local ones and offers them shared memory that they cannot see:\n"
+            "their topics are listed, but no data arrives",
+            fix="export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    in the container; or share the memory, as the same user:\n"
             "docker run --ipc host --user UID",
         )
     elif range_of(environ) == "LOCALHOST":
-        yield mend(
+        yield error(
             "private_shm",
             "this container has the host's network, uses UDP, and discovery is limited to LOCALHOST",
-            so="nodes outside of the container are listed but bring no data",
-            do="unset ROS_AUTOMATIC_DISCOVERY_RANGE ROS_LOCALHOST_ONLY    in the container",
+            impact="nodes outside the container are listed, but no data arrives from them",
+            fix="unset ROS_AUTOMATIC_DISCOVERY_RANGE ROS_LOCALHOST_ONLY    in the container",
         )

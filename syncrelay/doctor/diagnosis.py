@@ -1,37 +1,44 @@
-"""What a check says: what is so, what follows from it, and what to do."""
+"""What a check says: what is wrong, what that leads to, and how to fix it."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Severity(Enum):
-    """MEND keeps messages from flowing, or what the user asked for from being done; KNOW explains and may stay."""
+    """ERROR keeps messages from flowing, or what the user asked for from being done; WARNING costs sets.
 
-    MEND = "mend"
-    KNOW = "know"
+    INFO may well be as it was meant.
+    """
+
+    ERROR = "error"
+    WARNING = "warning"
+    INFO = "info"
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """One thing that was found. `code` names it for programs and stays; the texts may have several lines."""
+    """One thing that was found. `code` names it for programs and stays; the texts may have several lines.
+
+    `impact` and `fix` are None where `what` says all there is to say.
+    """
 
     code: str
     severity: Severity
     what: str
-    so: str
-    do: str
+    impact: str | None
+    fix: str | None
 
 
-def mend(code: str, what: str, *, so: str, do: str) -> Diagnosis:
+def error(code: str, what: str, *, impact: str, fix: str) -> Diagnosis:
     """Return a diagnosis that makes the doctor exit with 1."""
-    return Diagnosis(code, Severity.MEND, what, so, do)
+    return Diagnosis(code, Severity.ERROR, what, impact, fix)
 
 
-def know(code: str, what: str, *, so: str, do: str) -> Diagnosis:
+def info(code: str, what: str, *, impact: str, fix: str) -> Diagnosis:
     """Return a diagnosis that needs no action where things are meant to be so."""
-    return Diagnosis(code, Severity.KNOW, what, so, do)
+    return Diagnosis(code, Severity.INFO, what, impact, fix)
 
 
 def worst_first(diagnoses: list[Diagnosis]) -> list[Diagnosis]:
-    """Sort what is to mend before what is to know, else in the order of checking."""
-    return sorted(diagnoses, key=lambda diagnosis: diagnosis.severity is Severity.KNOW)
+    """Sort by severity, else in the order of checking."""
+    return sorted(diagnoses, key=lambda diagnosis: list(Severity).index(diagnosis.severity))

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from syncrelay.config.wording import did_you_mean, quoted
-from syncrelay.doctor.diagnosis import Diagnosis, know, mend
-from syncrelay.environment.domain import domain_of, no_domain
+from syncrelay.doctor.diagnosis import Diagnosis, error, info
+from syncrelay.environment.domain import DISCOVERY_RANGES, DOMAIN_ADVICE, domain_of, no_domain, range_of
 
-RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 # DDS: 250 UDP ports for each domain, from 7400 on.
 _FIRST_PORT: Final = 7400
 _PORTS: Final = 250
@@ -36,16 +35,8 @@ def peers_of(environ: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(peer for peer in environ.get(_PEERS, "").split(";") if peer)
 
 
-def range_of(environ: Mapping[str, str]) -> str:
-    """Return how far discovery reaches, as rcl takes it from the environment: one of RANGES."""
-    if environ.get(_LOCALHOST_ONLY) == "1":
-        return "LOCALHOST"
-    asked = environ.get(_RANGE) or "SUBNET"
-    return asked if asked in RANGES else "LOCALHOST"
-
-
 def check_discovery(found: Discovery) -> Iterator[Diagnosis]:
-    """Yield variables that ROS refuses, reads otherwise than meant, or that narrow whom it finds."""
+    """Yield variables that ROS refuses or misreads, or that limit which nodes it finds."""
     yield from _domain(found)
     yield from _range(found.environ)
     yield from _localhost_only(found.environ)
@@ -56,61 +47,61 @@ def _domain(found: Discovery) -> Iterator[Diagnosis]:
     text = found.environ.get("ROS_DOMAIN_ID", "")
     domain = domain_of(found.environ)
     if domain is None:
-        yield mend(
+        yield error(
             "domain_id",
             no_domain(found.environ),
-            so="no node starts with it, or it lands on a domain that nobody meant",
-            do="export ROS_DOMAIN_ID=0    or the number that the other nodes have; 0 to 101 are safe on Linux",
+            impact="no node starts with it, or it starts on a domain that nobody meant",
+            fix=DOMAIN_ADVICE,
         )
         return
     if text and text.strip() != str(domain):
-        yield mend(
+        yield error(
             "domain_id",
             f"ROS_DOMAIN_ID={text} is read as {domain}",
-            so=f"ROS reads numbers as C does: these nodes meet only others of domain {domain}",
-            do="write the number in plain digits, without a leading 0 and with nothing behind it",
+            impact=f"ROS reads numbers as C does, so these nodes find only others on domain {domain}",
+            fix="write the number in plain digits, without a leading 0 and nothing after it",
         )
     low, high = found.ephemeral_ports
     ports = ports_of(domain)
     # By its first ports: of the last ones of 250 only the hundredth node makes use.
     if low <= ports[0] <= high:
-        yield know(
+        yield info(
             "domain_ports",
             f"ROS_DOMAIN_ID={domain} uses UDP ports {ports[0]} to {ports[-1]}, which Linux also gives to any program",
-            so="now and then a node does not start or is not found, because its port is taken",
-            do="choose a domain from 0 to 101 on all machines",
+            impact="now and then a node does not start or is not found, because its port is taken",
+            fix="use a domain from 0 to 101 on all machines",
         )
 
 
 def _range(environ: Mapping[str, str]) -> Iterator[Diagnosis]:
     asked = environ.get(_RANGE, "")
-    if asked and asked not in RANGES:
-        yield mend(
+    if asked and asked not in DISCOVERY_RANGES:
+        yield error(
             "discovery_range",
-            f"{_RANGE}={asked} is unknown{did_you_mean(asked, RANGES)}",
-            so="ROS takes it as LOCALHOST: nodes on other machines are not found",
-            do=f"export {_RANGE}=SUBNET    (default), LOCALHOST, OFF or SYSTEM_DEFAULT, in capitals",
+            f"{_RANGE}={asked} is unknown{did_you_mean(asked, DISCOVERY_RANGES)}",
+            impact="ROS takes it as LOCALHOST: nodes on other machines are not found",
+            fix=f"export {_RANGE}=SUBNET    (default), LOCALHOST, OFF or SYSTEM_DEFAULT, in capitals",
         )
     elif range_of(environ) == "OFF":
-        yield mend(
+        yield error(
             "discovery_off",
             f"{_RANGE}=OFF",
-            so="nodes find nobody, not even on this machine",
-            do=f"unset {_RANGE}",
+            impact="nodes find no others, not even on this machine",
+            fix=f"unset {_RANGE}",
         )
     elif asked == "SYSTEM_DEFAULT":
-        yield know(
+        yield info(
             "discovery_range",
             f"{_RANGE}=SYSTEM_DEFAULT leaves discovery to the middleware's own configuration",
-            so="whom nodes find depends on its profiles file, and ROS_STATIC_PEERS has no effect",
-            do=f"nothing if that is meant; else: unset {_RANGE}",
+            impact="which nodes are found depends on its profiles file, and ROS_STATIC_PEERS has no effect",
+            fix=f"nothing if that is intended; otherwise: unset {_RANGE}",
         )
     elif asked == "LOCALHOST" and not peers_of(environ):
-        yield know(
+        yield info(
             "discovery_range",
             f"{_RANGE}=LOCALHOST",
-            so="only nodes on this machine are found",
-            do=f"nothing if the robot is this machine; else: unset {_RANGE}",
+            impact="only nodes on this machine are found",
+            fix=f"nothing if the robot is this machine; otherwise: unset {_RANGE}",
         )
 
 
@@ -121,27 +112,27 @@ def _localhost_only(environ: Mapping[str, str]) -> Iterator[Diagnosis]:
         name for name in (_RANGE, _PEERS) if environ.get(name) and (name, environ[name]) != (_RANGE, "LOCALHOST")
     ]
     if overruled:
-        yield mend(
+        yield error(
             "localhost_only",
-            f"{_LOCALHOST_ONLY}=1 overrules {' and '.join(overruled)}, which are set too",
-            so="only nodes on this machine are found, whatever the other variables say",
-            do=f"unset {_LOCALHOST_ONLY}    (deprecated since Jazzy)",
+            f"{_LOCALHOST_ONLY}=1 overrules {' and '.join(overruled)}",
+            impact="only nodes on this machine are found, whatever the other variables say",
+            fix=f"unset {_LOCALHOST_ONLY}    (deprecated since Jazzy)",
         )
     else:
-        yield know(
+        yield info(
             "localhost_only",
             f"{_LOCALHOST_ONLY}=1 is deprecated",
-            so="it still works: only nodes on this machine are found",
-            do=f"write {_RANGE}=LOCALHOST instead, or unset it to find other machines",
+            impact="it still works: only nodes on this machine are found",
+            fix=f"write {_RANGE}=LOCALHOST instead, or unset it to find other machines",
         )
 
 
 def _peers(found: Discovery) -> Iterator[Diagnosis]:
     if found.unresolved_peers:
         names = ", ".join(map(quoted, found.unresolved_peers))
-        yield mend(
+        yield error(
             "static_peers",
-            f"ROS_STATIC_PEERS names {names}, which has no address here",
-            so="no node starts: every peer must have an address",
-            do="write IP addresses or names that this machine resolves, with ; between them",
+            f"ROS_STATIC_PEERS: no address found for {names}",
+            impact="no node starts until every peer has an address",
+            fix="write IP addresses, or names that this machine can resolve, separated by ;",
         )

@@ -1,15 +1,18 @@
-"""The whole examination, from the environment to the graph, in the order in which one thing rests on the other."""
+"""The whole examination, from the environment to the graph: each step rests on those before."""
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from syncrelay.config import Config, ConfigError, Problem, TopicConfig, load
+from syncrelay.config import Config, ConfigError, Problem, load
+from syncrelay.config.interfaces import Interfaces
 from syncrelay.doctor.config_file import check_files, check_remaps, check_types
 from syncrelay.doctor.container import check_isolation
-from syncrelay.doctor.diagnosis import Diagnosis, know, worst_first
-from syncrelay.doctor.discovery import check_discovery, range_of
+from syncrelay.doctor.diagnosis import Diagnosis, info, worst_first
+from syncrelay.doctor.discovery import check_discovery
 from syncrelay.doctor.folders import check_folders
-from syncrelay.doctor.graph import check_clock, check_company, check_outputs, check_own_name, check_sizes, check_topics
+from syncrelay.doctor.graph import check_clock, check_graph, check_own_name
+from syncrelay.doctor.groups import check_groups, check_sizes
 from syncrelay.doctor.installation import Installation, check_installation, middleware_of
 from syncrelay.doctor.listen import check_listen
 from syncrelay.doctor.machine.discovery import look_at_discovery, look_at_transport
@@ -20,12 +23,11 @@ from syncrelay.doctor.machine.network import look_at_interfaces
 from syncrelay.doctor.machine.shared_memory import look_at_shared_memory
 from syncrelay.doctor.network import check_network
 from syncrelay.doctor.shared_memory import check_shared_memory
-from syncrelay.doctor.stamps import Matched, check_stamps
 from syncrelay.doctor.start import check_start
+from syncrelay.doctor.start_check import Plan, StartResult, start_node
 from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
-from syncrelay.environment.domain import domain_of
-from syncrelay.ros.sighting import Sighting
-from syncrelay.ros.trial import Plan, Trial, try_out
+from syncrelay.environment.domain import domain_of, range_of
+from syncrelay.explain import GraphSnapshot, GroupReport
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,16 @@ class Request:
     files: tuple[str, ...] = ()
     ros_args: tuple[str, ...] = ()
     live_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What a look at the graph gave; `unjudged` are groups without a report."""
+
+    seconds: float
+    graph: GraphSnapshot
+    reports: tuple[GroupReport, ...] = ()
+    unjudged: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +64,7 @@ class Examination:
     domain: int | None
     discovery_range: str
     diagnoses: tuple[Diagnosis, ...]
-    sighting: Sighting | None
+    observed: Observed | None
     path: str = ""
 
 
@@ -66,25 +78,26 @@ def examine(request: Request) -> Examination:
     environment = tuple(found)
     config, problems = _load(request) if request.files else (None, ())
     found += check_files(request.files, problems)
-    trial = try_out(_plan(config, problems, request.ros_args), environ) if installation.rclpy else None
-    if trial is not None:
-        found += check_start(trial, before=environment)
-        found += _of_file(config, trial)
-    sighting = None
+    started = start_node(_plan(config, request), environ) if installation.rclpy else None
+    if started is not None:
+        found += check_start(started, before=environment)
+        found += _of_file(config, started)
+    observed = None
     if request.live_s is not None:
-        if trial is None or trial.failed is not None:
+        if started is not None and started.failed is None:
+            observed = _observe(config, request.ros_args, seconds=request.live_s)
+        if started is None or observed is None:
             found.append(_not_looked())
         else:
-            sighting = _look(config, trial, seconds=request.live_s)
-            found += _of_graph(sighting, config, trial, environ)
+            found += _of_graph(observed, config, started, environ)
     return Examination(
         installation,
         middleware,
         domain_of(environ),
         range_of(environ),
         tuple(worst_first(found)),
-        sighting,
-        trial.path if trial is not None else "",
+        observed,
+        started.path if started is not None else "",
     )
 
 
@@ -109,88 +122,71 @@ def _load(request: Request) -> tuple[Config | None, Sequence[Problem]]:
     return config, config.notes
 
 
-def _plan(config: Config | None, problems: Sequence[Problem], ros_args: Sequence[str]) -> Plan:
+def _plan(config: Config | None, request: Request) -> Plan:
     if config is None:
-        return Plan(ros_args=tuple(ros_args))
-    topics = [topic for group in config.groups for topic in group.topics]
-    missing = {problem.text for problem in problems if problem.code == "package_missing"}
-    types = dict.fromkeys(
-        topic.type for topic in topics if not any(f"`{topic.type.partition('/')[0]}`" in text for text in missing)
-    )
+        return Plan(ros_args=request.ros_args)
+    installed = Interfaces.find(request.environ)
+    types = dict.fromkeys(topic.type for group in config.groups for topic in group.topics)
     return Plan(
         node=config.node.name,
         namespace=config.node.namespace,
-        types=tuple(types),
+        # What lacks its package is the file check's to say.
+        types=tuple(each for each in types if installed is None or each.partition("/")[0] in installed.packages),
         names=config.names.written,
-        ros_args=tuple(ros_args),
+        ros_args=request.ros_args,
         use_sim_time=config.node.use_sim_time,
     )
 
 
-def _of_file(config: Config | None, trial: Trial) -> Iterator[Diagnosis]:
+def _of_file(config: Config | None, started: StartResult) -> Iterator[Diagnosis]:
     if config is not None:
         yield from check_listen(config.listen)
-        yield from check_types(config, trial.unusable)
-        if trial.names:
-            yield from check_remaps(config, trial.names)
+        yield from check_types(config, started.unusable)
+        if started.names:
+            yield from check_remaps(config, started.names)
 
 
 def _not_looked() -> Diagnosis:
-    return know(
+    return info(
         "not_looked",
-        "the graph was not looked at, because no node starts here",
-        so="--live could find nothing",
-        do="mend what is above first",
+        "--live did not look at the graph, because the relay cannot start here",
+        impact="problems in the graph are not shown",
+        fix="fix the errors above first",
     )
 
 
-def _look(config: Config | None, trial: Trial, *, seconds: float) -> Sighting:
+def _observe(config: Config | None, ros_args: Sequence[str], *, seconds: float) -> Observed | None:
+    """Observe the groups as `--explain` does, or the graph alone; None where remaps make names of the file meet."""
     from syncrelay.ros.environment import require_rclpy  # noqa: PLC0415  rclpy is imported where the graph is wanted
 
     require_rclpy()
-    from syncrelay.ros.look import look  # noqa: PLC0415
+    from syncrelay.ros.entities import Purpose  # noqa: PLC0415
+    from syncrelay.ros.graph import snapshot  # noqa: PLC0415
+    from syncrelay.ros.hidden_node import watch_graph  # noqa: PLC0415
+    from syncrelay.ros.relay import Relay  # noqa: PLC0415
 
-    topics = [topic for group in (config.groups if config else ()) for topic in group.topics]
-    outputs = [trial.names[topic.output] for topic in topics]
-    return look(_topics(config, trial), outputs=outputs, seconds=seconds, use_sim_time=trial.use_sim_time)
+    if config is None:
+        return Observed(seconds, watch_graph(seconds=seconds))
+    try:
+        relay = Relay(config, ros_args=ros_args, purpose=Purpose.OBSERVE)
+    except ConfigError:
+        return None
+    with relay:
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            relay.step(left)
+        reports = relay.evaluate()
+        return Observed(seconds, snapshot(relay.node), reports, relay.monitor.unjudged)
 
 
 def _of_graph(
-    sighting: Sighting, config: Config | None, trial: Trial, environ: Mapping[str, str]
+    observed: Observed, config: Config | None, started: StartResult, environ: Mapping[str, str]
 ) -> Iterator[Diagnosis]:
-    yield from check_company(sighting, domain=domain_of(environ) or 0, discovery_range=range_of(environ))
+    yield from check_graph(observed.graph)
     if config is None:
         return
-    yield from check_clock(sighting, use_sim_time=trial.use_sim_time)
-    yield from check_own_name(sighting, trial.node)
-    yield from check_outputs(sighting, trial.node)
-    yield from check_topics(sighting, optional=_optional(config, trial))
+    yield from check_clock(observed.graph, use_sim_time=started.use_sim_time)
+    yield from check_own_name(observed.graph, started.node)
+    yield from check_groups(observed.reports, observed.unjudged)
     if config.node.transport == "default" and uses_defaults(environ):
-        yield from check_sizes(sighting)
-    yield from check_stamps(sighting.topics, _matched(config, trial))
-
-
-def _topics(config: Config | None, trial: Trial) -> dict[str, TopicConfig]:
-    groups = config.groups if config else ()
-    topics: dict[str, TopicConfig] = {}
-    for group in groups:
-        for topic in group.topics:
-            topics.setdefault(trial.names[topic.topic], topic)
-    return topics
-
-
-def _optional(config: Config, trial: Trial) -> frozenset[str]:
-    topics = [topic for group in config.groups for topic in group.topics]
-    required = {trial.names[topic.topic] for topic in topics if topic.required}
-    return frozenset(trial.names[topic.topic] for topic in topics) - required
-
-
-def _matched(config: Config, trial: Trial) -> list[Matched]:
-    return [
-        Matched(
-            group.name,
-            {trial.names[topic.topic]: topic.offset_ns for topic in group.topics if topic.stamp != "receive"},
-        )
-        for group in config.groups
-        if all(topic.key is None for topic in group.topics)
-    ]
+        yield from check_sizes(observed.reports)

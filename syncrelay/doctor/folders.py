@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.doctor.diagnosis import Diagnosis, error, info
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +29,18 @@ def check_folders(found: Written) -> Iterator[Diagnosis]:
         place = f"{found.log_folder} (by {found.log_named_by})"
         yield _log(f"ROS's log folder cannot be written: {place}: {found.log_fault}")
     if found.heartbeat_fault:
-        yield mend(
+        yield error(
             "heartbeat",
             f"the heartbeat cannot be written: SYNCRELAY_HEARTBEAT={found.heartbeat}: {found.heartbeat_fault}",
-            so="the relay runs, but `syncrelay healthcheck` and a container's health say that it does not",
-            do="name a file in a folder that exists and that this user may write, e.g. /tmp/syncrelay.heartbeat",
+            impact="the relay runs, but `syncrelay healthcheck` and a container's health check report that it does not",
+            fix="use a file in an existing folder that this user can write to, such as /tmp/syncrelay.heartbeat",
         )
 
 
 def _log(what: str) -> Diagnosis:
-    return know(
+    return info(
         "log_folder",
         what,
-        so="the relay runs without ROS's log file (its own log is on stderr), but other nodes fail at start",
-        do="export ROS_LOG_DIR=/tmp/ros-log    or any other folder that this user may write",
+        impact="the relay runs without ROS's log file (its own log is on stderr), but other nodes fail to start",
+        fix="export ROS_LOG_DIR=/tmp/ros-log    or any other folder that this user can write to",
     )

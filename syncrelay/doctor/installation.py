@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from syncrelay.config.wording import all_of
-from syncrelay.doctor.diagnosis import Diagnosis, mend
+from syncrelay.doctor.diagnosis import Diagnosis, error
 
 WHEEL_PYTHONS: Final = ((3, 11), (3, 12))
 """The versions of Python for which the ROS 2 Jazzy wheels are built."""
@@ -70,29 +70,29 @@ def check_installation(found: Installation) -> Iterator[Diagnosis]:
 
 def _no_rclpy(found: Installation) -> Diagnosis:
     what = f"rclpy is not installed in {_python(found)}"
-    so = "nothing of ROS can be used here: the relay does not start, and the graph cannot be looked at"
+    impact = "ROS cannot be used here: the relay does not start, and --live cannot look at the graph"
     if found.sourced or found.distribution:
         name = found.distribution or found.sourced[0]
-        return mend(
+        return error(
             "no_rclpy",
             f"{what}, though ROS 2 ({name}) is sourced",
-            so=so,
-            do="use the Python that this ROS was built for, in a venv made with:\n"
+            impact=impact,
+            fix="use the Python that this ROS was built for, in a venv made with:\n"
             "python3 -m venv --system-site-packages",
         )
     if found.unsourced:
-        return mend(
+        return error(
             "no_rclpy",
             f"{what}: ROS 2 is installed at {found.unsourced[-1]} but not sourced",
-            so=so,
-            do=f"source {found.unsourced[-1]}/setup.bash    and start syncrelay from that shell",
+            impact=impact,
+            fix=f"source {found.unsourced[-1]}/setup.bash    and start syncrelay from that shell",
         )
-    return mend("no_rclpy", what, so=so, do=_way_to_rclpy(found))
+    return error("no_rclpy", what, impact=impact, fix=_way_to_rclpy(found))
 
 
 def _way_to_rclpy(found: Installation) -> str:
     if found.machine != WHEEL_MACHINE:
-        return f"source a ROS 2 Jazzy of this machine's packages: there are no wheels for {found.machine}"
+        return f"install ROS 2 Jazzy from packages and source it: there are no wheels for {found.machine}"
     if found.python not in WHEEL_PYTHONS:
         versions = " and ".join(f"{major}.{minor}" for major, minor in WHEEL_PYTHONS)
         return f"make the venv with another Python: the wheels are for {versions}; or source a ROS 2 built for this one"
@@ -101,22 +101,22 @@ def _way_to_rclpy(found: Installation) -> str:
 
 def _other_python(found: Installation) -> Diagnosis:
     versions = all_of(f"{major}.{minor}" for major, minor in found.built_for)
-    return mend(
+    return error(
         "other_python",
         f"rclpy at {found.rclpy} is built for Python {versions}, this is {_python(found)}",
-        so="import rclpy fails: its compiled part does not load",
-        do=f"start syncrelay with Python {versions}, or install rclpy for this one",
+        impact="import rclpy fails: its compiled part does not load",
+        fix=f"start syncrelay with Python {versions}, or install rclpy for this one",
     )
 
 
 def _two_sets(found: Installation) -> Iterator[Diagnosis]:
     if found.wheels and found.sourced:
         places = all_of(str(prefix) for prefix in found.sourced)
-        yield mend(
+        yield error(
             "two_ros",
             f"ROS 2 is sourced ({places}), and its wheels are installed in this Python too",
-            so="two sets of the same libraries meet in one process: it crashes, or types are not found",
-            do="start from a shell without ROS sourced, or use a venv without the wheels:\n"
+            impact="two sets of the same libraries meet in one process: it crashes, or types are not found",
+            fix="start from a shell without ROS sourced, or use a venv without the wheels:\n"
             "python3 -m venv --system-site-packages, then pip install . in a clone of syncrelay",
         )
 
@@ -129,30 +129,30 @@ def _unmet(found: Installation) -> Iterator[Diagnosis]:
         ]
         more = len(found.unmet) - len(lines)
         rest = [f"and {more} more"] if more else []
-        yield mend(
+        yield error(
             "wheels_disagree",
-            "\n".join(["ROS wheels that don't belong together:", *lines, *rest]),
-            so="their libraries do not load together, or crash with messages",
-            do="install them anew in one go, in a clone of syncrelay: pip install --force-reinstall '.[ros]'",
+            "\n".join(["the installed ROS wheels do not belong together:", *lines, *rest]),
+            impact="their libraries fail to load, or crash on messages",
+            fix="reinstall them together, in a clone of syncrelay: pip install --force-reinstall '.[ros]'",
         )
 
 
 def _middleware(found: Installation) -> Iterator[Diagnosis]:
     asked, there = found.middleware_asked, found.middlewares
     if not there:
-        yield mend(
+        yield error(
             "no_middleware",
             "rclpy is installed without a middleware (no rmw_... in the ament index)",
-            so="import rclpy fails: there is nothing that could send or receive",
-            do="pip install 'ros-jazzy-rclpy[fastrtps]'    where rclpy is a wheel;\n"
-            "else: apt-get install ros-jazzy-rmw-fastrtps-cpp, and source ROS anew",
+            impact="import rclpy fails: nothing can send or receive",
+            fix="pip install 'ros-jazzy-rclpy[fastrtps]'    where rclpy is a wheel;\n"
+            "else: apt-get install ros-jazzy-rmw-fastrtps-cpp, and source ROS again",
         )
     elif asked and asked not in there:
-        yield mend(
+        yield error(
             "middleware_not_there",
-            f"RMW_IMPLEMENTATION asks for {asked}, which is not installed here; there is {', '.join(there)}",
-            so="ROS ends the whole process when rclpy is imported, without an exception",
-            do=f"unset RMW_IMPLEMENTATION    or install {asked} (ros-jazzy-{asked.replace('_', '-')}).\n"
+            f"RMW_IMPLEMENTATION asks for {asked}, which is not installed here; installed: {', '.join(there)}",
+            impact="ROS ends the whole process when rclpy is imported, without an exception",
+            fix=f"unset RMW_IMPLEMENTATION    or install {asked} (ros-jazzy-{asked.replace('_', '-')}).\n"
             "All nodes of a robot should use one middleware",
         )
 

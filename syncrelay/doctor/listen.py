@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from syncrelay.config import Listen
-from syncrelay.doctor.diagnosis import Diagnosis, know
+from syncrelay.doctor.diagnosis import Diagnosis, info
 from syncrelay.errors import ListenError
 
 
@@ -18,9 +18,9 @@ def check_listen(listen: Listen | None) -> Iterator[Diagnosis]:
         with Server(listen):
             pass
     except ListenError as error:
-        yield know(
+        yield info(
             "listen",
             str(error),
-            so="the relay ends at once with exit code 1, unless it is the one that listens there",
-            do="`syncrelay top` shows what answers; else give `metrics` another `listen`",
+            impact="the relay exits at once with code 1, unless it is the one that listens there already",
+            fix="`syncrelay top` shows whether a relay answers there; if not, give `metrics` another `listen`",
         )

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.doctor.diagnosis import Diagnosis, error, info
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,36 +22,36 @@ def check_network(interfaces: Sequence[Interface], *, discovery_range: str, midd
     loopback = [each for each in interfaces if each.is_loopback]
     others = [each for each in interfaces if each.is_up and not each.is_loopback]
     if not any(each.is_up for each in loopback):
-        yield mend(
+        yield error(
             "loopback_down",
             "the loopback interface (lo) is down",
-            so="nodes on this machine do not find each other",
-            do="ip link set lo up    (as root)",
+            impact="nodes on this machine do not find each other",
+            fix="ip link set lo up    (as root)",
         )
     elif not others:
         yield from _alone(loopback, discovery_range, middleware)
     if others and discovery_range == "SUBNET" and not any(each.multicast for each in others):
-        yield know(
+        yield info(
             "no_multicast",
             f"no interface but lo can do multicast ({', '.join(each.name for each in others)}), as with many VPNs",
-            so="nodes on other machines are not found by themselves",
-            do="name them on every machine: export ROS_STATIC_PEERS='ADDRESS;ADDRESS'",
+            impact="nodes on other machines are not found automatically",
+            fix="list them on every machine: export ROS_STATIC_PEERS='ADDRESS;ADDRESS'",
         )
 
 
 def _alone(loopback: Sequence[Interface], discovery_range: str, middleware: str) -> Iterator[Diagnosis]:
     # Fast DDS finds its own over a loopback without multicast (measured); Cyclone DDS does not.
     if "cyclonedds" in middleware and not any(each.multicast for each in loopback):
-        yield mend(
+        yield error(
             "loopback_multicast",
             "lo is the only network interface, and it has no multicast",
-            so="Cyclone DDS finds no node over it",
-            do="ip link set lo multicast on    (as root), or use rmw_fastrtps_cpp",
+            impact="Cyclone DDS finds no node over it",
+            fix="ip link set lo multicast on    (as root), or use rmw_fastrtps_cpp",
         )
     elif discovery_range != "LOCALHOST":
-        yield know(
+        yield info(
             "no_network",
             "there is no network interface but lo",
-            so="only nodes on this machine, or in this container, are found",
-            do="nothing if all nodes are here; else bring the network up (Docker: --network host)",
+            impact="only nodes on this machine, or in this container, are found",
+            fix="nothing if all nodes are here; otherwise bring the network up (Docker: --network host)",
         )

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.doctor.diagnosis import Diagnosis, error, info
 from syncrelay.doctor.discovery import ports_of
 
 # One participant with the default segment size of 512 kB, and its ports.
@@ -41,11 +41,11 @@ class SharedMemory:
 def check_shared_memory(found: SharedMemory, *, domain: int | None) -> Iterator[Diagnosis]:
     """Yield what keeps messages from passing through shared memory; None for a domain that is not known."""
     if found.fault:
-        yield know(
+        yield info(
             "shm_unusable",
             f"{found.folder} cannot be written: {found.fault}",
-            so="Fast DDS goes on over UDP alone; large messages cost more",
-            do="mount a tmpfs there (Docker: --shm-size 64m), or say it: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+            impact="Fast DDS uses UDP only; large messages cost more",
+            fix="mount a tmpfs there (Docker: --shm-size 64m), or choose UDP: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
         )
         return
     yield from _room(found)
@@ -56,19 +56,19 @@ def check_shared_memory(found: SharedMemory, *, domain: int | None) -> Iterator[
 def _room(found: SharedMemory) -> Iterator[Diagnosis]:
     what = f"{_size(found.free)} of {_size(found.total)} are free in {found.folder}"
     if found.free < _NEEDED:
-        yield mend(
+        yield error(
             "shm_full",
             f"{what}; one node needs {_size(_NEEDED)}",
-            so="nodes start without shared memory, and peers that expect it may get no data",
-            do="free it (see `df -h /dev/shm`, `ls -l /dev/shm`), or make it larger\n"
+            impact="nodes start without shared memory, and peers that expect it may get no data",
+            fix="free it (see `df -h /dev/shm`, `ls -l /dev/shm`), or make it larger\n"
             "(mount -o remount,size=64M /dev/shm, Docker: --shm-size 64m)",
         )
     elif found.free < _TIGHT:
-        yield know(
+        yield info(
             "shm_tight",
             what,
-            so=f"each node takes {_size(_NEEDED)}, more with a larger segment_size: the next nodes may find none",
-            do="make it larger (mount -o remount,size=64M /dev/shm, Docker: --shm-size 64m)",
+            impact=f"each node takes {_size(_NEEDED)}, more with a larger segment_size: the next may find no room",
+            fix="make it larger (mount -o remount,size=64M /dev/shm, Docker: --shm-size 64m)",
         )
 
 
@@ -77,19 +77,19 @@ def _foreign(found: SharedMemory, ports: range) -> Iterator[Diagnosis]:
     here = [each for each in found.files if each.is_live and each.uid != found.uid]
     in_domain = sorted({each.owner for each in here if each.port in ports})
     if in_domain:
-        yield mend(
+        yield error(
             "shm_foreign",
             f"nodes of another user ({', '.join(in_domain)}) run on this domain and use shared memory",
-            so="their topics are listed but bring no data: neither user may open the other's files in /dev/shm",
-            do="run all nodes as one user, or on both sides: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+            impact="their topics are listed, but no data arrives: neither user may open the other's files in /dev/shm",
+            fix="run all nodes as one user, or on both sides: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
         )
     elsewhere = sorted({each.owner for each in here if each.port is None} - set(in_domain))
     if elsewhere:
-        yield know(
+        yield info(
             "shm_foreign",
             f"processes of another user ({', '.join(elsewhere)}) use DDS over shared memory, perhaps on other domains",
-            so="should you need their topics: they are listed but bring no data from user to user",
-            do="nothing if you don't; else on both sides: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+            impact="if you need their topics: they are listed, but no data passes from user to user",
+            fix="nothing if you don't; otherwise on both sides: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
         )
 
 
@@ -99,11 +99,11 @@ def _stale(found: SharedMemory) -> Iterator[Diagnosis]:
         return
     owners = sorted({each.owner for each in stale if each.uid != found.uid})
     whose = f", some of {', '.join(owners)}" if owners else ""
-    yield know(
+    yield info(
         "shm_stale",
         f"{_counted(stale)} in /dev/shm left by processes that were killed: {_size(_bytes(stale))}{whose}",
-        so="they take room and are never removed by themselves; they keep no message from flowing",
-        do=f"when it suits, in bash{' as root' if owners else ''}; what is in use is left alone:\n{_CLEAN}",
+        impact="they take up memory until somebody removes them; messages are not affected",
+        fix=f"at any time, in bash{' as root' if owners else ''}; files in use are left alone:\n{_CLEAN}",
     )
 
 
@@ -112,7 +112,7 @@ def _bytes(files: Sequence[ShmFile]) -> int:
 
 
 def _counted(files: Sequence[ShmFile]) -> str:
-    return "1 file of Fast DDS" if len(files) == 1 else f"{len(files)} files of Fast DDS"
+    return "1 Fast DDS file" if len(files) == 1 else f"{len(files)} Fast DDS files"
 
 
 def _size(count: int) -> str:

@@ -1,42 +1,42 @@
-"""What came of starting a node for a trial."""
+"""What came of starting a node for a started."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from syncrelay.doctor.diagnosis import Diagnosis, Severity, know, mend
-from syncrelay.ros.trial import Step, Trial
+from syncrelay.doctor.diagnosis import Diagnosis, Severity, error, info
+from syncrelay.doctor.start_check import StartResult, Step
 
 _WHAT: Final = {
     Step.IMPORT: "rclpy cannot be imported",
     Step.TYPES: "message types cannot be imported",
     Step.INIT: "ROS does not start",
-    Step.NODE: "a node does not start here",
-    Step.NAMES: "a node started here does not live",
+    Step.NODE: "no node starts here",
+    Step.NAMES: "a node starts here, but fails at once",
 }
 
 
-def check_start(trial: Trial, *, before: Sequence[Diagnosis]) -> Iterator[Diagnosis]:
-    """Yield why a node does not start, unless something to mend that was found `before` explains it.
+def check_start(started: StartResult, *, before: Sequence[Diagnosis]) -> Iterator[Diagnosis]:
+    """Yield why a node does not start, unless an error that was found `before` explains it.
 
     Of one that starts, yield why it receives at a higher cost, if it does.
     """
-    if trial.path_fault:
-        yield know(
+    if started.path_fault:
+        yield info(
             "receive_path",
-            f"messages pass through rclpy: librcl is not as expected here ({trial.path_fault})",
-            so="the relay works, and each message costs it more CPU",
-            do="report it, with the first line of this examination",
+            f"messages pass through rclpy: librcl is not as expected here ({started.path_fault})",
+            impact="the relay works, but each message costs more CPU",
+            fix="please report it, with the first line of this output",
         )
-    if trial.failed is Step.ARGUMENTS:
-        fault, _, advice = trial.fault.partition("\n")
-        yield mend("ros_args", fault, so="the relay ends at once with exit code 2", do=advice.strip())
+    if started.failed is Step.ARGUMENTS:
+        fault, _, advice = started.fault.partition("\n")
+        yield error("ros_args", fault, impact="the relay exits at once with code 2", fix=advice.strip())
         return
-    if trial.failed is None or any(found.severity is Severity.MEND for found in before):
+    if started.failed is None or any(found.severity is Severity.ERROR for found in before):
         return
-    yield mend(
+    yield error(
         "no_start",
-        f"{_WHAT[trial.failed]}:\n{trial.fault}",
-        so="the relay does not start either",
-        do="search for the line above; try in an empty environment: env -i HOME=$HOME PATH=$PATH syncrelay doctor\n"
-        "where that works, a variable of this shell is to blame",
+        f"{_WHAT[started.failed]}:\n{started.fault}",
+        impact="the relay does not start either",
+        fix="search for the line above, and try an empty environment: env -i HOME=$HOME PATH=$PATH syncrelay doctor\n"
+        "if that works, a variable of this shell is the cause",
     )

@@ -1,42 +1,50 @@
 """Diagnoses and the graph as text: aligned, the worst first, the verdict last."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
 
 from rich.cells import cell_len
 
+from syncrelay.config.wording import counted
 from syncrelay.doctor.diagnosis import Diagnosis, Severity
-from syncrelay.doctor.graph import summary
-from syncrelay.doctor.stamps import delay_of
-from syncrelay.doctor.words import duration
+from syncrelay.doctor.examine import Observed
+from syncrelay.explain import Code, InputFacts, words
 from syncrelay.printable import printable
-from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
 
 _BOLD, _RED, _YELLOW, _DIM, _RESET = "\033[1m", "\033[31m", "\033[33m", "\033[2m", "\033[0m"
-_MARK: Final = {Severity.MEND: _RED, Severity.KNOW: _YELLOW}
-_INDENT: Final = "      "
+_MARK: Final = {Severity.ERROR: _RED, Severity.WARNING: _YELLOW, Severity.INFO: _BOLD}
+_INDENT: Final = " " * len("warning  ")
+_LONG: Final = 100_000_000_000
 
 
 def diagnosis_lines(found: Diagnosis, *, colour: bool) -> Iterator[str]:
-    """Yield a block: what is so, marked with its severity, then what follows and what to do."""
+    """Yield a block: what is wrong, marked with its severity, then its impact and how to fix it."""
     mark, bold, dim, reset = (_MARK[found.severity], _BOLD, _DIM, _RESET) if colour else ("", "", "", "")
     first, *rest = found.what.splitlines()
-    yield f"{mark}{found.severity.value:<6}{reset}{bold}{printable(first)}{reset}"
+    yield f"{mark}{found.severity.value:<{len(_INDENT)}}{reset}{bold}{printable(first)}{reset}"
     yield from (f"{_INDENT}{printable(line)}" for line in rest)
-    yield from _labelled("so", found.so, dim, reset)
-    yield from _labelled("do", found.do, dim, reset)
+    if found.impact is not None:
+        yield from _labelled("impact", found.impact, dim, reset)
+    if found.fix is not None:
+        yield from _labelled("fix", found.fix, dim, reset)
 
 
 def _labelled(label: str, text: str, dim: str, reset: str) -> Iterator[str]:
     first, *rest = text.splitlines()
-    yield f"{_INDENT}{dim}{label}{reset}  {printable(first)}"
-    yield from (f"{_INDENT}    {printable(line)}" for line in rest)
+    yield f"{_INDENT}{dim}{label + ':':<8}{reset}{printable(first)}"
+    yield from (f"{_INDENT}{'':8}{printable(line)}" for line in rest)
 
 
-def sighting_lines(sighting: Sighting) -> Iterator[str]:
-    """Yield what was seen of the graph: a line of counts, then a line for each topic of the file."""
-    yield f"seen in {sighting.seconds:.0f} s: {summary(sighting)}"
-    yield from aligned([_row(topic) for topic in sighting.topics])
+def observed_lines(observed: Observed) -> Iterator[str]:
+    """Yield what was seen: a line of counts, a line for each topic of the file, then how its healthy groups fare."""
+    graph = observed.graph
+    nodes, topics = counted(len(graph.nodes), "other node"), counted(graph.n_topics, "published topic")
+    yield f"observed for {observed.seconds:g} s: {nodes}, {topics}"
+    inputs = {each.name: each for report in observed.reports for each in report.facts.inputs}
+    yield from aligned([_row(each) for each in inputs.values()])
+    for report in observed.reports:
+        yield from (f"  {report.facts.name}: {each.text}" for each in report.findings if each.code is Code.HEALTHY)
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -47,28 +55,27 @@ def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
         yield f"  {'  '.join(padded)}".rstrip()
 
 
-def _row(topic: SeenTopic) -> tuple[str, ...]:
-    delay = delay_of(topic)
-    age = "" if delay is None else f"stamps {duration(abs(delay))} {'old' if delay >= 0 else 'ahead'}"
-    rate = f"{topic.rate_hz:.1f} Hz" if topic.rate_hz else f"{topic.received} received"
-    return topic.name, topic.type, rate, age, _publishers(topic)
+def _row(topic: InputFacts) -> tuple[str, ...]:
+    figures = topic.figures
+    came = f"{figures.rate_hz:.1f} Hz" if figures.rate_hz else f"{topic.counts.fed} received"
+    stamps = "" if figures.delay is None else _age(figures.delay)
+    return topic.name, topic.type, came, stamps, "; ".join(_publishers(topic)) or "no publisher"
 
 
-def _publishers(topic: SeenTopic) -> str:
-    return "; ".join(_publisher(each, topic.type) for each in topic.publishers) or "no publisher"
+def _age(delay: int) -> str:
+    size = abs(delay)
+    lasting = words.duration(size) if size < _LONG else words.seconds(size)
+    return f"stamps {lasting} {'old' if delay >= 0 else 'ahead'}"
 
 
-def _publisher(publisher: SeenPublisher, wanted: str) -> str:
-    strange = "" if publisher.type == wanted else f"{publisher.type}, "
-    return f"{publisher.node or 'a nameless node'} ({strange}{publisher.offers})"
+def _publishers(topic: InputFacts) -> Iterator[str]:
+    for each in topic.graph.publishers:
+        yield each.node if each.type == topic.type else f"{each.node} ({each.type})"
 
 
 def verdict(diagnoses: Sequence[Diagnosis]) -> str:
     """Return the last line."""
-    to_mend = sum(1 for each in diagnoses if each.severity is Severity.MEND)
-    to_know = len(diagnoses) - to_mend
-    things = [f"{to_mend} {'thing' if to_mend == 1 else 'things'} to mend"] if to_mend else []
-    things += [f"{to_know} to know"] if to_know else []
-    if not to_mend:
-        things.insert(0, "nothing to mend")
-    return ", ".join(things)
+    counts = Counter(each.severity for each in diagnoses)
+    problems = [counted(counts[each], each.value) for each in (Severity.ERROR, Severity.WARNING) if counts[each]]
+    hints = [f"{counts[Severity.INFO]} info"] if counts[Severity.INFO] else []
+    return ", ".join([*(problems or ["no problems found"]), *hints])

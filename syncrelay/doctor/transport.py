@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from syncrelay.config.wording import did_you_mean
-from syncrelay.doctor.diagnosis import Diagnosis, know, mend
+from syncrelay.doctor.diagnosis import Diagnosis, error, info
 
 _VARIABLE: Final = "FASTDDS_BUILTIN_TRANSPORTS"
 _PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _TRANSPORTS: Final = ("DEFAULT", "UDPv4", "SHM", "UDPv6", "DEFAULTv6", "LARGE_DATA", "LARGE_DATAv6")
 _WITH_SHARED_MEMORY: Final = ("DEFAULT", "SHM", "DEFAULTv6", "LARGE_DATA", "LARGE_DATAv6")
-_EXPECTED: Final = (
-    "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    where there are containers or several users; else unset it"
-)
+_EXPECTED: Final = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    with containers or several users; otherwise unset it"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,37 +34,37 @@ def uses_defaults(environ: Mapping[str, str]) -> bool:
 
 
 def check_transport(found: Transport) -> Iterator[Diagnosis]:
-    """Yield values that Fast DDS refuses, and those that narrow whom data reach."""
+    """Yield values that Fast DDS refuses, and those that limit which nodes data reach."""
     if found.profiles_fault:
-        yield mend(
+        yield error(
             "profiles_file",
             f"{_PROFILES}={found.environ[_PROFILES]}: {found.profiles_fault}",
-            so="Fast DDS goes on without these profiles: QoS, transports and peers are not what the file says",
-            do=f"mend the path (in a container: mount the file), or: unset {_PROFILES}",
+            impact="Fast DDS ignores it: QoS, transports and peers are not what the file says",
+            fix=f"fix the path (in a container: mount the file), or: unset {_PROFILES}",
         )
     asked = found.environ.get(_VARIABLE)
     word = (asked or "").partition("?")[0]
     if asked is None:
         return
     if word == "NONE":
-        yield mend(
+        yield error(
             "transports",
-            f"{_VARIABLE}=NONE leaves no way for messages",
-            so="no node starts, unless a profiles file brings transports of its own",
-            do=f"unset {_VARIABLE}",
+            f"{_VARIABLE}=NONE disables every transport",
+            impact="no node starts, unless a profiles file defines transports",
+            fix=f"unset {_VARIABLE}",
         )
     elif word not in _TRANSPORTS:
         unknown = f"{_VARIABLE}={asked} is unknown{did_you_mean(word, _TRANSPORTS)}"
-        yield mend(
+        yield error(
             "transports",
             unknown if word else f"{_VARIABLE} is set but empty, which Fast DDS refuses",
-            so="Fast DDS goes on as if it were unset: with shared memory, which does not cross containers and users",
-            do=_EXPECTED,
+            impact="Fast DDS ignores it and uses shared memory, which does not reach other containers and users",
+            fix=_EXPECTED,
         )
     elif word == "SHM":
-        yield know(
+        yield info(
             "transports",
             f"{_VARIABLE}=SHM",
-            so="only nodes of the same user on this machine are reached",
-            do=f"nothing if all nodes are; else: unset {_VARIABLE}",
+            impact="only nodes of the same user on this machine are reached",
+            fix=f"nothing if all nodes are; otherwise: unset {_VARIABLE}",
         )

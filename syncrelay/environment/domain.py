@@ -1,4 +1,4 @@
-"""The domain that ROS_DOMAIN_ID names, as rcl reads it."""
+"""Which graph a node joins, as rcl reads it from the environment: its domain, and how far discovery reaches."""
 
 import re
 from collections.abc import Mapping
@@ -7,6 +7,8 @@ from typing import Final
 from syncrelay.errors import RosUnavailableError
 from syncrelay.printable import printable
 
+DISCOVERY_RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+DOMAIN_ADVICE: Final = "export ROS_DOMAIN_ID=0    or the number that the other nodes have; 0 to 101 are safe on Linux"
 _LARGEST_DOMAIN: Final = 232
 # rcl reads numbers as C does: a leading 0 is octal, 0x hexadecimal, and what follows the digits is passed over.
 _NUMBER: Final = re.compile(r"\s*\+?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)(.*)", re.DOTALL)
@@ -27,10 +29,18 @@ def domain_of(environ: Mapping[str, str]) -> int | None:
     return number
 
 
+def range_of(environ: Mapping[str, str]) -> str:
+    """Return how far discovery reaches: one of DISCOVERY_RANGES."""
+    if environ.get("ROS_LOCALHOST_ONLY") == "1":
+        return "LOCALHOST"
+    asked = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") or "SUBNET"
+    return asked if asked in DISCOVERY_RANGES else "LOCALHOST"
+
+
 def no_domain(environ: Mapping[str, str]) -> str:
-    """Say what is wrong with a ROS_DOMAIN_ID of which `domain_of` makes nothing."""
+    """Say what is wrong with a ROS_DOMAIN_ID for which `domain_of` returns None."""
     return (
-        f"ROS_DOMAIN_ID={printable(environ['ROS_DOMAIN_ID'])} is no domain: expected a number from 0 to"
+        f"ROS_DOMAIN_ID={printable(environ['ROS_DOMAIN_ID'])} is not a domain: expected a number from 0 to"
         f" {_LARGEST_DOMAIN}"
     )
 
@@ -41,7 +51,4 @@ def require_domain(environ: Mapping[str, str]) -> None:
     To be asked before rclpy starts: of 300 Fast DDS ends the whole process, and rcl takes -1 for the default.
     """
     if domain_of(environ) is None:
-        raise RosUnavailableError(
-            f"{no_domain(environ)}\n"
-            "  export ROS_DOMAIN_ID=0    or the number that the other nodes have; 0 to 101 are safe on Linux"
-        )
+        raise RosUnavailableError(f"{no_domain(environ)}\n  {DOMAIN_ADVICE}")

@@ -9,6 +9,7 @@ from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
     ClockState,
     Endpoint,
+    GraphSnapshot,
     GroupFacts,
     InputFacts,
     InputGraph,
@@ -23,6 +24,7 @@ from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
+from syncrelay.explain.rules_graph import no_other_node
 from syncrelay.explain.suggestions import TryBudget
 from syncrelay.explain.watch import GroupWatch
 
@@ -38,6 +40,7 @@ __all__ = [
     "EngineDriver",
     "Finding",
     "FindingLog",
+    "GraphSnapshot",
     "GroupFacts",
     "GroupFigures",
     "GroupReport",
@@ -62,6 +65,7 @@ __all__ = [
     "explanation",
     "in_words",
     "judge",
+    "no_other_node",
     "recent",
     "with_ok",
 ]

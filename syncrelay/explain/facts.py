@@ -24,11 +24,31 @@ class Mismatch:
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher of an input or a subscriber of an output: its node, its type, why it does not connect to us."""
+    """A publisher of an input or a subscriber of an output: its node, its type, why it does not connect to us.
+
+    `is_named` is False where DDS has found the endpoint but not yet its node; `node` then says so.
+    """
 
     node: str
     type: str
     mismatch: Mismatch | None = None
+    is_named: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class GraphSnapshot:
+    """The whole graph at one moment. `nodes` are the full names of all other nodes, each as often as it is there.
+
+    `discovery_range` is ROS_AUTOMATIC_DISCOVERY_RANGE as rcl reads it. `n_topics` counts the topics with publishers,
+    `n_unreached` those of them with a publisher whose node is not known.
+    """
+
+    domain: int
+    discovery_range: str
+    nodes: tuple[str, ...] = ()
+    n_topics: int = 0
+    n_unreached: int = 0
+    has_clock: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +88,7 @@ class InputGraph:
     cannot be used here, `not_readable` why the stamp or key that the file names cannot be read from it, `refusal` what
     DDS does not make or publish for it, `alike` are topics of the graph that may have been meant, `lost` counts what
     DDS lost on the way of late. `rivals` are others that publish its output, seen so without a break since
-    `rivals_since`.
+    `rivals_since`. `largest` is the size of the largest message in bytes, 0 where nobody measures it.
     """
 
     name: str
@@ -82,6 +102,7 @@ class InputGraph:
     lost: int = 0
     rivals: tuple[Endpoint, ...] = ()
     rivals_since: int = 0
+    largest: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +157,8 @@ class GroupFacts:
     others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
-    late; `failure` what stopped the group for good. `evaluator` tries other values of the file on the last messages,
-    None where they cannot be run again.
+    late; `failure` what stopped the group for good; `empty_graph` the graph, where it holds no node but our own.
+    `evaluator` tries other values of the file on the last messages, None where they cannot be run again.
     """
 
     name: str
@@ -158,6 +179,7 @@ class GroupFacts:
     standstill: Standstill | None = None
     failure: str | None = None
     evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
+    empty_graph: GraphSnapshot | None = None
 
     @property
     def required_first(self) -> Sequence[int]:

@@ -1,6 +1,6 @@
 """When to say that a group is silent: not at once, not at every poll, and once when it is over."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Final, NamedTuple
 
 from syncrelay.explain import words
@@ -36,8 +36,13 @@ class FindingLog:
         self._well_since = 0
         self._warned: dict[tuple[Code, int | None], _Warning] = {}
 
-    def remarks(self, facts: GroupFacts, findings: tuple[Finding, ...]) -> Iterator[Remark]:
-        """Yield what is to be said now; findings that all is well may be left out."""
+    def remarks(
+        self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code] = ()
+    ) -> Iterator[Remark]:
+        """Yield what is to be said now; findings that all is well may be left out.
+
+        What is `explained` by others is not over where it is not found.
+        """
         now = facts.figures.now
         if facts.is_silent:
             yield from self._silent(facts, explanation(findings), now)
@@ -46,7 +51,7 @@ class FindingLog:
             if self._told:
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}", None)
             self._quiet_since, self._told, self._well_since = None, False, now
-        yield from self._warnings(findings, now)
+        yield from self._warnings(findings, explained, now)
 
     def _silent(self, facts: GroupFacts, finding: Finding, now: int) -> Iterator[Remark]:
         if self._quiet_since is None:
@@ -67,7 +72,7 @@ class FindingLog:
         ever = "no set" if facts.figures.last_set is None else "no more sets"
         yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", finding.code)
 
-    def _warnings(self, findings: tuple[Finding, ...], now: int) -> Iterator[Remark]:
+    def _warnings(self, findings: tuple[Finding, ...], explained: Collection[Code], now: int) -> Iterator[Remark]:
         for finding in findings:
             if finding.severity is Severity.OK:
                 continue
@@ -79,6 +84,9 @@ class FindingLog:
                 warning.told = warning.holds = True
                 yield Remark(Severity.WARN, in_words(finding), finding.code)
         for (code, _), warning in self._warned.items():
+            if warning.holds and code in explained:
+                # It may be so still: it is not looked for.
+                warning.seen = now
             if warning.holds and now - warning.seen >= _OVER:
                 warning.holds = False
                 yield Remark(Severity.OK, f"resolved {words.seconds(now - warning.seen)} ago: {warning.text}", code)

@@ -25,7 +25,8 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_graph.refused_by_dds),
     of_each_input(rules_graph.type_not_importable),
     of_each_input(rules_graph.other_type),
-    of_each_input(rules_graph.no_publisher),
+    rules_graph.alone,
+    rules_graph.no_publisher,
     of_each_input(rules_graph.incompatible_qos),
     rules_graph.no_clock,
     rules_graph.clock_stopped,
@@ -152,6 +153,15 @@ class Judge:
             found += rules_matching.few_sets(facts)
         return self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
 
+    def explained(self, facts: GroupFacts) -> frozenset[Code]:
+        """Return the codes of findings that causes may explain now: that they are not found does not end them."""
+        return frozenset(
+            code
+            for cause in self._causes.values()
+            for code in explained_by(cause.finding.code)
+            if cause.at >= _seen_since(code, facts)
+        )
+
     def _remember(self, found: Iterable[Finding], facts: GroupFacts) -> None:
         now = facts.figures.now
         if self._causes:
@@ -200,10 +210,16 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     is_narrow = finding.code not in explained.in_group or (about is not None and not facts.inputs[about].required)
     if is_narrow and about is not None and about != finding.input:
         return False
-    now, seen_since = facts.figures.now, _SEEN_SINCE.get(finding.code)
-    since = now - WINDOW_NS if seen_since is None else seen_since(facts)
-    # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
-    return cause.at >= (max(since, now - facts.silent_after) if finding.severity is Severity.ERROR else since)
+    since = _seen_since(finding.code, facts)
+    if finding.severity is Severity.ERROR:
+        # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
+        since = max(since, facts.figures.now - facts.silent_after)
+    return cause.at >= since
+
+
+def _seen_since(code: Code, facts: GroupFacts) -> int:
+    seen_since = _SEEN_SINCE.get(code)
+    return facts.figures.now - WINDOW_NS if seen_since is None else seen_since(facts)
 
 
 def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:

@@ -1,9 +1,11 @@
 """Findings about the graph and what we have there: publishers, subscribers, types, QoS, and who has gone silent."""
 
+from collections.abc import Sequence
 from typing import Final
 
+from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
-from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.facts import GraphSnapshot, GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks
 
 # Discovery takes this long.
@@ -81,20 +83,103 @@ def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             )
 
 
-def no_publisher(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find a topic that nobody publishes, or nobody any more."""
-    if an_input.graph.publishers or facts.figures.now - facts.figures.began < _GRACE:
+def alone(facts: GroupFacts) -> Found:
+    """Find that there is no other node in the graph, of a group to which nothing has come yet."""
+    graph = facts.empty_graph
+    if graph is None or not _is_past_grace(facts) or any(each.figures.last_received for each in facts.inputs):
         return
-    last = an_input.figures.last_received
-    gone = "" if last is None else f" any more, since {words.seconds(facts.figures.now - last)}"
+    yield Finding(
+        Code.ALONE,
+        Severity.ERROR if facts.is_silent else Severity.WARN,
+        no_other_node(graph),
+        "start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
+        " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`",
+    )
+
+
+def no_other_node(graph: GraphSnapshot) -> str:
+    """Say that a graph is empty, and which one it is."""
+    return f"no other node was found on domain {graph.domain} (discovery range {graph.discovery_range})"
+
+
+def no_publisher(facts: GroupFacts) -> Found:
+    """Find the topics that nobody publishes, and those that nobody publishes any more."""
+    if not _is_past_grace(facts):
+        return
+    missing = [index for index in facts.required_first if not facts.inputs[index].graph.publishers]
+    gone = [index for index in missing if facts.inputs[index].figures.last_received is not None]
+    if never := [index for index in missing if index not in gone]:
+        yield _without_publisher(facts, never, _never_published(facts, [facts.inputs[index] for index in never]))
     if gone:
-        suggestion = f"restart the node that published {an_input.name}"
-    elif an_input.graph.alike:
-        suggestion = f"did you mean `topic: {an_input.graph.alike[0]}`? It is published as {an_input.type}"
-    else:
-        suggestion = f"start the node that publishes {an_input.name}, or correct the topic's name"
-    text = f"nobody publishes {an_input.name} ({an_input.type}){gone}"
-    yield Finding(Code.NO_PUBLISHER, blocks(facts, an_input), text, suggestion, index)
+        yield _without_publisher(facts, gone, _no_longer_published(facts, [facts.inputs[index] for index in gone]))
+
+
+def _is_past_grace(facts: GroupFacts) -> bool:
+    return facts.figures.now - facts.figures.began >= _GRACE
+
+
+def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: tuple[str, str]) -> Finding:
+    severity = max(blocks(facts, facts.inputs[index]) for index in indices)
+    return Finding(Code.NO_PUBLISHER, severity, *words_of_it, indices[0] if len(indices) == 1 else None)
+
+
+def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[str, str]:
+    meant = _meant(facts, missing)
+    if len(missing) == 1:
+        (only,) = missing
+        text = f"nobody publishes {only.name} ({only.type})"
+        if meant:
+            return text, f"did you mean `topic: {meant[only.name]}`? It is published as {only.type}"
+        return text, f"start the node that publishes {only.name}, or correct the topic's name"
+    text = f"nobody publishes {one_of(each.name for each in missing)}"
+    if (moved := _in_another_namespace(missing)) is not None:
+        namespace, names = moved
+        return text, f"{all_of(names)} are published; did you mean namespace {namespace}?"
+    pairs = [f"{there} for {name}" for name, there in meant.items()]
+    hint = f"did you mean {all_of(pairs)}? Otherwise " if pairs else ""
+    return text, f"{hint}start the nodes that publish them, or correct the topics' names"
+
+
+def _meant(facts: GroupFacts, missing: Sequence[InputFacts]) -> dict[str, str]:
+    """Find for each topic the one that may have been meant: not another input's, and none twice."""
+    taken = {each.name for each in facts.inputs}
+    meant: dict[str, str] = {}
+    for each in missing:
+        if (there := next((name for name in each.graph.alike if name not in taken), None)) is not None:
+            meant[each.name] = there
+            taken.add(there)
+    return meant
+
+
+def _in_another_namespace(missing: Sequence[InputFacts]) -> tuple[str, list[str]] | None:
+    """Find the namespace in which all of these are published, and their names there."""
+    first = missing[0]
+    for name in first.graph.alike:
+        ours, theirs = _namespaces(first.name, name)
+        moved = [theirs + each.name.removeprefix(ours) for each in missing]
+        pairs = zip(moved, missing, strict=True)
+        if all(each.name.startswith(f"{ours}/") and there in each.graph.alike for there, each in pairs):
+            return theirs or "/", moved
+    return None
+
+
+def _namespaces(ours: str, theirs: str) -> tuple[str, str]:
+    """Return what two names begin with before the words that both end with."""
+    own_words, their_words = ours.split("/"), theirs.split("/")
+    while own_words and their_words and own_words[-1] == their_words[-1]:
+        own_words.pop()
+        their_words.pop()
+    return "/".join(own_words), "/".join(their_words)
+
+
+def _no_longer_published(facts: GroupFacts, gone: Sequence[InputFacts]) -> tuple[str, str]:
+    last = words.seconds(facts.figures.now - max(each.figures.last_received or 0 for each in gone))
+    if len(gone) == 1:
+        (only,) = gone
+        text = f"nobody publishes {only.name} ({only.type}) any more; its last message came {last} ago"
+        return text, f"restart the node that published {only.name}"
+    text = f"nobody publishes {one_of(each.name for each in gone)} any more; the last message came {last} ago"
+    return text, "restart the nodes that published them"
 
 
 def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -4,7 +4,15 @@ from collections.abc import Callable, Hashable, Sequence
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.clocks import Step
-from syncrelay.explain.facts import ClockState, GroupFacts, InputFacts, InputGraph, Standstill, Tolerance
+from syncrelay.explain.facts import (
+    ClockState,
+    GraphSnapshot,
+    GroupFacts,
+    InputFacts,
+    InputGraph,
+    Standstill,
+    Tolerance,
+)
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.suggestions import Evaluator, TryBudget
@@ -65,6 +73,7 @@ class GroupWatch:
         waited: int = 0,
         standstill: Standstill | None = None,
         failure: str | None = None,
+        empty_graph: GraphSnapshot | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
         options = self.config.options
@@ -100,6 +109,7 @@ class GroupWatch:
             standstill=standstill,
             failure=failure,
             evaluator=self._evaluator,
+            empty_graph=empty_graph,
         )
 
 

@@ -158,11 +158,11 @@ def _inputs_of(bindings: Sequence[GroupBinding]) -> list[InputBinding]:
 def _switch(ended: Sequence[GroupBinding], begun: Sequence[InputBinding]) -> None:
     """End some groups and begin others."""
     for each in _inputs_of(ended):
-        each.topic.detach(each.group)
+        each.topic.outputs.detach(each.group)
     for binding in ended:
         binding.group.flush(DropReason.SHUTDOWN)
     for each in begun:
-        each.topic.attach(each)
+        each.topic.outputs.attach(each)
 
 
 def _suspend(ended: Sequence[GroupBinding]) -> None:
@@ -174,6 +174,6 @@ def _suspend(ended: Sequence[GroupBinding]) -> None:
 def _resume(ended: Sequence[GroupBinding]) -> None:
     """Have groups that were to end go on, by the publishers that they have now."""
     for each in _inputs_of(ended):
-        each.topic.connect([each])
+        each.topic.outputs.connect([each])
     for binding in ended:
         binding.group.resume()

@@ -69,7 +69,7 @@ class Entities:
             return self._node.create_subscription(
                 message_type,
                 topic,
-                _never_called,
+                never_called,
                 profile,
                 raw=True,
                 callback_group=self._left_to_the_loop,
@@ -117,5 +117,5 @@ class Entities:
         self._holders.setdefault(name, {})[entity] = type_name
 
 
-def _never_called(_: bytes) -> None:
+def never_called(_: bytes) -> None:
     """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""

@@ -1,5 +1,6 @@
-"""What the graph shows of a topic's endpoints: nodes, types, and why they do not connect to us."""
+"""What the graph shows: its nodes and topics, and of a topic's endpoints why they do not connect to us."""
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -10,7 +11,8 @@ from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 
 from syncrelay.config.names import is_topic_name
-from syncrelay.explain import Endpoint, Mismatch
+from syncrelay.environment.domain import range_of
+from syncrelay.explain import Endpoint, GraphSnapshot, Mismatch
 from syncrelay.printable import printable
 
 _RELIABILITY: Final = {QoSReliabilityPolicy.BEST_EFFORT: "best_effort", QoSReliabilityPolicy.RELIABLE: "reliable"}
@@ -21,6 +23,9 @@ _LIVELINESS: Final = {
 }
 # What rmw_dds_common has in the place of a name that did not arrive.
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
+# Every node publishes these.
+_OF_EVERY_NODE: Final = ("/parameter_events", "/rosout")
+_CLOCK: Final = "/clock"
 # In a namespace of its own a sensor has the same last words.
 _ALIKE: Final = 0.5
 
@@ -49,24 +54,32 @@ def _nanoseconds(duration: Any) -> int:
 
 def publishers(infos: Iterable[Any], requested: QoSProfile | None) -> tuple[Endpoint, ...]:
     """Return a topic's publishers, with why they cannot serve our subscription."""
-    return _endpoints(infos, lambda qos: requested and mismatch(qos, requested))
+    return _endpoints(infos, lambda qos: requested and mismatch(qos, requested), "publisher")
 
 
 def subscribers(infos: Iterable[Any], offered: QoSProfile) -> tuple[Endpoint, ...]:
     """Return a topic's subscribers, with why our publisher cannot serve them."""
-    return _endpoints(infos, lambda qos: mismatch(offered, qos))
+    return _endpoints(infos, lambda qos: mismatch(offered, qos), "subscriber")
 
 
-def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None]) -> tuple[Endpoint, ...]:
-    return tuple(Endpoint(node_of(info), printable(info.topic_type), why(info.qos_profile)) for info in infos)
+def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None], kind: str) -> tuple[Endpoint, ...]:
+    return tuple(
+        Endpoint(
+            f"a {kind} whose node is not known yet" if is_nameless(info) else _full_name(info),
+            printable(info.topic_type),
+            why(info.qos_profile),
+            is_named=not is_nameless(info),
+        )
+        for info in infos
+    )
 
 
 def others(infos: Iterable[Any], *, than: str, own: int) -> tuple[Endpoint, ...]:
-    """Return the endpoints of other nodes than the one of this full name, which has so many `own` of them.
+    """Return the publishers of other nodes than the one of this full name, which has so many `own` of them.
 
     What has its name and is not among those is of a second node of that name.
     """
-    found = _endpoints(infos, lambda _: None)
+    found = _endpoints(infos, lambda _: None, "publisher")
     namesakes = [replace(each, node=f"another node of the name {than}") for each in found if each.node == than]
     return (*(each for each in found if each.node != than), *namesakes[own:])
 
@@ -76,11 +89,47 @@ def is_nameless(info: Any) -> bool:
     return bool(info.node_name == _NAMELESS)
 
 
-def node_of(info: Any) -> str:
-    """Return the full name of an endpoint's node."""
-    if is_nameless(info):
-        return "a node of unknown name"
+def _full_name(info: Any) -> str:
     return printable(f"{info.node_namespace.rstrip('/')}/{info.node_name}")
+
+
+def other_nodes(node: Any) -> tuple[str, ...]:
+    """Return the full names of the other nodes, each as often as it is there, without those that hide from lists."""
+    try:
+        found = node.get_node_names_and_namespaces()
+    except UnicodeDecodeError:
+        return ("a node whose name is not UTF-8",)
+    names = sorted(printable(f"{namespace.rstrip('/')}/{name}") for name, namespace in found)
+    shown = [name for name in names if not _is_hidden(name)]
+    if (own := node.get_fully_qualified_name()) in shown:
+        shown.remove(own)
+    return tuple(shown)
+
+
+def snapshot(node: Any) -> GraphSnapshot:
+    """Return what the whole graph holds beside a node."""
+    published = published_topics(node)
+    return GraphSnapshot(
+        domain=node.context.get_domain_id(),
+        discovery_range=range_of(os.environ),
+        nodes=other_nodes(node),
+        n_topics=len(published),
+        n_unreached=sum(any(map(is_nameless, node.get_publishers_info_by_topic(name))) for name in published),
+        has_clock=_CLOCK in published,
+    )
+
+
+def published_topics(node: Any) -> dict[str, tuple[str, ...]]:
+    """Return the topics with publishers, and their types; but for hidden ones and those of every node."""
+    return {
+        name: types
+        for name, types in topics_in(node).items()
+        if name not in _OF_EVERY_NODE and not _is_hidden(name) and node.count_publishers(name)
+    }
+
+
+def _is_hidden(name: str) -> bool:
+    return any(part.startswith("_") for part in name.split("/"))
 
 
 def topics_in(node: Any) -> dict[str, tuple[str, ...]]:
@@ -103,6 +152,11 @@ def _topics_by_node(node: Any) -> Iterator[tuple[str, Sequence[str]]]:
 
 
 def topics_alike(name: str, type_name: str, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
-    """Return the topics of a type whose names are most like one that nobody publishes; all graph names, best first."""
+    """Return the topics of a type whose names are most like one that nobody publishes, the best first.
+
+    First come those of the same name in a namespace; where nothing is alike, the only one of that type.
+    """
     of_type = [topic for topic, types in topics if type_name in types and topic != name]
-    return tuple(get_close_matches(name, of_type, n=3, cutoff=_ALIKE)) or tuple(of_type if len(of_type) == 1 else ())
+    in_namespaces = [topic for topic in of_type if topic.endswith(name)]
+    alike = [*in_namespaces, *get_close_matches(name, of_type, n=3, cutoff=_ALIKE)]
+    return tuple(dict.fromkeys(alike)) or tuple(of_type if len(of_type) == 1 else ())

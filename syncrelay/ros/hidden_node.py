@@ -1,17 +1,30 @@
-"""A node to look at the graph with: of those that `ros2 node list` hides, without services and topics of its own."""
+"""Nodes to look at the graph with, of those that `ros2 node list` hides: without services and topics of their own."""
 
 import os
-from typing import Any
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Final
 
 import rclpy
 from rclpy.context import Context
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.signals import SignalHandlerOptions
 
+from syncrelay.config import Config
 from syncrelay.environment.domain import require_domain
+from syncrelay.errors import RosUnavailableError
+from syncrelay.explain import GraphSnapshot
 from syncrelay.ros.environment import keep_stdout, log_arguments
+from syncrelay.ros.graph import snapshot
+from syncrelay.ros.start import make_node, resolver, start
+
+_NAME: Final = "_syncrelay_observer"
+# The first two overrule the third.
+_DISCOVERY: Final = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_AUTOMATIC_DISCOVERY_RANGE")
 
 
-def join(context: Context, name: str) -> Any:
+def join(context: Context, name: str, *, namespace: str = "", arguments: Sequence[str] = ()) -> Any:
     """Start rclpy in a context, signals left alone, and return a node; its name begins with an underscore.
 
     Raises RosUnavailableError where ROS_DOMAIN_ID names no domain.
@@ -24,5 +37,62 @@ def join(context: Context, name: str) -> Any:
         signal_handler_options=SignalHandlerOptions.NO,
     )
     return rclpy.create_node(
-        name, context=context, use_global_arguments=False, start_parameter_services=False, enable_rosout=False
+        name,
+        namespace=namespace,
+        context=context,
+        cli_args=["--ros-args", *arguments],
+        use_global_arguments=False,
+        start_parameter_services=False,
+        enable_rosout=False,
     )
+
+
+def join_hidden(config: Config, ros_args: Sequence[str]) -> tuple[Context, Any, str]:
+    """Return a hidden node for which topics have the names, and time is, as for the relay's node, and that one's name.
+
+    ROS arguments may name the relay's node: so what they mean is asked of a node of that name, whom nobody finds.
+
+    Raises UsageError where ROS does not take the arguments, RosUnavailableError where it does not start.
+    """
+    with _undiscovered():
+        context = start(ros_args, simulated=config.node.use_sim_time)
+        try:
+            node = make_node(config.node.name, namespace=config.node.namespace, context=context, ros_args=ros_args)
+            resolve = resolver(node, ros_args)
+            remaps = [word for name in config.names.written for word in ("-r", f"{name}:={resolve(name)}")]
+            is_simulated = str(node.get_parameter("use_sim_time").value).lower()
+            name, namespace = node.get_fully_qualified_name(), node.get_namespace()
+            node.destroy_node()
+        finally:
+            context.try_shutdown()
+    hidden = Context()
+    arguments = ["-p", f"use_sim_time:={is_simulated}", *remaps]
+    return hidden, join(hidden, _NAME, namespace=namespace, arguments=arguments), name
+
+
+def watch_graph(*, seconds: float) -> GraphSnapshot:
+    """Join the graph for a time and return what it holds; raises RosUnavailableError where rclpy does not start."""
+    context = Context()
+    try:
+        node = join(context, _NAME)
+        try:
+            time.sleep(seconds)
+            return snapshot(node)
+        finally:
+            node.destroy_node()
+    except _rclpy.RCLError as error:
+        raise RosUnavailableError(f"cannot look at the graph: {error}") from error
+    finally:
+        context.try_shutdown()
+
+
+@contextmanager
+def _undiscovered() -> Iterator[None]:
+    """Have nodes that start meanwhile find nobody, and nobody find them."""
+    before = {name: os.environ.pop(name) for name in _DISCOVERY if name in os.environ}
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "OFF"
+    try:
+        yield
+    finally:
+        del os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"]
+        os.environ.update(before)

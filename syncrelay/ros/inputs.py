@@ -3,7 +3,7 @@
 import importlib
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -58,7 +58,6 @@ class TopicInput:
         self._backend = backend
         self._loop = loop
         self._message_type: Any = None
-        self._source: Source | None = None
         self._lost: Any = None
         self._failure: Exception | None = None
         self._force_poll = True
@@ -67,11 +66,12 @@ class TopicInput:
 
     @property
     def is_due(self) -> bool:
-        """Whether it is to be polled though the graph is as before: for its type, or for what DDS did not make."""
+        """Whether to poll it though the graph is as before: for its type, a node's name, what DDS did not make."""
         return (
             self._force_poll
             or self._failure is not None
             or self._message_type is None
+            or not all(each.is_named for each in self.publishers)
             or any(binding.not_readable for binding in self.outputs.bindings)
             or (self._is_refused and self._may_try)
         )
@@ -104,25 +104,10 @@ class TopicInput:
             binding.publisher_refusal = error.refusal
             self._put_off(error.refusal)
 
-    def attach(self, binding: InputBinding) -> None:
-        """Feed it from now on. On the loop's thread, or before that runs."""
-        self.outputs.attach(binding)
-        self._feed()
-
-    def detach(self, group: GroupRelay) -> None:
-        """Feed a group no longer. On the loop's thread."""
-        self.outputs.detach(group)
-        self._feed()
-
-    def connect(self, bindings: Sequence[InputBinding]) -> None:
-        """Publish by the publishers that they have now. On the loop's thread."""
-        self.outputs.connect(bindings)
-        self._feed()
-
     def close(self) -> None:
         """Stop receiving; if it is polled again, it starts again. On the main thread."""
         self._force_poll = True
-        source, self._source = self._source, None
+        source, self.outputs.source = self.outputs.source, None
         if source is not None:
             self._loop.call(lambda: self._loop.remove(source)).result()
         self.profile = self._lost = None
@@ -167,8 +152,8 @@ class TopicInput:
             binding.find_handler(self._message_type)
             if binding.not_readable:
                 self._say_once(logging.ERROR, f"{binding.group.config.name}: {self.name}: {binding.not_readable}")
-        if self._source is not None and any(binding.handler for binding in lacking):
-            self._loop.call(lambda: self.connect(())).result()
+        if self.outputs.source is not None and any(binding.handler for binding in lacking):
+            self._loop.call(self.outputs.feed).result()
         return None
 
     def _find_publishers(self) -> str | None:
@@ -193,9 +178,9 @@ class TopicInput:
 
     def take_wait(self) -> int:
         """How long a message at most waited since this was last asked, in nanoseconds. On the loop's thread."""
-        if self._source is None:
-            return 0
-        waited, self._source.waited = self._source.waited, 0
+        source, waited = self.outputs.source, 0
+        if source is not None:
+            waited, source.waited = source.waited, 0
         return waited
 
     def lost(self) -> int:
@@ -220,7 +205,7 @@ class TopicInput:
         for binding in lacking:
             self.make_publisher_or_report(binding)
         if any(binding.publisher is not None for binding in lacking):
-            self._loop.call(lambda: self.connect(lacking)).result()
+            self._loop.call(lambda: self.outputs.connect(lacking)).result()
 
     def _refused(self, refusal: Refusal) -> None:
         self.refusal = refusal
@@ -264,20 +249,15 @@ class TopicInput:
         """Receive from another source, and publish by others; the publishers that are over. On the loop's thread."""
         # First what may fail.
         self._loop.add(source, self._fail)
-        old = self.outputs.exchange(publishers)
-        if self._source is not None:
-            self._loop.remove(self._source)
-        self._source = source
-        self._feed()
+        before = self.outputs.source
+        old = self.outputs.exchange(source, publishers)
+        if before is not None:
+            self._loop.remove(before)
         return old
 
     def _fail(self, error: Exception) -> None:
         """Note that the source gives no more messages. On the loop's thread."""
-        self._source, self._failure, self._force_poll = None, error, True
-
-    def _feed(self) -> None:
-        if self._source is not None:
-            self._source.deliver = self.outputs.deliver
+        self.outputs.source, self._failure, self._force_poll = None, error, True
 
 
 def _loss_counter(subscription: Any) -> Any:

@@ -20,14 +20,14 @@ from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import RosUnavailableError, TypeImportError
 from syncrelay.printable import printable
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
-from syncrelay.ros.graph import is_nameless, topics_in
+from syncrelay.ros.entities import never_called
+from syncrelay.ros.graph import is_nameless, published_topics
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.types import begins_with_header, import_type
 
 _NODE: Final = "_syncrelay_init"
 _LOOK_NS: Final = 200_000_000
-_OF_EVERY_NODE: Final = ("/parameter_events", "/rosout")
 _SECOND: Final = 1_000_000_000
 
 
@@ -117,9 +117,9 @@ class _Listener:
             self._loop.stop()
             return
         self._due = now + _LOOK_NS
-        for name in topics_in(self._node):
+        for name in published_topics(self._node):
             is_known = any(name in known for known in (self._topics, self._headerless, self._relayed, self._unusable))
-            if not is_known and name not in _OF_EVERY_NODE and not _is_hidden(name):
+            if not is_known:
                 self._find(name)
 
     def _find(self, name: str) -> None:
@@ -157,7 +157,7 @@ class _Listener:
             topic.places.append(self._count)
             self._count += 1
 
-        subscription = self._node.create_subscription(message_type, topic.name, _never_called, profile, raw=True)
+        subscription = self._node.create_subscription(message_type, topic.name, never_called, profile, raw=True)
         source = self._backend.source(subscription, take)
         self._subscribed.append((subscription, source))
         self._loop.add(source, _give_up)
@@ -178,13 +178,5 @@ def _is_reliable(profile: Any) -> bool:
     return bool(profile.reliability == QoSReliabilityPolicy.RELIABLE)
 
 
-def _is_hidden(name: str) -> bool:
-    return any(part.startswith("_") for part in name.split("/"))
-
-
 def _give_up(error: Exception) -> None:
     raise error
-
-
-def _never_called(_: bytes) -> None:
-    """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""

@@ -12,6 +12,7 @@ from syncrelay.dataflow.observers import Losses, SimulatedClock, Standstills, Sy
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.explain import (
     FindingLog,
+    GraphSnapshot,
     GroupReport,
     GroupWatch,
     Judge,
@@ -59,6 +60,7 @@ class Monitor:
         self.standstills = Standstills()
         self._system_clock = SystemClock()
         self._try_budget = TryBudget()
+        self._empty_graph: GraphSnapshot | None = None
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -111,6 +113,7 @@ class Monitor:
             self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
         for topic, losses in self._losses.items():
             losses.observe(topic.lost(), publishers=len(topic.publishers))
+        self._empty_graph = self._surroundings.empty_graph()
         for binding, batch in zip(bindings, batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
                 try:
@@ -133,10 +136,11 @@ class Monitor:
             waited=max(self._waits[each.topic].longest for each in binding.inputs),
             standstill=self.standstills.longest,
             failure=binding.group.failure,
+            empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)
-        for remark in log.remarks(facts, found):
+        for remark in log.remarks(facts, found, judge.explained(facts)):
             about = {"group": facts.name, "finding": remark.code and remark.code.value}
             _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.duration import Duration
 
-from syncrelay.dataflow.backend import Content, Deliver, RclBackend
+from syncrelay.dataflow.backend import Content, Deliver, RclBackend, Source
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Refusal
@@ -67,8 +67,10 @@ class Outputs:
 
     def __init__(self, *, entities: Entities, backend: RclBackend) -> None:
         self.bindings: list[InputBinding] = []
-        self.deliver: Deliver = self._deliver
-        """Feeds them all a message."""
+        self.source: Source | None = None
+        """What feeds them; None as long as nothing does."""
+        self.largest = 0
+        """The size of the largest message in bytes; measured only where nothing is published."""
         self._handlers: list[Deliver] = []
         self._entities = entities
         self._backend = backend
@@ -120,8 +122,9 @@ class Outputs:
         self.bindings = [binding for binding in self.bindings if binding.group is not group]
         self.feed()
 
-    def exchange(self, publishers: Mapping[InputBinding, Any]) -> list[Any]:
-        """Publish by these from now on; those that they replace."""
+    def exchange(self, source: Source, publishers: Mapping[InputBinding, Any]) -> list[Any]:
+        """Be fed by another source, and publish by these publishers; those that they replace."""
+        self.source = source
         old = [binding.publisher for binding in publishers]
         for binding, publisher in publishers.items():
             binding.publisher, binding.publisher_refusal = publisher, None
@@ -140,8 +143,18 @@ class Outputs:
     def feed(self) -> None:
         """Feed those that have a handler, and whose messages can leave."""
         self._handlers = [each.handler for each in self.bindings if each.handler and not each.publisher_refusal]
-        self.deliver = self._handlers[0] if len(self._handlers) == 1 else self._deliver
+        if self.source is None:
+            return
+        if self._publishes:
+            self.source.deliver = self._handlers[0] if len(self._handlers) == 1 else self.deliver
+        else:
+            self.source.deliver = self._measure
 
-    def _deliver(self, payload: Any, content: Content, received: int) -> None:
+    def _measure(self, payload: Any, content: Content, received: int) -> None:
+        self.largest = max(self.largest, len(content))
+        self.deliver(payload, content, received)
+
+    def deliver(self, payload: Any, content: Content, received: int) -> None:
+        """Feed all of them a message."""
         for handle in self._handlers:
             handle(payload, content, received)

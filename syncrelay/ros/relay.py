@@ -25,6 +25,7 @@ from syncrelay.ros.clock import WaitingClock
 from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
+from syncrelay.ros.hidden_node import join_hidden
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.snapshot import GroupSnapshot, InputSnapshot, RelaySnapshot
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
@@ -67,24 +68,28 @@ class Relay:
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
 
-        One that only observes has everything but publishers.
+        One that only observes is hidden from lists of nodes, and publishes nothing.
 
         Raises ConfigError where remaps give two topics one name, UsageError where ROS rejects `ros_args`.
         `config_path` is what `state` calls the file. `on_turn` is called on the receive thread for as long as that
         turns, once a second at least.
         """
         apply_transport(config.node.transport, os.environ)
-        self._context = start(ros_args, simulated=config.node.use_sim_time)
-        self.node = make_node(
-            config.node.name, namespace=config.node.namespace, context=self._context, ros_args=ros_args
-        )
+        if purpose is Purpose.OBSERVE:
+            self._context, self.node, relay_name = join_hidden(config, ros_args)
+        else:
+            self._context = start(ros_args, simulated=config.node.use_sim_time)
+            self.node = make_node(
+                config.node.name, namespace=config.node.namespace, context=self._context, ros_args=ros_args
+            )
+            relay_name = self.node.get_fully_qualified_name()
         resolve = resolver(self.node, ros_args)
         try:
             require_distinct_names(config, groups, resolve)
         except SyncRelayError:
             self._leave()
             raise
-        name_after(self.node.get_logger().name)
+        name_after(relay_name.removeprefix("/").replace("/", "."))
         self._rosout = RosoutHandler(self.node.get_logger())
         _LOG.addHandler(self._rosout)
         self._clock = WaitingClock(self.node)
@@ -102,7 +107,7 @@ class Relay:
         entities = Entities(self.node, purpose)
         bindings = GroupBindings(entities=entities, node=self.node, backend=backend, loop=self._loop)
         self._reporters = Reporters(self.node, entities)
-        self._surroundings = Surroundings(self.node, purpose)
+        self._surroundings = Surroundings(self.node, purpose, relay_name=relay_name)
         self.monitor = Monitor(
             node=self.node,
             loop=self._loop,

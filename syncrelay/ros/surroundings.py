@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from syncrelay.config.wording import counted
-from syncrelay.explain import Endpoint, InputGraph, Refusal
+from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal
 from syncrelay.ros import graph
 from syncrelay.ros.entities import Purpose
 from syncrelay.ros.outputs import InputBinding
@@ -23,8 +23,10 @@ class _Around(NamedTuple):
 class Surroundings:
     """Keeps what the graph shows around each input until the graph changes. On the main thread."""
 
-    def __init__(self, node: Any, purpose: Purpose) -> None:
+    def __init__(self, node: Any, purpose: Purpose, *, relay_name: str) -> None:
+        """Ask a node; `relay_name` is the full name of the relay's, another's where it is to observe."""
         self._node = node
+        self._relay_name = relay_name
         self._publishes = purpose is Purpose.RELAY
         self._bindings: frozenset[InputBinding] = frozenset()
         self._around: dict[InputBinding, _Around] = {}
@@ -39,6 +41,11 @@ class Surroundings:
     def forget(self) -> None:
         """Poll the graph again for each, as it has changed."""
         self._around.clear()
+
+    def empty_graph(self) -> GraphSnapshot | None:
+        """Return the graph if no other node is in it. It is asked only while a topic has no publisher."""
+        is_missing = any(not binding.topic.publishers for binding in self._bindings)
+        return graph.snapshot(self._node) if is_missing and not graph.other_nodes(self._node) else None
 
     def of(self, binding: InputBinding, *, lost: int) -> InputGraph:
         """Return what there is around an input, of whose messages so many were lost."""
@@ -58,6 +65,7 @@ class Surroundings:
             not_readable=binding.not_readable,
             refusal=binding.refusal or _unpublished(binding, around.output),
             lost=lost,
+            largest=topic.outputs.largest,
         )
 
     def _poll(self, binding: InputBinding) -> _Around:
@@ -66,7 +74,7 @@ class Surroundings:
         publishers = node.get_publishers_info_by_topic(output)
         # For one that only observes, the relay itself, which has its name, is no rival.
         own = int(binding.publisher is not None) if self._publishes else len(publishers)
-        rivals = graph.others(publishers, than=node.get_fully_qualified_name(), own=own)
+        rivals = graph.others(publishers, than=self._relay_name, own=own)
         if rivals:
             self._rivals_since.setdefault(binding, time.time_ns())
         else:
@@ -83,12 +91,8 @@ class Surroundings:
     def _alike(self, name: str, type_name: str) -> tuple[str, ...]:
         """Find what may have been meant: our own outputs are not it."""
         outputs = {self._node.resolve_topic_name(binding.output) for binding in self._bindings}
-        published = [
-            (topic, types)
-            for topic, types in graph.topics_in(self._node).items()
-            if topic not in outputs and self._node.count_publishers(topic)
-        ]
-        return graph.topics_alike(name, type_name, published)
+        published = graph.published_topics(self._node).items()
+        return graph.topics_alike(name, type_name, [each for each in published if each[0] not in outputs])
 
 
 def _unpublished(binding: InputBinding, output: str) -> Refusal | None:

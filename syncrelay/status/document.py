@@ -35,7 +35,7 @@ def document(state: RelayState) -> dict[str, Any]:
             "reload_error": state.reload_error,
             "pid": os.getpid(),
         },
-        "groups": [_group(report) for report in state.groups],
+        "groups": [group_document(report) for report in state.groups],
     }
 
 
@@ -47,7 +47,8 @@ def own_version() -> str:
         return "unknown"
 
 
-def _group(report: GroupReport) -> dict[str, Any]:
+def group_document(report: GroupReport) -> dict[str, Any]:
+    """Return what there is to say of a group as what json.dumps takes."""
     facts, figures = report.facts, report.facts.figures
     return {
         "name": facts.name,

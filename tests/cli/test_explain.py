@@ -31,7 +31,7 @@ def test_a_look_that_is_too_short_says_what_decided(capsys: pytest.CaptureFixtur
 def test_findings_of_a_group_decide_and_are_counted(capsys: pytest.CaptureFixture[str]):
     lonely = _report(a_group(an_input(publishers=()), an_input("/lidar", publishers=())))
     assert conclude([_report(a_group()), lonely], 10) == AT_FAULT
-    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: front has 2 warnings"
+    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: front has 1 warning"
 
 
 def test_a_group_of_which_there_is_no_report_is_not_healthy(capsys: pytest.CaptureFixture[str]):

@@ -70,16 +70,16 @@ def test_what_belongs_together_is_passed_over(found):
         (
             replace(WHEELS, middleware_asked="rmw_cyclonedds_cpp"),
             "middleware_not_there",
-            "RMW_IMPLEMENTATION asks for rmw_cyclonedds_cpp, which is not installed here; there is rmw_fastrtps_cpp",
+            "RMW_IMPLEMENTATION asks for rmw_cyclonedds_cpp, which is not installed here; installed: rmw_fastrtps_cpp",
             "unset RMW_IMPLEMENTATION    or install rmw_cyclonedds_cpp (ros-jazzy-rmw-cyclonedds-cpp)",
         ),
     ],
 )
 def test_what_does_not_belong_together_is_named_with_the_way_out(found, code, what, do):
     (diagnosis,) = check_installation(found)
-    assert (diagnosis.code, diagnosis.severity) == (code, Severity.MEND)
+    assert (diagnosis.code, diagnosis.severity) == (code, Severity.ERROR)
     assert what in diagnosis.what
-    assert do in diagnosis.do
+    assert do in diagnosis.fix
 
 
 @pytest.mark.parametrize(

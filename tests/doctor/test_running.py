@@ -6,22 +6,22 @@ from syncrelay.config import Listen
 from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.listen import check_listen
 from syncrelay.doctor.start import check_start
-from syncrelay.ros.trial import Trial
+from syncrelay.doctor.start_check import StartResult
 
 
-def test_a_path_that_costs_more_is_to_know_with_its_reason():
-    (found,) = check_start(Trial(path="rclpy", path_fault="other fields"), before=())
-    assert (found.code, found.severity) == ("receive_path", Severity.KNOW)
+def test_a_path_that_costs_more_is_an_info_with_its_reason():
+    (found,) = check_start(StartResult(path="rclpy", path_fault="other fields"), before=())
+    assert (found.code, found.severity) == ("receive_path", Severity.INFO)
     assert found.what == "messages pass through rclpy: librcl is not as expected here (other fields)"
-    assert list(check_start(Trial(path="direct"), before=())) == []
-    assert list(check_start(Trial(path="rclpy"), before=())) == []
+    assert list(check_start(StartResult(path="direct"), before=())) == []
+    assert list(check_start(StartResult(path="rclpy"), before=())) == []
 
 
-def test_a_port_that_is_taken_is_to_know_where_the_file_asks_for_it():
+def test_a_port_that_is_taken_is_an_info_where_the_file_asks_for_it():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         ports = range(taken.getsockname()[1], taken.getsockname()[1] + 1)
         (found,) = check_listen(Listen("127.0.0.1", ports))
-        assert (found.code, found.severity) == ("listen", Severity.KNOW)
+        assert (found.code, found.severity) == ("listen", Severity.INFO)
         assert found.what.startswith(f"cannot listen on 127.0.0.1:{ports[0]}: another process does")
         assert list(check_listen(Listen("127.0.0.1", ports, is_asked_for=False))) == []
     assert list(check_listen(Listen("127.0.0.1", range(1)))) == []

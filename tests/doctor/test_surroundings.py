@@ -6,14 +6,14 @@ import pytest
 
 from syncrelay.doctor.container import Isolation, check_isolation
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.discovery import Discovery, check_discovery, range_of
+from syncrelay.doctor.discovery import Discovery, check_discovery
 from syncrelay.doctor.folders import Written, check_folders
 from syncrelay.doctor.network import Interface, check_network
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile, check_shared_memory
 from syncrelay.doctor.transport import Transport, check_transport, uses_shared_memory
-from syncrelay.environment.domain import domain_of
+from syncrelay.environment.domain import domain_of, range_of
 
-MEND, KNOW = Severity.MEND, Severity.KNOW
+ERROR, INFO = Severity.ERROR, Severity.INFO
 
 
 def brief(diagnoses):
@@ -54,25 +54,25 @@ def discovery(environ, unresolved=()):
     [
         ({}, []),
         ({"ROS_DOMAIN_ID": "101"}, []),
-        ({"ROS_DOMAIN_ID": "102"}, [("domain_ports", KNOW)]),
+        ({"ROS_DOMAIN_ID": "102"}, [("domain_ports", INFO)]),
         ({"ROS_DOMAIN_ID": "232"}, []),
-        ({"ROS_DOMAIN_ID": "010"}, [("domain_id", MEND)]),
-        ({"ROS_DOMAIN_ID": "x"}, [("domain_id", MEND)]),
+        ({"ROS_DOMAIN_ID": "010"}, [("domain_id", ERROR)]),
+        ({"ROS_DOMAIN_ID": "x"}, [("domain_id", ERROR)]),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, []),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": ""}, []),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, [("discovery_range", KNOW)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, [("discovery_range", INFO)]),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.2"}, []),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}, [("discovery_range", KNOW)]),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "subnet"}, [("discovery_range", MEND)]),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, [("discovery_off", MEND)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}, [("discovery_range", INFO)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "subnet"}, [("discovery_range", ERROR)]),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, [("discovery_off", ERROR)]),
         ({"ROS_LOCALHOST_ONLY": "0"}, []),
-        ({"ROS_LOCALHOST_ONLY": "1"}, [("localhost_only", KNOW)]),
+        ({"ROS_LOCALHOST_ONLY": "1"}, [("localhost_only", INFO)]),
         (
             {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
-            [("discovery_range", KNOW), ("localhost_only", KNOW)],
+            [("discovery_range", INFO), ("localhost_only", INFO)],
         ),
-        ({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.2"}, [("localhost_only", MEND)]),
-        ({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, [("localhost_only", MEND)]),
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.2"}, [("localhost_only", ERROR)]),
+        ({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, [("localhost_only", ERROR)]),
     ],
 )
 def test_discovery_variables(environ, found):
@@ -81,7 +81,7 @@ def test_discovery_variables(environ, found):
 
 def test_a_peer_without_an_address_is_named():
     (diagnosis,) = discovery({"ROS_STATIC_PEERS": "robot;nobody"}, ("nobody",))
-    assert diagnosis.severity is MEND
+    assert diagnosis.severity is ERROR
     assert "`nobody`" in diagnosis.what
 
 
@@ -107,10 +107,10 @@ def test_discovery_reaches_as_far_as_ros_makes_of_it(environ, reach):
         ("UDPv6", [], False),
         ("LARGE_DATA", [], True),
         ("LARGE_DATA?max_msg_size=1MB", [], True),
-        ("SHM", [("transports", KNOW)], True),
-        ("NONE", [("transports", MEND)], True),
-        ("", [("transports", MEND)], True),
-        ("udpv4", [("transports", MEND)], True),
+        ("SHM", [("transports", INFO)], True),
+        ("NONE", [("transports", ERROR)], True),
+        ("", [("transports", ERROR)], True),
+        ("udpv4", [("transports", ERROR)], True),
     ],
 )
 def test_transports(value, found, shared):
@@ -136,13 +136,13 @@ DOWN = Interface("eth1", is_up=False, is_loopback=False, multicast=True)
     [
         ([LO, ETH], "SUBNET", "rmw_fastrtps_cpp", []),
         ([LO], "LOCALHOST", "rmw_fastrtps_cpp", []),
-        ([LO, DOWN], "SUBNET", "rmw_fastrtps_cpp", [("no_network", KNOW)]),
-        ([LO], "SUBNET", "rmw_cyclonedds_cpp", [("loopback_multicast", MEND)]),
-        ([LO, VPN], "SUBNET", "rmw_fastrtps_cpp", [("no_multicast", KNOW)]),
+        ([LO, DOWN], "SUBNET", "rmw_fastrtps_cpp", [("no_network", INFO)]),
+        ([LO], "SUBNET", "rmw_cyclonedds_cpp", [("loopback_multicast", ERROR)]),
+        ([LO, VPN], "SUBNET", "rmw_fastrtps_cpp", [("no_multicast", INFO)]),
         ([LO, VPN], "LOCALHOST", "rmw_fastrtps_cpp", []),
         ([LO, VPN, ETH], "SUBNET", "rmw_fastrtps_cpp", []),
-        ([], "SUBNET", "rmw_fastrtps_cpp", [("loopback_down", MEND)]),
-        ([ETH], "SUBNET", "rmw_fastrtps_cpp", [("loopback_down", MEND)]),
+        ([], "SUBNET", "rmw_fastrtps_cpp", [("loopback_down", ERROR)]),
+        ([ETH], "SUBNET", "rmw_fastrtps_cpp", [("loopback_down", ERROR)]),
     ],
 )
 def test_interfaces(interfaces, reach, middleware, found):
@@ -157,9 +157,9 @@ LOG = Path("/log")
     [
         (Written(LOG, "ROS_LOG_DIR", None), []),
         (Written(LOG, "ROS_LOG_DIR", None, LOG / "beat", None), []),
-        (Written(None, "", None), [("log_folder", KNOW)]),
-        (Written(LOG, "ROS_HOME", "Read-only file system"), [("log_folder", KNOW)]),
-        (Written(LOG, "HOME", None, LOG / "beat", "Permission denied"), [("heartbeat", MEND)]),
+        (Written(None, "", None), [("log_folder", INFO)]),
+        (Written(LOG, "ROS_HOME", "Read-only file system"), [("log_folder", INFO)]),
+        (Written(LOG, "HOME", None, LOG / "beat", "Permission denied"), [("heartbeat", ERROR)]),
     ],
 )
 def test_what_must_be_written(written, found):
@@ -183,14 +183,14 @@ def file(*, uid, is_live, port=None):
     [
         (shm(), []),
         (shm(file(uid=1000, is_live=True), file(uid=1000, is_live=True, port=7911)), []),
-        (shm(fault="Read-only file system"), [("shm_unusable", KNOW)]),
-        (shm(free=500_000), [("shm_full", MEND)]),
-        (shm(free=2 * MB), [("shm_tight", KNOW)]),
-        (shm(file(uid=1000, is_live=False)), [("shm_stale", KNOW)]),
-        (shm(file(uid=0, is_live=False, port=7911)), [("shm_stale", KNOW)]),
+        (shm(fault="Read-only file system"), [("shm_unusable", INFO)]),
+        (shm(free=500_000), [("shm_full", ERROR)]),
+        (shm(free=2 * MB), [("shm_tight", INFO)]),
+        (shm(file(uid=1000, is_live=False)), [("shm_stale", INFO)]),
+        (shm(file(uid=0, is_live=False, port=7911)), [("shm_stale", INFO)]),
         # Domain 2 has the ports 7900 to 8149.
-        (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7911)), [("shm_foreign", MEND)]),
-        (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7411)), [("shm_foreign", KNOW)]),
+        (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7911)), [("shm_foreign", ERROR)]),
+        (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7411)), [("shm_foreign", INFO)]),
         (shm(file(uid=0, is_live=True, port=7000)), []),
     ],
 )
@@ -200,9 +200,9 @@ def test_shared_memory(diagnoses, found):
 
 def test_what_is_stale_is_counted_with_its_size_and_owner():
     (diagnosis,) = shm(file(uid=1000, is_live=False), file(uid=0, is_live=False))
-    assert "2 files of Fast DDS in /dev/shm" in diagnosis.what
+    assert "2 Fast DDS files in /dev/shm" in diagnosis.what
     assert "1.1 MB, some of user0" in diagnosis.what
-    assert "as root" in diagnosis.do
+    assert "as root" in diagnosis.fix
 
 
 CONTAINER = Isolation("/.dockerenv", host_network=True, private_shm=True)
@@ -212,17 +212,17 @@ CONTAINER = Isolation("/.dockerenv", host_network=True, private_shm=True)
     ("isolation", "environ", "found"),
     [
         (Isolation(None, host_network=True, private_shm=True), {}, []),
-        (CONTAINER, {}, [("private_shm", MEND)]),
-        (CONTAINER, {"FASTDDS_BUILTIN_TRANSPORTS": "LARGE_DATA"}, [("private_shm", MEND)]),
+        (CONTAINER, {}, [("private_shm", ERROR)]),
+        (CONTAINER, {"FASTDDS_BUILTIN_TRANSPORTS": "LARGE_DATA"}, [("private_shm", ERROR)]),
         (CONTAINER, {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}, []),
         (
             CONTAINER,
             {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
-            [("private_shm", MEND)],
+            [("private_shm", ERROR)],
         ),
         (Isolation("/.dockerenv", host_network=False, private_shm=True), {}, []),
         (Isolation("/.dockerenv", host_network=True, private_shm=False), {}, []),
-        (Isolation(None, False, False, 29, "ulimit -u"), {}, [("task_limit", MEND)]),  # noqa: FBT003
+        (Isolation(None, False, False, 29, "ulimit -u"), {}, [("task_limit", ERROR)]),  # noqa: FBT003
         (Isolation(None, False, False, 30, "ulimit -u"), {}, []),  # noqa: FBT003
     ],
 )

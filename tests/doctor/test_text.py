@@ -4,46 +4,54 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.doctor.diagnosis import Severity, know, mend, worst_first
+from syncrelay.doctor.diagnosis import Diagnosis, Severity, error, info, worst_first
 from syncrelay.doctor.discovery import Discovery, check_discovery
-from syncrelay.doctor.graph import check_topics
-from syncrelay.doctor.stamps import Matched, check_stamps
-from syncrelay.doctor.text import diagnosis_lines, sighting_lines, verdict
-from syncrelay.doctor.words import duration
-from syncrelay.ros.sighting import SeenPublisher, SeenTopic, Sighting
+from syncrelay.doctor.examine import Observed
+from syncrelay.doctor.groups import check_groups
+from syncrelay.doctor.text import diagnosis_lines, observed_lines, verdict
+from syncrelay.explain import Endpoint, GraphSnapshot, GroupReport, judge
+from syncrelay.sync.counts import InputCounts
+from tests.explain.support.groups import S, a_group, a_silent_group, an_input
 
 ROOT = Path(__file__).parents[2]
-IMAGE, CLOUD = "sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2"
+IMAGE, CLOUD, IMU = "sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/Imu"
 MS = 1_000_000
 
 
 def test_a_block_is_aligned_under_its_label():
-    found = mend("code", "what\nmore", so="so", do="do\nthis")
+    found = error("code", "what\nmore", impact="impact", fix="fix\nthis")
     assert list(diagnosis_lines(found, colour=False)) == [
-        "mend  what",
-        "      more",
-        "      so  so",
-        "      do  do",
-        "          this",
+        "error    what",
+        "         more",
+        "         impact: impact",
+        "         fix:    fix",
+        "                 this",
     ]
-    assert next(diagnosis_lines(found, colour=True)).startswith("\033[31mmend")
+    assert next(diagnosis_lines(found, colour=True)).startswith("\033[31merror")
+
+
+def test_what_has_no_impact_of_its_own_is_shown_without():
+    found = Diagnosis("code", Severity.WARNING, "what", None, "fix")
+    assert list(diagnosis_lines(found, colour=False)) == ["warning  what", "         fix:    fix"]
 
 
 def test_what_would_move_the_cursor_is_escaped():
-    found = know("code", "a\x1b[2Jb", so="c\rd", do="e")
+    found = info("code", "a\x1b[2Jb", impact="c\rd", fix="e")
     assert "\x1b" not in "".join(diagnosis_lines(found, colour=False))
 
 
-A, B = mend("a", "a", so="", do=""), know("b", "b", so="", do="")
+A, B = error("a", "a", impact="", fix=""), info("b", "b", impact="", fix="")
+W = Diagnosis("w", Severity.WARNING, "w", None, None)
 
 
 @pytest.mark.parametrize(
     ("found", "text"),
     [
-        ([], "nothing to mend"),
-        ([A], "1 thing to mend"),
-        ([B], "nothing to mend, 1 to know"),
-        ([A, A, B, B], "2 things to mend, 2 to know"),
+        ([], "no problems found"),
+        ([A], "1 error"),
+        ([W], "1 warning"),
+        ([B], "no problems found, 1 info"),
+        ([A, W, B, A, W, B], "2 errors, 2 warnings, 2 info"),
     ],
 )
 def test_the_verdict_counts(found, text):
@@ -51,52 +59,60 @@ def test_the_verdict_counts(found, text):
 
 
 def test_the_worst_comes_first_else_in_order():
-    assert [each.code for each in worst_first([B, A, B, A])] == ["a", "a", "b", "b"]
-    assert worst_first([B])[0].severity is Severity.KNOW
+    assert [each.code for each in worst_first([B, W, A, B, A])] == ["a", "a", "w", "b", "b"]
 
 
 @pytest.mark.parametrize(
-    ("ns", "text"),
+    ("delay", "text"),
     [
-        (0, "0 ms"),
-        (2_500_000, "2.5 ms"),
-        (-12 * MS, "-12 ms"),
-        (812 * MS, "812 ms"),
-        (37_200 * MS, "37.2 s"),
-        (150_000 * MS, "2.5 min"),
-        (7_200_000 * MS, "2 h"),
-        (86_400_000 * MS * 20_000, "20000 d"),
+        (2_500_000, "stamps 2.5 ms old"),
+        (-12 * MS, "stamps 12 ms ahead"),
+        (37_200 * MS, "stamps 37.2 s old"),
+        (7_200 * S, "stamps 2 h old"),
     ],
 )
-def test_durations_are_in_the_unit_that_reads_best(ns, text):
-    assert duration(ns) == text
+def test_the_age_of_stamps_is_in_the_unit_that_reads_best(delay, text):
+    assert f"  {text}  /driver" in shown(an_input(figures={"delay": delay}))
+
+
+def shown(*inputs):
+    facts = a_group(*inputs)
+    lines = list(observed_lines(Observed(5.0, GraphSnapshot(0, "SUBNET"), (GroupReport(facts, ()),))))
+    return lines[1]
 
 
 def test_a_publisher_of_another_type_is_listed_with_it():
-    stranger = SeenPublisher("/ouster", CLOUD, "reliable, volatile")
-    seen = Sighting(5.0, ("/ouster",), 1, topics=(SeenTopic("/scan", "sensor_msgs/msg/LaserScan", (stranger,)),))
-    assert list(sighting_lines(seen))[1].endswith(
-        "0 received    /ouster (sensor_msgs/msg/PointCloud2, reliable, volatile)"
-    )
+    assert shown(an_input(publishers=(Endpoint("/ouster", CLOUD),))).endswith("/ouster (sensor_msgs/msg/PointCloud2)")
+
+
+def test_a_healthy_group_is_told_with_its_figures():
+    facts = a_group()
+    lines = list(observed_lines(Observed(5.0, GraphSnapshot(0, "SUBNET"), (GroupReport(facts, ()),))))
+    assert lines[-1] == "  front: 10 of 10 possible sets a second, span 5 ms and latency 2 ms at the 95th percentile"
 
 
 def test_the_readme_shows_what_is_printed():
-    driver = SeenPublisher("/camera_driver", IMAGE, "reliable, volatile")
-    camera = SeenTopic("/camera/image_raw", IMAGE, (driver,), 150, 29.97, delays=(37_231 * MS,))
-    lidar = SeenTopic("/lidar/points", CLOUD, alike=("/ouster/points",))
-    imu_driver = SeenPublisher("/imu_driver", "sensor_msgs/msg/Imu", "best_effort, volatile")
-    imu = SeenTopic("/imu/data", "sensor_msgs/msg/Imu", (imu_driver,), 998, 199.8, delays=(2 * MS,))
-    seen = Sighting(5.0, ("/camera_driver", "/imu_driver", "/ouster"), 7, topics=(camera, lidar, imu))
-    found = worst_first(
-        [
-            *check_discovery(Discovery({"ROS_DOMAIN_ID": "110"}, (32768, 60999))),
-            *check_topics(seen, optional=frozenset()),
-            *check_stamps(
-                seen.topics, [Matched("front", {"/camera/image_raw": 0, "/lidar/points": 0, "/imu/data": 0})]
-            ),
-        ]
+    nothing = {"last_received": None, "rate_hz": 0.0, "usual_hz": 0.0, "delay": None}
+    never = InputCounts(0, 0, {}, 0)
+    camera = an_input(
+        "/camera/image_raw", node="/camera_driver", type=IMAGE, figures={"rate_hz": 29.97, "delay": 31 * MS}
     )
-    lines = list(sighting_lines(seen))
+    lidar = an_input(
+        "/lidar/points", publishers=(), type=CLOUD, counts=never, figures=nothing, alike=("/ouster/points",)
+    )
+    imu = an_input(
+        "/imu/data",
+        publishers=(Endpoint("/imu_driver", IMU),),
+        type=IMU,
+        figures={"rate_hz": 199.8, "delay": 2 * MS},
+    )
+    facts = a_silent_group(camera, lidar, imu)
+    reports = (GroupReport(facts, judge(facts)),)
+    graph = GraphSnapshot(110, "SUBNET", ("/camera_driver", "/imu_driver", "/ouster"), 7)
+    found = worst_first(
+        [*check_discovery(Discovery({"ROS_DOMAIN_ID": "110"}, (32768, 60999))), *check_groups(reports, ())]
+    )
+    lines = list(observed_lines(Observed(5.0, graph, reports)))
     for each in found:
         lines += ["", *diagnosis_lines(each, colour=False)]
     lines += ["", verdict(found)]

@@ -255,6 +255,6 @@ class _Relay:
         self.facts = self._watch.facts(graph, now=now, **{"waited": waited, "standstill": worst, **more})
         found = self._judge.judge(self.facts)
         self.found.append((second, found))
-        for remark in self._log.remarks(self.facts, found):
+        for remark in self._log.remarks(self.facts, found, self._judge.explained(self.facts)):
             code = remark.code and remark.code.value
             self.lines.append(Line(second, remark.severity is not Severity.OK, remark.text, code))

@@ -107,6 +107,14 @@ def test_the_end_of_a_warning_is_said_once_in_its_last_words():
     assert warned(silence, range(11, 40)) == [(20, "resolved 10 s ago: stamps repeat still")]
 
 
+def test_what_another_finding_explains_is_not_over():
+    silence = FindingLog()
+    warned(silence, range(10), REPEATS)
+    hidden = [a_group(figures={"now": NOW + second * S, "last_set": NOW + second * S}) for second in range(10, 40)]
+    assert [line for facts in hidden for line in silence.remarks(facts, (), {Code.DUPLICATES})] == []
+    assert warned(silence, range(40, 60)) == [(49, "resolved 10 s ago: stamps repeat")]
+
+
 def test_what_did_not_last_has_no_end_to_say():
     silence = FindingLog()
     warned(silence, range(3), REPEATS)

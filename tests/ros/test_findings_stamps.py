@@ -108,8 +108,8 @@ def test_two_nodes_whose_stamps_conflict_on_one_topic_are_both_named(stage: Stag
     other_cam.start(stream("/camera", hz=10, shift_ms=-350), speed=1)
     finding = wait_for_finding(relay, "several_publishers")
     assert re.fullmatch(
-        r"/\w+ and /\w+ both publish /camera: \d+ of the last \d+ messages repeat a stamp or arrived out of stamp"
-        r" order",
+        r"/\w+ and /\w+ both publish /camera: (\d+ of the last \d+ messages repeat a stamp or arrived out of stamp"
+        r" order|their stamps are [\d.]+ ms apart)",
         finding["text"],
     )
     assert {"/usb_cam", "/other_cam"} <= set(re.findall(r"/\w+", finding["text"]))

@@ -95,8 +95,11 @@ def test_a_run_that_explains_exits_with_1_and_what_to_do(stage: Stage):
     relay = stage.relay(front(), "--explain", "6")
     assert relay.wait() == 1
     assert relay.stdout.splitlines()[:2] == [
-        "front: error: nobody publishes /camera (geometry_msgs/msg/Vector3Stamped) [no_publisher]",
-        "    start the node that publishes /camera, or correct the topic's name",
+        f"front: error: no other node was found on domain {stage.domain} (discovery range LOCALHOST) [alone]",
+        (
+            "    start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
+            " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`"
+        ),
     ]
 
 
@@ -136,4 +139,4 @@ def test_clients_that_stall_keep_no_message_and_no_answer_back(stage: Stage):
 
 def test_json_lines_carry_the_finding(stage: Stage):
     relay = stage.relay(front(), "--log-format", "json")
-    relay.wait_for_log('"group": "front", "finding": "no_publisher"}')
+    relay.wait_for_log('"group": "front", "finding": "alone"}')

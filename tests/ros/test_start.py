@@ -106,7 +106,7 @@ def test_of_any_arguments_there_comes_a_node_or_a_sentence():
 @pytest.mark.parametrize("domain", ["300", "-1", "abc", "08", "233"])
 def test_a_domain_that_is_none_is_refused_before_dds_ends_the_process(domain, monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    with pytest.raises(RosUnavailableError, match=f"ROS_DOMAIN_ID={domain} is no domain: expected a number from 0 to"):
+    with pytest.raises(RosUnavailableError, match=f"ROS_DOMAIN_ID={domain} is not a domain"):
         ros_start.start([], simulated=False)
 
 
@@ -114,7 +114,7 @@ def test_a_domain_that_is_none_is_refused_before_dds_ends_the_process(domain, mo
     ("words", "environ", "code", "said"),
     [
         (["--ros-args", "-p", "use_sim_time:=maybe"], {}, 2, "syncrelay: ROS rejects --ros-args -p"),
-        ([], {"ROS_DOMAIN_ID": "300"}, 69, "syncrelay: ROS_DOMAIN_ID=300 is no domain"),
+        ([], {"ROS_DOMAIN_ID": "300"}, 69, "syncrelay: ROS_DOMAIN_ID=300 is not a domain"),
         (["--ros-args", "-r", "/front/a:=/a"], {}, 1, "the default output `/a`, remapped from `/front/a`, is an input"),
     ],
     ids=["parameter", "domain", "loop"],

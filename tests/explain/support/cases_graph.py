@@ -3,8 +3,17 @@
 from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
 from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import ClockState, Code, Endpoint, Mismatch, Refusal, Severity
+from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Severity
 from syncrelay.sync.counts import InputCounts
+
+
+def unpublished(alike=None, /, **figures):
+    """Inputs that nobody publishes, by their names; nothing came of those without figures."""
+    return [
+        an_input(f"/{name}", publishers=(), alike=(alike or {}).get(name, ()), figures=each or {"last_received": None})
+        for name, each in figures.items()
+    ]
+
 
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
@@ -75,8 +84,65 @@ FOUND = {
         Code.NO_PUBLISHER,
         Severity.WARN,
         a_group(camera(publishers=(), figures={"last_received": NOW - 3 * S}), LIDAR),
-        f"nobody publishes /camera ({IMAGE}) any more, since 3 s",
+        f"nobody publishes /camera ({IMAGE}) any more; its last message came 3 s ago",
         "restart the node that published /camera",
+    ),
+    "several are not published any more": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(*unpublished(camera={"last_received": NOW - 9 * S}, lidar={"last_received": NOW - 8 * S})),
+        "nobody publishes /camera or /lidar any more; the last message came 8 s ago",
+        "restart the nodes that published them",
+    ),
+    "several are not published": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(*unpublished(camera={}, imu={}, lidar={})),
+        "nobody publishes /camera, /imu or /lidar",
+        "start the nodes that publish them, or correct the topics' names",
+    ),
+    "several are published under other names": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(*unpublished({"camera": ("/cam",), "lidar": ("/cam", "/lidar2")}, camera={}, lidar={})),
+        "nobody publishes /camera or /lidar",
+        (
+            "did you mean /cam for /camera and /lidar2 for /lidar? Otherwise start the nodes that publish them,"
+            " or correct the topics' names"
+        ),
+    ),
+    "several are published in a namespace": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(
+            *unpublished(
+                {"camera": ("/robot2/camera", "/robot1/camera"), "lidar": ("/robot1/lidar",)}, camera={}, lidar={}
+            )
+        ),
+        "nobody publishes /camera or /lidar",
+        "/robot1/camera and /robot1/lidar are published; did you mean namespace /robot1?",
+    ),
+    "several are published outside of the namespace": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(
+            *unpublished(
+                {"robot1/camera": ("/camera",), "robot1/lidar": ("/lidar",)},
+                **{"robot1/camera": {}, "robot1/lidar": {}},
+            )
+        ),
+        "nobody publishes /robot1/camera or /robot1/lidar",
+        "/camera and /lidar are published; did you mean namespace /?",
+    ),
+    "nobody is there": (
+        Code.ALONE,
+        Severity.ERROR,
+        a_silent_group(*unpublished(camera={}, lidar={}), empty_graph=GraphSnapshot(7, "LOCALHOST")),
+        "no other node was found on domain 7 (discovery range LOCALHOST)",
+        (
+            "start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
+            " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`"
+        ),
     ),
     "QoS that does not fit": (
         Code.INCOMPATIBLE_QOS,
@@ -205,6 +271,20 @@ QUIETLY = {
     "no publisher in the first two seconds": (
         Code.NO_PUBLISHER,
         a_group(camera(publishers=()), LIDAR, figures={"began": NOW - 1900 * MS}),
+    ),
+    "nobody is there in the first two seconds": (
+        Code.ALONE,
+        a_group(
+            *unpublished(camera={}, lidar={}),
+            figures={"began": NOW - 1900 * MS},
+            empty_graph=GraphSnapshot(0, "SUBNET"),
+        ),
+    ),
+    "nobody is there any more": (
+        Code.ALONE,
+        a_silent_group(
+            *unpublished(camera={"last_received": NOW - 9 * S}, lidar={}), empty_graph=GraphSnapshot(0, "SUBNET")
+        ),
     ),
     "another type is no QoS": (Code.INCOMPATIBLE_QOS, a_silent_group(camera(publishers=(STRANGER,)), LIDAR)),
     "what nobody publishes is not silent": (Code.SILENT, a_silent_group(camera(publishers=(), figures=QUIET), LIDAR)),

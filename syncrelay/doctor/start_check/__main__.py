@@ -1,4 +1,4 @@
-"""The process of a trial: a plan as JSON on stdin, then one object a line on stdout for every step begun or done."""
+"""The process that starts the node: a plan as JSON on stdin, then an object on stdout for each step begun or done."""
 
 import json
 import os
@@ -6,9 +6,9 @@ import sys
 from typing import Any
 
 from syncrelay.dataflow.backend import BackendName
+from syncrelay.doctor.start_check import Step
 from syncrelay.errors import RosUnavailableError, TypeImportError, UsageError
 from syncrelay.ros.environment import require_rclpy
-from syncrelay.ros.trial import Step
 from syncrelay.ros.types import import_type
 
 

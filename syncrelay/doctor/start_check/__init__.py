@@ -1,4 +1,4 @@
-"""A node started for a trial, in a process of its own: rcl and broken message libraries may end the whole process."""
+"""A node started and ended as a check, in its own process: rcl and broken message libraries may end that."""
 
 import json
 import re
@@ -15,7 +15,7 @@ _OVERRULED: Final = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
 
 
 class Step(Enum):
-    """What is tried, in this order, but ARGUMENTS: what comes after --ros-args can fail at any of the last three."""
+    """The steps in their order, but ARGUMENTS: what comes after --ros-args can fail at any of the last three."""
 
     IMPORT = "import"
     TYPES = "types"
@@ -41,8 +41,8 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
-    """What came of it. `failed` is the step that failed, None if all went well, and `fault` says why.
+class StartResult:
+    """How it went. `failed` is the step that failed, None if all went well, and `fault` says why.
 
     `unusable` has the fault of every type that cannot be imported. `names` are the topics after all remaps. `path` is
     how messages pass, direct or rclpy, and `path_fault` why not directly.
@@ -59,8 +59,8 @@ class Trial:
     path_fault: str = ""
 
 
-def try_out(plan: Plan, environ: Mapping[str, str]) -> Trial:
-    """Start a node as planned, end it, and return what came of it. It finds nobody and nobody finds it."""
+def start_node(plan: Plan, environ: Mapping[str, str]) -> StartResult:
+    """Start a node as planned, end it, and return how that went. It finds nobody and nobody finds it."""
     quiet = {name: value for name, value in environ.items() if name not in _OVERRULED}
     request = {
         "node": plan.node,
@@ -72,7 +72,7 @@ def try_out(plan: Plan, environ: Mapping[str, str]) -> Trial:
     }
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "syncrelay.ros.trial"],
+            [sys.executable, "-m", "syncrelay.doctor.start_check"],
             input=json.dumps(request),
             env={**quiet, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"},
             capture_output=True,
@@ -82,9 +82,9 @@ def try_out(plan: Plan, environ: Mapping[str, str]) -> Trial:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return Trial(Step.IMPORT, f"no end after {_DEADLINE_S:.0f} s")
+        return StartResult(Step.IMPORT, f"it did not finish within {_DEADLINE_S:.0f} s")
     except OSError as error:
-        return Trial(Step.IMPORT, f"{sys.executable} cannot be started: {error.strerror}")
+        return StartResult(Step.IMPORT, f"{sys.executable} cannot be started: {error.strerror}")
     return _read(_objects(done.stdout), done.returncode, done.stderr)
 
 
@@ -93,14 +93,14 @@ def _objects(stdout: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in stdout.splitlines() if line.startswith('{"step"')]
 
 
-def _read(objects: Sequence[Mapping[str, Any]], code: int, stderr: str) -> Trial:
+def _read(objects: Sequence[Mapping[str, Any]], code: int, stderr: str) -> StartResult:
     said: dict[str, Any] = {}
     for each in objects:
         said |= each
     unusable = said.get("unusable", {})
     middleware = said.get("middleware", "")
     if code == 0 and "names" in said:
-        return Trial(
+        return StartResult(
             None,
             "",
             unusable,
@@ -113,10 +113,10 @@ def _read(objects: Sequence[Mapping[str, Any]], code: int, stderr: str) -> Trial
         )
     step = Step(said.get("step", Step.IMPORT.value))
     if "fault" in said:
-        return Trial(step, said["fault"], unusable, middleware=middleware)
+        return StartResult(step, said["fault"], unusable, middleware=middleware)
     if step is Step.TYPES and (last := said.get("type")):
-        return Trial(step, "", {**unusable, last: _end(code, stderr)}, middleware=middleware)
-    return Trial(step, _end(code, stderr), unusable, middleware=middleware)
+        return StartResult(step, "", {**unusable, last: _end(code, stderr)}, middleware=middleware)
+    return StartResult(step, _end(code, stderr), unusable, middleware=middleware)
 
 
 def _end(code: int, stderr: str) -> str:
