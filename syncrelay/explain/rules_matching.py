@@ -262,15 +262,10 @@ def _waits_enough(index: int, trials: Trials) -> Iterator[Tried]:
     others = [median_low(each) for other, each in enumerate(trials.delays) if other != index and each]
     if not others or not trials.delays[index]:
         return
-    if tried := trials.try_out(()):
-        yield tried
-        return
     late = Distribution([delay - min(others) for delay in trials.delays[index]])
     wait = parse_duration(with_headroom(late))
-    for times in (1, 2, 4):
-        if tried := trials.try_out((Change("max_wait", words.at_least(times * wait)),)):
-            yield tried
-            return
+    values: list[Changes] = [(Change("max_wait", words.at_least(times * wait)),) for times in (1, 2) if wait > 0]
+    yield from islice(filter(None, map(trials.try_out, [*values, ()])), 1)
 
 
 def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:

@@ -32,13 +32,13 @@ _LEFT_OUT: Final = 0.05
 _PERIODS: Final = 1.5
 _FAR_OFF: Final = 4
 # A queue that was too short is tried longer by this factor again and again; what does is suggested with a quarter more.
-_LONGER: Final = 1.5
+_LONGER: Final = 2
 _HEADROOM: Final = 1.25
 # What was tried holds for so long while its finding stands: the first time for a second, then twice as long each time.
 _TRIED_AGAIN: Final = _SECOND
 _HOLDS: Final = 8 * _SECOND
 # A run costs about 3 us a message: this is some hundredths of a second.
-_MESSAGES_A_POLL: Final = 20_000
+_MESSAGES_A_POLL: Final = 30_000
 # Less is not told apart from what a driver takes.
 _LEAST_DISTANCE: Final = 1_000_000
 # Of a period: so near to one another are messages of one moment received.
@@ -200,12 +200,12 @@ class Trials:
             return None
         if changes and (tried := self.gives_enough(changes)) is not None:
             return tried
-        longer = ceil(_LONGER * self.config.options.queue_size)
+        longer = _LONGER * self.config.options.queue_size
         size = need if need is not None and need > self.config.options.queue_size else longer
         while size <= LONGEST_QUEUE and not self._budget.is_spent:
             if self._is_enough(self._run((*changes, _queue(size)))):
                 return self.gives_enough((*changes, _queue(min(LONGEST_QUEUE, ceil(size * _HEADROOM) + 1))))
-            size = ceil(_LONGER * size)
+            size *= _LONGER
         return None
 
     def gives_enough(self, changes: Changes) -> Tried | None:
@@ -256,7 +256,8 @@ def _last(recent: Sequence[Arrivals], pacemaker: int) -> tuple[Arrival, ...]:
 
 def with_headroom(spans: Distribution) -> str:
     """Return the tolerance, as it stands in the file, that takes in 99 % of spans, and what they scatter by."""
-    return words.at_least(spans.quantile(0.99) + (spans.quantile(0.95) - spans.quantile(0.5)) // 2)
+    most = spans.quantile(0.99)
+    return words.at_least(most + (most - spans.quantile(0.5)) // 2)
 
 
 def changed(config: GroupConfig, changes: Changes) -> GroupConfig:

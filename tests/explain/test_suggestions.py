@@ -1,6 +1,7 @@
 """Suggestions: each was tried on the messages that came, cures what it is said of, and gives what it promises."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -9,7 +10,8 @@ from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import Finding
-from tests.explain.scenario import MS, Source, Told, run
+from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, TryBudget
+from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run
 
 _VALUES = re.compile(r"(`[^`]+: [^`]+`(?: at /\w+)?(?: and `[^`]+: [^`]+`(?: at /\w+)?)*), which would give (\d+)")
 _VALUE = re.compile(r"`(\w+): ([^`]+)`(?: at (/\w+))?")
@@ -160,6 +162,42 @@ def test_a_rate_that_changes_brings_no_few_sets(hz):
     camera = replace(CAMERA, hz_at=lambda second: 10 if second < 25 else hz)
     lidar = replace(LIDAR, hz=30)
     assert "few_sets" not in run(camera, lidar, seconds=50, options={"slop": "60ms"}).ever_found
+
+
+def evaluator(budget: TryBudget | None = None) -> Evaluator:
+    """Of a group whose stamps lie 30 ms apart, with a slop of 20 ms."""
+    config = group_of([CAMERA, LIDAR], {"slop": "20ms"})
+    stamps = [BEGAN + number * 100 * MS for number in range(60)]
+    arrivals = [[(stamp + shift, stamp + 40 * MS) for stamp in stamps] for shift in (0, 30 * MS)]
+    return Evaluator(config, lambda: arrivals, budget)
+
+
+def wider(trials: Trials) -> Iterator[Tried]:
+    yield from filter(None, [trials.try_out((Change("slop", "35ms"),))])
+
+
+def test_what_was_tried_says_what_it_gives():
+    assert evaluator().best("a", wider, now=BEGAN).tried == (Tried((Change("slop", "35ms"),), 59, 0, 59),)
+
+
+def test_what_was_tried_is_not_tried_again_at_once():
+    asked = evaluator()
+    first = asked.best("a", wider, now=BEGAN)
+    assert asked.best("a", lambda _: iter(()), now=BEGAN + 999 * MS) is first
+    assert asked.best("a", lambda _: iter(()), now=BEGAN + 1000 * MS).tried == ()
+
+
+def test_nothing_is_tried_for_any_group_once_the_budget_is_spent_until_it_is_refilled():
+    budget = TryBudget()
+    asked, other = evaluator(budget), evaluator(budget)
+    budget.spend(1_000_000)
+    assert asked.best("a", wider, now=BEGAN).tried == other.best("a", wider, now=BEGAN).tried == ()
+    budget.refill()
+    assert asked.best("a", wider, now=BEGAN).tried != ()
+
+
+def test_what_does_not_help_is_not_offered():
+    assert evaluator().best("a", lambda t: filter(None, [t.try_out((Change("slop", "25ms"),))]), now=BEGAN).tried == ()
 
 
 _RATES = st.sampled_from([1, 2, 5, 7, 10, 15, 20, 30, 50, 100, 200])
