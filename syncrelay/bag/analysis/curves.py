@@ -14,7 +14,7 @@ from syncrelay.config import GroupConfig
 from syncrelay.explain import Arrival, dry_run
 
 MOST_MESSAGES: Final = 50_000
-"""Of a longer recording, these first ones are used: up to 20 runs of the engine then take some seconds."""
+"""Of a longer recording, these first ones are used: some 20 runs of the engine on them take seconds."""
 LARGEST_QUEUE: Final = 1000
 """Longer queues are neither tried nor suggested."""
 

@@ -121,17 +121,14 @@ def _offsets(group: GroupAnalysis) -> list[int]:
 def _dropped(group: GroupAnalysis, index: int, origin: int, begin: int) -> tuple[Nanoseconds, Nanoseconds, int]:
     """Return when the dropped messages of an input were made, the codes of their fates, and how many are astray."""
     rows = zip(group.evaluation.drops, group.unneeded.flags.tolist(), strict=True)
-    drops, unneeded = [], []
-    for drop, is_unneeded in rows:
-        if drop.input == index:
-            drops.append(drop)
-            unneeded.append(is_unneeded)
+    of_input = [(drop, is_unneeded) for drop, is_unneeded in rows if drop.input == index]
+    drops = [drop for drop, _ in of_input]
     stamps = np.array([each.stamp for each in drops], dtype=np.int64)
     received = np.array([each.received for each in drops], dtype=np.int64)
     times = stamps - origin
     is_astray = (stamps == 0) | (np.abs(times - received + begin) > _ASTRAY)
     codes = np.array([CODES[each.reason.value] for each in drops], dtype=np.int64)
-    codes[np.array(unneeded, dtype=bool)] = CODES[UNNEEDED]
+    codes[np.array([is_unneeded for _, is_unneeded in of_input], dtype=bool)] = CODES[UNNEEDED]
     return np.where(is_astray, received - begin, times), codes, int(np.count_nonzero(is_astray))
 
 
