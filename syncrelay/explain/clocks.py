@@ -96,10 +96,14 @@ class StampSteps:
         self._newest = self._pending = self._stayed = None
         self._swings.clear()
 
-    def add(self, received: Sequence[int], delays: Sequence[int], *, period: Callable[[], float]) -> None:
-        """Take when messages came, and their delays; `period` gives the usual time between two, when it is needed."""
+    def add(
+        self, received: Sequence[int], delays: Sequence[int], least: int, most: int, *, period: Callable[[], float]
+    ) -> None:
+        """Take when messages came, their delays, and the least and the most of those.
+
+        `period` gives the usual time between two, when it is needed.
+        """
         newest, self._newest = self._newest, (received[-1], delays[-1])
-        least, most = min(delays), max(delays)
         if newest is not None and max(most, newest[1]) - min(least, newest[1]) >= STEP_NS:
             self._scan(newest, received, delays, period())
         if self._pending is not None:

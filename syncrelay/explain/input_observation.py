@@ -86,8 +86,9 @@ class InputObservation:
         if stamped and stamped is not arrivals:
             stamps, received = zip(*stamped, strict=True)
         delays = list(map(sub, map(by_clock, received) if by_clock else received, stamps)) if stamped else []
+        least, most = (min(delays), max(delays)) if delays else (0, 0)
         if delays:
-            self._steps.add(received, delays, period=self._period)
+            self._steps.add(received, delays, least, most, period=self._period)
         # Of two clocks in turn, each fall is followed by a rise: nothing begins anew.
         if fallen and not self._steps.swings(last)[0]:
             self._forget()
@@ -102,7 +103,7 @@ class InputObservation:
             self._points.clear()
             self._drift = None
         if delays:
-            self._measure(stamped, stamps, delays)
+            self._measure(stamped, stamps, delays, least, most)
         return fallen
 
     @property
@@ -193,25 +194,25 @@ class InputObservation:
         last = self._received[-_PERIODS:]
         return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0
 
-    def _measure(self, stamped: Arrivals, stamps: Sequence[int], delays: list[int]) -> None:
+    def _measure(self, stamped: Arrivals, stamps: Sequence[int], delays: list[int], least: int, most: int) -> None:
         """Measure delays, drift and bursts, from messages that have stamps."""
         keep_last(self._stamps, stamps, _TRIED_MESSAGES)
         keep_last(self._delays, delays, _TRIED_MESSAGES)
-        self._find_bursts(stamped, delays)
+        self._find_bursts(stamped, delays, least, most)
         # What came fastest was held up least: the least delay tells more of the clock than of the load.
-        self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, min(delays)))
+        self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, least))
         self._points_seen += 1
         if len(self._points) < _FEW_POINTS or self._points_seen % _DRIFT_EVERY == 0:
             self._drift = drift(self._points)
 
-    def _find_bursts(self, stamped: Arrivals, delays: Sequence[int]) -> None:
+    def _find_bursts(self, stamped: Arrivals, delays: Sequence[int], least: int, most: int) -> None:
         while self._bursts and self._bursts[0].at <= stamped[-1][1] - WINDOW_NS:
             self._bursts.popleft()
         before = list(self._newest_arrivals)
-        all_delays = [*self._newest_delays, *delays]
+        held_up = max(most, *self._newest_delays) - min(least, *self._newest_delays) if before else most - least
         self._newest_arrivals.extend(stamped)
         self._newest_delays.extend(delays[-AT_ONCE:])
-        if max(all_delays) - min(all_delays) >= LEAST_HELD_NS:
+        if held_up >= LEAST_HELD_NS:
             self._bursts.extend(bursts([*before, *stamped]))
 
     def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:
