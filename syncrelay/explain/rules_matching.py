@@ -59,7 +59,8 @@ def over_slop(facts: GroupFacts) -> Found:
     over = nearest.share_over(tolerance.ns)
     if facts.is_silent and over > 1 - _MISSED:
         text, severity = _too_wide(tolerance, nearest), Severity.ERROR
-    elif not facts.is_silent and over > (_MOST if _come_at_once(facts) else _MISSED):
+    elif not facts.is_silent and over > max(_MOST if _come_at_once(facts) else _MISSED, 1.5 / len(nearest)):
+        # One message alone is chance.
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
