@@ -29,6 +29,7 @@ class FindingLog:
     """Turns the findings of one group, poll by poll, into what is worth saying."""
 
     def __init__(self) -> None:
+        self._now = 0
         self._quiet_since: int | None = None
         self._told = False
         self._pause = 0
@@ -44,6 +45,9 @@ class FindingLog:
         What is `explained` by others is not over where it is not found.
         """
         now = facts.figures.now
+        if now < self._now:
+            self._set_back(self._now - now)
+        self._now = now
         if facts.is_silent:
             yield from self._silent(facts, explanation(findings), now)
             return
@@ -52,6 +56,16 @@ class FindingLog:
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}", None)
             self._quiet_since, self._told, self._well_since = None, False, now
         yield from self._warnings(findings, explained, now)
+
+    def _set_back(self, by: int) -> None:
+        """Bear that this machine's clock was set back: else nothing would be said until it comes to where it was."""
+        if self._quiet_since is not None:
+            self._quiet_since -= by
+        self._tell_again -= by
+        self._well_since -= by
+        for warning in self._warned.values():
+            warning.began -= by
+            warning.seen -= by
 
     def _silent(self, facts: GroupFacts, finding: Finding, now: int) -> Iterator[Remark]:
         if self._quiet_since is None:

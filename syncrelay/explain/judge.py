@@ -56,7 +56,6 @@ _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.out_of_order),
     of_each_input(rules_stamps.duplicates),
-    rules_matching.constant_offset,
     of_each_input(rules_graph.subscriber_qos),
     of_each_input(rules_graph.output_taken),
 )

@@ -1,6 +1,7 @@
 """What other values of the file would give: the engine itself, run on the messages that came last."""
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+import time
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -24,6 +25,7 @@ _PIVOTS: Final = 100
 # ... or those of so long, as late ones take.
 _AT_LEAST: Final = 5 * _SECOND
 _MOST_MESSAGES: Final = 4_000
+_LEAST_MESSAGES: Final = 500
 # From fewer possible sets nothing can be told.
 _FEWEST: Final = 5
 # All possible sets but one, which may still wait for what comes next, or but this share.
@@ -37,8 +39,12 @@ _HEADROOM: Final = 1.25
 # What was tried holds for so long while its finding stands: the first time for a second, then twice as long each time.
 _TRIED_AGAIN: Final = _SECOND
 _HOLDS: Final = 8 * _SECOND
-# A run costs about 3 us a message: this is some hundredths of a second.
-_MESSAGES_A_POLL: Final = 30_000
+# A run costs 3 to 20 us a message, by what the engine has to do: a few runs for a group alone ...
+_MESSAGES: Final = 30_000
+# ... and for groups of one relay so much of the processor in a poll, after which no try begins, or goes on.
+_BEGINS_NS: Final = 20_000_000
+_ENDS_NS: Final = 40_000_000
+_ASKED_EVERY: Final = 50
 # Less is not told apart from what a driver takes.
 _LEAST_DISTANCE: Final = 1_000_000
 # Of a period: so near to one another are messages of one moment received.
@@ -77,23 +83,51 @@ UNTRIED: Final = Verdict(())
 
 
 class TryBudget:
-    """How many messages may be run through engines until the next poll, by all groups that share it."""
+    """How much may be tried out until the next poll, by all groups that share it: so much of the processor's time.
 
-    def __init__(self) -> None:
-        self._left = _MESSAGES_A_POLL
+    Without a `clock` of that, in nanoseconds, so many messages may be run through engines: the same on any machine.
+    """
+
+    def __init__(self, clock: Callable[[], int] | None = time.thread_time_ns) -> None:
+        self._clock = clock
+        self._is_wanted = False
+        self.refill()
 
     def refill(self) -> None:
         """Begin a poll."""
-        self._left = _MESSAGES_A_POLL
+        self._began = self._clock() if self._clock else 0
+        self._left = _MESSAGES
+        self.is_short, self._is_wanted = self._is_wanted, False
+        """Whether the poll before had no time for something that was never tried."""
 
-    def spend(self, messages: int) -> None:
-        """Take so many from what is left."""
-        self._left -= messages
+    def want(self) -> None:
+        """Note that there was no time for something that was never tried."""
+        self._is_wanted = True
 
     @property
     def is_spent(self) -> bool:
         """Whether no run may begin any more."""
-        return self._left <= 0
+        return self._spent() >= _BEGINS_NS if self._clock else self._left <= 0
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether what has begun is to try no more; by a clock it is interrupted, and goes on at the next poll."""
+        return self._clock is None and self._left <= 0
+
+    def spent_on(self, arrivals: Iterable[Arrival]) -> Iterator[Arrival]:
+        """Yield messages that a run takes. Raises OutOfTimeError where it takes too long."""
+        for number, each in enumerate(arrivals):
+            if self._clock and number % _ASKED_EVERY == 0 and self._spent() >= _ENDS_NS:
+                raise OutOfTimeError
+            self._left -= 1
+            yield each
+
+    def _spent(self) -> int:
+        return self._clock() - self._began if self._clock else 0
+
+
+class OutOfTimeError(Exception):
+    """A try took too long."""
 
 
 class Evaluator:
@@ -104,8 +138,10 @@ class Evaluator:
     ) -> None:
         self._config = config
         self._recent = recent
-        self._budget = budget or TryBudget()
+        self._budget = budget or TryBudget(clock=None)
         self._is_shared = budget is not None
+        self._most_messages = _MOST_MESSAGES
+        self._unfinished: tuple[Hashable, Trials] | None = None
         self._found: dict[Hashable, _Found] = {}
 
     def best(
@@ -127,13 +163,30 @@ class Evaluator:
             return verdict
         if not self._is_shared:
             self._budget.refill()
-        if self._budget.is_spent:
+        if self._budget.is_spent or (holds and self._budget.is_short):
+            # What was never tried goes first.
+            if not holds:
+                self._budget.want()
             return verdict
-        trials = Trials(self._config, self._recent(), self._budget, within=within, optional=optional)
-        before = verdict.tried if holds == _HOLDS else ()
-        again = tuple(tried for each in before if (tried := trials.gives_enough(each.changes)) is not None)
-        found = again if before and len(again) == len(before) else tuple(propose(trials))
-        verdict = Verdict(found, may_miss=trials.may_miss)
+        begun, self._unfinished = self._unfinished, None
+        if begun is not None and begun[0] == about:
+            trials = begun[1]
+        else:
+            most = self._most_messages
+            trials = Trials(self._config, self._recent(), self._budget, within=within, optional=optional, most=most)
+        runs = trials.runs
+        try:
+            before = verdict.tried if holds == _HOLDS else ()
+            again = tuple(tried for each in before if (tried := trials.gives_enough(each.changes)) is not None)
+            found = again if before and len(again) == len(before) else tuple(propose(trials))
+            verdict = Verdict(found, may_miss=trials.may_miss)
+        except OutOfTimeError:
+            if trials.runs > runs:
+                # The next poll goes on from here.
+                self._unfinished = about, trials
+            else:
+                self._most_messages = max(_LEAST_MESSAGES, self._most_messages // 2)
+            return verdict
         self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), verdict)
         return verdict
 
@@ -165,13 +218,14 @@ class Trials:
         *,
         within: int | None = None,
         optional: int | None = None,
+        most: int = _MOST_MESSAGES,
     ) -> None:
         self.config = config
         self._budget = budget
         self._trigger = config.trigger
         required = [index for index, topic in enumerate(config.topics) if topic.required]
         pacemaker = min(required, key=lambda index: _rate(recent[index])) if self._trigger is None else self._trigger
-        self._arrivals = _last(recent, pacemaker)
+        self._arrivals = _last(recent, pacemaker)[-most:]
         self.stamps: list[list[int]] = [[] for _ in config.topics]
         self.delays: list[list[int]] = [[] for _ in config.topics]
         for each in self._arrivals:
@@ -183,7 +237,16 @@ class Trials:
         self.pivot: int = slowest if self._trigger is None else self._trigger
         self.spans = self._possible(among, within)
         self._counted = self.pivot if optional is None else optional
-        self._now = self._run(())
+        self._given: dict[Changes, int] = {}
+
+    @property
+    def runs(self) -> int:
+        """How many runs there were."""
+        return len(self._given)
+
+    @property
+    def _now(self) -> int:
+        return self._run(())
 
     @property
     def may_miss(self) -> bool:
@@ -202,7 +265,7 @@ class Trials:
             return tried
         longer = _LONGER * self.config.options.queue_size
         size = need if need is not None and need > self.config.options.queue_size else longer
-        while size <= LONGEST_QUEUE and not self._budget.is_spent:
+        while size <= LONGEST_QUEUE and not self._budget.has_ended:
             if self._is_enough(self._run((*changes, _queue(size)))):
                 return self.gives_enough((*changes, _queue(min(LONGEST_QUEUE, ceil(size * _HEADROOM) + 1))))
             size *= _LONGER
@@ -219,8 +282,12 @@ class Trials:
         return given >= len(self.spans) - max(1, int(_LEFT_OUT * len(self.spans)))
 
     def _run(self, changes: Changes) -> int:
-        self._budget.spend(len(self._arrivals))
-        run = dry_run(changed(self.config, changes), self._arrivals)
+        if changes not in self._given:
+            self._given[changes] = self._completed(changes)
+        return self._given[changes]
+
+    def _completed(self, changes: Changes) -> int:
+        run = dry_run(changed(self.config, changes), self._budget.spent_on(self._arrivals))
         counts = run.counts[self._counted]
         # A message that is held may be in many sets.
         completed = max(run.held[self._counted], counts.matched + counts.dropped.get(DropReason.THINNED, 0))
@@ -251,7 +318,7 @@ def _last(recent: Sequence[Arrivals], pacemaker: int) -> tuple[Arrival, ...]:
         # What is held until there is a newer one may have come long before.
         if received >= begin or place == len(each) - 1 or each[place + 1][1] >= begin
     ]
-    return tuple(sorted(came, key=lambda each: each.received)[-_MOST_MESSAGES:])
+    return tuple(sorted(came, key=lambda each: each.received))
 
 
 def with_headroom(spans: Distribution) -> str:
@@ -313,7 +380,7 @@ def constant_offsets(trials: Trials) -> Iterator[Change]:
         if distance is None:
             continue
         later = median(trials.delays[index]) - median(trials.delays[pivot])
-        period = _period(trials.stamps[index])
+        period = _period(sorted(set(trials.stamps[index])))
         whole = round((later + distance) / period) * period
         shift = whole - distance if abs(later + distance - whole) <= _SAME * period else -distance
         # Of two, the one that is farther from this machine's time is odd.

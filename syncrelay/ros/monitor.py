@@ -2,7 +2,9 @@
 
 import logging
 import time
+from collections import deque
 from collections.abc import Sequence
+from itertools import islice
 from math import ceil
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -52,6 +54,7 @@ class Monitor:
         self._bugs = bugs
         self._clock = SimulatedClock() if simulated else None
         self._bindings: Sequence[GroupBinding] = ()
+        self._turns: deque[GroupBinding] = deque()
         self._watched: dict[GroupRelay, _Watched] = {}
         self._reports: dict[GroupRelay, GroupReport] = {}
         self._losses: dict[TopicInput, Losses] = {}
@@ -77,6 +80,7 @@ class Monitor:
         """Evaluate these groups from now on; what is known of those that were there before stays."""
         now = time.time_ns()
         self._bindings = bindings
+        self._turns = deque(bindings)
         self._watched = {
             binding.group: self._watched.get(binding.group)
             or _Watched(GroupWatch(binding.group.config, began=now, budget=self._try_budget), Judge(), FindingLog())
@@ -93,12 +97,15 @@ class Monitor:
         self._evaluate(self._bindings)
 
     def evaluate_in_turn(self) -> None:
-        """Evaluate those that were not for longest, and all where there are new ones. Raises as `evaluate` does."""
+        """Evaluate the next in turn, and all where there are new ones. Raises as `evaluate` does."""
         if len(self._reports) < len(self._bindings):
             self._evaluate(self._bindings)
             return
-        longest_ago = sorted(self._bindings, key=lambda binding: self._reports[binding.group].facts.figures.now)
-        self._evaluate(longest_ago[: max(_IN_TURN, ceil(len(longest_ago) / _LONGEST_TURN))])
+        # Not by the time of their reports: the clock may be set.
+        count = max(_IN_TURN, ceil(len(self._turns) / _LONGEST_TURN))
+        now = [*islice(self._turns, count)]
+        self._turns.rotate(-count)
+        self._evaluate(now)
 
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
         self._judge(bindings, *self._loop.call(lambda: self._gather(bindings)).result())

@@ -143,7 +143,7 @@ def run(
     """
     config = group_of(sources, options or {})
     names = [topic.topic for topic in config.topics]
-    arrivals = merge(*(_arrivals(each, names, seconds, random.Random(f"{seed} {each}")) for each in sources))
+    arrivals = merge(*(_arrivals(each, names, seconds, random.Random(f"{seed} {each.topic} {each.node}")) for each in sources))
     relay = _Relay(config)
     waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in arrivals)
     taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)

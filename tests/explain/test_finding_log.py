@@ -42,6 +42,14 @@ def test_a_silence_is_said_with_its_reason_and_what_to_do():
     assert looked(FindingLog(), at(17, last_set=10))[0].text == f"no more sets for 7 s: {WHY}"
 
 
+def test_a_clock_that_is_set_back_delays_nothing():
+    log = FindingLog()
+    assert told(log, range(1, 21), last_set=lambda _: None) == [5, 10, 20]
+    began = BEGAN - 3600 * S
+    silent = [at(second, last_set=None, began=began) for second in range(-3579, -3539)]
+    assert [number for number, facts in enumerate(silent) if looked(log, facts)] == [20]
+
+
 def test_its_end_is_said_once():
     silence = FindingLog()
     looked(silence, at(5, last_set=None))

@@ -35,6 +35,12 @@ def test_it_is_not_found(code, facts):
     assert code not in {finding.code for finding in found_in(facts)}
 
 
+@pytest.mark.parametrize("facts", [case[2] for case in FOUND.values()], ids=FOUND)
+def test_nothing_is_found_twice(facts):
+    found = judge(facts)
+    assert len(found) == len(set(found))
+
+
 def test_every_code_has_its_case():
     assert {case[0] for case in FOUND.values()} == set(Code)
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import Finding
-from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, TryBudget
+from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, TryBudget, constant_offsets
 from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run
 
 _VALUES = re.compile(r"(`[^`]+: [^`]+`(?: at /\w+)?(?: and `[^`]+: [^`]+`(?: at /\w+)?)*), which would give (\d+)")
@@ -187,13 +187,66 @@ def test_what_was_tried_is_not_tried_again_at_once():
     assert asked.best("a", lambda _: iter(()), now=BEGAN + 1000 * MS).tried == ()
 
 
+class Processor:
+    """A clock of the processor that takes 1 ms each time it is read."""
+
+    def __init__(self) -> None:
+        self.now = 0
+
+    def __call__(self) -> int:
+        self.now += MS
+        return self.now
+
+
 def test_nothing_is_tried_for_any_group_once_the_budget_is_spent_until_it_is_refilled():
-    budget = TryBudget()
+    budget = TryBudget(clock := Processor())
     asked, other = evaluator(budget), evaluator(budget)
-    budget.spend(1_000_000)
+    clock.now += 20 * MS
     assert asked.best("a", wider, now=BEGAN).tried == other.best("a", wider, now=BEGAN).tried == ()
     budget.refill()
     assert asked.best("a", wider, now=BEGAN).tried != ()
+
+
+def slops(trials: Trials) -> Iterator[Tried]:
+    yield from filter(None, [trials.try_out((Change("slop", f"{slop}ms"),)) for slop in range(21, 36)])
+
+
+def test_a_poll_interrupts_what_takes_long_and_the_next_goes_on_from_there():
+    budget = TryBudget(clock := Processor())
+    asked = evaluator(budget)
+    polls, found = 0, ()
+    while not found and polls < 100:
+        began = clock.now
+        found = asked.best("a", slops, now=BEGAN).tried
+        assert clock.now - began < 60 * MS
+        budget.refill()
+        polls += 1
+    assert polls > 1
+    assert found == evaluator().best("a", slops, now=BEGAN).tried
+
+
+def test_what_was_never_tried_comes_before_what_was():
+    budget = TryBudget(clock := Processor())
+    asked, other = evaluator(budget), evaluator(budget)
+    before = asked.best("a", wider, now=BEGAN)
+    clock.now += 20 * MS
+    other.best("a", wider, now=BEGAN)
+    budget.refill()
+    assert asked.best("a", lambda _: iter(()), now=BEGAN + 2000 * MS) is before
+    assert other.best("a", wider, now=BEGAN + 2000 * MS).tried != ()
+    budget.refill()
+    assert asked.best("a", lambda _: iter(()), now=BEGAN + 3000 * MS).tried == ()
+
+
+def test_an_offset_is_found_where_each_stamp_comes_three_times():
+    stamps = [BEGAN + number * 100 * MS for number in range(60)]
+    config = group_of([CAMERA, LIDAR], {"slop": "20ms"})
+    arrivals = [
+        [(stamp, stamp + 45 * MS) for stamp in stamps],
+        [(stamp + 30 * MS, stamp + (40 + nth) * MS) for stamp in stamps for nth in range(3)],
+    ]
+    trials = Trials(config, arrivals, TryBudget(clock=None))
+    assert list(constant_offsets(trials)) == [Change("offset", "30ms", 0)]
 
 
 def test_what_does_not_help_is_not_offered():
