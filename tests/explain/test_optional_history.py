@@ -106,12 +106,12 @@ def test_no_cause_is_named_that_did_not_hold():
             cause = finding.text.partition(": ")[2]
             if "too late" in cause:
                 assert history.came_too_late(), (seed, finding)
-                assert finding.suggestion.startswith("check what holds /c up")
+                assert finding.suggestion.startswith("check what delays /c")
             elif "span" in cause:
                 assert abs(history.shift) > _SLOP, (seed, finding)
             elif "behind" in cause or "ahead" in cause:
                 assert abs(history.shift) > S, (seed, finding)
-            elif "has not come for" in cause:
+            elif "has been silent for" in cause:
                 assert at - history.came[-1][1] > S, (seed, finding)
             elif "no message" in cause:
                 assert not history.came, (seed, finding)

@@ -50,7 +50,7 @@ def test_a_relay_tells_of_a_second_one_and_of_others_that_publish_its_outputs(st
     second = stage.relay(front())
     text = wait_for_finding(relay, "output_taken")["text"]
     assert text.startswith("another node of the name /syncrelay publishes /front/")
-    assert text.endswith(" too: whoever subscribes to it gets the messages of both")
+    assert text.endswith(" too: its subscribers get the messages of both")
     assert_logged(second, r"\[WARN\] .* front: another node of the name /syncrelay publishes /front/")
     second.send(signal.SIGTERM)
     assert second.wait() == 0
