@@ -88,7 +88,7 @@ def test_a_required_topic_that_is_not_there_is_a_fault_of_the_data(folder):
 @pytest.mark.parametrize("output", ["out.mcap", "out"])
 def test_what_is_written_can_be_replayed(output, folder):
     done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", output, folder=folder)
-    said = f"syncrelay: {output} is written: 78 messages of 39 sets\n"
+    said = f"syncrelay: wrote {output}: 78 messages of 39 sets\n"
     assert (done.returncode, done.stdout, done.stderr) == (0, _SUMMARY, said)
     (folder / "g.yaml").write_text(_file().replace('"/', '"/front/'))
     again = run("replay", output, "--config", "g.yaml", folder=folder)
