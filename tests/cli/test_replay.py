@@ -121,7 +121,7 @@ def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
         (["rig.mcap", "--config", "g.yaml"], 1, "g.yaml: no such file"),
         (["rig.mcap"], 2, "syncrelay: the following arguments are required: --config"),
         (["--config", "f.yaml"], 2, "syncrelay: the following arguments are required: BAG"),
-        (["rig.mcap", "--config", "f.yaml", "-o", "f.yaml"], 1, "syncrelay: f.yaml: exists already"),
+        (["rig.mcap", "--config", "f.yaml", "-o", "f.yaml"], 1, "syncrelay: f.yaml: already exists"),
     ],
 )
 def test_what_is_wrong_is_said(words, code, said, folder):
