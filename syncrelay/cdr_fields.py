@@ -125,7 +125,7 @@ def _reader(type_name: str, path: str) -> _Read:
         return _primitive_reader(_PRIMITIVES[type_name])
     if _STRING.fullmatch(type_name):
         return _read_string
-    raise UnreadableFieldError(f"{path} is {type_name}, expected a number, a text or a time")
+    raise UnreadableFieldError(f"{path} is {type_name}, expected a number, a string or a time")
 
 
 def _skipper(fields_of: FieldsOf, type_name: str) -> _Skip:

@@ -108,7 +108,7 @@ def test_a_length_that_the_payload_cannot_hold_is_not_counted_down():
     ("path", "words"),
     [
         ("header.stamps", "std_msgs/Header has no field stamps, it has stamp, frame_id"),
-        ("weights", "weights is sequence<double>, expected a number, a text or a time"),
+        ("weights", "weights is sequence<double>, expected a number, a string or a time"),
         ("boxes.label", "sequence<a/Box> has no field label"),
         ("id.value", "uint32 has no field value"),
     ],

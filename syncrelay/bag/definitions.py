@@ -116,7 +116,7 @@ def _require_bearable(types: Mapping[str, Any]) -> None:
 
     def weight_of(name: str, depth: int) -> int:
         if depth > _DEEPEST:
-            raise ValueError(f"{name} holds itself")
+            raise ValueError(f"{name} contains itself")
         if name not in weights:
             weights[name] = sum(weight_of_field(description, depth) for _, description in types[name][1])
         if weights[name] > _MOST_FIELDS:

@@ -38,7 +38,7 @@ class McapOutput:
         self._folder = None if path.suffix == MCAP_SUFFIX else path
         self._path = path if self._folder is None else path / f"{path.name}_0{MCAP_SUFFIX}"
         if path.exists():
-            raise BagError(f"{path}: exists already, and is not overwritten")
+            raise BagError(f"{path}: already exists and is not overwritten")
         try:
             if self._folder is not None:
                 self._folder.mkdir(parents=True)

@@ -139,8 +139,8 @@ def _why(channel: Channel | None, time: object, payload: object) -> str:
     if channel is None:
         return OF_NO_CHANNEL
     if type(time) is not int:
-        return "the time of receipt is no integer"
-    return "the payload is no BLOB" if type(payload) is not bytes else OF_NO_TIME
+        return "the time of receipt is not an integer"
+    return "the payload is not a BLOB" if type(payload) is not bytes else OF_NO_TIME
 
 
 def _opened(path: Path, name: str) -> sqlite3.Connection:

@@ -53,7 +53,7 @@ def command(words: Sequence[str], _stop: StopRequest) -> int:
     arguments = parser.read(words)
     config, *others = arguments.config or [None]
     if others:
-        parser.error("--config is here several times: analyze takes one file, of which --write makes a better one")
+        parser.error("--config was given more than once: analyze takes one file")
     asked = Asked(config, tuple(arguments.topics), arguments.write, arguments.html, arguments.json)
     return analyze_bag(arguments.bag, asked)
 
@@ -84,7 +84,7 @@ def analyze_bag(bag: str, asked: Asked) -> int:
 
 
 def _require_sense(asked: Asked) -> None:
-    more = "\n  syncrelay analyze --help says more"
+    more = "\n  see syncrelay analyze --help"
     if asked.config is not None and asked.topics:
         raise UsageError(f"name a file with --config FILE, or the topics to match, not both{more}")
     if asked.config is None and not asked.topics and (asked.write or asked.html):

@@ -44,7 +44,7 @@ def command(words: Sequence[str], stop: StopRequest) -> int:
     parser = Parser(
         "syncrelay demo",
         description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it. "
-        "Exit code 1 if a group gave no set.",
+        "Exit code 1 if a group produced no set.",
     )
     parser.add_argument("--seconds", metavar="N", type=positive, help="end N seconds after the sensors are up")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")

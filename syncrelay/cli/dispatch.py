@@ -29,7 +29,7 @@ _COMMANDS: Final = {
         _Command("demo", "try it on simulated sensors; needs no robot", "demo"),
         _Command("doctor", "find out why messages may not arrive", "doctor"),
         _Command("top", "watch a running relay, here or on another machine", "top"),
-        _Command("reload", "have a running relay read its file again", "reload"),
+        _Command("reload", "make a running relay read its file again", "reload"),
         _Command("healthcheck", "check that the relay is receiving", "heartbeat"),
         _Command("schema", "print the JSON Schema of the file, for editors", "schema"),
     )
@@ -70,7 +70,7 @@ def _unknown_command(word: str) -> str:
 
     if word.endswith((".yaml", ".yml")) or Path(word).is_file():
         return (
-            f"{word} is not a command\n  syncrelay --config {word}     to relay what it says\n"
+            f"{word} is not a command\n  syncrelay --config {word}     to run the relay with it\n"
             f"  syncrelay validate {word}     to check it"
         )
     return f"unknown command {word}{did_you_mean(word, _COMMANDS)}\n  syncrelay --help lists the commands"

@@ -42,10 +42,10 @@ def command(words: Sequence[str], _stop: StopRequest) -> int:
     )
     parser.add_argument("--seconds", metavar="N", type=positive, help="with --live: watch for N s (5)")
     parser.add_argument("--json", action="store_true", help="print JSON, for programs")
-    parser.add_argument("--ros-args", action="store_true", help="what follows is what the relay is given: remaps, say")
+    parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
     arguments = parser.read(words)
     if arguments.seconds and not arguments.live:
-        parser.error("--seconds N is for how long --live looks at the graph, and --live is missing")
+        parser.error("--seconds N needs --live: it is how long to observe the graph")
     parser.refuse_repeated(arguments.config)
     live_s = (arguments.seconds or 5.0) if arguments.live else None
     return doctor(arguments.config, live_s, "json" if arguments.json else "text", arguments.ros_args)

@@ -31,7 +31,7 @@ def conclude(reports: "Sequence[GroupReport]", looked_s: float, *, unjudged: "Se
         for line in _lines(report):
             put(line)
     faults = [f"{report.facts.name} {fault}" for report in reports if (fault := _fault(report, looked_s))]
-    faults += [f"{name} could not be judged: see the log" for name in unjudged]
+    faults += [f"{name} could not be evaluated: see the log" for name in unjudged]
     if not faults:
         return DONE
     put(f"exit code 1: {'; '.join(faults)}")
@@ -46,7 +46,7 @@ def _fault(report: "GroupReport", looked_s: float) -> str | None:
         if count := sum(finding.severity is severity for finding in report.findings):
             return f"has {count} {word}{'s' if count > 1 else ''}"
     if report.facts.figures.last_set is None:
-        return f"gave no set in {looked_s:.0f} s, too short a time to tell why: write a larger N for --explain"
+        return f"produced no set in {looked_s:.0f} s, which is too short to tell why: give --explain a larger N"
     return None
 
 

@@ -79,7 +79,7 @@ def command(words: Sequence[str], _stop: "StopRequest") -> int:
 def healthcheck() -> int:
     """Print what is wrong, if anything is; 0 if the relay is receiving, 1 if not."""
     named = os.environ.get(VARIABLE)
-    found = ailment(Path(named)) if named else f"{VARIABLE} is not set: it names the heartbeat's file"
+    found = ailment(Path(named)) if named else f"{VARIABLE} is not set: it must name the heartbeat file"
     print(found or "receiving")  # noqa: T201  Docker keeps it with the result
     return 1 if found else 0
 

@@ -39,7 +39,7 @@ def command(words: Sequence[str], _stop: StopRequest) -> int:
     if arguments.from_graph:
         return init_from_graph(arguments.seconds or 10.0, arguments.output)
     if arguments.seconds is not None:
-        parser.error("--seconds N is for how long --from-graph listens, and --from-graph is missing")
+        parser.error("--seconds N needs --from-graph: it is how long to listen")
     return init_from_bag(arguments.from_bag, arguments.output)
 
 

@@ -60,7 +60,7 @@ def _stamps(topic: Topic) -> str:
     faults, delay = faults_of(topic.figures), topic.figures.delay
     if delay is None:
         return ", ".join(faults) or "equal to receipt"
-    return ", ".join([f"{words.duration(delay.median)} before receipt", *faults])
+    return ", ".join([f"{words.span_of_time(delay.median)} before receipt", *faults])
 
 
 def _next(bag: str, fit: Sequence[str]) -> Iterator[str]:

@@ -16,10 +16,10 @@ def write_new(name: str, text: str) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise BagError(f"{path}: exists already, and is not overwritten") from error
+        raise BagError(f"{path}: already exists and is not overwritten") from error
     except OSError as error:
         raise BagError(f"{path}: cannot be written: {error.strerror}") from error
-    remark(f"{path} is written")
+    remark(f"wrote {path}")
 
 
 def write_again(name: str, text: str, *, mark: str) -> None:

@@ -31,7 +31,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise UsageError with argparse's message."""
-        raise UsageError(f"{message}\n  {self.prog} --help says more")
+        raise UsageError(f"{message}\n  see {self.prog} --help")
 
     def read(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the arguments, with what follows --ros-args, which the parser may have, as `ros_args`.

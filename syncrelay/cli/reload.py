@@ -26,7 +26,7 @@ def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay reload`."""
     parser = Parser(
         "syncrelay reload",
-        description="Has the relay on this machine read its file again. Groups that did not change keep running and "
+        description="Makes the relay on this machine read its file again. Groups that did not change keep running and "
         "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
     )
     parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host:port or URL")
@@ -73,4 +73,6 @@ def _signal(pid: int) -> None:
     try:
         os.kill(pid, signal.SIGHUP)
     except PermissionError as error:
-        raise SyncRelayError(f"the relay belongs to another user, who alone may signal its process {pid}") from error
+        raise SyncRelayError(
+            f"process {pid} of the relay belongs to another user, and only that user may signal it"
+        ) from error

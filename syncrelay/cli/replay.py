@@ -77,7 +77,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         _say_all(recording.faults)
     if written is not None:
         sets = sum(result.sets for result in results)
-        remark(f"{wanted.output} is written: {counted(written.count, 'message')} of {counted(sets, 'set')}")
+        remark(f"wrote {wanted.output}: {counted(written.count, 'message')} of {counted(sets, 'set')}")
     tell = say if wanted.sets or wanted.drops else put
     for result in results:
         for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):

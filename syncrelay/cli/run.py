@@ -73,7 +73,7 @@ def _parser() -> Parser:
         help="debug, info (default), warning or error",
     )
     add("--log-format", choices=("text", "json"), default="text", metavar="FORMAT", help="text (default) or json")
-    add("--ros-args", action="store_true", help="pass what follows to ROS: -r __ns:=/robot1, say")
+    add("--ros-args", action="store_true", help="pass what follows to ROS, such as -r __ns:=/robot1")
     parser.add_argument("--version", action="store_true", help="print the version")
     return parser
 
@@ -213,5 +213,5 @@ def _require_groups(asked: Sequence[str], config: "Config", config_paths: Sequen
     there = [group.name for group in config.groups]
     for name in asked:
         if name not in there:
-            hint, files = did_you_mean(name, there), ", ".join(config_paths)
-            raise UsageError(f"--group {name}: {files} has no such group{hint}; there is {', '.join(there)}")
+            hint, files = did_you_mean(name, there) or f"; it has {', '.join(there)}", ", ".join(config_paths)
+            raise UsageError(f"--group {name}: {files} has no such group{hint}")

@@ -87,10 +87,10 @@ def _require_terminal() -> None:
 def _otherwise(named: str | None) -> str:
     if named is None:
         return (
-            "  Start one with `syncrelay --config FILE`, whose file must not say\n"
-            "  `metrics: null`, or say where it is: `syncrelay top --url robot:9464`."
+            "  Start one with `syncrelay --config FILE` (not with `metrics: null` in it),\n"
+            "  or say where it is: `syncrelay top --url robot:9464`."
         )
     return (
-        "  From other machines a relay can be asked if its file says\n"
+        "  A relay on another machine answers only if its file says\n"
         "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between."
     )

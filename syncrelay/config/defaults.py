@@ -96,9 +96,9 @@ def _take(path: Path, document: Document, merged: Document) -> list[Problem]:
         return []
     place = f"line {there.key.line} of {printable(merged.sources[there.key.source].name)}"
     text = (
-        f"the group {quoted(str(key))} is also in {place}: rename one of them"
+        f"the group {quoted(str(key))} is also on {place}: rename one of them"
         if parents
-        else f"`{key}` is also in {place}: files that run together may have it only once"
+        else f"`{key}` is also on {place}: files that run together may have it only once"
     )
     return [document.problem(path, text, code="duplicate_key", span=entry.key)]
 

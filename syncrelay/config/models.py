@@ -137,7 +137,7 @@ class Topic(Keys):
         default=0,
         description=(
             "Added to the stamp for matching only, for a sensor whose clock is off: -12ms for one that is 12 ms"
-            " ahead. A number is seconds, a text has a unit (ns, us, ms, s, min). Default: 0."
+            " ahead. A number is seconds, a string has a unit (ns, us, ms, s, min). Default: 0."
         ),
         examples=["-12ms"],
     )
@@ -171,7 +171,7 @@ class PacedTopic(Topic):
         default=0,
         description=(
             "Least time between two messages of this input: it lets a set leave before the next message arrives."
-            " Too large a value gives worse sets. A number is seconds, a text has a unit (ns, us, ms, s, min)."
+            " Too large a value gives worse sets. A number is seconds, a string has a unit (ns, us, ms, s, min)."
             " Default: 0, nothing known."
         ),
         examples=["9ms"],
@@ -254,7 +254,7 @@ class Group(Keys):
         description=(
             "How long a set may wait, once its required messages are there, for optional ones or for a closer match;"
             " then it leaves as it is. Needed if an input is optional, except with latest_time, which never waits for"
-            " one. A number is seconds, a text has a unit (ns, us, ms, s, min). Default: no limit."
+            " one. A number is seconds, a string has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["100ms"],
     )
@@ -262,7 +262,7 @@ class Group(Keys):
         default=None,
         description=(
             "Largest number of sets a second, evenly spaced by their stamps; the others are dropped whole, as"
-            " `thinned`. A number is Hz, a text has a unit (Hz, kHz). Default: no limit."
+            " `thinned`. A number is Hz, a string has a unit (Hz, kHz). Default: no limit."
         ),
         examples=["10 Hz"],
     )

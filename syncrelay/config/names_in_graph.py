@@ -134,7 +134,7 @@ def _repeated_inputs(topics: Sequence[_Topic], document: Document) -> Iterator[P
     for name in (topic.input for topic in topics if topic.input.text):
         other = first.setdefault(name.text, name)
         if other is not name:
-            text = f"{name.said} is in this group twice, first in {other.line(document, beside=name.path)}"
+            text = f"{name.said} is in this group twice, first on {other.line(document, beside=name.path)}"
             yield document.problem(name.path, text, code="repeated_topic")
 
 
@@ -148,12 +148,12 @@ def _shared_topics(topics: Sequence[_Topic], document: Document) -> Iterator[Pro
         if all(types) and types[0] != types[1]:
             path = (*topic.path, "type")
             line = document.line((*other.path, "type"), beside=path)
-            text = f"{topic.input.said} is {quoted(types[1])} in {line}, but a topic has only one type"
+            text = f"{topic.input.said} is {quoted(types[1])} on {line}, but a topic has only one type"
             yield document.problem(path, text, code="conflict")
         qos, others = _qos(topic, document), _qos(other, document)
         if topic.config.qos != other.config.qos and not {qos, others} & document.faulty:
             text = (
-                f"{topic.input.said} has a different `qos` in {document.line(others, beside=qos)}: there is one"
+                f"{topic.input.said} has a different `qos` on {document.line(others, beside=qos)}: there is one"
                 " subscription for both, write the same `qos`"
             )
             yield document.problem(qos, text, code="conflict")
@@ -179,7 +179,7 @@ def _outputs(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
             text = f"{what} is also an input ({line}), which makes a loop: choose another `output`"
             yield document.problem(name.path, text, code="loop")
         elif other is not name:
-            text = f"{what} is already used in {other.line(document, beside=name.path)}: choose another `output`"
+            text = f"{what} is already used on {other.line(document, beside=name.path)}: choose another `output`"
             yield document.problem(name.path, text, code="repeated_output")
 
 

@@ -19,7 +19,7 @@ from syncrelay.sync import (
 )
 
 Slop = Field(
-    description="Largest span of a set, inclusive. A number is seconds, a text has a unit (ns, us, ms, s, min).",
+    description="Largest span of a set, inclusive. A number is seconds, a string has a unit (ns, us, ms, s, min).",
     examples=["20ms"],
 )
 
@@ -124,7 +124,7 @@ class LatestTimeGroup(Group):
     max_age: Annotated[Duration | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "How much older than the trigger's message another may be. A number is seconds, a text has a unit"
+            "How much older than the trigger's message another may be. A number is seconds, a string has a unit"
             " (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["500ms"],
@@ -162,7 +162,7 @@ class EqualKeyGroup(Group):
     )
     key: Annotated[FieldPath | None, NOT_NULL] = Field(
         default=None,
-        description="Path of the field to match by, fields joined by dots: a number, a text or a time. Default: none,"
+        description="Path of the field to match by, fields joined by dots: a number, a string or a time. Default: none,"
         " every topic has a `key` of its own.",
         examples=["header.frame_id"],
     )

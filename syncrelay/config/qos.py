@@ -71,7 +71,7 @@ _QosDuration = Annotated[
     BeforeValidator(_qos_duration),
     WithJsonSchema({"anyOf": [*duration_schema(sign=r"\+?", minimum=0)["anyOf"], _SEC_AND_NSEC]}),
 ]
-_DURATION: Final = "A number is seconds, a text has a unit (ns, us, ms, s, min), a mapping has sec and nsec."
+_DURATION: Final = "A number is seconds, a string has a unit (ns, us, ms, s, min), a mapping has sec and nsec."
 
 
 class QosOverrides(Keys):

@@ -26,7 +26,7 @@ _EXPECTED: Final = {
     "int_type": "a whole number",
     "float_type": "a number",
     "bool_type": "true or false",
-    "string_type": "text",
+    "string_type": "a string",
     "tuple_type": "a list",
     "dict_type": "a mapping",
     "model_type": "a mapping",
@@ -116,7 +116,7 @@ def _found(value: object, kind: str) -> str:
     if not isinstance(value, str):
         return found
     if kind == "bool_type" and value.lower() in _TRUTH_WORDS:
-        return f"{found}, which YAML 1.2 reads as text"
+        return f"{found}, which YAML 1.2 reads as a string"
     if kind in ("int_type", "float_type") and isinstance(read_plain(value), int | float):
         return f"{found}: write it without quotes"
     return found

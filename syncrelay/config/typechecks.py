@@ -128,7 +128,7 @@ class _AskedField(NamedTuple):
 
 
 _A_TIME: Final = _Wanted(frozenset([TIME]), TIME)
-_A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a text or a time")
+_A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a string or a time")
 
 
 def _check_field(

@@ -76,7 +76,7 @@ def _hertz(text: str) -> Decimal:
         raise ValueError(f"expected a rate such as 10 Hz, found {describe(text)}")
     number, unit = matched.groups()
     if not unit:
-        raise ValueError(f"the text {quoted(text)} has no unit: write {number} Hz, or {number} without quotes")
+        raise ValueError(f"the string {quoted(text)} has no unit: write {number} Hz, or {number} without quotes")
     if unit not in _HERTZ:
         raise ValueError(f"unknown unit {quoted(unit)}, expected Hz or kHz")
     return Decimal(number) * _HERTZ[unit]
@@ -89,7 +89,7 @@ def _number_and_unit(text: str) -> tuple[Decimal, int]:
     number, unit = matched.groups()
     if not unit:
         raise ValueError(
-            f"the text {quoted(text)} has no unit: write {number}ms, or {number} without quotes for seconds"
+            f"the string {quoted(text)} has no unit: write {number}ms, or {number} without quotes for seconds"
         )
     known = NS_PER_UNIT.get(unit.replace("μ", "µ"))
     if known is None:

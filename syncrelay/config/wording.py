@@ -50,7 +50,7 @@ def describe(value: object) -> str:
         case int() | float():
             return f"the number {quoted(str(value))}"
         case str():
-            return f"the text {quoted(value)}" if value else "an empty text"
+            return f"the string {quoted(value)}" if value else "an empty string"
         case list() | tuple():
             return "a list"
         case _:

@@ -150,7 +150,7 @@ class _Composer:
             self._report(text, span, code="merge_key")
         elif key in top.node.entries:
             first = top.node.entries[key].key.line
-            self._report(f"duplicate key, first in line {first}", span, code="duplicate_key")
+            self._report(f"duplicate key, first on line {first}", span, code="duplicate_key")
 
     def _value(self, event: yaml.ScalarEvent, span: Span) -> ScalarNode:
         try:

@@ -31,7 +31,7 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
     if warnings:
         yield info(
             "file_doubtful",
-            f"{named} may not mean what it says:\n{render(warnings)}",
+            f"{named} may not mean what you intended:\n{render(warnings)}",
             impact="the relay does what it says",
             fix="write what you mean, with its unit",
         )

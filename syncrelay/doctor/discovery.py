@@ -59,7 +59,7 @@ def _domain(found: Discovery) -> Iterator[Diagnosis]:
             "domain_id",
             f"ROS_DOMAIN_ID={text} is read as {domain}",
             impact=f"ROS reads numbers as C does, so these nodes find only others on domain {domain}",
-            fix="write the number in plain digits, without a leading 0 and nothing after it",
+            fix="write the number in plain digits, without a leading 0 and with nothing after it",
         )
     low, high = found.ephemeral_ports
     ports = ports_of(domain)

@@ -38,7 +38,7 @@ def _burst_text(held_up: Sequence[InputFacts], *, are_all: bool = False) -> str:
     times = "once" if count == 1 else f"{count} times"
     names = "all inputs" if are_all else " and ".join(each.name for each in held_up)
     held = words.duration(max(each.figures.held for each in held_up))
-    return f"{times} in the last 10 s messages of {names} arrived in a burst, up to {held} late"
+    return f"messages of {names} arrived in a burst {times} in the last 10 s, up to {held} late"
 
 
 def _burst_check(facts: GroupFacts, an_input: InputFacts) -> str:
@@ -47,7 +47,7 @@ def _burst_check(facts: GroupFacts, an_input: InputFacts) -> str:
         return f"check whether {who} sent in bursts, or the recorder received it late"
     return (
         f"check whether {who} sends in bursts; if it runs on another machine, check the network: after a loss, reliable"
-        " publishers send again only every 3 s by default, configs/fast_heartbeats.xml makes them faster"
+        " publishers send again only every 3 s by default; configs/fast_heartbeats.xml makes them faster"
     )
 
 
@@ -68,7 +68,7 @@ def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found
             Code.MESSAGES_LOST,
             Severity.WARN,
             f"DDS lost {messages} of {an_input.name} on the way here in the last 10 s",
-            f"check the network and the CPU load; if {nodes(an_input)} is reliable, `qos: auto` has it send again",
+            f"check the network and the CPU load; if {nodes(an_input)} is reliable, `qos: auto` makes it resend them",
             index,
         )
 
@@ -123,7 +123,7 @@ def fates(an_input: InputFacts) -> str:
     """Say what most often became of an input's messages."""
     figures = an_input.figures
     if not figures.fed:
-        return f"of {an_input.name} none came lately"
+        return f"no messages of {an_input.name} arrived recently"
     dropped = sorted(figures.dropped.items(), key=lambda item: -item[1])[:2]
     parts = " and ".join(f"{count} were dropped as {reason.value}" for reason, count in dropped)
-    return f"of {an_input.name}'s last {figures.fed} messages {parts or 'none was dropped'}"
+    return f"of the last {figures.fed} messages of {an_input.name}, {parts or 'none were dropped'}"

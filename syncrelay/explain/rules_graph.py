@@ -44,7 +44,7 @@ def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Foun
             refusal.text,
             "give one of the two another name: a process has one type for each topic"
             if refusal.held_as
-            else "the relay tries again every few seconds; if it stays, look at limits of memory and open files",
+            else "the relay tries again every 5 s; if this goes on, check the limits on memory and open files",
             index,
         )
 
@@ -176,9 +176,9 @@ def _no_longer_published(facts: GroupFacts, gone: Sequence[InputFacts]) -> tuple
     last = words.seconds(facts.figures.now - max(each.figures.last_received or 0 for each in gone))
     if len(gone) == 1:
         (only,) = gone
-        text = f"nobody publishes {only.name} ({only.type}) any more; its last message came {last} ago"
+        text = f"nobody publishes {only.name} ({only.type}) any more; its last message arrived {last} ago"
         return text, f"restart the node that published {only.name}"
-    text = f"nobody publishes {one_of(each.name for each in gone)} any more; the last message came {last} ago"
+    text = f"nobody publishes {one_of(each.name for each in gone)} any more; the last message arrived {last} ago"
     return text, "restart the nodes that published them"
 
 
@@ -257,7 +257,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
         )
     if not _is_silent(facts, an_input, quiet) or (facts.is_held(index) and _is_enough(facts, an_input)):
         return None
-    until_then = f"; until then it came at {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
+    until_then = f"; before that its rate was {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
     return Finding(
         Code.SILENT,
         blocks(facts, an_input),
@@ -282,7 +282,9 @@ def _is_silent(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
 
 
 def _is_there(quiet: int) -> str:
-    return "still publishes it" if quiet > _LEASE else "publishes it, or died: the graph shows a dead node for 20 s"
+    return (
+        "still publishes it" if quiet > _LEASE else "publishes it or has died: a dead node stays in the graph for 20 s"
+    )
 
 
 def _is_enough(facts: GroupFacts, an_input: InputFacts) -> bool:
@@ -299,7 +301,7 @@ def _or_hold_longer(facts: GroupFacts, index: int) -> str:
     if facts.tolerance is None or not facts.is_held(index):
         return ""
     age = words.duration(facts.tolerance.ns)
-    return f"; if it is sent that rarely by design, write a larger `{facts.tolerance.key}` than {age}, or none"
+    return f"; if it is meant to be sent this rarely, write a `{facts.tolerance.key}` larger than {age}, or none"
 
 
 def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -324,8 +326,8 @@ def output_taken(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         yield Finding(
             Code.OUTPUT_TAKEN,
             Severity.WARN,
-            f"{they} {verb} {an_input.output} too: whoever subscribes to it gets the messages of {whose}",
-            "end all publishers but one, or give this output another name, `output: ...`; a node that was killed is"
-            " gone from the graph after 20 s",
+            f"{they} {verb} {an_input.output} too: its subscribers get the messages of {whose}",
+            "stop all publishers but one, or give this output another name with `output: ...`; a node that was killed"
+            " stays in the graph for 20 s",
             index,
         )

@@ -82,7 +82,7 @@ def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distributi
     missed = f"{words.share(nearest.share_over(tolerance.ns))} of the last {len(nearest)} messages of"
     name = facts.pacemaker.name
     if tolerance.wider_policy:
-        return f"{missed} {name} have no partner of an equal stamp"
+        return f"{missed} {name} have no partner with an equal stamp"
     return f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
 
 
@@ -232,7 +232,7 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
     within = tolerance.ns if tolerance else None
     if tolerance is None or len(nearest) < _FEWEST:
         found = _tried(facts, about, lambda trials: _long_enough(None, trials), optional=index, within=within)
-        return "", _advice(facts, found, name) or f"check how late {name} comes"
+        return "", _advice(facts, found, name) or f"check how late {name} arrives"
     if abs(behind) > max(SECOND, tolerance.ns):
         offset = Change("offset", words.exactly(behind + an_input.offset), index)
         found = _tried(facts, about, lambda trials: filter(None, [trials.gives_enough((offset,))]), optional=index)
@@ -251,11 +251,11 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
     if facts.max_wait is not None and behind > facts.max_wait:
         found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=tolerance.ns)
         return (
-            f": it comes {words.duration(behind)} after the others, too late",
-            f"check what holds {name} up{_or(_advice(facts, found, name))}",
+            f": it arrives {words.duration(behind)} after the others, too late",
+            f"check what delays {name}{_or(_advice(facts, found, name))}",
         )
     found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=within)
-    return "", _advice(facts, found, name) or f"check how late {name} comes"
+    return "", _advice(facts, found, name) or f"check how late {name} arrives"
 
 
 def _waits_enough(index: int, trials: Trials) -> Iterator[Tried]:
@@ -274,11 +274,11 @@ def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
     figures = an_input.figures
     look = f"check {nodes(an_input)}"
     if figures.last_received is None:
-        return ": no message of it has come", look
+        return ": no message of it has arrived", look
     quiet = facts.figures.now - figures.last_received
     usual = round(SECOND / figures.usual_hz) if figures.usual_hz else 0
     if quiet > max(SECOND, _AWAY * usual):
-        return f": it has not come for {words.seconds(quiet)}", look
+        return f": it has been silent for {words.seconds(quiet)}", look
     return None
 
 

@@ -53,7 +53,7 @@ def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             Code.MALFORMED,
             _blocks_if_most(facts, an_input, count),
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} are cut short, or not of its type",
-            f"see that {nodes(an_input)} has the same version of {an_input.type} as is installed here",
+            f"check that {nodes(an_input)} uses the same version of {an_input.type} as is installed here",
             index,
             explains=_matters(facts, an_input, count),
         )
@@ -119,7 +119,7 @@ def other_clock(facts: GroupFacts) -> Found:
 def _wait_for_it(facts: GroupFacts, behind: int, name: str) -> str:
     needed = max((each.counts.needed_queue or 0 for each in facts.inputs), default=0)
     may_be_late = needed > facts.queue_size and 0 < behind < _LATENCY
-    return f"; if {name} really takes that long to come, write `queue_size: {needed}`" if may_be_late else ""
+    return f"; if {name} really takes that long to arrive, write `queue_size: {needed}`" if may_be_late else ""
 
 
 def _epoch(an_input: InputFacts, behind: int) -> str:
@@ -144,8 +144,8 @@ def no_common_key(facts: GroupFacts) -> Found:
     yield Finding(
         Code.NO_COMMON_KEY,
         Severity.ERROR,
-        f"no key came on all inputs while it was buffered; the newest are {newest}",
-        "correct `key`, or write a larger `queue_size` if one input's keys come much later",
+        f"no key arrived on all inputs while it was buffered; the newest are {newest}",
+        "correct `key`, or write a larger `queue_size` if one input's keys arrive much later",
     )
 
 

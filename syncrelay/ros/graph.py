@@ -80,7 +80,7 @@ def others(infos: Iterable[Any], *, than: str, own: int) -> tuple[Endpoint, ...]
     What has its name and is not among those is of a second node of that name.
     """
     found = _endpoints(infos, lambda _: None, "publisher")
-    namesakes = [replace(each, node=f"another node of the name {than}") for each in found if each.node == than]
+    namesakes = [replace(each, node=f"another node named {than}") for each in found if each.node == than]
     return (*(each for each in found if each.node != than), *namesakes[own:])
 
 

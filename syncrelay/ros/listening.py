@@ -75,7 +75,7 @@ def listen(*, seconds: float) -> Heard:
         )
         return listener.run()
     except _rclpy.RCLError as error:
-        raise RosUnavailableError(f"the graph cannot be listened to: {error}") from error
+        raise RosUnavailableError(f"cannot listen to the graph: {error}") from error
     finally:
         if node is not None:
             node.destroy_node()

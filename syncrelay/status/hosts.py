@@ -55,7 +55,7 @@ class Hosts:
         try:
             asked = _asked(environ)
         except ValueError:
-            return "400 Bad Request", "expected one header `Host` with a name or an address, and a port or none"
+            return "400 Bad Request", "expected one `Host` header with a name or an address, and optionally a port"
         strange = next((host for host in asked if host not in self), None)
         if strange is None:
             return None

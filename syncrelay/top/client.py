@@ -186,9 +186,9 @@ def _no_answer(error: Exception, timeout_s: float) -> NoAnswerError:
         case TimeoutError():
             return NoAnswerError(f"no answer within {timeout_s:g} s")
         case socket.gaierror():
-            return NoAnswerError("no machine of that name was found")
+            return NoAnswerError("no machine with that name was found")
         case IncompleteRead() | ConnectionError():
-            return NoAnswerError("the connection ended before the answer did")
+            return NoAnswerError("the connection closed before the answer was complete")
         case OSError(strerror=str() as words):
             return NoAnswerError(words)
         case _:

@@ -58,7 +58,7 @@ def _topics(column: str, value: object, *, where: str = "name = '/camera'") -> s
 @pytest.mark.parametrize("value", ["NULL", "'soon'", "1.5", "X'00'"])
 def test_a_row_without_a_whole_number_for_its_time_is_left_out(value, tmp_path):
     path = _sqlite3(tmp_path, _first_message("timestamp", value))
-    assert _read(path) == (_RIG[1:], ["1 message left out: the time of receipt is no integer"])
+    assert _read(path) == (_RIG[1:], ["1 message left out: the time of receipt is not an integer"])
 
 
 @pytest.mark.parametrize("value", [-1, LATEST + 1, 2**63 - 1, -(2**63)])
@@ -75,7 +75,7 @@ _STRAYS = "left out: channel not described in the file"
 @pytest.mark.parametrize("value", ["NULL", "7", "'text'", "1.5", "CAST(data AS TEXT)"])
 def test_a_row_without_bytes_for_its_payload_is_left_out(value, tmp_path):
     path = _sqlite3(tmp_path, _first_message("data", value))
-    assert _read(path) == (_RIG[1:], ["1 message left out: the payload is no BLOB"])
+    assert _read(path) == (_RIG[1:], ["1 message left out: the payload is not a BLOB"])
 
 
 @pytest.mark.parametrize("column", ["name", "type", "serialization_format"])

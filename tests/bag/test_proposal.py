@@ -110,9 +110,9 @@ def test_what_gives_no_set_with_the_others_is_named_too(tmp_path):
         pytest.raises(NothingToMatchError) as raised,
     ):
         propose(recording)
-    said = [f"/early ({VECTOR}): 50 messages, and no set with the others"]
-    said += [f"/late ({VECTOR}): 50 messages, and no set with the others"]
-    assert str(raised.value).split("\n  ") == ["no two topics of the recording give a set", *said]
+    said = [f"/early ({VECTOR}): none of its 50 messages forms a set with the others"]
+    said += [f"/late ({VECTOR}): none of its 50 messages forms a set with the others"]
+    assert str(raised.value).split("\n  ") == ["no two topics of the recording form a set", *said]
 
 
 def test_of_a_topic_of_two_types_the_one_with_more_messages_is_taken(tmp_path):
@@ -141,7 +141,7 @@ def test_queues_are_as_long_as_the_rule_of_the_readme_asks(fast_ms, latency_ms, 
     assert ("queue_size" in text) == (size is not None)
     if size is not None:
         (line,) = (line for line in text.splitlines() if "queue_size" in line)
-        assert f"twice the {size // 2} messages of /imu that may come before one of /lidar does" in line
+        assert f"twice the {size // 2} messages of /imu that may arrive before one of /lidar" in line
     assert sets["fused"] == 90
 
 

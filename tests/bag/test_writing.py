@@ -124,7 +124,7 @@ def test_outputs_without_a_set_are_there_too(tmp_path):
 
 def test_nothing_is_overwritten(tmp_path):
     bag = write_mcap(tmp_path / "rig.mcap", _RIG)
-    with pytest.raises(BagError, match=r"rig\.mcap: exists already, and is not overwritten"):
+    with pytest.raises(BagError, match=r"rig\.mcap: already exists and is not overwritten"):
         _written(bag, bag)
     with pytest.raises(BagError, match="cannot be written: No such file"):
         _written(bag, tmp_path / "none" / "out.mcap")

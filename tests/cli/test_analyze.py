@@ -68,12 +68,12 @@ def test_the_json_holds_the_same_for_programs(folder):
 def test_the_written_file_gives_what_was_promised(folder, tmp_path):
     written = str(tmp_path / "better.yaml")
     done = run("analyze", "rig.mcap", "--config", "f.yaml", "--write", written, folder=folder)
-    assert (done.returncode, done.stderr) == (0, f"syncrelay: {written} is written\n")
+    assert (done.returncode, done.stderr) == (0, f"syncrelay: wrote {written}\n")
     assert run("validate", written, folder=folder).returncode == 0
     replayed = run("replay", "rig.mcap", "--config", written, folder=folder)
     assert read_summary(replayed.stdout)["front"].sets == 100
     again = run("analyze", "rig.mcap", "--config", "f.yaml", "--write", written, folder=folder)
-    assert (again.returncode, again.stderr) == (1, f"syncrelay: {written}: exists already, and is not overwritten\n")
+    assert (again.returncode, again.stderr) == (1, f"syncrelay: {written}: already exists and is not overwritten\n")
 
 
 def test_comments_of_the_file_stay(folder, tmp_path):

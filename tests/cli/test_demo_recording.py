@@ -52,4 +52,4 @@ def test_a_seed_repeats_it(folder, tmp_path):
 
 def test_nothing_is_overwritten(folder):
     done = run("demo", "--record", "rig.mcap", folder=folder)
-    assert (done.returncode, done.stderr) == (1, "syncrelay: rig.mcap: exists already, and is not overwritten\n")
+    assert (done.returncode, done.stderr) == (1, "syncrelay: rig.mcap: already exists and is not overwritten\n")

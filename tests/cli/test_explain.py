@@ -24,7 +24,7 @@ def test_a_look_that_is_too_short_says_what_decided(capsys: pytest.CaptureFixtur
     first, last = capsys.readouterr().out.splitlines()
     assert first.endswith("[starting]")
     assert last == (
-        "exit code 1: front gave no set in 1 s, too short a time to tell why: write a larger N for --explain"
+        "exit code 1: front produced no set in 1 s, which is too short to tell why: give --explain a larger N"
     )
 
 
@@ -36,4 +36,4 @@ def test_findings_of_a_group_decide_and_are_counted(capsys: pytest.CaptureFixtur
 
 def test_a_group_of_which_there_is_no_report_is_not_healthy(capsys: pytest.CaptureFixture[str]):
     assert conclude([_report(a_group())], 10, unjudged=["rear"]) == AT_FAULT
-    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: rear could not be judged: see the log"
+    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: rear could not be evaluated: see the log"

@@ -82,4 +82,4 @@ def test_the_command_and_the_bare_probe_say_the_same(tmp_path, command):
     code, said = probe(**{VARIABLE: str(tmp_path / "old")})
     assert code == 1
     assert said.startswith("the receive loop last turned 36")
-    assert probe(**{VARIABLE: ""}) == (1, f"{VARIABLE} is not set: it names the heartbeat's file")
+    assert probe(**{VARIABLE: ""}) == (1, f"{VARIABLE} is not set: it must name the heartbeat file")

@@ -175,7 +175,7 @@ def folder(tmp_path_factory):
 def test_the_command_writes_it_beside_what_it_prints(folder):
     plain = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
     done = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", "--html", "report.html", folder=folder)
-    assert (done.returncode, done.stderr) == (0, "syncrelay: report.html is written\n")
+    assert (done.returncode, done.stderr) == (0, "syncrelay: wrote report.html\n")
     assert done.stdout == plain.stdout
     assert (folder / "report.html").read_text().startswith("<!doctype html>")
 
@@ -183,10 +183,10 @@ def test_the_command_writes_it_beside_what_it_prints(folder):
 def test_a_former_report_is_replaced_and_nothing_else_is(folder):
     (folder / "again.html").write_text(_FORMER)
     done = run("analyze", "rig.mcap", "--config", "f.yaml", "--html", "again.html", folder=folder)
-    assert (done.returncode, done.stderr) == (0, "syncrelay: again.html is written\n")
+    assert (done.returncode, done.stderr) == (0, "syncrelay: wrote again.html\n")
     (folder / "mine.html").write_text("<!doctype html><title>mine</title>")
     done = run("analyze", "rig.mcap", "--config", "f.yaml", "--html", "mine.html", folder=folder)
-    assert (done.returncode, done.stderr) == (1, "syncrelay: mine.html: exists already, and is not overwritten\n")
+    assert (done.returncode, done.stderr) == (1, "syncrelay: mine.html: already exists and is not overwritten\n")
     assert (folder / "mine.html").read_text() == "<!doctype html><title>mine</title>"
 
 

@@ -21,7 +21,7 @@ def test_what_it_writes_is_in_order_and_gives_sets(folder):
     assert (printed.returncode, printed.stderr) == (0, "")
     written = run("init", "--from-bag", "rig.mcap", "-o", "new.yaml", folder=folder)
     assert (written.returncode, written.stdout) == (0, "")
-    assert written.stderr == "syncrelay: new.yaml is written\n"
+    assert written.stderr == "syncrelay: wrote new.yaml\n"
     assert (folder / "new.yaml").read_text() == printed.stdout
     assert run("validate", "new.yaml", folder=folder).returncode == 0
     replayed = run("replay", "rig.mcap", "--config", "new.yaml", folder=folder)
@@ -55,11 +55,11 @@ def test_what_it_writes_for_packages_that_are_not_installed_is_in_order_too(fold
     [
         ([], 2, "one of the arguments --from-bag --from-graph is required"),
         (["--from-bag", "rig.mcap", "--from-graph"], 2, "argument --from-graph: not allowed with argument --from-bag"),
-        (["--from-bag", "rig.mcap", "--seconds", "3"], 2, "--seconds N is for how long --from-graph listens"),
+        (["--from-bag", "rig.mcap", "--seconds", "3"], 2, "--seconds N needs --from-graph"),
         (["--from-graph", "--seconds", "0"], 2, "argument --seconds: expected a number above 0, found 0"),
         (["--from-bag", "none.mcap"], 1, "none.mcap: no such file or folder"),
         (["--from-bag", "x" * 300], 1, f"{'x' * 300}: cannot be read: File name too long"),
-        (["--from-bag", "rig.mcap", "-o", "rig.mcap"], 1, "rig.mcap: exists already, and is not overwritten"),
+        (["--from-bag", "rig.mcap", "-o", "rig.mcap"], 1, "rig.mcap: already exists and is not overwritten"),
     ],
 )
 def test_what_is_wrong_is_said(words, code, said, folder):

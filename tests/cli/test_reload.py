@@ -47,7 +47,9 @@ def test_a_relay_that_ends_once_it_is_found_is_gone(tmp_path):
     with speaking(lambda: iter(next(speeches, []))) as url:
         asked = run("reload", "--url", url, folder=tmp_path)
     assert (asked.returncode, asked.stdout) == (1, "")
-    assert asked.stderr == f"syncrelay: the relay at {url} is gone: the connection ended before the answer did\n"
+    assert (
+        asked.stderr == f"syncrelay: the relay at {url} is gone: the connection closed before the answer was complete\n"
+    )
 
 
 @pytest.mark.parametrize("told", [{}, {"pid": 0}, {"pid": -1}, {"pid": 1}, {"pid": 2**70}])

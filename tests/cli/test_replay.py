@@ -88,7 +88,7 @@ def test_a_required_topic_that_is_not_there_is_a_fault_of_the_data(folder):
 @pytest.mark.parametrize("output", ["out.mcap", "out"])
 def test_what_is_written_can_be_replayed(output, folder):
     done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", output, folder=folder)
-    said = f"syncrelay: {output} is written: 78 messages of 39 sets\n"
+    said = f"syncrelay: wrote {output}: 78 messages of 39 sets\n"
     assert (done.returncode, done.stdout, done.stderr) == (0, _SUMMARY, said)
     (folder / "g.yaml").write_text(_file().replace('"/', '"/front/'))
     again = run("replay", output, "--config", "g.yaml", folder=folder)
@@ -121,7 +121,7 @@ def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
         (["rig.mcap", "--config", "g.yaml"], 1, "g.yaml: no such file"),
         (["rig.mcap"], 2, "syncrelay: the following arguments are required: --config"),
         (["--config", "f.yaml"], 2, "syncrelay: the following arguments are required: BAG"),
-        (["rig.mcap", "--config", "f.yaml", "-o", "f.yaml"], 1, "syncrelay: f.yaml: exists already"),
+        (["rig.mcap", "--config", "f.yaml", "-o", "f.yaml"], 1, "syncrelay: f.yaml: already exists"),
     ],
 )
 def test_what_is_wrong_is_said(words, code, said, folder):

@@ -55,7 +55,7 @@ def test_where_no_relay_answers_it_says_what_to_do(tmp_path):
     assert shown.stderr.splitlines() == [
         f"syncrelay: no relay answers at {url}",
         f"  {url}: nothing listens there",
-        "  From other machines a relay can be asked if its file says",
+        "  A relay on another machine answers only if its file says",
         "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between.",
     ]
 

@@ -181,7 +181,7 @@ def test_github_takes_what_would_end_a_property_or_a_command(folder, environ):
     done = run("validate", "--format", "github", "50%,a:b.yaml", folder=folder, environ=environ)
     (line,) = done.stdout.splitlines()
     assert line.startswith("::error file=50%25%2Ca%3Ab.yaml,line=4,")
-    assert "found the text `100%25\\n::error::`" in line
+    assert "found the string `100%25\\n::error::`" in line
 
 
 def test_variables_come_from_the_environment(folder, environ):

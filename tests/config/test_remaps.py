@@ -132,10 +132,10 @@ def test_what_remaps_leave_in_order_has_no_loop_and_no_name_twice():
                 " choose another `output`"
             ),
         ),
-        ({"/a": "/b"}, "`/b` is in this group twice, first in line 8, remapped from `/a`"),
+        ({"/a": "/b"}, "`/b` is in this group twice, first on line 8, remapped from `/a`"),
         (
             {"/f/a": "/f/b"},
-            "the default output `/f/b` is already used in line 8, remapped from `/f/a`: choose another `output`",
+            "the default output `/f/b` is already used on line 8, remapped from `/f/a`: choose another `output`",
         ),
     ],
 )

@@ -77,13 +77,13 @@ def test_a_file_may_have_the_node_alone(environ):
 def test_what_there_is_once_is_refused_twice_with_both_places(key, environ):
     name = key.partition(":")[0]
     assert errors(environ, one=f"{FRONT}{key}\n", two=file(group("rear", "/c", "/d"), top=f"{key}\n")) == [
-        f"two.yaml:2:1: {name}: `{name}` is also in line 8 of one.yaml: files that run together may have it only once"
+        f"two.yaml:2:1: {name}: `{name}` is also on line 8 of one.yaml: files that run together may have it only once"
     ]
 
 
 def test_one_name_of_two_groups_is_refused_with_both_places(environ):
     assert errors(environ, one=FRONT, two=file(group("rear", "/c", "/d"), group("front", "/c", "/d"))) == [
-        "two.yaml:8:3: groups.front: the group `front` is also in line 3 of one.yaml: rename one of them"
+        "two.yaml:8:3: groups.front: the group `front` is also on line 3 of one.yaml: rename one of them"
     ]
 
 
@@ -95,7 +95,7 @@ def test_defaults_without_a_group_are_refused(environ):
 
 def test_outputs_that_meet_are_refused_across_files(environ):
     assert errors(environ, one=FRONT, two=file(group("rear", "/a", "/b", keys="output_prefix: /front"))) == [
-        f"two.yaml:{line}:17: groups.rear.topics[{index}].topic: the default output `/front/{topic}` is already used in"
+        f"two.yaml:{line}:17: groups.rear.topics[{index}].topic: the default output `/front/{topic}` is already used on"
         f" line {line - 1} of one.yaml: choose another `output`"
         for index, (line, topic) in enumerate([(7, "a"), (8, "b")])
     ]
@@ -112,7 +112,7 @@ def test_an_output_that_another_file_takes_in_is_a_loop(environ):
 def test_one_topic_has_one_type_in_all_files(environ):
     (error,) = errors(environ, one=FRONT, two=file(group("rear", "/a", "/c", kind="Imu")))
     assert error == (
-        "two.yaml:6:27: groups.rear.topics[0].type: `/a` is `sensor_msgs/msg/Image` in line 6 of one.yaml, but a"
+        "two.yaml:6:27: groups.rear.topics[0].type: `/a` is `sensor_msgs/msg/Image` on line 6 of one.yaml, but a"
         " topic has only one type"
     )
 
@@ -121,7 +121,7 @@ def test_one_topic_has_one_qos_in_all_files(environ):
     rear = file(group("rear", "/a", "/c")).replace("Image}", "Image, qos: sensor_data}", 1)
     (error,) = errors(environ, one=FRONT, two=rear)
     assert error.startswith(
-        "two.yaml:6:55: groups.rear.topics[0].qos: `/a` has a different `qos` in line 6 of one.yaml: "
+        "two.yaml:6:55: groups.rear.topics[0].qos: `/a` has a different `qos` on line 6 of one.yaml: "
     )
 
 
@@ -139,7 +139,7 @@ def test_everything_wrong_with_all_files_is_told_at_once(environ):
     ]
     assert errors(environ, one=FRONT.replace("version: 1", "version: 2"), two=FRONT.replace("exact", "exakt")) == [
         "one.yaml:1:10: version: expected 1, the version of the format, found the number `2`",
-        "two.yaml:3:3: groups.front: the group `front` is also in line 3 of one.yaml: rename one of them",
+        "two.yaml:3:3: groups.front: the group `front` is also on line 3 of one.yaml: rename one of them",
         "two.yaml:4:13: groups.front.policy: unknown value `exakt_time`, did you mean `exact_time`?",
     ]
 

@@ -78,8 +78,8 @@ def test_a_topic_that_falls_silent_and_comes_back_is_told(stage: Stage):
     lidar = play(stage, stream("/lidar", hz=10, last_ms=3000), node="ouster")
     assert_logged(
         relay,
-        r"no more sets for [\d.]+ s: /lidar has been silent for [\d.]+ s; until then it came at [\d.]+ Hz;"
-        r" check /ouster, which publishes it, or died: the graph shows a dead node for 20 s\n",
+        r"no more sets for [\d.]+ s: /lidar has been silent for [\d.]+ s; before that its rate was [\d.]+ Hz;"
+        r" check /ouster, which publishes it or has died: a dead node stays in the graph for 20 s\n",
     )
     lidar.finish()
     lidar.start(stream("/lidar", hz=10), speed=1)
@@ -95,7 +95,7 @@ def test_a_node_that_dies_and_comes_back_is_told(stage: Stage):
     assert_logged(
         relay,
         r"no more sets for [\d.]+ s: nobody publishes /lidar \(geometry_msgs/msg/Vector3Stamped\) any more; its"
-        r" last message came [\d.]+ s ago; restart the node that published /lidar\n",
+        r" last message arrived [\d.]+ s ago; restart the node that published /lidar\n",
     )
     play(stage, stream("/lidar", hz=10), node="ouster")
     assert_logged(relay, r"front: recovered after [\d.]+ s\n")

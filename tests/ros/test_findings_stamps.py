@@ -131,8 +131,8 @@ def test_messages_that_are_cut_short_are_told(stage: Stage):
     play(stage, merged(short, stream("/lidar", hz=10)), node="usb_cam")
     assert_logged(
         relay,
-        r"no set for [\d.]+ s: all \d+ messages of /camera are cut short, or not of its type; see that /usb_cam has the"
-        r" same version of geometry_msgs/msg/Vector3Stamped as is installed here\n",
+        r"no set for [\d.]+ s: all \d+ messages of /camera are cut short, or not of its type; check that /usb_cam uses"
+        r" the same version of geometry_msgs/msg/Vector3Stamped as is installed here\n",
     )
 
 
@@ -153,7 +153,7 @@ def test_inputs_without_a_common_key_are_told_with_their_keys(stage: Stage):
     play(stage, merged(_keyed("/camera", "c"), _keyed("/lidar", "l")))
     assert_logged(
         relay,
-        r"no set for [\d.]+ s: no key came on all inputs while it was buffered; the newest are 'c\d+' of /camera,"
+        r"no set for [\d.]+ s: no key arrived on all inputs while it was buffered; the newest are 'c\d+' of /camera,"
         r" 'l\d+' of /lidar; correct `key`",
     )
 
@@ -165,7 +165,8 @@ def test_far_fewer_sets_than_possible_are_told(stage: Stage):
     play(stage, merged(_keyed("/camera", "k"), half))
     finding = wait_for_finding(relay, "few_sets")
     assert re.fullmatch(
-        r"[\d.]+ of [\d.]+ possible sets a second leave; of /(camera|lidar)'s last \d+ messages .*", finding["text"]
+        r"[\d.]+ of [\d.]+ possible sets leave per second; of the last \d+ messages of /(camera|lidar), .*",
+        finding["text"],
     )
 
 

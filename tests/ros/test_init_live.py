@@ -45,7 +45,7 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     done = _init(stage, *_LISTEN, "-o", str(written))
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
     left_out = f"syncrelay: left out: /log ({STRING}): its type has no header, so no stamp to match by\n"
-    assert done.stderr == f"{left_out}syncrelay: {written} is written\n"
+    assert done.stderr == f"{left_out}syncrelay: wrote {written}\n"
 
     (group,) = load(str(written)).groups
     assert {topic.topic for topic in group.topics} == {"/camera", "/lidar", "/imu"}
@@ -70,7 +70,7 @@ def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
 def test_an_empty_graph_is_named(stage: Stage):
     done = _init(stage, "--seconds", "1")
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("syncrelay: no two topics of 1 s of the graph have stamps and 10 messages or more")
+    assert done.stderr.startswith("syncrelay: no two topics of 1 s of the graph have stamps and at least 10 messages")
     assert "nobody publishes anything that can be used here" in done.stderr
 
 
@@ -93,7 +93,7 @@ def test_a_file_that_is_there_is_left_alone(stage: Stage):
     taken.write_text("mine")
     done = _init(stage, *_LISTEN, "-o", str(taken))
     assert (done.returncode, taken.read_text()) == (1, "mine")
-    assert done.stderr == f"syncrelay: {taken}: exists already, and is not overwritten\n"
+    assert done.stderr == f"syncrelay: {taken}: already exists and is not overwritten\n"
 
 
 def test_it_can_be_stopped_while_it_listens(stage: Stage):

@@ -326,7 +326,7 @@ def test_a_change_of_the_graph_that_was_never_told_is_looked_for_every_minute(he
 
 def test_without_word_of_changes_in_the_graph_rclpy_is_used(here, monkeypatch):
     monkeypatch.setattr(LibrclBackend, "graph_changes", lambda *_: SimpleNamespace(seen=lambda: False))
-    with pytest.raises(check.LibrclUnusableError, match="does not tell of changes in the graph"):
+    with pytest.raises(check.LibrclUnusableError, match="does not report changes in the graph"):
         check.checked_backend(here.node)
 
 

@@ -49,9 +49,9 @@ def test_a_relay_tells_of_a_second_one_and_of_others_that_publish_its_outputs(st
     assert "output_taken" not in findings(relay)
     second = stage.relay(front())
     text = wait_for_finding(relay, "output_taken")["text"]
-    assert text.startswith("another node of the name /syncrelay publishes /front/")
-    assert text.endswith(" too: whoever subscribes to it gets the messages of both")
-    assert_logged(second, r"\[WARN\] .* front: another node of the name /syncrelay publishes /front/")
+    assert text.startswith("another node named /syncrelay publishes /front/")
+    assert text.endswith(" too: its subscribers get the messages of both")
+    assert_logged(second, r"\[WARN\] .* front: another node named /syncrelay publishes /front/")
     second.send(signal.SIGTERM)
     assert second.wait() == 0
     wait_until(lambda: "output_taken" not in findings(relay), "the end of the second relay to be seen")

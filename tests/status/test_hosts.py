@@ -94,7 +94,7 @@ def test_a_request_that_names_no_host_is_answered_where_http_had_none_yet(addres
     refused = sent(address, b"GET /status HTTP/1.1\r\nConnection: close\r\n\r\n")
     assert not told(refused)
     assert refused.startswith(b"HTTP/1.1 400 ")
-    assert refused.endswith(b"expected one header `Host` with a name or an address, and a port or none\n")
+    assert refused.endswith(b"expected one `Host` header with a name or an address, and optionally a port\n")
 
 
 @pytest.mark.parametrize("host", [ALIAS, ALIAS.upper(), f"{ALIAS}.:80", "10.0.0.5", "[fd00::5]:9464", "localhost"])

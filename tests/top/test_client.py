@@ -77,7 +77,7 @@ def test_who_accepts_and_never_answers_is_given_up():
 
 
 def test_an_unknown_machine_is_said():
-    with pytest.raises(NoAnswerError, match="no machine of that name was found"):
+    with pytest.raises(NoAnswerError, match="no machine with that name was found"):
         ask("http://robot.invalid:9464")
 
 

@@ -145,8 +145,8 @@ def test_the_screen_follows_the_relay():
         with serving(states.healthy()) as server:
             async with terminal(server) as user:
                 server.show(states.silent())
-                await user.sees("/lidar/points has been silent for 18 s; until then it came at 10 Hz")
-                assert "→ check /lidar_driver, which publishes it, or died" in user.text
+                await user.sees("/lidar/points has been silent for 18 s; before that its rate was 10 Hz")
+                assert "→ check /lidar_driver, which publishes it or has died" in user.text
 
     asyncio.run(look())
 

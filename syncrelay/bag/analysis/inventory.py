@@ -73,7 +73,7 @@ def _lack(channel: Channel) -> str | None:
         return str(error)
     has_header = begins_with_header(channel)
     if has_header is None:
-        return "the recording does not define its type, so nothing is known of its stamps"
+        return "the recording does not define its type, so nothing is known about its stamps"
     return None if has_header else NO_HEADER
 
 

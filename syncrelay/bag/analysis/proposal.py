@@ -14,6 +14,7 @@ from syncrelay.bag.analysis.nearest import pair
 from syncrelay.bag.analysis.topics import TopicFigures
 from syncrelay.bag.recording import Recording
 from syncrelay.config import GroupConfig
+from syncrelay.config.wording import counted
 from syncrelay.errors import NothingToMatchError
 from syncrelay.explain import words
 from syncrelay.printable import printable
@@ -54,11 +55,11 @@ def propose_for(topics: Sequence[Topic], *, source: str) -> Proposal:
         groups[_FUSED] = [epoch[0] for epoch in epochs]
     if not groups:
         raise _nothing(
-            f"no two topics of {source} have stamps and {FEWEST} messages or more: there is nothing to match", topics
+            f"no two topics of {source} have stamps and at least {FEWEST} messages: there is nothing to match", topics
         )
     texts = {name: text for name, members in groups.items() if (text := _measured(name, members, source))}
     if not texts:
-        raise _nothing(f"no two topics of {source} give a set", topics)
+        raise _nothing(f"no two topics of {source} form a set", topics)
     taken = {topic.channel for name in texts for topic in groups[name]}
     left_out = tuple(_left_out(topic) for topic in topics if topic.channel not in taken)
     return Proposal(_HEAD + "".join(text.removeprefix(_HEAD) for text in texts.values()), left_out)
@@ -70,7 +71,7 @@ def _nothing(why: str, topics: Sequence[Topic]) -> NothingToMatchError:
 
 def _left_out(topic: Topic) -> str:
     channel = topic.channel
-    why = topic.unfit or f"{topic.figures.messages} messages, and no set with the others"
+    why = topic.unfit or f"none of its {counted(topic.figures.messages, 'message')} forms a set with the others"
     return f"{channel.topic} ({channel.type or 'a type without a name'}): {why}"
 
 
@@ -119,7 +120,7 @@ def _with_room(name: str, members: Sequence[Topic], changes: Sequence[Change], t
     narrow = group_of(with_changes(text, changes), name)
     if size <= narrow.options.queue_size:
         return changes
-    reason = f"twice the {come} messages of {fastest.topic} that may come before one of {slowest.topic} does"
+    reason = f"twice the {come} messages of {fastest.topic} that may arrive before one of {slowest.topic}"
     others = [change for change in changes if change.key != _QUEUE_SIZE]
     wide = [*others, Change(name, None, _QUEUE_SIZE, size, reason)]
     gives = [_sets(group, members) for group in (narrow, group_of(with_changes(text, wide), name))]
@@ -142,7 +143,8 @@ def _evidence(topic: Topic) -> str:
     figures = topic.figures
     said = [words.rate(figures.rate_hz)]
     if figures.delay is not None:
-        said.append(f"received {words.duration(figures.delay.median)} after the stamp")
-    said += [f"{count} {word}" for count, word in ((figures.gaps, "gaps"), (figures.duplicates, "repeated")) if count]
+        said.append(f"received {words.span_of_time(figures.delay.median)} after the stamp")
+    said += [counted(figures.gaps, "gap")] if figures.gaps else []
+    said += [f"{figures.duplicates} repeated"] if figures.duplicates else []
     said += sorted({profile.reliability for profile in topic.channel.qos})
     return ", ".join(said)

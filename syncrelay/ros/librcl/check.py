@@ -80,13 +80,13 @@ def _check_there_and_back(rcl: Rcl, node: Any) -> None:
     changes = backend.graph_changes(node)
     changes.seen()
     with _endpoints(node) as (subscription, publisher):
-        _require(changes.seen(), "librcl does not tell of changes in the graph")
+        _require(changes.seen(), "librcl does not report changes in the graph")
         source, watch = backend.source(subscription, _never_called), backend.watch()
         try:
             watch.add(source)
             watch.wait(0)
             publisher.handle.publish_raw(_PAYLOAD)
-            _require(source in watch.wait(_PATIENCE_NS)[0], "DDS does not tell of messages that arrive")
+            _require(source in watch.wait(_PATIENCE_NS)[0], "DDS does not report messages that arrive")
             pool = Pool(rcl)
             memory = pool.lend()
             ours = _take_with_margin(rcl, source.address, memory)
@@ -95,7 +95,7 @@ def _check_there_and_back(rcl: Rcl, node: Any) -> None:
             theirs = subscription.handle.take_message(Time, True)  # noqa: FBT003  rclpy's signature
         finally:
             watch.close()
-    _require(theirs is not None and theirs[0] == _PAYLOAD, "a message published in librcl comes back as another")
+    _require(theirs is not None and theirs[0] == _PAYLOAD, "a message published in librcl comes back changed")
     _compare(ours, theirs[1])
 
 
@@ -105,7 +105,7 @@ def _take_with_margin(rcl: Rcl, subscription: int, memory: Memory) -> MessageInf
     code = rcl.take(pointer(subscription), memory.pointer, byref(roomy), None)
     rcl.require(code, "rcl_take_serialized_message")
     _require_margin(roomy, "rmw_message_info_t")
-    _require(memory.content() == _PAYLOAD, "a message taken in librcl is another than the one published")
+    _require(memory.content() == _PAYLOAD, "a message taken in librcl differs from the one published")
     info: MessageInfo = roomy.info
     return info
 

@@ -36,7 +36,7 @@ FOUND = {
             camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
         ),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check how late /camera comes",
+        "check how late /camera arrives",
     ),
     "an optional input whose stamps fit no set": (
         Code.WAITING_FOR_OPTIONAL,
@@ -63,23 +63,23 @@ FOUND = {
         Severity.WARN,
         without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100)),
         (
-            "100 % of the sets leave without /camera after waiting 100 ms for it: it comes 300 ms after the others, too"
-            " late"
+            "100 % of the sets leave without /camera after waiting 100 ms for it: it arrives 300 ms after the others,"
+            " too late"
         ),
-        "check what holds /camera up",
+        "check what delays /camera",
     ),
     "an optional input that went away": (
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
         without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100), last_received=NOW - 4 * S),
-        "100 % of the sets leave without /camera after waiting 100 ms for it: it has not come for 4 s",
+        "100 % of the sets leave without /camera after waiting 100 ms for it: it has been silent for 4 s",
         "check /usb_cam",
     ),
     "an optional input that never came": (
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
         without_camera(last_received=None),
-        "100 % of the sets leave without /camera after waiting 100 ms for it: no message of it has come",
+        "100 % of the sets leave without /camera after waiting 100 ms for it: no message of it has arrived",
         "check /usb_cam",
     ),
     "an optional input that comes in time and is missing all the same": (
@@ -87,37 +87,37 @@ FOUND = {
         Severity.WARN,
         without_camera(delay=104 * MS, nearest=Distribution([3 * MS] * 100)),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check how late /camera comes",
+        "check how late /camera arrives",
     ),
     "messages that were held up": (
         Code.BURSTS,
         Severity.WARN,
         a_group(camera(figures={"bursts": 4, "held": 2900 * MS}), LIDAR),
-        "4 times in the last 10 s messages of /camera arrived in a burst, up to 2.9 s late",
+        "messages of /camera arrived in a burst 4 times in the last 10 s, up to 2.9 s late",
         (
             "check whether /usb_cam sends in bursts; if it runs on another machine, check the network: after a loss,"
-            " reliable publishers send again only every 3 s by default, configs/fast_heartbeats.xml makes them faster"
+            " reliable publishers send again only every 3 s by default; configs/fast_heartbeats.xml makes them faster"
         ),
     ),
     "messages of all inputs that were held up together": (
         Code.BURSTS,
         Severity.WARN,
         a_group(held_up(NOW - 4 * S, NOW - 2 * S), an_input("/lidar", figures=HELD_UP)),
-        "once in the last 10 s messages of all inputs arrived in a burst, up to 2 s late",
+        "messages of all inputs arrived in a burst once in the last 10 s, up to 2 s late",
         "check whether this machine, a player or what connects them stood still",
     ),
     "messages of two inputs of three that were held up together": (
         Code.BURSTS,
         Severity.WARN,
         a_group(held_up(NOW - 3 * S, NOW - S), an_input("/lidar", figures=HELD_UP), an_input("/imu")),
-        "once in the last 10 s messages of /camera and /lidar arrived in a burst, up to 2 s late",
+        "messages of /camera and /lidar arrived in a burst once in the last 10 s, up to 2 s late",
         "check whether this machine, a player or what connects them stood still",
     ),
     "messages that were recorded in a burst": (
         Code.BURSTS,
         Severity.WARN,
         a_group(held_up(NOW - 3 * S, NOW - S), LIDAR, is_recorded=True),
-        "once in the last 10 s messages of /camera arrived in a burst, up to 2 s late",
+        "messages of /camera arrived in a burst once in the last 10 s, up to 2 s late",
         "check whether /usb_cam sent in bursts, or the recorder received it late",
     ),
     "a standstill in which messages were missed": (
@@ -139,7 +139,7 @@ FOUND = {
         Severity.WARN,
         a_group(camera(lost=1), LIDAR),
         "DDS lost 1 message of /camera on the way here in the last 10 s",
-        "check the network and the CPU load; if /usb_cam is reliable, `qos: auto` has it send again",
+        "check the network and the CPU load; if /usb_cam is reliable, `qos: auto` makes it resend them",
     ),
     "a relay that does not keep up": (
         Code.TOO_SLOW,
@@ -177,7 +177,7 @@ FOUND = {
         Code.FEW_SETS,
         Severity.WARN,
         a_group(dropped(DropReason.LATE, 60), LIDAR, figures={"rate_hz": 4.0}),
-        "4 of 10 possible sets leave per second; of /camera's last 100 messages 60 were dropped as late",
+        "4 of 10 possible sets leave per second; of the last 100 messages of /camera, 60 were dropped as late",
         None,
     ),
     "few sets of a trigger, told by its own messages": (
@@ -189,7 +189,7 @@ FOUND = {
             figures={"rate_hz": 4.0},
             **AGES,
         ),
-        "4 of 10 possible sets leave per second; of /camera's last 100 messages 60 were dropped as expired",
+        "4 of 10 possible sets leave per second; of the last 100 messages of /camera, 60 were dropped as expired",
         None,
     ),
     "what nothing explains": (
@@ -200,8 +200,8 @@ FOUND = {
             an_input("/lidar", figures={"fed": 0}),
         ),
         (
-            "messages arrive on all inputs, but no set leaves: of /camera's last 100 messages 90 were dropped as"
-            " too_far and 3 were dropped as late; of /lidar none came lately"
+            "messages arrive on all inputs, but no set leaves: of the last 100 messages of /camera, 90 were dropped as"
+            " too_far and 3 were dropped as late; no messages of /lidar arrived recently"
         ),
         "run `syncrelay doctor --config FILE --live`, which checks the graph and the stamps",
     ),

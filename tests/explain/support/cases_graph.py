@@ -36,7 +36,7 @@ FOUND = {
         Severity.WARN,
         a_group(camera(required=False, refusal=Refusal("subscribe to", "/camera", IMAGE, why="out of memory")), LIDAR),
         f"the relay cannot subscribe to /camera as {IMAGE}: out of memory",
-        "the relay tries again every few seconds; if it stays, look at limits of memory and open files",
+        "the relay tries again every 5 s; if this goes on, check the limits on memory and open files",
     ),
     "a type that is not installed": (
         Code.TYPE_NOT_IMPORTABLE,
@@ -84,14 +84,14 @@ FOUND = {
         Code.NO_PUBLISHER,
         Severity.WARN,
         a_group(camera(publishers=(), figures={"last_received": NOW - 3 * S}), LIDAR),
-        f"nobody publishes /camera ({IMAGE}) any more; its last message came 3 s ago",
+        f"nobody publishes /camera ({IMAGE}) any more; its last message arrived 3 s ago",
         "restart the node that published /camera",
     ),
     "several are not published any more": (
         Code.NO_PUBLISHER,
         Severity.ERROR,
         a_silent_group(*unpublished(camera={"last_received": NOW - 9 * S}, lidar={"last_received": NOW - 8 * S})),
-        "nobody publishes /camera or /lidar any more; the last message came 8 s ago",
+        "nobody publishes /camera or /lidar any more; the last message arrived 8 s ago",
         "restart the nodes that published them",
     ),
     "several are not published": (
@@ -179,22 +179,22 @@ FOUND = {
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(figures=QUIET), LIDAR),
-        "/camera has been silent for 7 s; until then it came at 10 Hz",
-        "check /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+        "/camera has been silent for 7 s; before that its rate was 10 Hz",
+        "check /usb_cam, which publishes it or has died: a dead node stays in the graph for 20 s",
     ),
     "nothing came for long": (
         Code.SILENT,
         Severity.ERROR,
         a_silent_group(camera(figures={**QUIET, "last_received": NOW - 21 * S}), LIDAR),
-        "/camera has been silent for 21 s; until then it came at 10 Hz",
+        "/camera has been silent for 21 s; before that its rate was 10 Hz",
         "check /usb_cam, which still publishes it",
     ),
     "nothing of what is held comes any more, which always came": (
         Code.SILENT,
         Severity.WARN,
         a_group(camera(figures=QUIET), LIDAR, **AGES),
-        "/camera has been silent for 7 s; until then it came at 10 Hz",
-        "check /usb_cam, which publishes it, or died: the graph shows a dead node for 20 s",
+        "/camera has been silent for 7 s; before that its rate was 10 Hz",
+        "check /usb_cam, which publishes it or has died: a dead node stays in the graph for 20 s",
     ),
     "what was sent once is too old": (
         Code.SILENT,
@@ -202,7 +202,7 @@ FOUND = {
         a_silent_group(camera(figures={**ONCE, "last_received": NOW - 60 * S}), LIDAR, **HALF_A_SECOND),
         "/camera has been silent for 60 s",
         (
-            "check /usb_cam, which still publishes it; if it is sent that rarely by design, write a larger `max_age`"
+            "check /usb_cam, which still publishes it; if it is meant to be sent this rarely, write a `max_age` larger"
             " than 500 ms, or none"
         ),
     ),
@@ -220,20 +220,20 @@ FOUND = {
         Code.OUTPUT_TAKEN,
         Severity.WARN,
         a_group(camera(rivals=(Endpoint("/bag", IMAGE),), rivals_since=NOW - 3 * S), LIDAR),
-        "/bag publishes /front/camera too: whoever subscribes to it gets the messages of both",
+        "/bag publishes /front/camera too: its subscribers get the messages of both",
         (
-            "end all publishers but one, or give this output another name, `output: ...`; a node that was killed is"
-            " gone from the graph after 20 s"
+            "stop all publishers but one, or give this output another name with `output: ...`; a node that was killed"
+            " stays in the graph for 20 s"
         ),
     ),
     "an output that two other nodes publish": (
         Code.OUTPUT_TAKEN,
         Severity.WARN,
         a_group(camera(rivals=(Endpoint("/bag", IMAGE), Endpoint("/old", IMAGE)), rivals_since=NOW - 9 * S), LIDAR),
-        "/bag and /old publish /front/camera too: whoever subscribes to it gets the messages of all",
+        "/bag and /old publish /front/camera too: its subscribers get the messages of all",
         (
-            "end all publishers but one, or give this output another name, `output: ...`; a node that was killed is"
-            " gone from the graph after 20 s"
+            "stop all publishers but one, or give this output another name with `output: ...`; a node that was killed"
+            " stays in the graph for 20 s"
         ),
     ),
 }

@@ -23,14 +23,14 @@ FOUND = {
         Severity.ERROR,
         a_silent_group(dropped(DropReason.MALFORMED, 100), LIDAR),
         "all 100 messages of /camera are cut short, or not of its type",
-        f"see that /usb_cam has the same version of {IMAGE} as is installed here",
+        f"check that /usb_cam uses the same version of {IMAGE} as is installed here",
     ),
     "a few messages that are cut short explain no silence": (
         Code.MALFORMED,
         Severity.WARN,
         a_silent_group(dropped(DropReason.MALFORMED, 3), LIDAR),
         "3 of the last 100 messages of /camera are cut short, or not of its type",
-        f"see that /usb_cam has the same version of {IMAGE} as is installed here",
+        f"check that /usb_cam uses the same version of {IMAGE} as is installed here",
     ),
     "stamps of 0": (
         Code.UNSTAMPED,
@@ -67,7 +67,7 @@ FOUND = {
         "stamps of /camera are 1.5 s behind those of /lidar",
         (
             "synchronize the clocks of their machines, or write `offset: 1.5s` at /camera; if /camera really takes that"
-            " long to come, write `queue_size: 16`"
+            " long to arrive, write `queue_size: 16`"
         ),
     ),
     "no common key": (
@@ -76,8 +76,8 @@ FOUND = {
         a_silent_group(
             camera(key="c7"), an_input("/lidar", key="l7"), by_stamp=False, policy="equal_key", tolerance=None
         ),
-        "no key came on all inputs while it was buffered; the newest are 'c7' of /camera, 'l7' of /lidar",
-        "correct `key`, or write a larger `queue_size` if one input's keys come much later",
+        "no key arrived on all inputs while it was buffered; the newest are 'c7' of /camera, 'l7' of /lidar",
+        "correct `key`, or write a larger `queue_size` if one input's keys arrive much later",
     ),
     "sets wider than slop": (
         Code.OVER_SLOP,
@@ -108,7 +108,7 @@ FOUND = {
         a_group(
             figures=wide(*[0] * 90, *[33] * 10), policy="exact_time", tolerance=Tolerance("slop", 0, "approximate_time")
         ),
-        "10 % of the last 100 messages of /camera have no partner of an equal stamp",
+        "10 % of the last 100 messages of /camera have no partner with an equal stamp",
         CHECK_STAMPS,
     ),
     "what is held is too old": (
