@@ -68,7 +68,7 @@ _COMES_BACK: Final = 5 * _SECOND
 _ALIKE: Final = 0.25
 # A step stays if the delays of so many polls say so.
 _LEVELS: Final = 3
-# A live clock is this close to the machine's, before the step or after it. A looped recording is not.
+# A live clock is this close to the machine's after the step. A looped recording is not.
 _LIVE: Final = 10 * _SECOND
 _WINDOW: Final = 10 * _SECOND
 _TOLD: Final = 30 * _SECOND
@@ -145,8 +145,7 @@ class StampSteps:
         (step, delay), self._pending = self._pending, None
         # What came with the step is of before it too.
         level = median_low(self._levels[1:])
-        is_live = min(abs(level), abs(delay + step.by)) < _LIVE
-        if is_live and _is_alike(level - delay - step.by, -step.by):
+        if abs(level) < _LIVE and _is_alike(level - delay - step.by, -step.by):
             self._stayed = step
 
 

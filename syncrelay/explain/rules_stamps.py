@@ -105,7 +105,8 @@ def other_clock(facts: GroupFacts) -> Found:
     shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
     if epoch := _epoch(an_input, behind):
         text = f"stamps of {an_input.name}{shifted} {apart_by}: they {epoch}"
-        suggestion = f"have {nodes(an_input)} stamp with the host's time, or write `stamp: receive` at {an_input.name}"
+        instead = "stamp: receive" if abs(behind) > _BOOT else f"offset: {words.exactly(behind + offset)}"
+        suggestion = f"have {nodes(an_input)} stamp with the host's time, or write `{instead}` at {an_input.name}"
     else:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"
         suggestion = (
