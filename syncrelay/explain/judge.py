@@ -119,10 +119,16 @@ def explained_by(code: Code) -> frozenset[Code]:
     return explained.in_group | explained.of_input if explained else frozenset()
 
 
+def _first_step(facts: GroupFacts) -> int:
+    steps = (each.figures.stepped for each in facts.inputs)
+    return min([facts.figures.now - WINDOW_NS, *(step.at for step in steps if step is not None)])
+
+
 _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     # That an input is silent is seen of now alone.
     Code.SILENT: lambda facts: facts.figures.now,
     Code.OVER_SLOP: lambda facts: min(facts.figures.nearest_from, facts.figures.now - WINDOW_NS),
+    Code.CLOCK_STEP: _first_step,
 }
 """Since when the messages came that a finding judges by, where that is not the usual window."""
 

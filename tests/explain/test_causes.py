@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from syncrelay.config import load_text
 from syncrelay.explain import Code, Endpoint, GroupWatch, InputGraph, Judge, Severity, Standstill, judge, with_ok
-from syncrelay.explain.clocks import Drift
+from syncrelay.explain.clocks import Drift, Step
 from syncrelay.explain.judge import EXPLAINS, explained_by
 from syncrelay.sync import Match, Message
 from syncrelay.sync.messages import DropReason
@@ -44,6 +44,15 @@ def test_a_cause_is_remembered_while_the_messages_of_its_time_are_judged_by():
     assert codes(a_judge.judge(a_group(figures={**since, "now": NOW + 9 * S, "last_set": NOW + 9 * S}))) == []
     later = {**WIDE, "nearest_from": NOW + S, "now": NOW + 11 * S, "last_set": NOW + 11 * S}
     assert codes(a_judge.judge(a_group(figures=later))) == [Code.OVER_SLOP]
+
+
+def test_a_cause_explains_a_step_for_as_long_as_the_step_is_told():
+    stepped = [an_input(name, figures={"stepped": Step(NOW - S, S)}) for name in ("/camera", "/lidar")]
+    later = {"now": NOW + 25 * S, "last_set": NOW + 25 * S}
+    assert codes(judge(a_group(*stepped, figures=later))) == [Code.CLOCK_STEP]
+    a_judge = Judge()
+    assert codes(a_judge.judge(a_group(*stepped, waited=3 * S))) == [Code.TOO_SLOW]
+    assert codes(a_judge.judge(a_group(*stepped, figures=later))) == []
 
 
 def test_a_cause_that_is_over_does_not_explain_a_silence_for_long():

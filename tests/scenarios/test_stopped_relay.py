@@ -65,8 +65,12 @@ def test_only_the_wait_for_the_relay_is_said(played: Played, name: str):
 def test_how_long_messages_waited_for_the_relay_is_said(played: Played, name: str):
     first = next((line for line in played.warnings_of(name) if line.act == "2"), None)
     assert first is not None, told(played, name)
-    stood_still = r"messages waited up to [\d.]+ s for the relay|the relay stood still for (2\.9|3)[\d.]* s"
-    assert re.search(stood_still, first.message), first.message
+    said = re.search(
+        r"messages waited up to [\d.]+ s for the relay|the relay stood still for ([\d.]+) s", first.message
+    )
+    assert said, first.message
+    # A busy machine may let it stand still for longer.
+    assert said[1] is None or float(said[1]) >= _STOPPED_S - 0.1, first.message
 
 
 @pytest.mark.parametrize("name", RIGS)
