@@ -42,7 +42,7 @@ _DRIFT_SOON: Final = 4 * SECOND
 _EVIDENT: Final = 5
 _MAY_BE: Final = 2
 _USUAL: Final = 0.95
-# So long is waited for a drift to be proven, and so long in a silence.
+# So long is waited for a drift to be proven, in a silence only so long unless it looks like one.
 _DRIFT_PROVEN: Final = 60 * SECOND
 _DRIFT_PROVEN_SILENT: Final = 15 * SECOND
 # An input that drifts by so much less than another has the better clock.
@@ -286,13 +286,16 @@ def may_drift(facts: GroupFacts) -> bool:
     watched, tolerance = facts.figures.now - facts.figures.began, facts.tolerance
     if tolerance is None or facts.is_recorded or not 0 < watched < _DRIFT_PROVEN:
         return False
-    if facts.is_silent and facts.silent_for >= _DRIFT_PROVEN_SILENT:
-        return False
     nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
     if not nearest.share_over(tolerance.ns):
         return False
     needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
-    return any(abs(each.slope) + _MAY_BE * each.error >= needed for each in _drifts(facts)[1].values())
+    is_urgent = facts.is_silent and facts.silent_for >= _DRIFT_PROVEN_SILENT
+    return any(
+        abs(each.slope) >= max(needed, _MAY_BE * each.error)
+        or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)
+        for each in _drifts(facts)[1].values()
+    )
 
 
 def clock_drift(facts: GroupFacts) -> Found:
