@@ -2,24 +2,31 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from math import hypot, sqrt
 from operator import mul, sub
 from statistics import fmean, median, median_low
 from typing import Final, NamedTuple
 
-_FEWEST = 6
+_FEWEST = 4
 _PARTS = 4
+# A slope from few points may be off by more than its standard error tells.
+_MORE_OF_FEW = 8
+# So many times as far off the line as the median point: held up on its way.
+_HELD_UP = 6
 
 
 class Drift(NamedTuple):
     """A slope without unit, positive where stamps run slow, and for how long it was watched in nanoseconds.
 
     `bend_ns` is how far the delays strayed from the line, by the medians of the quarters of that time: a clock drifts
-    along a line, what else makes delays grow, such as a load, a step or a pause, does not.
+    along a line, what else makes delays grow, such as a load, a step or a pause, does not. `error` is that of the
+    slope, by how far single points are off the line: that of jitter is as great as its slope.
     """
 
     slope: float
     bend_ns: float
     watched_ns: int
+    error: float = 0.0
 
     @property
     def drifted_ns(self) -> float:
@@ -30,10 +37,24 @@ class Drift(NamedTuple):
 def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
     """Return the drift from times of receipt and delays (time of receipt minus stamp), both in nanoseconds.
 
-    By least squares; None from too few points to tell.
+    By least squares, without what was held up; None from too few points to tell.
     """
     if len(points) < _FEWEST:
         return None
+    fit = _fit(points)
+    if fit is None:
+        return None
+    found, strayed = fit
+    far = _HELD_UP * median(map(abs, strayed))
+    if max(map(abs, strayed)) > far:
+        near = [point for point, off in zip(points, strayed, strict=True) if abs(off) <= far]
+        if len(near) >= _FEWEST and (fit := _fit(near)) is not None:
+            return fit[0]
+    return found
+
+
+def _fit(points: Sequence[tuple[int, int]]) -> tuple[Drift, Sequence[float]] | None:
+    """Return the line through points, and how far each is off it; None where all are of one moment."""
     # As differences of integers, before floats could lose the nanoseconds of an epoch.
     first_time, first_delay = points[0]
     times = [float(time - first_time) for time, _ in points]
@@ -47,12 +68,15 @@ def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
     strayed = list(map(sub, delays, [mean_delay + slope * time for time in times]))
     quarter = len(points) // _PARTS
     bend = max(abs(median(strayed[part * quarter : (part + 1) * quarter])) for part in range(_PARTS))
-    return Drift(slope, bend, points[-1][0] - first_time)
+    variance = sum(map(mul, strayed, strayed)) / (len(points) - 2)
+    error = (1 + _MORE_OF_FEW / len(points)) * sqrt(variance / spread)
+    return Drift(slope, bend, points[-1][0] - first_time, error), strayed
 
 
 def apart(one: Drift, other: Drift) -> Drift:
     """Return how fast two inputs drift apart."""
-    return Drift(one.slope - other.slope, one.bend_ns + other.bend_ns, min(one.watched_ns, other.watched_ns))
+    watched = min(one.watched_ns, other.watched_ns)
+    return Drift(one.slope - other.slope, one.bend_ns + other.bend_ns, watched, hypot(one.error, other.error))
 
 
 _SECOND: Final = 1_000_000_000

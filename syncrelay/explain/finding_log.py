@@ -7,6 +7,7 @@ from syncrelay.explain import words
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.judge import explanation
+from syncrelay.explain.rules_stamps import may_drift
 
 _SECOND: Final = 1_000_000_000
 _LONGEST_PAUSE: Final = 600 * _SECOND
@@ -75,6 +76,9 @@ class FindingLog:
             if now - self._well_since > _FORGOTTEN:
                 self._pause, self._tell_again = 0, now
         if now < self._tell_again:
+            return
+        if finding.code is Code.UNEXPLAINED and may_drift(facts):
+            # Its cause may be known soon.
             return
         self._pause = min(2 * self._pause, _LONGEST_PAUSE) if self._pause else now - self._quiet_since
         self._tell_again = now + self._pause

@@ -96,15 +96,28 @@ class InputObservation:
             self._faults.popleft()
         self._faults.append(_Faults(last, duplicates, out_of_order))
         keep_last(self._received, all_received, _LAST_MESSAGES)
+        keep_last(self._stamps, stamps if delays else (), _TRIED_MESSAGES)
+        keep_last(self._delays, delays, _TRIED_MESSAGES)
+        # What is held up, and then comes at once, was sent at the pace of its stamps.
+        self._observe_pace(self._stamps if delays else self._received)
+        if delays:
+            self._measure(stamped, delays, least, most)
+        return fallen
+
+    def _observe_pace(self, times: Sequence[int]) -> None:
         before = self._pace.slowed_from
-        self._pace.observe(self._received)
+        self._pace.observe(times)
         if before != self._pace.slowed_from:
             # The least delay of fewer messages is greater: that is no drift.
             self._points.clear()
             self._drift = None
-        if delays:
-            self._measure(stamped, stamps, delays, least, most)
-        return fallen
+
+    def forget_publishers(self) -> None:
+        """Bear that others publish now than did: their rate and their clocks are not those of before."""
+        self._pace.forget()
+        self._steps.forget()
+        self._points.clear()
+        self._drift = None
 
     @property
     def slowed_from_hz(self) -> float | None:
@@ -194,10 +207,8 @@ class InputObservation:
         last = self._received[-_PERIODS:]
         return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0
 
-    def _measure(self, stamped: Arrivals, stamps: Sequence[int], delays: list[int], least: int, most: int) -> None:
-        """Measure delays, drift and bursts, from messages that have stamps."""
-        keep_last(self._stamps, stamps, _TRIED_MESSAGES)
-        keep_last(self._delays, delays, _TRIED_MESSAGES)
+    def _measure(self, stamped: Arrivals, delays: Sequence[int], least: int, most: int) -> None:
+        """Measure drift and bursts, from messages that have stamps."""
         self._find_bursts(stamped, delays, least, most)
         # What came fastest was held up least: the least delay tells more of the clock than of the load.
         self._points.append(((stamped[0][1] + stamped[-1][1]) // 2, least))

@@ -43,6 +43,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     rules_flow.bursts,
     of_each_input(rules_stamps.time_jump),
     of_each_input(rules_flow.messages_lost),
+    of_each_input(rules_stamps.duplicates),
 )
 
 _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
@@ -53,9 +54,11 @@ _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
 )
 """What they suggest they try, which costs: they are not asked for what a cause explains."""
 
+_OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET})
+"""What a drift brings about, and sooner than it can be proven."""
+
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.out_of_order),
-    of_each_input(rules_stamps.duplicates),
     of_each_input(rules_graph.subscriber_qos),
     of_each_input(rules_graph.output_taken),
 )
@@ -88,10 +91,7 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.NO_CLOCK: _Explained(frozenset({Code.SILENT, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.CLOCK_STOPPED: _Explained(_MATCHING | {Code.SILENT, Code.SLOWED}),
     Code.TOO_SLOW: _Explained(
-        _MATCHING
-        | _ORDER
-        | {Code.SILENT, Code.SLOWED, Code.BURSTS, Code.MESSAGES_LOST, Code.CLOCK_DRIFT, Code.CLOCK_STEP}
-        | {Code.OTHER_CLOCK}
+        _MATCHING | {Code.SILENT, Code.BURSTS, Code.MESSAGES_LOST, Code.CLOCK_DRIFT, Code.CLOCK_STEP}
     ),
     Code.SILENT: _Explained(_MATCHING),
     Code.MALFORMED: _Explained(_MATCHING),
@@ -109,6 +109,7 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.SLOWED: _Explained(_MATCHING),
     Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.MESSAGES_LOST: _Explained(frozenset(), frozenset({Code.BURSTS})),
+    Code.DUPLICATES: _Explained(frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})),
 }
 """Causes, and which other findings they explain. No chain of explanations comes back to where it began."""
 
@@ -127,6 +128,9 @@ def _first_step(facts: GroupFacts) -> int:
 _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     # That an input is silent is seen of now alone.
     Code.SILENT: lambda facts: facts.figures.now,
+    # What the graph shows, it shows of now.
+    Code.NO_PUBLISHER: lambda facts: facts.figures.now,
+    Code.NO_CLOCK: lambda facts: facts.figures.now,
     Code.OVER_SLOP: lambda facts: min(facts.figures.nearest_from, facts.figures.now - WINDOW_NS),
     Code.CLOCK_STEP: _first_step,
 }
@@ -148,13 +152,14 @@ class Judge:
         """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
         found = [finding for rule in _CAUSE_RULES for finding in rule(facts)]
         self._remember(found, facts)
+        may_drift = rules_stamps.may_drift(facts)
         for code, rule in _MATCHING_RULES:
-            if not self._is_explained(code, facts):
+            if not self._is_explained(code, facts) and not (may_drift and code in _OF_DRIFT):
                 found += rule(facts)
         found += [finding for rule in _OTHER_RULES for finding in rule(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
             found.append(_unexplained(facts))
-        elif _is_well(found) and facts.figures.last_set is not None:
+        elif _is_well(found) and facts.figures.last_set is not None and not may_drift:
             # Few sets are what other findings come to: they are said where there is none of those.
             found += rules_matching.few_sets(facts)
         return self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
@@ -198,7 +203,8 @@ class Judge:
 
     def _root(self, finding: Finding, facts: GroupFacts) -> Finding:
         """Return the cause that explains a finding and that nothing explains, or the finding itself."""
-        for cause in self._causes.values():
+        # A relay that gets too little CPU makes all a little worse: what else is found says more.
+        for cause in sorted(self._causes.values(), key=lambda each: each.finding.code is Code.TOO_SLOW):
             if _explains(cause, finding, facts):
                 return self._root(cause.finding, facts)
         return finding

@@ -112,6 +112,10 @@ class Observation:
         )
         return group, inputs
 
+    def forget_publishers(self, index: int) -> None:
+        """Bear that others publish an input now than did."""
+        self._inputs[index].forget_publishers()
+
     def recent(self) -> Sequence[Arrivals]:
         """Give the last messages of each input that have stamps, to try values on."""
         return [each.recent() for each in self._inputs]

@@ -58,9 +58,14 @@ class Pace:
         """The steady pace that it had before it slowed down, None if it has not."""
         self._paces: deque[float] = deque(maxlen=_PACES)
 
-    def observe(self, received: Sequence[int]) -> None:
-        """Take the times of receipt of the last messages, in nanoseconds."""
-        last = received[-_PERIODS - 1 :]
+    def forget(self) -> None:
+        """Start afresh: others publish now."""
+        self._paces.clear()
+        self.slowed_from = None
+
+    def observe(self, times: Sequence[int]) -> None:
+        """Take the stamps of the last messages, or when they were received, in nanoseconds."""
+        last = times[-_PERIODS - 1 :]
         if len(last) <= _PERIODS:
             self.now_hz = 0.0
             self.slowed_from = None

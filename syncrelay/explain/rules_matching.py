@@ -110,7 +110,7 @@ def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution,
         values = ((*policy, Change(tolerance.key, wider)) for policy in policies)
         yield from islice(filter(None, map(trials.try_out, values)), 1)
     if facts.trigger is None:
-        yield from filter(None, (trials.gives_enough((each,)) for each in constant_offsets(trials)))
+        yield from filter(None, (trials.gives_enough((each,)) for each in dict.fromkeys(constant_offsets(trials))))
 
 
 def constant_offset(facts: GroupFacts) -> Found:

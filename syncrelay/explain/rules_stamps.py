@@ -37,7 +37,14 @@ _MOST_ZONES: Final = 28
 _FEWEST_SWINGS: Final = 2
 # Drift tells sooner if it is great.
 _DRIFTED_SOON: Final = 25_000_000
-_DRIFT_SOON: Final = 5 * SECOND
+_DRIFT_SOON: Final = 4 * SECOND
+# A slope of so many standard errors is no chance, one within so many may be all there is.
+_EVIDENT: Final = 5
+_MAY_BE: Final = 2
+_USUAL: Final = 0.95
+# So long is waited for a drift to be proven, in a silence only so long unless it looks like one.
+_DRIFT_PROVEN: Final = 60 * SECOND
+_DRIFT_PROVEN_SILENT: Final = 15 * SECOND
 # An input that drifts by so much less than another has the better clock.
 _EVIDENTLY: Final = 0.2
 # A drift explains what is apart if it made so great a part of the tolerance.
@@ -96,7 +103,9 @@ def other_clock(facts: GroupFacts) -> Found:
     usual = median_low(known.values()) if len(known) > 2 else min(known.values(), key=abs)  # noqa: PLR2004
     odd = max(known, key=lambda index: abs(known[index] - usual))
     behind = known[odd] - usual
-    if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0):
+    # What waited for the relay seems as late as that.
+    waited = 2 * max(facts.waited, facts.standstill.ns if facts.standstill else 0)
+    if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0, waited):
         return
     an_input, offset = facts.inputs[odd], facts.inputs[odd].offset
     others = [facts.inputs[index].name for index in known if index != odd]
@@ -104,8 +113,9 @@ def other_clock(facts: GroupFacts) -> Found:
     apart_by = f"are {words.span_of_time(abs(behind))} {'behind' if behind > 0 else 'ahead of'} those of {whose}"
     shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
     if epoch := _epoch(an_input, behind):
-        text = f"stamps of {an_input.name}{shifted} {apart_by}: they {epoch}"
-        instead = "stamp: receive" if abs(behind) > _BOOT else f"offset: {words.exactly(behind + offset)}"
+        what, exactly = epoch
+        text = f"stamps of {an_input.name}{shifted} {apart_by}: they {what}"
+        instead = "stamp: receive" if abs(behind) > _BOOT else f"offset: {words.exactly(exactly + offset)}"
         suggestion = f"have {nodes(an_input)} stamp with the host's time, or write `{instead}` at {an_input.name}"
     else:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"
@@ -122,18 +132,18 @@ def _wait_for_it(facts: GroupFacts, behind: int, name: str) -> str:
     return f"; if {name} really takes that long to arrive, write `queue_size: {needed}`" if may_be_late else ""
 
 
-def _epoch(an_input: InputFacts, behind: int) -> str:
-    """Say which time stamps seem to tell, that are so far behind those of others; nothing if it is no known one."""
+def _epoch(an_input: InputFacts, behind: int) -> tuple[str, int] | None:
+    """Say which time stamps seem to tell that are so far behind those of others, and how far that one is behind."""
     newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
     if 0 < newest < _BOOT and behind > _BOOT:
-        return "count from boot or the start of a simulation, not from 1970"
+        return "count from boot or the start of a simulation, not from 1970", behind
     for epoch, off, what in _EPOCHS:
         if abs(behind - off) < epoch:
-            return f"look like {what}"
+            return f"look like {what}", off
     zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
     if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < SECOND:
-        return "look like local time, not UTC"
-    return ""
+        return "look like local time, not UTC", zones * _ZONE if behind > 0 else -zones * _ZONE
+    return None
 
 
 def no_common_key(facts: GroupFacts) -> Found:
@@ -247,19 +257,52 @@ def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     count = an_input.figures.duplicates
     if facts.by_stamp and not facts.is_held(index) and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} repeat the stamp before them"
-        yield Finding(Code.DUPLICATES, Severity.WARN, text, f"check how {nodes(an_input)} stamps its messages", index)
+        yield Finding(
+            Code.DUPLICATES,
+            Severity.WARN,
+            text,
+            f"check how {nodes(an_input)} stamps its messages",
+            index,
+            explains=_matters(facts, an_input, count),
+        )
+
+
+def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:
+    """Return the drifts of the inputs of which they are known, and how they drift away from the others' median."""
+    known = {index: each.figures.drift for index, each in enumerate(facts.inputs) if each.figures.drift}
+    if not facts.by_stamp or len(known) < 2:  # noqa: PLR2004  one alone cannot drift apart
+        return {}, {}
+    return known, {
+        index: apart(drift, _median([known[other] for other in known if other != index]))
+        for index, drift in known.items()
+    }
+
+
+def may_drift(facts: GroupFacts) -> bool:
+    """Whether a drift that is neither proven nor refuted yet may be why stamps are so far apart.
+
+    For a while only: what takes longer to prove is not why they were apart so soon.
+    """
+    watched, tolerance = facts.figures.now - facts.figures.began, facts.tolerance
+    if tolerance is None or facts.is_recorded or not 0 < watched < _DRIFT_PROVEN:
+        return False
+    nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
+    if not nearest.share_over(tolerance.ns):
+        return False
+    needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
+    is_urgent = facts.is_silent and facts.silent_for >= _DRIFT_PROVEN_SILENT
+    return any(
+        abs(each.slope) >= max(needed, _MAY_BE * each.error)
+        or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)
+        for each in _drifts(facts)[1].values()
+    )
 
 
 def clock_drift(facts: GroupFacts) -> Found:
     """Find the input whose stamps drift away from the others' median; of two that may be either, both."""
-    drifts = {index: each.figures.drift for index, each in enumerate(facts.inputs) if each.figures.drift}
-    if not facts.by_stamp or len(drifts) < 2:  # noqa: PLR2004  one alone cannot drift apart
+    known, between = _drifts(facts)
+    if not known:
         return
-    known = {index: drift for index, drift in drifts.items() if drift is not None}
-    between = {
-        index: apart(drift, _median([known[other] for other in known if other != index]))
-        for index, drift in known.items()
-    }
     most = max(abs(each.slope) for each in between.values())
     # Of those that are as far from the others, the one whose stamps run least like this machine's clock.
     odd = max(
@@ -270,6 +313,8 @@ def clock_drift(facts: GroupFacts) -> Found:
     enough = _DRIFTED if found.watched_ns >= _DRIFT_WATCHED else _DRIFTED_SOON
     drifted = abs(found.drifted_ns)
     if found.watched_ns < _DRIFT_SOON or drifted < max(enough, _DRIFT_BENDS * found.bend_ns):
+        return
+    if abs(found.slope) < _EVIDENT * found.error:
         return
     others = [index for index in known if index != odd]
     is_evident = len(others) > 1 or abs(known[others[0]].slope) < _EVIDENTLY * abs(known[odd].slope)

@@ -21,6 +21,7 @@ class GroupWatch:
         self.config = config
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
+        self._publishers = [0] * len(config.topics)
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
@@ -66,6 +67,7 @@ class GroupWatch:
     ) -> GroupFacts:
         """Give all that is known now."""
         options = self.config.options
+        self._compare_publishers(graph)
         figures, input_figures = self._observation.figures(now=now)
         rows = zip(self.config.topics, graph, self._counts, input_figures, self._keys, strict=True)
         return GroupFacts(
@@ -100,3 +102,12 @@ class GroupWatch:
             evaluator=self._evaluator,
             empty_graph=empty_graph,
         )
+
+    def _compare_publishers(self, graph: Sequence[InputGraph]) -> None:
+        """See whether inputs have more or fewer publishers than they had; one that is restarted is the same."""
+        for index, shown in enumerate(graph):
+            count = len(shown.publishers)
+            if count and count != self._publishers[index]:
+                if self._publishers[index]:
+                    self._observation.forget_publishers(index)
+                self._publishers[index] = count

@@ -143,7 +143,9 @@ def run(
     """
     config = group_of(sources, options or {})
     names = [topic.topic for topic in config.topics]
-    arrivals = merge(*(_arrivals(each, names, seconds, random.Random(f"{seed} {each.topic} {each.node}")) for each in sources))
+    arrivals = merge(
+        *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources))
+    )
     relay = _Relay(config)
     waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in arrivals)
     taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)
@@ -174,6 +176,11 @@ def group_of(sources: Sequence[Source], options: dict[str, Any]) -> GroupConfig:
             topics[each.topic]["required"] = False
     group = {"policy": "approximate_time", "topics": list(topics.values()), **options}
     return load_text(yaml.safe_dump({"version": 1, "groups": {"front": group}}), environ={}).groups[0]
+
+
+def _chance(seed: int, place: int, source: Source) -> random.Random:
+    """Return what a source's jitter comes from: the same in each process, which a function's name is not."""
+    return random.Random(f"{seed} {place} {source.topic} {source.hz} {source.node}")
 
 
 def _ns(second: float) -> int:

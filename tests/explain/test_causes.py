@@ -7,7 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import load_text
-from syncrelay.explain import Code, Endpoint, GroupWatch, InputGraph, Judge, Severity, Standstill, judge, with_ok
+from syncrelay.explain import (
+    Code,
+    Endpoint,
+    GroupWatch,
+    InputGraph,
+    Judge,
+    Severity,
+    Standstill,
+    explanation,
+    judge,
+    with_ok,
+)
 from syncrelay.explain.clocks import Drift, Step
 from syncrelay.explain.judge import EXPLAINS, explained_by
 from syncrelay.sync import Match, Message
@@ -70,8 +81,30 @@ def test_the_cause_of_all_errors_of_a_silent_group_is_the_error():
 
 
 def test_an_explained_cause_explains_all_the_same():
-    stood = {"figures": {**SLOWED, "dropped": {DropReason.OVERFLOW: 9}}}
-    assert codes(judge(a_group(camera(**stood), LIDAR, figures=WIDE, waited=3 * S))) == [Code.TOO_SLOW]
+    stepped = camera(figures={"stepped": Step(NOW - S, -3 * S), "delay": 3 * S})
+    assert codes(judge(a_silent_group(stepped, LIDAR, waited=S))) == [Code.TOO_SLOW]
+
+
+@pytest.mark.parametrize(
+    ("an_input", "said"),
+    [
+        (camera(figures={"delay": 18 * S}), Code.OTHER_CLOCK),
+        (dropped(DropReason.UNSTAMPED, 100), Code.UNSTAMPED),
+        (dropped(DropReason.MALFORMED, 100), Code.MALFORMED),
+        (camera(figures=SLOWED), Code.SLOWED),
+        (camera(figures={"duplicates": 50}), Code.DUPLICATES),
+    ],
+)
+def test_a_relay_with_too_little_cpu_hides_nothing_that_it_cannot_cause(an_input, said):
+    silent = a_silent_group(an_input, LIDAR, figures=wide(*[30] * 9), waited=S)
+    found = judge(silent)
+    assert set(codes(found)) == {Code.TOO_SLOW, said}
+    assert explanation(found).code is said
+
+
+def test_what_waited_for_the_relay_is_no_other_clock():
+    late = camera(figures={"delay": 3 * S})
+    assert codes(judge(a_silent_group(late, LIDAR, waited=2 * S))) == [Code.TOO_SLOW]
 
 
 def test_an_optional_input_explains_nothing_of_the_others():

@@ -35,7 +35,7 @@ def test_an_epoch_costs_no_nanoseconds():
     assert drift(points(lambda second: second)).slope == pytest.approx(1e-9)
 
 
-@pytest.mark.parametrize("n", [0, 1, 5])
+@pytest.mark.parametrize("n", [0, 1, 3])
 def test_few_points_tell_nothing(n):
     assert drift(points(lambda second: second * MS, n=n)) is None
 

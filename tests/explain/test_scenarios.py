@@ -295,3 +295,104 @@ def test_a_publisher_that_goes_and_returns_as_another_is_told_by_that(returns_as
 def test_a_standstill_in_which_nothing_was_due_is_nobodys_fault():
     more = {"facts": lambda second: {"standstill": Standstill(1_700_000_000 * S + 20 * S, S)} if second < 30 else {}}
     assert a_pair(more=more).warnings == []
+
+
+def pauses(seed: int, longest: float) -> list[tuple[float, float]]:
+    """When a relay on a busy machine stands still, for as long as that at most."""
+    chance = random.Random(seed)
+    at, found = 1.0, []
+    while at < 80:
+        found.append((at, at + chance.choice([0.02, 0.05, 0.2, longest])))
+        at = found[-1][1] + chance.expovariate(1.5)
+    return found
+
+
+BUSY = {
+    "calm": lambda _: {},
+    "starved": lambda seed: {"starved": pauses(seed, 0.45)},
+    "starved for a second": lambda seed: {"starved": pauses(seed, 1.0)},
+    "stopped": lambda seed: {"stops": pauses(seed, 0.45)},
+}
+
+
+@pytest.mark.parametrize(("rate", "slop"), [(0.01, "20ms"), (-0.01, "20ms"), (0.001, "20ms"), (-0.0002, "5ms")])
+@pytest.mark.parametrize("noise", [0.0, 2.0, 10.0])
+@pytest.mark.parametrize("busy", BUSY)
+def test_no_slop_and_no_offset_is_offered_for_a_drift(rate, slop, noise, busy):
+    real = {"delay_jitter_ms": noise}
+    sources = (
+        Source("/camera", 10, **real),
+        Source("/lidar", 10, clock=lambda second: rate * second, **real),
+        Source("/imu", 20, **real),
+    )
+    told = run(*sources, seconds=80, options={"slop": slop}, **BUSY[busy](1))
+    assert told.codes <= {"clock_drift", "too_slow"}, told.warnings
+    assert told.codes
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "late", [Source("/gps", 1, delay_ms=80, delay_jitter_ms=30), Source("/camera", 5, delay_ms=700, delay_jitter_ms=60)]
+)
+def test_a_delay_that_varies_is_no_drift(late, seed):
+    told = run(Source("/imu", 100), late, seconds=60, seed=seed, options={"slop": "10ms", "queue_size": 200})
+    assert told.ever_found == set()
+
+
+@pytest.mark.parametrize("lag", [-1.0, 0.4, 2.4])
+def test_when_one_of_two_publishers_leaves_nothing_has_slowed_or_stepped(lag):
+    """The graph shows it some time before or after the last message."""
+    sources = (
+        Source("/camera", 10, node="/left", **REAL),
+        Source(
+            "/camera", 10, node="/right", phase_ms=50, clock=lambda _: -3.0, sends=lambda second: second < 30, **REAL
+        ),
+        Source("/lidar", 10, **REAL),
+    )
+
+    def publishers(topic, second):
+        there = [each.endpoint for each in sources if each.topic == topic]
+        return tuple(there[:1] if second > 30 + lag else there)
+
+    told = run(*sources, seconds=90, options=SLOP, publishers=publishers)
+    assert told.ever_found <= {"several_publishers", *(("slowed",) if lag > 2 else ())}
+    says_only(told, "several_publishers")
+
+
+def test_a_driver_that_is_started_again_at_a_lower_rate_has_slowed_down():
+    sources = Source("/a", 30, hz_at=lambda second: 30 if second < 30 else 10, **REAL), Source("/b", 30, **REAL)
+
+    def publishers(topic, second):
+        return () if topic == "/a" and 30 < second < 33 else (Endpoint(f"{topic}_driver", IMU),)
+
+    told = run(*sources, seconds=70, options={"slop": "20ms"}, publishers=publishers)
+    assert "slowed" in told.codes
+
+
+def test_a_recording_that_begins_again_is_no_step():
+    told = all_of(clock=lambda second: 0.0 if second < 20 else -20.0)
+    assert told.warnings == []
+    assert told.ever_found == set()
+    assert told.findings("time_jump")
+
+
+def test_the_offset_of_a_time_scale_is_offered_exactly():
+    told = a_pair(clock=lambda _: 18.0)
+    says_only(told, "other_clock", "stamp with the host's time, or write `offset: -18s` at /b")
+
+
+@pytest.mark.parametrize("busy", BUSY)
+def test_messages_in_pairs_of_a_stamp_are_no_matter_of_slop(busy):
+    told = a_pair(stamp=lambda stamp: stamp - stamp % 200_000_000, more=BUSY[busy](2))
+    assert "duplicates" in told.codes
+    assert told.codes <= {"duplicates", "too_slow"}, told.warnings
+
+
+@pytest.mark.parametrize("slower", [1.0, 0.5])
+def test_what_comes_in_batches_has_the_pace_of_its_stamps(slower):
+    told = all_of(
+        hz_at=lambda second: 10 if second < 30 else 10 * slower, received=lambda second: second - second % 1.2 + 1.2
+    )
+    texts = [each.text for _, each in told.findings("slowed")]
+    assert bool(texts) == (slower < 1)
+    assert all(re.match(r"/[ab] has slowed from (9\.\d+|10(\.\d+)?) Hz to [4-6]", text) for text in texts), texts

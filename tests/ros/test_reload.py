@@ -156,7 +156,7 @@ def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
     second.write_text(config({"rear": _rear(), "left": _rear(output_prefix="/left")}))
     file.relay.wait_for_log("reloaded: 2 groups unchanged, 1 group started")
     file.write(config({"left": _FRONT}, metrics=ANY_PORT))
-    file.relay.wait_for_log(f"of {file.path} too: give one of them another name")
+    file.relay.wait_for_log(f"of {file.path}: rename one of them")
 
 
 def test_a_watched_file_is_read_when_it_changes(stage: Stage):

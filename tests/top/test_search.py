@@ -123,7 +123,10 @@ def test_who_does_not_come_to_an_end_is_given_up(speech):
 
 @pytest.mark.parametrize("said", [b"", b"HTTP/1.1 200 OK\r\nContent-Length: 99999999999\r\n\r\n{"])
 def test_who_ends_before_the_answer_does_is_no_other_server(said):
-    with speaking(lambda: iter([said])) as url, pytest.raises(NoAnswerError, match="closed before the answer was complete"):
+    with (
+        speaking(lambda: iter([said])) as url,
+        pytest.raises(NoAnswerError, match="closed before the answer was complete"),
+    ):
         ask(url, **PATIENT)
 
 
