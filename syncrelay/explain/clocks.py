@@ -13,6 +13,7 @@ _PARTS = 4
 _MORE_OF_FEW = 8
 # So many times as far off the line as the median point: held up on its way.
 _HELD_UP = 6
+_LEAST_HELD_UP = 1_000_000
 
 
 class Drift(NamedTuple):
@@ -45,8 +46,10 @@ def drift(points: Sequence[tuple[int, int]]) -> Drift | None:
     if fit is None:
         return None
     found, strayed = fit
+    if max(strayed) < _LEAST_HELD_UP:
+        return found
     far = _HELD_UP * median(map(abs, strayed))
-    if max(map(abs, strayed)) > far:
+    if max(strayed) > far:
         near = [point for point, off in zip(points, strayed, strict=True) if abs(off) <= far]
         if len(near) >= _FEWEST and (fit := _fit(near)) is not None:
             return fit[0]
