@@ -1,6 +1,6 @@
 """What a finding is, and what every rule that makes them needs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final, TypeAlias
@@ -74,15 +74,15 @@ class Finding:
 
 
 Found: TypeAlias = Iterator[Finding]
-Rule: TypeAlias = Callable[[GroupFacts], Found]
+Rule: TypeAlias = Callable[[GroupFacts], Iterable[Finding]]
 
 
 def of_each_input(rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:
     """Make a rule about an input one about a group, the required inputs first."""
 
-    def of_all(facts: GroupFacts) -> Found:
-        for index in facts.required_first:
-            yield from rule(facts, index, facts.inputs[index])
+    def of_all(facts: GroupFacts) -> list[Finding]:
+        inputs = facts.inputs
+        return [finding for index in facts.required_first for finding in rule(facts, index, inputs[index])]
 
     return of_all
 
