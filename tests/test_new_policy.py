@@ -10,7 +10,7 @@ from pydantic import Field
 
 from syncrelay.bag import open_recording
 from syncrelay.bag.analysis import analyze
-from syncrelay.bag.wiring import wire
+from syncrelay.bag.bindings import bind
 from syncrelay.cli.analysis_html import as_html
 from syncrelay.config import ConfigError, Tolerance, load_text, policies
 from syncrelay.config.keys import Duration
@@ -83,7 +83,7 @@ def test_its_options_are_read_and_checked_and_in_the_schema():
 def test_a_recording_is_analyzed_by_it_and_drawn(tmp_path: Path):
     bag, text = _recording(tmp_path), _text("1ms")
     with closing(open_recording([str(bag)])) as recording:
-        analysis = analyze(recording, text, wire(load_text(text), recording))
+        analysis = analyze(recording, text, bind(load_text(text), recording))
     (group,) = analysis.groups
     assert group.suggestion.now < group.suggestion.possible
     assert [change.key for change in group.suggestion.changes] == ["gap"]

@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
+from syncrelay.bag.bindings import GroupBinding
 from syncrelay.bag.payloads import message_reader
 from syncrelay.bag.recording import Channel, RawMessage, Recording
-from syncrelay.bag.wiring import Wiring
 from syncrelay.explain import EngineDriver
 from syncrelay.sync import InputCounts, Message, Outcome
 
-Listener: TypeAlias = Callable[[Wiring, Outcome, int], None]
+Listener: TypeAlias = Callable[[GroupBinding, Outcome, int], None]
 """Told of each set and drop of a group when it leaves, and at what time. The payload of a message is the RawMessage."""
 
 _Feed: TypeAlias = Callable[[RawMessage], None]
@@ -36,26 +36,26 @@ class GroupResult:
 class GroupReplay:
     """One group at work on a recording."""
 
-    def __init__(self, wiring: Wiring, listeners: Sequence[Listener]) -> None:
-        self.wiring = wiring
-        self.driver: Final = EngineDriver(wiring.group, self._take if listeners else _take_nothing)
+    def __init__(self, binding: GroupBinding, listeners: Sequence[Listener]) -> None:
+        self.binding = binding
+        self.driver: Final = EngineDriver(binding.group, self._take if listeners else _take_nothing)
         self._listeners = listeners
 
     def feeds(self) -> Iterable[tuple[Channel, _Feed]]:
         """Give what takes in the messages of each channel; raises BagError for a stamp or key that isn't there."""
-        for index, each in enumerate(self.wiring.inputs):
+        for index, each in enumerate(self.binding.inputs):
             for channel in each.channels:
                 yield channel, self._feed(index, channel)
 
     def result(self) -> GroupResult:
         """Give the counts so far."""
         engine = self.driver.engine
-        topics = (each.config.topic for each in self.wiring.inputs)
+        topics = (each.config.topic for each in self.binding.inputs)
         inputs = tuple(InputResult(*each) for each in zip(topics, engine.counts(), strict=True))
-        return GroupResult(self.wiring.group.name, inputs, engine.sets)
+        return GroupResult(self.binding.group.name, inputs, engine.sets)
 
     def _feed(self, index: int, channel: Channel) -> _Feed:
-        read = message_reader(self.wiring.group, index, channel)
+        read = message_reader(self.binding.group, index, channel)
         add, reject = self.driver.add, self.driver.reject
 
         def feed(raw: RawMessage) -> None:
@@ -70,19 +70,21 @@ class GroupReplay:
     def _take(self, outcomes: Sequence[Outcome], now: int) -> None:
         for outcome in outcomes:
             for listener in self._listeners:
-                listener(self.wiring, outcome, now)
+                listener(self.binding, outcome, now)
 
 
 def _take_nothing(_outcomes: Sequence[Outcome], _now: int) -> None:
     """Stand in for listeners where there are none."""
 
 
-def replay(recording: Recording, wirings: Sequence[Wiring], *, listeners: Sequence[Listener] = ()) -> list[GroupResult]:
+def replay(
+    recording: Recording, bindings: Sequence[GroupBinding], *, listeners: Sequence[Listener] = ()
+) -> list[GroupResult]:
     """Feed a recording to its end; what became of all messages, in the order of the groups.
 
     Raises BagError for a stamp or key that a recorded type does not have.
     """
-    groups = [GroupReplay(wiring, listeners) for wiring in wirings]
+    groups = [GroupReplay(binding, listeners) for binding in bindings]
     # What waited in one group leaves before a later message of another arrives.
     waiting = [group.driver for group in groups if group.driver.has_deadlines]
     feeds: dict[Channel, list[_Feed]] = {}

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from typing import TypeAlias
 
+from syncrelay.bag.bindings import GroupBinding, Input
 from syncrelay.bag.definitions import as_ros2, begins_with_header, converter
 from syncrelay.bag.mcap_output import McapOutput, Output
 from syncrelay.bag.qos import output_profile
 from syncrelay.bag.recording import Channel, Encoding
-from syncrelay.bag.wiring import Input, Wiring
 from syncrelay.cdr import patch_stamp
 from syncrelay.errors import BagError
 from syncrelay.sync import Match, Message, Outcome
@@ -28,17 +28,17 @@ class SetWriter:
         self._outputs: dict[str, Output] = {}
         self._payloads: dict[tuple[str, Channel], _Payload] = {}
 
-    def begin(self, wiring: Wiring) -> None:
+    def begin(self, binding: GroupBinding) -> None:
         """Make the outputs of a group, so that those without a message are there too."""
-        for each in wiring.inputs:
+        for each in binding.inputs:
             if each.channels:
                 self._add(each)
 
-    def take(self, wiring: Wiring, outcome: Outcome, now: int) -> None:
+    def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
         """Write a set that leaves at `now`; drops are none."""
         if not isinstance(outcome, Match):
             return
-        for each, message in zip(wiring.inputs, outcome.messages, strict=True):
+        for each, message in zip(binding.inputs, outcome.messages, strict=True):
             if message is not None:
                 self._write(each, message, outcome.stamp, now)
 

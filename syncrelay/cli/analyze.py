@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from syncrelay.bag import Channel, Recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, with_changes
-from syncrelay.bag.wiring import wire
+from syncrelay.bag.bindings import bind
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
@@ -71,16 +71,16 @@ def analyze_bag(bag: str, asked: Asked) -> int:
             _tell_faults(recording)
             return DONE
         text = read_source(asked.config).text if asked.config else _proposed(recording, asked.topics)
-        wirings = wire(load_text(text, name=asked.config or "<topics>"), recording)
-        for problem in (problem for wiring in wirings for problem in wiring.problems):
+        bindings = bind(load_text(text, name=asked.config or "<topics>"), recording)
+        for problem in (problem for binding in bindings for problem in binding.problems):
             remark(printable(problem))
         with reading(recording):
-            analysis = analyze(recording, text, wirings)
+            analysis = analyze(recording, text, bindings)
         if asked.config is None:
             analysis = settled(analysis)
         _tell_faults(recording)
     _print(bag, analysis, asked)
-    return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
+    return DONE if all(binding.is_complete for binding in bindings) else AT_FAULT
 
 
 def _require_sense(asked: Asked) -> None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from syncrelay.bag import Encoding, open_recording
+from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.bag.lines import drop_line, set_line
 from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import Listener
 from syncrelay.bag.replay import replay as replay_groups
-from syncrelay.bag.wiring import Wiring, wire
 from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.parser import Parser
@@ -68,12 +68,12 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     with ExitStack() as opened:
         recording = open_recording(bags)
         opened.callback(recording.close)
-        wirings = wire(config, recording)
-        _say_all(problem for wiring in wirings for problem in wiring.problems)
-        written = _written(wanted.output, wirings, opened)
-        listeners = [*_printing(wanted), *([] if written is None else [_writing(written, wirings)])]
+        bindings = bind(config, recording)
+        _say_all(problem for binding in bindings for problem in binding.problems)
+        written = _written(wanted.output, bindings, opened)
+        listeners = [*_printing(wanted), *([] if written is None else [_writing(written, bindings)])]
         with reading(recording):
-            results = replay_groups(recording, wirings, listeners=listeners)
+            results = replay_groups(recording, bindings, listeners=listeners)
         _say_all(recording.faults)
     if written is not None:
         sets = sum(result.sets for result in results)
@@ -82,7 +82,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     for result in results:
         for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):
             tell(line)
-    return DONE if all(wiring.is_complete for wiring in wirings) else AT_FAULT
+    return DONE if all(binding.is_complete for binding in bindings) else AT_FAULT
 
 
 def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:
@@ -91,13 +91,13 @@ def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:
 
 
 def _printing(wanted: Wanted) -> Iterator[Listener]:
-    def print_set(wiring: Wiring, outcome: Outcome, now: int) -> None:
+    def print_set(binding: GroupBinding, outcome: Outcome, now: int) -> None:
         if isinstance(outcome, Match):
-            put(set_line(wiring, outcome, now))
+            put(set_line(binding, outcome, now))
 
-    def print_drop(wiring: Wiring, outcome: Outcome, now: int) -> None:
+    def print_drop(binding: GroupBinding, outcome: Outcome, now: int) -> None:
         if not isinstance(outcome, Match):
-            put(drop_line(wiring, outcome, now))
+            put(drop_line(binding, outcome, now))
 
     if wanted.sets:
         yield print_set
@@ -105,19 +105,19 @@ def _printing(wanted: Wanted) -> Iterator[Listener]:
         yield print_drop
 
 
-def _written(output: str | None, wirings: Sequence[Wiring], opened: ExitStack) -> McapOutput | None:
+def _written(output: str | None, bindings: Sequence[GroupBinding], opened: ExitStack) -> McapOutput | None:
     """Return the recording to be written, if one is, with what there is to say of it."""
     if output is None:
         return None
-    channels = (channel for wiring in wirings for each in wiring.inputs for channel in each.channels)
+    channels = (channel for binding in bindings for each in binding.inputs for channel in each.channels)
     recording = opened.enter_context(McapOutput(Path(output)))
     if any(channel.encoding is Encoding.ROS1 for channel in channels):
         remark("this is a ROS 1 recording: its messages are written as ROS 2 CDR, without header.seq")
     return recording
 
 
-def _writing(recording: McapOutput, wirings: Sequence[Wiring]) -> Listener:
+def _writing(recording: McapOutput, bindings: Sequence[GroupBinding]) -> Listener:
     writer = SetWriter(recording)
-    for wiring in wirings:
-        writer.begin(wiring)
+    for binding in bindings:
+        writer.begin(binding)
     return writer.take

@@ -10,7 +10,7 @@ import pytest
 
 from syncrelay.bag import open_recording
 from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled
-from syncrelay.bag.wiring import wire
+from syncrelay.bag.bindings import bind
 from syncrelay.config import load_text
 from tests.bag.making import write_mcap
 from tests.ros import recordings
@@ -32,8 +32,8 @@ def _analyzed(bag: Path, topics: tuple[str, ...]) -> Analysis:
     with closing(open_recording([str(bag)])) as recording:
         channels = {channel.topic: channel for channel in recording.channels}
         text = proposed_text("matched", [channels[topic] for topic in topics])
-        wirings = wire(load_text(text), recording)
-        return settled(analyze(recording, text, wirings))
+        bindings = bind(load_text(text), recording)
+        return settled(analyze(recording, text, bindings))
 
 
 @pytest.fixture(scope="module")

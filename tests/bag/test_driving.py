@@ -11,9 +11,9 @@ from syncrelay.bag.analysis import analyze
 from syncrelay.bag.analysis.evaluation import DropOut, completed, evaluate
 from syncrelay.bag.analysis.streams import read_streams
 from syncrelay.bag.analysis.watching import watch_group
+from syncrelay.bag.bindings import bind
 from syncrelay.bag.recording import Definition, RawMessage
 from syncrelay.bag.replay import replay
-from syncrelay.bag.wiring import wire
 from syncrelay.cli.analysis_html import as_html
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
@@ -95,7 +95,7 @@ def _groups(draw, policy):
     return config({"front": keys})
 
 
-def _replayed(recording, wirings):
+def _replayed(recording, bindings):
     sets, drops = [], []
 
     def listen(_, outcome, now):
@@ -105,7 +105,7 @@ def _replayed(recording, wirings):
             message = outcome.message
             drops.append(DropOut(message.input, message.stamp, message.payload[1], outcome.reason))
 
-    (result,) = replay(recording, wirings, listeners=[listen])
+    (result,) = replay(recording, bindings, listeners=[listen])
     return sets, drops, [each.counts for each in result.inputs]
 
 
@@ -114,10 +114,10 @@ def _replayed(recording, wirings):
 @given(data=st.data())
 def test_a_replay_and_an_evaluation_give_the_same(policy, data):
     recording, text = data.draw(_recordings()), data.draw(_groups(policy))
-    wirings = wire(load_text(text), recording)
-    sets, drops, counts = _replayed(recording, wirings)
-    (streams,) = read_streams(recording, wirings)
-    evaluation = evaluate(wirings[0].group, streams)
+    bindings = bind(load_text(text), recording)
+    sets, drops, counts = _replayed(recording, bindings)
+    (streams,) = read_streams(recording, bindings)
+    evaluation = evaluate(bindings[0].group, streams)
     assert [(each.stamps, each.left) for each in evaluation.sets] == sets
     assert list(evaluation.drops) == drops
     assert list(evaluation.counts) == counts
@@ -125,7 +125,7 @@ def test_a_replay_and_an_evaluation_give_the_same(policy, data):
         assert each.fed == each.matched + sum(each.dropped.values()) + each.buffered
         assert each.fed == sum(row[0] == index for row in recording.rows)
         assert each.buffered == 0
-    assert all(each.seconds > 0 for each in watch_group(wirings[0].group, streams))
+    assert all(each.seconds > 0 for each in watch_group(bindings[0].group, streams))
 
 
 @pytest.mark.parametrize("policy", _POLICIES)
@@ -133,7 +133,7 @@ def test_a_replay_and_an_evaluation_give_the_same(policy, data):
 @given(data=st.data())
 def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(policy, data):
     recording, text = data.draw(_recordings()), data.draw(_groups(policy))
-    analysis = analyze(recording, text, wire(load_text(text), recording))
+    analysis = analyze(recording, text, bind(load_text(text), recording))
     (group,) = as_json("made", analysis)["groups"]
     lines, page = list(report("made", analysis)), as_html("made", analysis)
     for topic, each in zip(_TOPICS, group["inputs"], strict=True):
@@ -151,8 +151,8 @@ def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(policy, da
 def test_without_listeners_a_replay_counts_the_same():
     recording = Made([(index, n * 100 * MS, n * 100 * MS, "") for n in range(1, 20) for index in range(3)])
     topics = inputs(dict.fromkeys(_TOPICS, VECTOR))
-    wirings = wire(load_text(config({"front": {"policy": "exact_time", "topics": topics}})), recording)
-    assert replay(recording, wirings)[0].sets == 19 == len(_replayed(recording, wirings)[0])
+    bindings = bind(load_text(config({"front": {"policy": "exact_time", "topics": topics}})), recording)
+    assert replay(recording, bindings)[0].sets == 19 == len(_replayed(recording, bindings)[0])
 
 
 def test_what_waited_in_one_group_leaves_before_later_messages_of_another():
@@ -164,8 +164,8 @@ def test_what_waited_in_one_group_leaves_before_later_messages_of_another():
         "slow": {"policy": "exact_time", "topics": [*pair, optional], "max_wait": "90ms"},
     }
     recording, told = Made(rows), []
-    wirings = wire(load_text(config(groups)), recording)
-    replay(recording, wirings, listeners=[lambda wiring, _, now: told.append((now // MS, wiring.group.name))])
+    bindings = bind(load_text(config(groups)), recording)
+    replay(recording, bindings, listeners=[lambda binding, _, now: told.append((now // MS, binding.group.name))])
     assert told == sorted(told)
     assert told[:3] == [(100, "quick"), (190, "slow"), (200, "quick")]
     assert len(told) == 38
@@ -177,4 +177,4 @@ def test_what_waits_at_the_end_leaves_at_its_own_time_however_late_the_recording
     text = config({"front": {"policy": "exact_time", "max_wait": "50ms", "topics": topics}})
     recording = Made(rows)
     recording.end = 60 * _SECOND
-    assert _replayed(recording, wire(load_text(text), recording))[0] == [((100 * MS, 100 * MS, None), 150 * MS)]
+    assert _replayed(recording, bind(load_text(text), recording))[0] == [((100 * MS, 100 * MS, None), 150 * MS)]

@@ -7,8 +7,8 @@ import pytest
 
 from syncrelay.bag import open_recording
 from syncrelay.bag.analysis import propose
+from syncrelay.bag.bindings import bind
 from syncrelay.bag.replay import replay
-from syncrelay.bag.wiring import wire
 from syncrelay.config import load_text
 from syncrelay.errors import NothingToMatchError
 from tests.bag.making import BEST_EFFORT, write_mcap, write_rosbag2
@@ -32,7 +32,7 @@ def _proposed(bag: Path) -> tuple[str, dict[str, int]]:
     with closing(open_recording([str(bag)])) as recording:
         text = propose(recording).text
     with closing(open_recording([str(bag)])) as recording:
-        results = replay(recording, wire(load_text(text), recording))
+        results = replay(recording, bind(load_text(text), recording))
     return text, {result.name: result.sets for result in results}
 
 

@@ -6,9 +6,9 @@ import pytest
 from rosbags.rosbag2 import Reader
 
 from syncrelay.bag import open_recording
+from syncrelay.bag.bindings import bind
 from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import replay
-from syncrelay.bag.wiring import wire
 from syncrelay.bag.writing import SetWriter
 from syncrelay.config import load_text
 from tests.bag.making import write_mcap
@@ -42,12 +42,12 @@ def test_the_sets_of_a_replay_are_those_that_the_relay_gives(case, real_data: Pa
     types = relaying.topics_of(frames)
     group = {**case.group, "topics": inputs({topic: types[topic] for topic in case.topics})}
     recording = open_recording([str(bag)])
-    wirings = wire(load_text(config({case.name: group}), environ={}), recording)
+    bindings = bind(load_text(config({case.name: group}), environ={}), recording)
     with McapOutput(tmp_path / "out") as output:
         writer = SetWriter(output)
-        for wiring in wirings:
-            writer.begin(wiring)
-        (result,) = replay(recording, wirings, listeners=[writer.take])
+        for binding in bindings:
+            writer.begin(binding)
+        (result,) = replay(recording, bindings, listeners=[writer.take])
     recording.close()
     assert result.sets == case.sets
     expected = relaying.matched_by_engine(case.policy(), frames, case.topics)

@@ -5,8 +5,8 @@ from contextlib import closing
 import pytest
 
 from syncrelay.bag import open_recording
+from syncrelay.bag.bindings import bind
 from syncrelay.bag.replay import received, replay
-from syncrelay.bag.wiring import wire
 from syncrelay.config import load_text
 from syncrelay.errors import BagError
 from syncrelay.sync import Drop, DropReason, Match
@@ -28,8 +28,8 @@ def _replayed(path, group, **file_keys):
     left = []
     with closing(open_recording([str(path)])) as recording:
         file = load_text(config({"front": group}, **file_keys))
-        wirings = wire(file, recording)
-        (result,) = replay(recording, wirings, listeners=[lambda _, outcome, now: left.append((outcome, now))])
+        bindings = bind(file, recording)
+        (result,) = replay(recording, bindings, listeners=[lambda _, outcome, now: left.append((outcome, now))])
     return left, result
 
 
@@ -71,22 +71,22 @@ def test_what_still_waits_at_the_end_leaves_when_its_time_has_come(tmp_path):
 def test_a_topic_that_the_recording_lacks_is_named_with_the_nearest(tmp_path):
     recording = open_recording([str(write_mcap(tmp_path / "rig.mcap", rig(2)))])
     topics = inputs({"/camra": VECTOR, "/xyz": VECTOR})
-    (wiring,) = wire(load_text(config({"front": _group(topics)})), recording)
+    (binding,) = bind(load_text(config({"front": _group(topics)})), recording)
     recording.close()
-    assert wiring.problems == (
+    assert binding.problems == (
         "front: /camra is not in the recording, did you mean `/camera`?",
         "front: /xyz is not in the recording, it has /lidar, /camera",
     )
-    assert not wiring.is_complete
+    assert not binding.is_complete
 
 
 def test_a_type_that_differs_from_the_files_is_named_and_not_fed(tmp_path):
     topics = inputs({"/camera": "sensor_msgs/msg/Image", "/lidar": VECTOR})
     recording = open_recording([str(write_mcap(tmp_path / "rig.mcap", rig(2)))])
-    (wiring,) = wire(load_text(config({"front": _group(topics)})), recording)
-    (result,) = replay(recording, [wiring])
+    (binding,) = bind(load_text(config({"front": _group(topics)})), recording)
+    (result,) = replay(recording, [binding])
     recording.close()
-    assert wiring.problems == (f"front: /camera is recorded as {VECTOR}, the file says sensor_msgs/msg/Image",)
+    assert binding.problems == (f"front: /camera is recorded as {VECTOR}, the file says sensor_msgs/msg/Image",)
     assert [each.counts.fed for each in result.inputs] == [0, 2]
 
 
@@ -156,9 +156,9 @@ def test_a_channel_that_is_not_of_ros_is_named(tmp_path):
     content = path.read_bytes().replace(b"\x03\0\0\0cdr", b"\x03\0\0\0xml")
     path.write_bytes(content)
     recording = open_recording([str(path)])
-    (wiring,) = wire(load_text(config({"front": _group(inputs(_PAIR))})), recording)
+    (binding,) = bind(load_text(config({"front": _group(inputs(_PAIR))})), recording)
     recording.close()
-    assert any("/camera is recorded as xml, expected cdr" in problem for problem in wiring.problems)
+    assert any("/camera is recorded as xml, expected cdr" in problem for problem in binding.problems)
 
 
 @pytest.mark.parametrize("stamp", ["receive", {"field": "seen"}])

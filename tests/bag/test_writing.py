@@ -10,10 +10,10 @@ from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
 from syncrelay.bag import open_recording
+from syncrelay.bag.bindings import bind
 from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.qos import PRESETS, Profile, output_profile, read_profiles, write_profile
 from syncrelay.bag.replay import replay
-from syncrelay.bag.wiring import wire
 from syncrelay.bag.writing import SetWriter
 from syncrelay.config import AUTO, QosOverrides, QosPreset, load_text
 from syncrelay.errors import BagError
@@ -33,10 +33,10 @@ def _written(bag: Path, output: Path, **keys) -> list[Frame]:
     group = {"policy": "approximate_time", "slop": "5ms", "topics": inputs(_PAIR), **keys}
     with closing(open_recording([str(bag)])) as recording, McapOutput(output) as written:
         writer = SetWriter(written)
-        wirings = wire(load_text(config({"front": group})), recording)
-        for wiring in wirings:
-            writer.begin(wiring)
-        replay(recording, wirings, listeners=[writer.take])
+        bindings = bind(load_text(config({"front": group})), recording)
+        for binding in bindings:
+            writer.begin(binding)
+        replay(recording, bindings, listeners=[writer.take])
     return _read(output)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from syncrelay.bag import open_recording
 from syncrelay.bag.analysis import Analysis, analyze
-from syncrelay.bag.wiring import wire
+from syncrelay.bag.bindings import bind
 from syncrelay.config import load_text
 from tests.bag.making import write_mcap
 from tests.ros.cdr_messages import VECTOR
@@ -40,7 +40,7 @@ def analyzed(folder: Path, frames: Sequence[Frame], **keys: Any) -> Analysis:
     group = {key: value for key, value in {**defaults, **keys}.items() if value is not None}
     text = config({"fused": group})
     with closing(open_recording([str(write_mcap(folder / "drive.mcap", frames))])) as recording:
-        return analyze(recording, text, wire(load_text(text), recording))
+        return analyze(recording, text, bind(load_text(text), recording))
 
 
 def renamed(analysis: Analysis) -> Analysis:

@@ -16,9 +16,9 @@ from syncrelay.bag.analysis.suggest import Suggestion, possible_sets, stamped, s
 from syncrelay.bag.analysis.topics import TopicFigures, figures_of
 from syncrelay.bag.analysis.unneeded import InputFates, Unneeded, find_unneeded, input_fates
 from syncrelay.bag.analysis.watching import LastingFinding, watch_group
+from syncrelay.bag.bindings import GroupBinding
 from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.recording import Channel, Recording
-from syncrelay.bag.wiring import Wiring
 from syncrelay.config import GroupConfig, load_text
 
 
@@ -78,14 +78,14 @@ class Analysis:
         return tuple(change for each in self.groups for change in each.suggestion.changes)
 
 
-def analyze(recording: Recording, text: str, wirings: Sequence[Wiring]) -> Analysis:
+def analyze(recording: Recording, text: str, bindings: Sequence[GroupBinding]) -> Analysis:
     """Read a recording to its end and return what it tells, and what the groups of a file's text make of it.
 
     Raises BagError for a stamp or key that a recorded type does not have.
     """
-    streams = read_streams(recording, wirings)
+    streams = read_streams(recording, bindings)
     groups = tuple(
-        analyze_group(wiring.group, of_group, text) for wiring, of_group in zip(wirings, streams, strict=True)
+        analyze_group(binding.group, of_group, text) for binding, of_group in zip(bindings, streams, strict=True)
     )
     distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
     topics = tuple(figures_of(stream) for stream in distinct.values() if stream.stamps)

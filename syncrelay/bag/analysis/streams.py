@@ -8,9 +8,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from syncrelay.bag.bindings import GroupBinding
 from syncrelay.bag.payloads import ReadMessage, message_reader, stamp_or_receipt_reader
 from syncrelay.bag.recording import Channel, Encoding, RawMessage, Recording
-from syncrelay.bag.wiring import Wiring
 from syncrelay.config import StampSource
 from syncrelay.explain import Arrival
 
@@ -44,7 +44,7 @@ _Wanted: TypeAlias = tuple[str, StampSource, str | None, bool]
 _Take: TypeAlias = Callable[[int, RawMessage], None]
 
 
-def read_streams(recording: Recording, wirings: Sequence[Wiring]) -> tuple[tuple[Stream, ...], ...]:
+def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tuple[tuple[Stream, ...], ...]:
     """Read a recording to its end; give a stream for each input of each group.
 
     Raises BagError for a stamp or key that a recorded type does not have.
@@ -52,16 +52,16 @@ def read_streams(recording: Recording, wirings: Sequence[Wiring]) -> tuple[tuple
     streams: dict[_Wanted, Stream] = {}
     takers: dict[Channel, list[_Take]] = {}
     chosen: list[tuple[Stream, ...]] = []
-    for wiring in wirings:
+    for binding in bindings:
         of_group = []
-        for index, each in enumerate(wiring.inputs):
+        for index, each in enumerate(binding.inputs):
             topic = each.config
-            needs_place = wiring.group.restamp is not None and topic.stamp != "header"
+            needs_place = binding.group.restamp is not None and topic.stamp != "header"
             wanted = (each.topic, topic.stamp, topic.key, needs_place)
             if wanted not in streams:
                 streams[wanted] = Stream(each.topic, topic.type, keys=None if topic.key is None else [])
                 for channel in each.channels:
-                    read = message_reader(wiring.group, index, channel)
+                    read = message_reader(binding.group, index, channel)
                     takers.setdefault(channel, []).append(_taker(streams[wanted], read))
             of_group.append(streams[wanted])
         chosen.append(tuple(of_group))

@@ -22,7 +22,7 @@ class Input:
 
 
 @dataclass(frozen=True, slots=True)
-class Wiring:
+class GroupBinding:
     """A group, its inputs in the file's order, and why an input has no channel, a sentence each."""
 
     group: GroupConfig
@@ -35,9 +35,9 @@ class Wiring:
         return all(each.channels for each in self.inputs if each.config.required)
 
 
-def wire(config: Config, recording: Recording) -> tuple[Wiring, ...]:
-    """Return each group's wiring, in the file's order."""
-    return tuple(_wire(group, config, recording.channels) for group in config.groups)
+def bind(config: Config, recording: Recording) -> tuple[GroupBinding, ...]:
+    """Return each group's binding, in the file's order."""
+    return tuple(_bind(group, config, recording.channels) for group in config.groups)
 
 
 def full_name(topic: str, config: Config) -> str:
@@ -45,7 +45,7 @@ def full_name(topic: str, config: Config) -> str:
     return expand(topic, node=config.node.name, namespace=config.node.namespace)
 
 
-def _wire(group: GroupConfig, config: Config, channels: Sequence[Channel]) -> Wiring:
+def _bind(group: GroupConfig, config: Config, channels: Sequence[Channel]) -> GroupBinding:
     inputs, problems = [], []
     for topic in group.topics:
         name = full_name(topic.topic, config)
@@ -55,7 +55,7 @@ def _wire(group: GroupConfig, config: Config, channels: Sequence[Channel]) -> Wi
         if not found:
             problems.append(f"{group.name}: {_missing(name, channels)}")
         inputs.append(Input(topic, name, full_name(topic.output, config), fitting))
-    return Wiring(group, tuple(inputs), tuple(dict.fromkeys(problems)))
+    return GroupBinding(group, tuple(inputs), tuple(dict.fromkeys(problems)))
 
 
 def _is_ros(channel: Channel) -> bool:
