@@ -25,7 +25,7 @@ from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
 from syncrelay.explain.rules_graph import no_other_node
-from syncrelay.explain.suggestions import TryBudget
+from syncrelay.explain.try_budget import TryBudget
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [

@@ -1,7 +1,6 @@
 """What other values of the file would give: the engine itself, run on the messages that came last."""
 
-import time
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -16,6 +15,7 @@ from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.dry_run import Arrival, dry_run
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.nearest import NearestSpans, greatest_age, signed_distances, tightest_span
+from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from syncrelay.sync.messages import DropReason
 from syncrelay.sync.queues import LONGEST_QUEUE
 
@@ -39,12 +39,6 @@ _HEADROOM: Final = 1.25
 # What was tried holds for so long while its finding stands: the first time for a second, then twice as long each time.
 _TRIED_AGAIN: Final = _SECOND
 _HOLDS: Final = 8 * _SECOND
-# A run costs 3 to 20 us a message, by what the engine has to do: a few runs for a group alone ...
-_MESSAGES: Final = 30_000
-# ... and for groups of one relay so much of the processor in a poll, after which no try begins, or goes on.
-_BEGINS_NS: Final = 40_000_000
-_ENDS_NS: Final = 80_000_000
-_ASKED_EVERY: Final = 50
 # Less is not told apart from what a driver takes.
 _LEAST_DISTANCE: Final = 1_000_000
 # Of a period: so near to one another are messages of one moment received.
@@ -80,59 +74,6 @@ class Verdict(NamedTuple):
 
 
 UNTRIED: Final = Verdict(())
-
-
-class TryBudget:
-    """How much may be tried out until the next poll, by all groups that share it: so much of the processor's time.
-
-    Without a `clock` of that, in nanoseconds, so many messages may be run through engines: the same on any machine.
-    """
-
-    def __init__(self, clock: Callable[[], int] | None = time.thread_time_ns) -> None:
-        self._clock = clock
-        self._is_wanted = False
-        self.refill()
-
-    def refill(self) -> None:
-        """Begin a poll."""
-        self._began = self._clock() if self._clock else 0
-        self._left = _MESSAGES
-        self._has_finished = False
-        self.is_short, self._is_wanted = self._is_wanted, False
-        """Whether the poll before had no time for something that was never tried."""
-
-    def want(self) -> None:
-        """Note that there was no time for something that was never tried."""
-        self._is_wanted = True
-
-    @property
-    def is_spent(self) -> bool:
-        """Whether no run may begin any more."""
-        return self._spent() >= _BEGINS_NS if self._clock else self._left <= 0
-
-    @property
-    def has_ended(self) -> bool:
-        """Whether what has begun is to try no more; by a clock it is interrupted, and goes on at the next poll."""
-        return self._clock is None and self._left <= 0
-
-    def spent_on(self, arrivals: Iterable[Arrival]) -> Iterator[Arrival]:
-        """Yield messages that a run takes. Raises OutOfTimeError where it takes too long.
-
-        The first of a poll may take as long as it needs: on a slow machine none would end else.
-        """
-        for number, each in enumerate(arrivals):
-            if self._clock and self._has_finished and number % _ASKED_EVERY == 0 and self._spent() >= _ENDS_NS:
-                raise OutOfTimeError
-            self._left -= 1
-            yield each
-        self._has_finished = True
-
-    def _spent(self) -> int:
-        return self._clock() - self._began if self._clock else 0
-
-
-class OutOfTimeError(Exception):
-    """A try took too long."""
 
 
 class Evaluator:

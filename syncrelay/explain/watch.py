@@ -7,7 +7,8 @@ from syncrelay.explain.clocks import Step
 from syncrelay.explain.facts import ClockState, GraphSnapshot, GroupFacts, InputFacts, InputGraph, Standstill
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
-from syncrelay.explain.suggestions import Evaluator, TryBudget
+from syncrelay.explain.suggestions import Evaluator
+from syncrelay.explain.try_budget import TryBudget
 from syncrelay.sync.counts import InputCounts
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import Finding
-from syncrelay.explain.suggestions import Change, Evaluator, OutOfTimeError, Trials, Tried, TryBudget, constant_offsets
+from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, constant_offsets
+from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run
 
 _VALUES = re.compile(r"(`[^`]+: [^`]+`(?: at /\w+)?(?: and `[^`]+: [^`]+`(?: at /\w+)?)*), which would give (\d+)")
