@@ -13,7 +13,7 @@ from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted, nodes
 from syncrelay.explain.nearest import signed_distances
 from syncrelay.explain.rules_flow import fates
-from syncrelay.explain.rules_stamps import other_clock
+from syncrelay.explain.rules_stamps import offered_offset, other_clock
 from syncrelay.explain.suggestions import (
     UNTRIED,
     Change,
@@ -129,14 +129,15 @@ def constant_offset(facts: GroupFacts) -> Found:
         delays = {index: facts.inputs[index].figures.delay or 0 for index in (first, other)}
         odd, right = sorted(delays, key=lambda index: -abs(delays[index] - facts.inputs[index].offset))
         off = off if odd == other else -off
-        name, offset = facts.inputs[odd].name, Change("offset", words.exactly(facts.inputs[odd].offset - off), odd)
+        name = facts.inputs[odd].name
+        advice = offered_offset(facts, Code.CONSTANT_OFFSET, odd, facts.inputs[odd].offset - off)
         yield Finding(
             Code.CONSTANT_OFFSET,
             Severity.WARN,
             f"stamps of {name} are always {words.duration(abs(off))} {'ahead of' if off > 0 else 'behind'} those of"
             f" {facts.inputs[right].name} received at the same time: sets may hold messages of different moments",
-            f"check how {nodes(facts.inputs[odd])} stamps; if both are measured at the same time, write"
-            f" {_written(facts, (offset,))}",
+            f"check how {nodes(facts.inputs[odd])} stamps"
+            + (f"; if both are measured at the same time, {advice}" if advice else ""),
             odd,
         )
 

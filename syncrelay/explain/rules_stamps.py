@@ -8,6 +8,7 @@ from syncrelay.explain import words
 from syncrelay.explain.clocks import Drift, apart
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
+from syncrelay.explain.suggestions import Change
 from syncrelay.sync.messages import DropReason
 
 # Stamps that are off by more come from another clock, or are older than a queue should hold.
@@ -115,15 +116,33 @@ def other_clock(facts: GroupFacts) -> Found:
     if epoch := _epoch(an_input, behind):
         what, exactly = epoch
         text = f"stamps of {an_input.name}{shifted} {apart_by}: they {what}"
-        instead = "stamp: receive" if abs(behind) > _BOOT else f"offset: {words.exactly(exactly + offset)}"
-        suggestion = f"have {nodes(an_input)} stamp with the host's time, or write `{instead}` at {an_input.name}"
+        receive = f", or write `stamp: receive` at {an_input.name}"
+        instead = receive if abs(behind) > _BOOT else _or_offset(facts, odd, exactly + offset)
+        suggestion = f"have {nodes(an_input)} stamp with the host's time{instead}"
     else:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"
         suggestion = (
-            f"synchronize the clocks of their machines, or write `offset: {words.exactly(behind + offset)}` at"
-            f" {an_input.name}{_wait_for_it(facts, behind, an_input.name)}"
+            f"synchronize the clocks of their machines{_or_offset(facts, odd, behind + offset)}"
+            f"{_wait_for_it(facts, behind, an_input.name)}"
         )
     yield Finding(Code.OTHER_CLOCK, Severity.ERROR, text, suggestion, odd)
+
+
+def offered_offset(facts: GroupFacts, code: Code, index: int, by: int) -> str:
+    """Say what offset to write and what it gives, tried where there are messages; nothing where it does not help."""
+    change, gives = Change("offset", words.exactly(by), index), ""
+    if facts.evaluator is not None:
+        tried = facts.evaluator.offset((code, index), change, now=facts.figures.now)
+        if tried is None:
+            return ""
+        (change,) = tried.changes
+        gives = f", which would give {tried.given} of {tried.possible} possible sets"
+    return f"write `offset: {change.value}` at {facts.inputs[index].name}{gives}"
+
+
+def _or_offset(facts: GroupFacts, index: int, by: int) -> str:
+    advice = offered_offset(facts, Code.OTHER_CLOCK, index, by)
+    return f", or {advice}" if advice else ""
 
 
 def _wait_for_it(facts: GroupFacts, behind: int, name: str) -> str:

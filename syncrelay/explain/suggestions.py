@@ -98,11 +98,12 @@ class Evaluator:
         now: int,
         within: int | None = None,
         optional: int | None = None,
+        given: Changes = (),
     ) -> Verdict:
         """Return what `propose` finds, now and then for each `about`; nothing new once the budget is spent.
 
         What was found on many messages stands as long as it helps, with the figures of now. See Trials for
-        `within` and `optional`.
+        `within` and `optional`. With changes `given`, these are what the possible sets are measured by.
         """
         at, holds, verdict = self._found.get(about, _NOTHING)
         if 0 <= now - at < holds:
@@ -119,10 +120,11 @@ class Evaluator:
             trials = begun[1]
         else:
             most = self._most_messages
-            trials = Trials(self._config, self._recent(), self._budget, within=within, optional=optional, most=most)
+            config = changed(self._config, given)
+            trials = Trials(config, self._recent(), self._budget, within=within, optional=optional, most=most)
         runs = trials.runs
         try:
-            before = verdict.tried if holds == _HOLDS else ()
+            before = verdict.tried if holds == _HOLDS and not given else ()
             again = tuple(tried for each in before if (tried := trials.gives_enough(each.changes)) is not None)
             found = again if before and len(again) == len(before) else tuple(propose(trials))
             verdict = Verdict(found, may_miss=trials.may_miss)
@@ -135,6 +137,15 @@ class Evaluator:
             return verdict
         self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), verdict)
         return verdict
+
+    def offset(self, about: Hashable, change: Change, *, now: int) -> Tried | None:
+        """Return what another offset gives if it brings messages together that are possible sets by then, else None."""
+
+        def all_in_all(trials: Trials) -> Iterator[Tried]:
+            if (given := trials.given_enough()) is not None:
+                yield Tried((change,), given, 0, len(trials.spans))
+
+        return next(iter(self.best(about, all_in_all, now=now, given=(change,)).tried), None)
 
 
 class _Found(NamedTuple):
@@ -223,6 +234,10 @@ class Trials:
             return None
         given = self._run(changes)
         return Tried(changes, given, self._now, len(self.spans)) if self._is_enough(given) else None
+
+    def given_enough(self) -> int | None:
+        """Return how many sets there are as it is, if these are enough of the possible ones, else None."""
+        return self._now if len(self.spans) >= _FEWEST and self._is_enough(self._now) else None
 
     def _is_enough(self, given: int) -> bool:
         return given >= len(self.spans) - max(1, int(_LEFT_OUT * len(self.spans)))

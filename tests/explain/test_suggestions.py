@@ -95,7 +95,9 @@ def test_wrong_frames_are_not_paired_in_silence(clock, offset):
     camera = replace(CAMERA, clock=lambda _: clock)
     told = run(camera, LIDAR, seconds=30, options={"slop": "30ms"})
     assert told.codes == {"constant_offset"}
-    assert told.first.text.endswith(f"write `offset: {offset}` at /camera")
+    assert re.search(
+        rf"write `offset: {offset}` at /camera, which would give (\d+) of \1 possible sets$", told.first.text
+    )
     right = replace(camera, topic_options={"offset": offset})
     assert run(right, LIDAR, seconds=30, options={"slop": "30ms"}).ever_found == set()
 
@@ -103,7 +105,7 @@ def test_wrong_frames_are_not_paired_in_silence(clock, offset):
 def test_no_slop_that_would_pair_wrong_frames_is_suggested():
     _, cured = rig(replace(CAMERA, clock=lambda _: -0.08), LIDAR, slop="10ms")
     assert {key for finding, _, _ in cured for ((key, _, _),), _ in offers(finding)} == {"offset"}
-    assert_cured(cured, offered=1)
+    assert_cured(cured, offered=2)
 
 
 @pytest.mark.parametrize("delay_ms", [30, 80, 100, 180, 250])
@@ -163,6 +165,22 @@ def test_a_rate_that_changes_brings_no_few_sets(hz):
     camera = replace(CAMERA, hz_at=lambda second: 10 if second < 25 else hz)
     lidar = replace(LIDAR, hz=30)
     assert "few_sets" not in run(camera, lidar, seconds=50, options={"slop": "60ms"}).ever_found
+
+
+def test_the_offset_of_another_clock_is_tried_and_cures():
+    ahead = Source("/lidar", hz=10, jitter_ms=0.5, clock=lambda _: 5.25)
+    told, cured = rig(CAMERA, ahead, slop="20ms")
+    assert told.codes == {"other_clock"}
+    assert re.search(r"`offset: -5.2[45]\d?s` at /lidar, which would give \d+ of \d+ possible sets", told.first.text)
+    assert_cured(cured, offered=1)
+
+
+def test_no_offset_is_offered_for_another_clock_whose_stamps_would_not_match_by_it():
+    wandering = Source("/lidar", hz=10, jitter_ms=30, clock=lambda _: 5.25)
+    told, cured = rig(CAMERA, wandering, slop="2ms")
+    assert told.codes == {"other_clock"}
+    assert told.first.text.endswith("synchronize the clocks of their machines")
+    assert cured == []
 
 
 def evaluator(budget: TryBudget | None = None) -> Evaluator:
