@@ -18,6 +18,9 @@ _FORGOTTEN: Final = 60 * _SECOND
 _OVER: Final = 10 * _SECOND
 
 
+_OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OFFSET})
+
+
 class Remark(NamedTuple):
     """A line for the log, and what it is about."""
 
@@ -50,7 +53,8 @@ class FindingLog:
             self._set_back(self._now - now)
         self._now = now
         if facts.is_silent:
-            yield from self._silent(facts, explanation(findings), now)
+            if findings:
+                yield from self._silent(facts, explanation(findings), now)
             return
         if self._quiet_since is not None:
             if self._told:
@@ -77,8 +81,8 @@ class FindingLog:
                 self._pause, self._tell_again = 0, now
         if now < self._tell_again:
             return
-        if finding.code is Code.UNEXPLAINED and may_drift(facts):
-            # Its cause may be known soon.
+        if finding.code in _OF_DRIFT and may_drift(facts):
+            # The cause may be known soon.
             return
         self._pause = min(2 * self._pause, _LONGEST_PAUSE) if self._pause else now - self._quiet_since
         self._tell_again = now + self._pause

@@ -146,6 +146,7 @@ class InputObservation:
             slowed_from_hz=self._pace.slowed_from if rate_hz else None,
             fed=fed,
             dropped=dropped,
+            first_received=self._first,
             received=self._received[:],
             stamps=self._stamps[-_LAST_MESSAGES:],
             delays=self._delays[-_LAST_MESSAGES:],

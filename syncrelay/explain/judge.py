@@ -56,6 +56,8 @@ _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
 
 _OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET})
 """What a drift brings about, and sooner than it can be proven."""
+_OF_GRAPH: Final = frozenset({Code.ALONE, Code.NO_PUBLISHER, Code.TYPE_NOT_IMPORTABLE, Code.NO_CLOCK})
+_WAIT: Final = "wait some seconds: it is not known yet whether a clock drifts"
 
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_stamps.out_of_order),
@@ -154,11 +156,15 @@ class Judge:
         self._remember(found, facts)
         may_drift = rules_stamps.may_drift(facts)
         for code, rule in _MATCHING_RULES:
-            if not self._is_explained(code, facts) and not (may_drift and code in _OF_DRIFT):
+            if self._is_explained(code, facts):
+                continue
+            if not (may_drift and code in _OF_DRIFT):
                 found += rule(facts)
+            elif facts.is_silent:
+                found += [replace(finding, suggestion=_WAIT) for finding in rule(facts)]
         found += [finding for rule in _OTHER_RULES for finding in rule(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
-            found.append(_unexplained(facts))
+            found += [_unexplained(facts)] if _had_time(facts) else []
         elif _is_well(found) and facts.figures.last_set is not None and not may_drift:
             # Few sets are what other findings come to: they are said where there is none of those.
             found += rules_matching.few_sets(facts)
@@ -216,6 +222,9 @@ def judge(facts: GroupFacts) -> tuple[Finding, ...]:
 
 
 def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
+    if cause.finding.code in _OF_GRAPH and cause.at < facts.figures.now and finding.severity is Severity.ERROR:
+        # What the graph shows no more is not why no set leaves now.
+        return False
     explained, about = EXPLAINS[cause.finding.code], cause.finding.input
     if finding.code not in explained.in_group and finding.code not in explained.of_input:
         return False
@@ -254,6 +263,13 @@ def explanation(findings: tuple[Finding, ...]) -> Finding:
     if worst is Severity.OK:
         return findings[-1]
     return next(finding for finding in findings if finding.severity is worst)
+
+
+def _had_time(facts: GroupFacts) -> bool:
+    """Whether messages came on all inputs for long enough that there should be a set."""
+    firsts = [each.figures.first_received for each in facts.inputs if each.required]
+    now, longest = facts.figures.now, facts.silent_after
+    return facts.figures.last_set is not None or all(at is not None and now - at >= longest for at in firsts)
 
 
 def _unexplained(facts: GroupFacts) -> Finding:

@@ -10,6 +10,7 @@ from syncrelay.config import load_text
 from syncrelay.explain import (
     Code,
     Endpoint,
+    GraphSnapshot,
     GroupWatch,
     InputGraph,
     Judge,
@@ -64,6 +65,26 @@ def test_a_cause_explains_a_step_for_as_long_as_the_step_is_told():
     a_judge = Judge()
     assert codes(a_judge.judge(a_group(*stepped, waited=3 * S))) == [Code.TOO_SLOW]
     assert codes(a_judge.judge(a_group(*stepped, figures=later))) == []
+
+
+def test_a_graph_that_was_empty_explains_nothing_once_others_are_there():
+    a_judge = Judge()
+    alone = a_silent_group(
+        *(an_input(name, publishers=(), figures={"last_received": None}) for name in ("/camera", "/lidar")),
+        empty_graph=GraphSnapshot(7, "LOCALHOST"),
+    )
+    assert codes(a_judge.judge(alone)) == [Code.ALONE]
+    since = {"nearest_since": wide(*[30] * 60)["nearest"], "now": NOW + 3 * S}
+    assert codes(a_judge.judge(a_silent_group(figures=since))) == [Code.OVER_SLOP]
+
+
+def test_a_group_whose_messages_have_just_begun_is_not_said_to_be_unexplained():
+    def began(ago):
+        first = {"first_received": NOW - ago}
+        return a_silent_group(camera(figures=first), an_input("/lidar", figures=first), figures={"last_set": None})
+
+    assert [each.code for each in with_ok(began(3 * S), judge(began(3 * S)))] == [Code.STARTING]
+    assert codes(judge(began(6 * S))) == [Code.UNEXPLAINED]
 
 
 def test_a_cause_that_is_over_does_not_explain_a_silence_for_long():
