@@ -102,6 +102,7 @@ def test_messages_that_dds_lost_while_the_relay_stood_still_are_counted_and_the_
     play(stage, stream("/lidar", hz=10))
     play(stage, [frame._replace(payload=frame.payload + big) for frame in fast], reliability="best_effort")
     # What is lost in a publisher's first looks is what it sent before it was heard.
+    wait_until(lambda: status(relay)["groups"], "a report of the group")
     wait_until(lambda: status(relay)["groups"][0]["inputs"][0]["received"] > 200, "messages of four seconds")
     relay.send(signal.SIGSTOP)
     sent = collector.count("/camera")

@@ -33,7 +33,7 @@ def test_a_camera_of_another_clock_is_told_with_its_offset(stage: Stage):
     assert_logged(
         relay,
         r"no set for [\d.]+ s: stamps of /camera are 37.2 s behind those of /lidar; synchronize the clocks of their"
-        r" machines, or write `offset: 37.\d+s` at /camera\n",
+        r" machines, or write `offset: 37.\d+s` at /camera, which would give (\d+) of \1 possible sets\n",
     )
 
 
