@@ -5,13 +5,15 @@ Here a wake drains all sources that are ready.
 """
 
 import time
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from syncrelay.dataflow.backend import Source, Watch
 from syncrelay.dataflow.backlog import Backlog
+from syncrelay.dataflow.calls import Calls
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 _Result = TypeVar("_Result")
 
@@ -53,31 +55,15 @@ class ReceiveLoop:
         self._contain = contain
         self._sources: dict[Source, Callable[[Exception], None]] = {}
         self._backlog = Backlog()
-        self._calls: deque[tuple[Future[Any], Callable[[], None]]] = deque()
+        self._calls = Calls(watch.wake)
         self._stopping = False
-        self._ended = False
 
     def call(self, function: Callable[[], _Result]) -> "Future[_Result]":
         """Have `function` called between two messages on the loop's thread; its result comes in the future.
 
         A call that the loop ends before is cancelled.
         """
-        future: Future[_Result] = Future()
-
-        def perform() -> None:
-            try:
-                result = function()
-            except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
-                future.set_exception(error)
-            else:
-                future.set_result(result)
-
-        self._calls.append((future, perform))
-        if self._ended:
-            self._cancel_calls()
-        else:
-            self.wake()
-        return future
+        return self._calls.add(function)
 
     def wake(self) -> None:
         """Have the loop check its calls and deadlines now."""
@@ -113,11 +99,10 @@ class ReceiveLoop:
                 self._guarded(self._receive)
                 if not self._stopping:
                     time.sleep(_AFTER_FAILURE_S)
-            for last in (self._take_what_came, self._backlog.deliver_held, self._carry_out_calls):
+            for last in (self._take_what_came, self._backlog.deliver_held, self._calls.carry_out):
                 self._guarded(last)
         finally:
-            self._ended = True
-            self._cancel_calls()
+            self._calls.end()
 
     def _guarded(self, function: Callable[[], None]) -> None:
         try:
@@ -130,7 +115,7 @@ class ReceiveLoop:
     def _receive(self) -> None:
         while not self._stopping:
             if self._calls:
-                self._carry_out_calls()
+                self._calls.carry_out()
             deadline = self.deadline
             longest = _LONGEST_REST_NS if deadline is None else self._expire_due(deadline)
             self._backlog.deliver(self._watch.wait(0 if self._backlog.held else longest))
@@ -155,14 +140,6 @@ class ReceiveLoop:
     def close(self) -> None:
         """Free what the loop holds of rcl. After `run` has returned."""
         self._watch.close()
-
-    def _carry_out_calls(self) -> None:
-        while self._calls:
-            self._calls.popleft()[1]()
-
-    def _cancel_calls(self) -> None:
-        while self._calls:
-            self._calls.popleft()[0].cancel()
 
     def _expire_due(self, deadline: Callable[[], int | None]) -> int:
         """Let go what is due; give the nanoseconds until the next deadline, a on_turn at most."""

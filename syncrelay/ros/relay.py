@@ -8,12 +8,13 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
 from syncrelay.config import Config
 from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.calls import Calls
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.environment.transport import apply_transport
 from syncrelay.errors import SyncRelayError
@@ -34,6 +35,7 @@ from syncrelay.sync import DropReason
 from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
+_Result = TypeVar("_Result")
 
 # The graph is polled this often while something is missing, so that a rig that starts loses little ...
 _EAGER_POLL_S = 0.1
@@ -130,6 +132,7 @@ class Relay:
         self._next_evaluation = time.monotonic() + EVALUATE_S
         self._started = time.monotonic()
         self._wake = Wakeup()
+        self._calls = Calls(self._wake.set)
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
         self._services = SingleThreadedExecutor(context=self._context)
         self._services.add_node(self.node)
@@ -168,10 +171,18 @@ class Relay:
         """Have `step` return at once. Safe in a signal handler."""
         self._wake.set()
 
+    def call(self, function: Callable[[], _Result]) -> "Future[_Result]":
+        """Have `function` called at the next `step`; its result comes in the future. Any thread.
+
+        A call that the end comes before is cancelled.
+        """
+        return self._calls.add(function)
+
     def step(self, timeout_s: float = _POLL_S) -> None:
         """Poll the graph, evaluate groups, then rest until one of them is due, `timeout_s` at most, or until `wake`."""
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
+        self._calls.carry_out()
         with self._bugs.contained("polling the graph"):
             self._poll_graph()
             self._groups.announce()
@@ -233,6 +244,7 @@ class Relay:
 
     def drain(self) -> tuple[GroupReport, ...]:
         """Take in what has arrived, let go of what is buffered, stop receiving; report on each group a last time."""
+        self._calls.end()
         receiving, self._receiving = self._receiving, None
         self._phase = Phase.DRAINING
         if receiving is not None:

@@ -1,0 +1,56 @@
+"""Functions that one thread has another call."""
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+_Result = TypeVar("_Result")
+
+
+class Calls:
+    """What is to be called on a thread, in the order in which it was asked for.
+
+    `wake` is called, on the thread that asks, when there is something to carry out.
+    """
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self._wake = wake
+        self._due: deque[tuple[Future[Any], Callable[[], None]]] = deque()
+        self._ended = False
+
+    def __bool__(self) -> bool:
+        return bool(self._due)
+
+    def add(self, function: Callable[[], _Result]) -> "Future[_Result]":
+        """Have `function` called; its result, or what it raised, comes in the future. Any thread.
+
+        A call that comes after the end, or that the end comes before, is cancelled.
+        """
+        future: Future[_Result] = Future()
+
+        def perform() -> None:
+            try:
+                result = function()
+            except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+
+        self._due.append((future, perform))
+        if self._ended:
+            self.end()
+        else:
+            self._wake()
+        return future
+
+    def carry_out(self) -> None:
+        """Call what is due."""
+        while self._due:
+            self._due.popleft()[1]()
+
+    def end(self) -> None:
+        """Cancel what is due, and all that comes."""
+        self._ended = True
+        while self._due:
+            self._due.popleft()[0].cancel()
