@@ -1,5 +1,6 @@
 """Draws docs/demo.svg from a real run of the demo: `python docs/draw_demo.py`."""  # noqa: INP001  no package
 
+from contextlib import nullcontext
 from pathlib import Path
 
 from picture import COLUMNS, LINES, draw
@@ -21,7 +22,7 @@ def main() -> None:
     """Run the demo and draw the moment that shows most."""
     prepare_ros()
     moments: list[Moment] = []
-    relay_rig(moments.append, total_s=_SECONDS, seed=0, stop=StopRequest())
+    relay_rig(nullcontext(moments.append), total_s=_SECONDS, seed=0, stop=StopRequest())
     settled = [moment for moment in moments if moment.elapsed_s > _SETTLED_S]
     healthy = [moment for moment in settled if not any(group.problems for group in moment.state.groups)]
     draw(frame(max(healthy or settled, key=_fullness), width=COLUMNS, height=LINES), _PICTURE)

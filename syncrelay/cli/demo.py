@@ -5,10 +5,10 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from importlib.resources import files
 from logging.handlers import MemoryHandler
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, TypeAlias
 
 from rich.console import Console
 from rich.live import Live
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 _STARTING = "Starting a simulated camera, lidar and IMU ..."
 _FRAME_S = 0.125
 _LINE_S = 1.0
+
+Show: TypeAlias = Callable[[Moment], None]
+"""Shows a moment, if it is time to."""
+
 # Lines of log; more than that, and something else is wrong.
 _MOST_HELD = 1000
 
@@ -74,9 +78,7 @@ def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopReque
         return DONE
     configure("warning", "text")
     prepare_ros()
-    console = Console(highlight=False)
-    with _view(console) as view:
-        final = relay_rig(view.show, total_s=seconds, seed=seed, stop=stop)
+    final = relay_rig(_view(Console(highlight=False)), total_s=seconds, seed=seed, stop=stop)
     if final is None:
         remark("stopped before it started")
         return DONE
@@ -94,17 +96,19 @@ def prepare_ros() -> None:
     require_rclpy()
 
 
-def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: int, stop: StopRequest) -> Moment | None:
+def relay_rig(
+    view: AbstractContextManager[Show], *, total_s: float | None, seed: int, stop: StopRequest
+) -> Moment | None:
     """Start the rig, relay it and show every moment; return how it stood when all was drained.
 
-    Time counts from when every sensor publishes: how long their start takes is the machine's affair. None if it was
-    stopped before.
+    The view is left before the rig ends, which may take time and words. Time counts from when every sensor publishes:
+    how long their start takes is the machine's affair. None if it was stopped before.
     """
     from syncrelay.environment.quick_discovery import quick_discovery
     from syncrelay.rig.processes import Rig
 
     stop.defer()
-    with quick_discovery(), Rig(seed=seed) as rig:
+    with quick_discovery(), Rig(seed=seed) as rig, view as show:
         # Imported while the sensors start.
         from syncrelay.ros.relay import Relay
 
@@ -117,9 +121,7 @@ def relay_rig(show: Callable[[Moment], None], *, total_s: float | None, seed: in
             return _relay(relay, rig, show, total_s=total_s, stop=stop)
 
 
-def _relay(
-    relay: "Relay", rig: "Rig", show: Callable[[Moment], None], *, total_s: float | None, stop: StopRequest
-) -> Moment:
+def _relay(relay: "Relay", rig: "Rig", show: Show, *, total_s: float | None, stop: StopRequest) -> Moment:
     began = time.monotonic()
     end = math.inf if total_s is None else began + total_s
 
@@ -151,11 +153,6 @@ def isolation(environ: Mapping[str, str]) -> dict[str, str]:
     # Within the range of one host, Fast DDS delivers through shared memory only: its UDP alone, which the container
     # image chooses, finds peers and sends them nothing.
     return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "FASTDDS_BUILTIN_TRANSPORTS": "DEFAULT"}
-
-
-class _View(Protocol):
-    def show(self, moment: Moment) -> None:
-        """Show a moment, if it is time to."""
 
 
 class _Screen:
@@ -192,12 +189,12 @@ def _can_draw(console: Console) -> bool:
 
 
 @contextmanager
-def _view(console: Console) -> Iterator[_View]:
+def _view(console: Console) -> Iterator[Show]:
     if not _can_draw(console):
-        yield _Lines()
+        yield _Lines().show
         return
     with _log_held_back(), Live(Text(_STARTING), console=console, screen=True, auto_refresh=False) as live:
-        yield _Screen(live)
+        yield _Screen(live).show
 
 
 @contextmanager

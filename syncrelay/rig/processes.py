@@ -1,6 +1,9 @@
 """The rig's sensors as child processes of this one."""
 
+import contextlib
+import logging
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -16,7 +19,11 @@ UP = "publishes"
 
 # A sensor is up in 3 s and leaves DDS in 0.2 s; on a busy machine both take long.
 _UP_WITHIN_S = 60.0
-_END_WITHIN_S = 10.0
+_END_WITHIN_S = 60.0
+# Whoever waits at a terminal is told by then what for.
+_SILENT_S = 3.0
+
+_LOG = logging.getLogger("syncrelay")
 
 
 class Rig:
@@ -53,18 +60,34 @@ class Rig:
         for name, (process, talk) in self._sensors.items():
             code = process.poll()
             if code is not None:
-                raise RuntimeError(f"the rig's {name} ended with exit code {code}: {_all_of(talk)[-2000:]}")
+                raise RuntimeError(_end_of(name, code, talk))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # A sensor that was dead before is what the error tells.
+        to_tell = set(self._sensors) if error is None else set(self._running_at(0))
         for process, _ in self._sensors.values():
             assert process.stdin is not None  # noqa: S101 - a pipe was asked for
             process.stdin.close()
-        deadline = time.monotonic() + _END_WITHIN_S
-        for process, talk in self._sensors.values():
-            _await_end(process, deadline)
+            # One that is still being imported reads no stdin yet: it ends at once, DDS knows nothing of it.
+            process.terminate()
+        began = time.monotonic()
+        if late := self._running_at(began + _SILENT_S):
+            _LOG.warning("waiting for the rig's %s to end; another Ctrl-C ends the demo at once", ", ".join(late))
+        for name in self._running_at(began + _END_WITHIN_S):
+            self._sensors[name][0].kill()
+        for name, (process, talk) in self._sensors.items():
+            if (code := process.wait()) not in (0, -signal.SIGTERM) and name in to_tell:
+                _LOG.warning("%s", _end_of(name, code, talk))
             talk.close()
+
+    def _running_at(self, deadline: float) -> list[str]:
+        """Wait until then at most; give the names of those that run on."""
+        for process, _ in self._sensors.values():
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(max(0, deadline - time.monotonic()))
+        return [name for name, (process, _) in self._sensors.items() if process.poll() is None]
 
 
 def _start(name: str, *, seed: int, start: int, talk: IO[bytes]) -> subprocess.Popen[bytes]:
@@ -85,14 +108,10 @@ def _start(name: str, *, seed: int, start: int, talk: IO[bytes]) -> subprocess.P
     )
 
 
+def _end_of(name: str, code: int, talk: IO[bytes]) -> str:
+    return f"the rig's {name} ended with exit code {code}: {_all_of(talk)[-2000:]}"
+
+
 def _all_of(talk: IO[bytes]) -> str:
     # Not by its position, which the sensor writes at too.
     return os.pread(talk.fileno(), os.fstat(talk.fileno()).st_size, 0).decode(errors="replace").strip()
-
-
-def _await_end(process: subprocess.Popen[bytes], deadline: float) -> None:
-    try:
-        process.wait(max(0, deadline - time.monotonic()))
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()

@@ -148,14 +148,18 @@ with Rig(seed=1) as rig:
 """
 
 
-@pytest.fixture
-def holder(stage):
+def hold(stage):
     """A process that runs the whole rig until its stdin ends."""
     process = stage.start("holder", [sys.executable, "-c", _HOLD_RIG], stdin=subprocess.PIPE)
     process.wait_until(lambda: len(children_of(process.pid)) == len(SENSORS), "the rig's processes")
     process.wait_until(lambda: all(map(segments_of, children_of(process.pid))), "shared memory of all sensors")
     stage.note_shared_memory()
     return process
+
+
+@pytest.fixture
+def holder(stage):
+    return hold(stage)
 
 
 def runs(pid):
@@ -185,6 +189,35 @@ def test_an_orderly_end_takes_the_sensors_along(stage, holder):
     assert holder.wait() == 0
     assert not any(map(runs, sensors))
     assert left_of(stage.domain, held) == set()
+
+
+_AT_THE_END = """
+import atexit, os, sys, time
+def linger():
+    while not os.path.exists("enough"):
+        time.sleep(0.05)
+if "camera" in sys.orig_argv:
+    atexit.register(os._exit, 3)
+if "lidar" in sys.orig_argv:
+    atexit.register(linger)
+"""
+
+
+@pytest.mark.ros
+def test_a_sensor_that_is_slow_to_end_is_waited_for_and_one_that_fails_at_its_end_is_named(stage):
+    stage.before_each_sensor(_AT_THE_END)
+    holder = hold(stage)
+    holder.ask_to_end()
+    holder.wait_until(
+        lambda: any(line.startswith("waiting for the rig's") and "lidar" in line for line in holder.said),
+        "words on the sensor that does not end",
+    )
+    (stage.folder / "enough").touch()
+    assert holder.wait() == 0
+    assert [line for line in holder.said if not line.startswith("waiting")] == [
+        "the rig's camera ended with exit code 3: publishes /demo/camera/image_raw"
+    ]
+    assert stage.left_in_shared_memory() == set()
 
 
 @pytest.mark.ros
