@@ -16,6 +16,8 @@ _LASTING: Final = 5 * _SECOND
 _FORGOTTEN: Final = 60 * _SECOND
 # It is over when it has been gone for this long.
 _OVER: Final = 10 * _SECOND
+# What to write against it is worth this wait, where the relay had no time yet to try anything.
+_UNTIL_TRIED: Final = 10 * _SECOND
 
 
 _OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OFFSET})
@@ -60,7 +62,7 @@ class FindingLog:
             if self._told:
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}", None)
             self._quiet_since, self._told, self._well_since = None, False, now
-        yield from self._warnings(findings, explained, now)
+        yield from self._warnings(facts, findings, explained, now)
 
     def _set_back(self, by: int) -> None:
         """Bear that this machine's clock was set back: else nothing would be said until it comes to where it was."""
@@ -84,6 +86,8 @@ class FindingLog:
         if finding.code in _OF_DRIFT and may_drift(facts):
             # The cause may be known soon.
             return
+        if _awaits_a_try(facts, finding) and now - self._tell_again < _UNTIL_TRIED:
+            return
         self._pause = min(2 * self._pause, _LONGEST_PAUSE) if self._pause else now - self._quiet_since
         self._tell_again = now + self._pause
         self._told = True
@@ -94,7 +98,9 @@ class FindingLog:
         ever = "no set" if facts.figures.last_set is None else "no more sets"
         yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", finding.code)
 
-    def _warnings(self, findings: tuple[Finding, ...], explained: Collection[Code], now: int) -> Iterator[Remark]:
+    def _warnings(
+        self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code], now: int
+    ) -> Iterator[Remark]:
         for finding in findings:
             if finding.severity is Severity.OK:
                 continue
@@ -102,7 +108,8 @@ class FindingLog:
             if now - warning.seen > _FORGOTTEN:
                 warning.began, warning.told = now, False
             warning.seen, warning.text = now, finding.text
-            if not warning.told and now - warning.began >= _LASTING:
+            lasting = _LASTING + (_UNTIL_TRIED if _awaits_a_try(facts, finding) else 0)
+            if not warning.told and now - warning.began >= lasting:
                 warning.told = warning.holds = True
                 yield Remark(Severity.WARN, in_words(finding), finding.code)
         for (code, _), warning in self._warned.items():
@@ -112,6 +119,10 @@ class FindingLog:
             if warning.holds and now - warning.seen >= _OVER:
                 warning.holds = False
                 yield Remark(Severity.OK, f"resolved {words.seconds(now - warning.seen)} ago: {warning.text}", code)
+
+
+def _awaits_a_try(facts: GroupFacts, finding: Finding) -> bool:
+    return facts.evaluator is not None and facts.evaluator.awaits((finding.code, finding.input))
 
 
 class _Warning:

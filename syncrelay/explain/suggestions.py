@@ -89,6 +89,11 @@ class Evaluator:
         self._most_messages = _MOST_MESSAGES
         self._unfinished: tuple[Hashable, Trials] | None = None
         self._found: dict[Hashable, _Found] = {}
+        self._awaited: set[Hashable] = set()
+
+    def awaits(self, about: Hashable) -> bool:
+        """Whether there was no time yet to try anything for what was asked about."""
+        return about in self._awaited
 
     def best(
         self,
@@ -114,6 +119,7 @@ class Evaluator:
             # What was never tried goes first.
             if not holds:
                 self._budget.want()
+                self._awaited.add(about)
             return verdict
         begun, self._unfinished = self._unfinished, None
         if begun is not None and begun[0] == about:
@@ -134,7 +140,10 @@ class Evaluator:
                 self._unfinished = about, trials
             else:
                 self._most_messages = max(_LEAST_MESSAGES, self._most_messages // 2)
+            if not holds:
+                self._awaited.add(about)
             return verdict
+        self._awaited.discard(about)
         self._found[about] = _Found(now, min(_HOLDS, 2 * holds or _TRIED_AGAIN), verdict)
         return verdict
 

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
+from groups import NOW, S, a_group
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
-from syncrelay.explain import Finding
+from syncrelay.explain import Code, Finding, FindingLog, Severity
 from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, constant_offsets
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run
@@ -224,6 +225,39 @@ def test_nothing_is_tried_for_any_group_once_the_budget_is_spent_until_it_is_ref
     assert asked.best("a", wider, now=BEGAN).tried == other.best("a", wider, now=BEGAN).tried == ()
     budget.refill()
     assert asked.best("a", wider, now=BEGAN).tried != ()
+
+
+TOO_WIDE = (Code.OVER_SLOP, None)
+
+
+def told_at(seconds, asked, severity, last_set):
+    """At which of these seconds the log speaks of what is too wide, which is asked about at each."""
+    log, told = FindingLog(), []
+    for second in seconds:
+        now = NOW + second * S
+        asked(second).best(TOO_WIDE, wider, now=now)
+        facts = a_group(figures={"now": now, "last_set": last_set(now)}, evaluator=asked(second))
+        finding = Finding(Code.OVER_SLOP, severity, "too wide")
+        told += [second for _ in log.remarks(facts, (finding,))]
+    return told
+
+
+@pytest.mark.parametrize(("severity", "last_set"), [(Severity.WARN, lambda now: now), (Severity.ERROR, lambda _: NOW)])
+def test_the_log_waits_until_there_was_time_to_try_something_but_not_for_ever(severity, last_set):
+    budget = TryBudget(clock := Processor())
+    clock.now += 40 * MS
+    asked = evaluator(budget)
+
+    def free_at(second):
+        if second == 8:
+            budget.refill()
+        return asked
+
+    assert told_at(range(10), lambda _: evaluator(), severity, last_set) == [5]
+    assert told_at(range(10), free_at, severity, last_set) == [8]
+    clock.now += 40 * MS
+    hopeless = evaluator(budget)
+    assert told_at(range(18), lambda _: hopeless, severity, last_set) == [15]
 
 
 def slops(trials: Trials) -> Iterator[Tried]:
