@@ -10,7 +10,7 @@ from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import Process
 from tests.ros.stage import Player, Stage
-from tests.ros.status import ANY_PORT
+from tests.ros.status import ANY_PORT, status
 from tests.ros.streams import BEGIN, MS, at
 
 PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
@@ -23,6 +23,9 @@ ON_AND_ON_MS = 300_000
 # Nodes that begin at different times play together all the same.
 BY_RECEIPT = inputs(PAIR, stamp="receive")
 
+
+# How long something took or lasts: how long it is, a busy machine says.
+LASTED = r"[\d.]+ (?:ms|s|min|h)"
 
 # What a machine that does not give a rig the time it needs makes of it, truly: no test has a say in that.
 OF_A_BUSY_MACHINE = {"too_slow", "bursts", "slowed", "silent"}
@@ -67,6 +70,16 @@ def assert_looked_at_a_healthy_rig(look: Process) -> None:
     assert found <= {"healthy"} | OF_A_BUSY_MACHINE, look.stdout
     told = look.stdout.splitlines()[-1].startswith("exit code 1: front has ")
     assert (code, told) == ((0, False) if found == {"healthy"} else (1, True)), look.stdout
+
+
+def wait_for_sets(relay: Process, more: int, group: str = "front") -> None:
+    """Wait until so many more sets have left a group than now."""
+
+    def sets() -> int:
+        return next((int(each["sets"]) for each in status(relay)["groups"] if each["name"] == group), 0)
+
+    before = sets()
+    relay.wait_until(lambda: sets() >= before + more, f"{more} sets of {group}")
 
 
 def assert_logged(relay: Process, pattern: str) -> None:

@@ -3,9 +3,10 @@
 import json
 import re
 from typing import Any
+from urllib.error import HTTPError
 from urllib.request import urlopen
 
-from tests.ros.processes import Process, wait_until
+from tests.ros.processes import DEADLINE_S, Process, wait_until
 
 ANY_PORT = {"listen": "127.0.0.1:0"}
 _ADDRESS = re.compile(r"status and metrics: (http://\S+)/")
@@ -21,8 +22,16 @@ def address(relay: Process) -> str:
 
 def get(relay: Process, path: str) -> str:
     """The body of a page that must be there."""
-    with urlopen(f"{address(relay)}{path}", timeout=30) as answer:  # noqa: S310  the relay's own
+    with urlopen(f"{address(relay)}{path}", timeout=DEADLINE_S) as answer:  # noqa: S310  the relay's own
         return str(answer.read().decode())
+
+
+def page(relay: Process, path: str) -> tuple[int, str]:
+    """The code and the body of a page, also of one that says that something is not so."""
+    try:
+        return 200, get(relay, path)
+    except HTTPError as error:
+        return error.code, error.read().decode()
 
 
 def status(relay: Process) -> dict[str, Any]:
@@ -35,7 +44,25 @@ def findings(relay: Process, group: str = "front") -> dict[str, dict[str, Any]]:
     return {each["code"]: each for each in groups[group]["findings"]} if group in groups else {}
 
 
-def wait_for_finding(relay: Process, code: str, group: str = "front") -> dict[str, Any]:
-    """A finding, as soon as it is there."""
-    wait_until(lambda: code in findings(relay, group), f"the finding {code}")
-    return findings(relay, group).get(code) or wait_for_finding(relay, code, group)
+def wait_for_finding(
+    relay: Process, code: str, group: str = "front", *, text: str = "", suggestion: str = ""
+) -> dict[str, Any]:
+    """A finding, as soon as it is there and says what these patterns, where they are given, match as a whole.
+
+    Its figures are those of the moment: what a busy machine holds up may disturb them for a while.
+    """
+    found: dict[str, Any] = {}
+
+    def is_there() -> bool:
+        found.update(findings(relay, group).get(code, {}))
+        return bool(
+            found
+            and (not text or re.fullmatch(text, found["text"]))
+            and (not suggestion or re.fullmatch(suggestion, found["suggestion"] or ""))
+        )
+
+    try:
+        wait_until(is_there, f"the finding {code}")
+    except AssertionError as error:
+        raise AssertionError(f"{error}; the last was {found}") from None
+    return found
