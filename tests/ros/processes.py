@@ -13,6 +13,7 @@ from tests.ros.shared_memory import segments_of
 # What is still missing after this long will not come. A bound for broken runs, not a measure: on an idle
 # machine everything waited for here takes a second or two.
 DEADLINE_S = 90.0
+_REAPED_S = 30.0
 _POLL_S = 0.02
 _ROS_PREFIXES = ("ROS_", "RMW_", "RCL_", "RCUTILS_", "FASTDDS_", "FASTRTPS_", "SYNCRELAY_")
 # Which ROS is sourced, not how it behaves.
@@ -152,7 +153,8 @@ class Process:
         """Wait for its end, at last with SIGKILL."""
         for insist in (self._child.terminate, self._child.kill):
             try:
-                self._child.wait(5)
+                # What is killed leaves shared memory, and what is told twice to end, too.
+                self._child.wait(_REAPED_S)
             except subprocess.TimeoutExpired:
                 insist()
         self._child.wait()

@@ -30,6 +30,10 @@ class Player:
         self._folder = folder
         self._plays = 0
 
+    def is_up(self) -> None:
+        """Wait until its publishers are there."""
+        self.process.ask("match 0")
+
     def match(self, subscriptions: int = 1) -> None:
         """Wait until every publisher has so many matched subscriptions at least."""
         self.process.ask(f"match {subscriptions}")

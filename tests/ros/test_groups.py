@@ -56,7 +56,9 @@ def test_a_topic_of_two_groups_is_subscribed_once_and_serves_both(stage: Stage):
         expected = relaying.expected_sets(ExactTime(n_inputs=2, queue_size=ROOMY), recording, topics)
         assert len(expected) == 20
         assert relaying.sets_within(recording, collector, outputs(group, topics)) == expected
-    assert len(collector.endpoints("/lidar", kind="subscription", node="/syncrelay")) == 1
+    wait_until(
+        lambda: len(collector.endpoints("/lidar", kind="subscription", node="/syncrelay")) == 1, "a subscription"
+    )
 
 
 def test_eight_topics_leave_in_sets_of_eight(stage: Stage):
@@ -164,7 +166,7 @@ def test_groups_that_were_not_named_do_not_run(stage: Stage):
         aligned,
         arguments=["--group", "seeing"],
     )
-    assert collector.endpoints("/camera", kind="subscription", node="/syncrelay")
+    wait_until(lambda: collector.endpoints("/camera", kind="subscription", node="/syncrelay"), "the subscription")
     assert not collector.endpoints("/imu", kind="subscription", node="/syncrelay")
     assert not collector.endpoints("/moving/lidar", kind="publisher")
     relay.send(signal.SIGTERM)

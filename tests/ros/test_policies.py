@@ -7,7 +7,7 @@ import pytest
 
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR, stamps_of, vector
-from tests.ros.configs import LOSSLESS, config, inputs, outputs
+from tests.ros.configs import LOSSLESS, ROOMY, config, inputs, outputs
 from tests.ros.frames import Frame
 from tests.ros.stage import Stage, both_backends
 from tests.ros.streams import BEGIN, MS, at
@@ -74,7 +74,7 @@ def test_a_trigger_takes_along_the_latest_of_the_other_input(stage: Stage):
 
 
 def test_thinning_lets_every_third_set_leave_whole(stage: Stage):
-    group = {"policy": "exact_time", "every": 3, "topics": inputs(_PAIR, qos=LOSSLESS)}
+    group = {"policy": "exact_time", "every": 3, "queue_size": ROOMY, "topics": inputs(_PAIR, qos=LOSSLESS)}
     recording = at("/camera", *range(0, 900, 10)) + at("/lidar", *range(0, 900, 10))
     recording.sort(key=lambda frame: frame.time)
     collector = stage.collector(_PAIR_OUT)

@@ -10,6 +10,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.reloaded import ReloadedFile
+from tests.ros.sensors import stream
 from tests.ros.stage import Collector, Stage, both_backends
 from tests.ros.status import ANY_PORT, findings, wait_for_finding
 from tests.ros.streams import at, jittery, merged
@@ -178,26 +179,33 @@ def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_o
     player.play(recording)
     relaying.conclude(player, collector, recording, _ALIGNED)
     assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 4
-    assert [len(relaying.within(recording, collector.payloads(each))) for each in of_failing] == [2, 2]
     finding = wait_for_finding(file.relay, "internal_error", "failing")
     assert finding["text"].startswith("a bug in syncrelay stopped this group: KeyError: ")
     assert "internal_error" not in findings(file.relay)
     assert file.relay.stderr.count("Traceback") == 1
     file.reload(front=_FRONT, failing=failing)
-    assert "reloaded: 1 group unchanged, 1 group started" in file.relay.stderr
+    file.relay.wait_for_log("reloaded: 1 group unchanged, 1 group started")
     relaying.conclude(player, collector, recording, of_failing)
+    assert [len(relaying.within(recording, collector.payloads(each))) for each in of_failing] == [2, 2]
 
 
-# The first set's second message. One more is published at the start, when librcl has to prove itself.
+# The second message after there is a file of this name: that of the first set's second topic.
 _FAILING_PUBLISH = """
+import os
 from syncrelay.ros.librcl.rcl import Rcl
 
-init = Rcl.__init__
+init, calls = Rcl.__init__, []
 
 def failing_init(self):
     init(self)
-    publish, calls = self.publish, []
-    self.publish = lambda *words: calls.append(1) or (1 if len(calls) == 3 else publish(*words))
+    publish = self.publish
+
+    def failing_publish(*words):
+        if os.path.exists("fail"):
+            calls.append(1)
+        return 1 if len(calls) == 2 else publish(*words)
+
+    self.publish = failing_publish
 
 Rcl.__init__ = failing_init
 """
@@ -208,16 +216,16 @@ def test_a_message_that_rcl_does_not_publish_is_told_and_the_next_ones_leave(sta
     recording = merged(*(at(topic, 0, 10, 20) for topic in _PAIR))
     relay = stage.relay(config({"front": _FRONT}, metrics=ANY_PORT))
     collector, player = stage.collector(_ALIGNED), stage.player(_PAIR)
-    player.match()
-    collector.process.wait_until(
-        lambda: all(collector.endpoints(each, kind="publisher", node="/syncrelay") for each in _ALIGNED), "outputs"
-    )
+    relaying.connect(player, collector, recording, _ALIGNED)
+    relaying.conclude(player, collector, recording, _ALIGNED)
+    before = {output: collector.count(output) for output in _ALIGNED}
+    (stage.folder / "fail").touch()
     player.play(recording)
     relay.wait_for_log("front: a message could not be published on /front/lidar: rcl_publish_serialized_message failed")
     relay.wait_for_log("front: publishing on /front/lidar again; 1 message was not published")
     assert "Traceback" not in relay.stderr
-    collector.wait_for("/front/camera", 3)
-    collector.wait_for("/front/lidar", 2)
+    collector.wait_for("/front/camera", before["/front/camera"] + 3)
+    collector.wait_for("/front/lidar", before["/front/lidar"] + 2)
 
 
 @pytest.mark.parametrize("name", ["impossible", "half_possible"])
@@ -242,14 +250,14 @@ def test_a_bug_that_a_file_finds_leaves_the_relay_with_its_old_file(stage: Stage
 
 def test_a_group_that_cannot_be_judged_is_relayed_and_others_are_judged(stage: Stage):
     stage.before_each_relay(_FAILING)
-    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
+    recording = merged(*(stream(topic, hz=10) for topic in _PAIR))
     relay = stage.relay(config({"unjudged": _FRONT, "front": _FRONT}, metrics=ANY_PORT))
     aligned = {**_ALIGNED, "/unjudged/camera": VECTOR, "/unjudged/lidar": VECTOR}
     collector, player = stage.collector(aligned), stage.player(_PAIR)
     relaying.connect(player, collector, recording, aligned)
-    player.play(recording)
-    relaying.conclude(player, collector, recording, aligned)
-    assert len(relaying.sets_within(recording, collector, aligned)) == 3
+    player.start(recording, speed=1)
+    for output in aligned:
+        collector.wait_for(output, collector.count(output) + 3)
     wait_for_finding(relay, "healthy")
     relay.wait_for_log("a bug in syncrelay while evaluating unjudged; the relay keeps running")
     assert relay.stderr.count("ZeroDivisionError: no rate") == 1

@@ -46,15 +46,25 @@ def test_diagnostics_have_a_status_for_each_group(stage: Stage):
     stage.relay(text)
     collector = stage.collector({"/diagnostics": DIAGNOSTICS})
     play(stage, _RIG)
-    seen: list[dict[str, tuple[int, str, dict[str, str]]]] = []
+    seen: dict[str, tuple[int, str, dict[str, str]]] = {}
+
+    def is_as_expected() -> bool:
+        """Whether what they tell is undisturbed by what a busy machine holds up, and was tried."""
+        nonlocal seen
+        seen = statuses(collector)
+        return (
+            [level for level, _, _ in seen.values()] == [0, 2, 3]
+            and float(seen["syncrelay: front"][2]["/camera rate (Hz)"]) > 5
+            and seen["syncrelay: rear"][2].get("suggestion", "").startswith("write ")
+        )
+
     wait_until(
-        lambda: bool(seen.append(statuses(collector))) or [level for level, _, _ in seen[-1].values()] == [0, 2, 3],
+        is_as_expected,
         "OK of the group that works, ERROR of the one whose slop is too small, STALE of the one that gets nothing",
     )
-    front_status, rear, side = seen[-1].values()
-    assert list(seen[-1]) == ["syncrelay: front", "syncrelay: rear", "syncrelay: side"]
+    front_status, rear, side = seen.values()
+    assert list(seen) == ["syncrelay: front", "syncrelay: rear", "syncrelay: side"]
     assert front_status[1].endswith("at the 95th percentile")
-    assert float(front_status[2]["/camera rate (Hz)"]) > 5
     assert front_status[2]["span p95 (ms)"] == "7.00"
     assert rear[1] == "the nearest sets span 7 ms, over slop 1 ms"
     assert rear[2]["suggestion"].startswith("write `slop: 7ms`, which would give ")
@@ -71,8 +81,13 @@ def test_figures_are_published_for_plotting_if_they_are_asked_for(stage: Stage):
     collector = stage.collector(topics)
     stage.relay(front(top={"diagnostics": {"scalars": True}}))
     play(stage, _RIG)
-    spans = [struct.unpack("<d", payload[4:12])[0] for payload in collector.wait_for("/syncrelay/front/span_ms", 2)]
-    assert spans[-1] == pytest.approx(7.0)
+
+    def last_span() -> float:
+        (span,) = struct.unpack("<d", collector.payloads("/syncrelay/front/span_ms")[-1][4:12])
+        return float(span)
+
+    collector.wait_for("/syncrelay/front/span_ms", 2)
+    wait_until(lambda: last_span() == pytest.approx(7.0), "the span of all sets")
     assert all(collector.wait_for(topic, 2) for topic in topics)
 
 
@@ -84,10 +99,10 @@ def test_nothing_is_published_about_the_relay_if_that_is_asked_for(stage: Stage)
 
 
 def test_a_run_that_explains_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
-    play_later = stage.player(PAIR)
+    player = stage.player(PAIR)
+    player.is_up()
+    player.start(_RIG, speed=1)
     relay = stage.relay(front(), "--explain", "12")
-    play_later.match()
-    play_later.start(_RIG, speed=1)
     assert_looked_at_a_healthy_rig(relay)
 
 

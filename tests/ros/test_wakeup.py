@@ -39,6 +39,8 @@ def test_signals_that_come_in_the_midst_of_a_rest_never_hang_it():
                 lambda: os.kill(resting.pid, signal.SIGHUP) or resting.poll() is not None,
                 f"{_SIGNALS} handled signals",
                 poll_s=1e-4,
+                # Each needs a turn of both processes.
+                deadline_s=250,
             )
             assert resting.returncode == 0
         finally:

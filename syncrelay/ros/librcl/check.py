@@ -18,7 +18,7 @@ from syncrelay.ros.librcl.rcl import Allocator, MessageInfo, Rcl, RclCallError, 
 
 _MARGIN: Final = 256
 _UNTOUCHED: Final = 0xA5
-_PATIENCE_NS: Final = 1_000_000_000
+_PATIENCE_NS: Final = 10_000_000_000
 _ROOM: Final = 17
 # A Time of 1 s and 2 ns, little-endian.
 _PAYLOAD: Final = bytes([0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0])
