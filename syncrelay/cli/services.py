@@ -19,6 +19,8 @@ def services(relay: "Relay", files: ConfigFiles) -> "Offered":
     return {
         "reload": files.read_again,
         "status": lambda: _status(relay.state),
+        "pause": lambda: relay.call(relay.pause),
+        "resume": lambda: relay.call(relay.resume),
     }
 
 

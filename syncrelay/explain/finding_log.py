@@ -18,6 +18,8 @@ _FORGOTTEN: Final = 60 * _SECOND
 _OVER: Final = 10 * _SECOND
 
 
+# Who pauses a relay is told so at once.
+_TOLD_ELSEWHERE: Final = frozenset({Code.PAUSED})
 _OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OFFSET})
 
 
@@ -56,7 +58,9 @@ class FindingLog:
             if findings:
                 yield from self._silent(facts, explanation(findings), now)
             return
-        if self._quiet_since is not None:
+        last = facts.figures.last_set
+        # After a pause, a group is not silent though no set has left yet.
+        if self._quiet_since is not None and last is not None and last > self._quiet_since:
             if self._told:
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}", None)
             self._quiet_since, self._told, self._well_since = None, False, now
@@ -96,7 +100,7 @@ class FindingLog:
 
     def _warnings(self, findings: tuple[Finding, ...], explained: Collection[Code], now: int) -> Iterator[Remark]:
         for finding in findings:
-            if finding.severity is Severity.OK:
+            if finding.severity is Severity.OK or finding.code in _TOLD_ELSEWHERE:
                 continue
             warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
             if now - warning.seen > _FORGOTTEN:

@@ -44,6 +44,7 @@ class Groups:
         self.reloads = 0
         self.refused_reloads = 0
         self.reload_error: str | None = None
+        self.is_paused = False
         self._names = chosen
         self._node = node
         self._resolve = resolve
@@ -89,15 +90,38 @@ class Groups:
         running = [group for group in self.bindings.groups if group.failure is None]
         chosen = _chosen(config, self._names)
         unchanged = [next((group for group in running if group.config == each), None) for each in chosen]
-        self.bindings.run(
-            [group or GroupRelay(each, now=self._clock.now) for group, each in zip(unchanged, chosen, strict=True)]
-        )
+        self.bindings.run([group or self._begun(each) for group, each in zip(unchanged, chosen, strict=True)])
         limited = self._limited
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         asks = bool(limited) and not self._clock.is_simulated
         self._loop.deadline = (lambda: _next_deadline(limited)) if asks else None
         self._loop.wake()
         self._changed(config)
+
+    def _begun(self, config: GroupConfig) -> GroupRelay:
+        group = GroupRelay(config, now=self._clock.now)
+        if self.is_paused:
+            group.pause()
+        return group
+
+    def pause(self) -> None:
+        """Let nothing leave any more, when this returns, of these groups and of those that a reload brings."""
+        self.is_paused = True
+        self._of_each(GroupRelay.pause)
+
+    def resume(self) -> None:
+        """Let sets leave again."""
+        self.is_paused = False
+        self._of_each(GroupRelay.unpause)
+
+    def _of_each(self, step: Callable[[GroupRelay], None]) -> None:
+        """Take a step of each group between two messages."""
+
+        def take() -> None:
+            for group in self.bindings.groups:
+                step(group)
+
+        self._loop.call(take).result()
 
     @property
     def _limited(self) -> list[GroupRelay]:

@@ -169,6 +169,24 @@ class Relay:
         self._next_evaluation = time.monotonic()
         return changed
 
+    def pause(self) -> str:
+        """Let nothing leave until `resume`; say what changed. On the main thread."""
+        if self._groups.is_paused:
+            return "paused already"
+        self._groups.pause()
+        _LOG.warning("paused: nothing leaves until %s is called", self.node.resolve_service_name("~/resume"))
+        self.evaluate()
+        return "paused: nothing leaves until ~/resume is called"
+
+    def resume(self) -> str:
+        """Let sets leave again; say what changed. On the main thread."""
+        if not self._groups.is_paused:
+            return "not paused"
+        self._groups.resume()
+        _LOG.info("resumed")
+        self.evaluate()
+        return "resumed"
+
     def refuse_reload(self, reason: str) -> None:
         """Report in `state` that a reload failed, and why."""
         self._groups.refuse_reload(reason)
@@ -231,7 +249,7 @@ class Relay:
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
-        self._phase = Phase.RUNNING
+        self._phase = Phase.PAUSED if self._groups.is_paused else Phase.RUNNING
         self._reporters.publish(self.monitor.reports)
         return self.monitor.reports
 
