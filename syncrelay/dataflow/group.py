@@ -5,17 +5,19 @@ import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
+from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.explain import Code, RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
 _Result = TypeVar("_Result")
+_Engine: TypeAlias = SyncGroup | PausedEngine | StoppedEngine
 
 # Enough for the widest terminal's strip of recent sets.
 _RECENT = 256
@@ -48,38 +50,6 @@ class Unpublished(NamedTuple):
     why: str
 
 
-class _StoppedEngine:
-    """Stands in for an engine that failed or is suspended: gives nothing. The counts stay as they were.
-
-    Of what comes it holds the newest `most` messages, with the reason of one that is to be rejected.
-    """
-
-    def __init__(self, sets: int, counts: tuple[InputCounts, ...], *, most: int = 0) -> None:
-        self.sets = sets
-        self.held: deque[tuple[Message, DropReason | None]] = deque(maxlen=most)
-        self._counts = counts
-
-    def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002  an engine's signature
-        self.held.append((message, None))
-        return ()
-
-    def reject(self, message: Message, reason: DropReason) -> Drop:
-        self.held.append((message, reason))
-        return Drop(message, reason)
-
-    def expire(self, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002
-        return ()
-
-    def flush(self, reason: DropReason) -> Sequence[Drop]:  # noqa: ARG002
-        return ()
-
-    def next_deadline(self) -> int | None:
-        return None
-
-    def counts(self) -> tuple[InputCounts, ...]:
-        return self._counts
-
-
 class GroupRelay:
     """Feeds a group's engine and publishes the sets that it gives.
 
@@ -88,9 +58,11 @@ class GroupRelay:
 
     def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
         self.config = config
-        self.engine: SyncGroup | _StoppedEngine = config.engine()
+        self.engine: _Engine = config.engine()
         self.failure: str | None = None
         """What stopped it; None of one that works."""
+        self.paused_since: int | None = None
+        """Since when it is paused, in nanoseconds of the system clock; None of one that is not."""
         self.last: deque[tuple[int | None, ...] | RecentDrop] = deque(maxlen=_RECENT)
         """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
         self.unpublished: dict[int, Unpublished] = {}
@@ -101,8 +73,8 @@ class GroupRelay:
         self._watch()
         self._restamped = [False] * len(config.topics)
         self._outlets: list[Outlet | None] = [None] * len(config.topics)
-        self._suspended: SyncGroup | _StoppedEngine = self.engine
-        self._held_by = _StoppedEngine(0, ())
+        self._suspended: _Engine = self.engine
+        self._held_by = StoppedEngine(0, ())
         self._was_connected: list[bool] = []
 
     def connect(self, index: int, outlet: Outlet, *, restamped: bool) -> None:
@@ -113,11 +85,26 @@ class GroupRelay:
         self._outlets[index] = outlet
         self._restamped[index] = restamped
 
+    def pause(self) -> None:
+        """Let nothing leave until `unpause`; what is buffered, and what comes meanwhile, is dropped as `paused`."""
+        if self.paused_since is not None:
+            return
+        self.paused_since = time.time_ns()
+        self._guarded(lambda: self._conclude(self.engine.let_go(DropReason.PAUSED)))
+        if isinstance(self.engine, SyncGroup):
+            self.engine = PausedEngine(self.engine, trigger=self.config.trigger)
+
+    def unpause(self) -> None:
+        """Match what comes from now on. No set is older than those before the pause."""
+        self.paused_since = None
+        if isinstance(self.engine, PausedEngine):
+            self.engine = self.engine.engine
+
     def suspend(self) -> None:
         """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
         counts = self.counts()
         self._suspended = self.engine
-        self.engine = self._held_by = _StoppedEngine(self.engine.sets, counts, most=_HELD)
+        self.engine = self._held_by = StoppedEngine(self.engine.sets, counts, most=_HELD)
         self._outlets, self._was_connected = [None] * self._n_inputs, [outlet is not None for outlet in self._outlets]
 
     def resume(self) -> None:
@@ -197,7 +184,7 @@ class GroupRelay:
             exc_info=error,
             extra={"group": self.config.name, "finding": Code.INTERNAL_ERROR.value},
         )
-        self.engine = _StoppedEngine(self.engine.sets, self._last_counts())
+        self.engine = StoppedEngine(self.engine.sets, self._last_counts())
 
     def _last_counts(self) -> tuple[InputCounts, ...]:
         """Count once more, as far as what failed still can."""

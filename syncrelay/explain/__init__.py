@@ -15,6 +15,7 @@ from syncrelay.explain.facts import (
     InputFacts,
     InputGraph,
     Mismatch,
+    Pause,
     Refusal,
     Standstill,
 )
@@ -52,6 +53,7 @@ __all__ = [
     "Judge",
     "Mismatch",
     "Observation",
+    "Pause",
     "RecentDrop",
     "RecentSet",
     "Refusal",

@@ -131,6 +131,13 @@ class Standstill(NamedTuple):
     ns: int
 
 
+class Pause(NamedTuple):
+    """Nothing leaves since a time, because somebody asked for that; `ended_by` is the service that ends it."""
+
+    since: int
+    ended_by: str
+
+
 class ClockState(NamedTuple):
     """The clock of a node with use_sim_time: whether /clock was ever received, and for how long it has stood still.
 
@@ -150,7 +157,8 @@ class GroupFacts:
     of the others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
-    late; `failure` what stopped the group for good; `empty_graph` the graph, where it holds no node but our own.
+    late; `failure` what stopped the group for good; `pause` since when it is paused, and `unpaused` when the last pause
+    ended; `empty_graph` the graph, where it holds no node but our own.
     `evaluator` tries other values of the file on the last messages, None where they cannot be run again.
     """
 
@@ -171,6 +179,8 @@ class GroupFacts:
     waited: int = 0
     standstill: Standstill | None = None
     failure: str | None = None
+    pause: Pause | None = None
+    unpaused: int | None = None
     evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
 
@@ -211,9 +221,10 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        return self.silent_for >= self.silent_after
+        return self.pause is None and self.silent_for >= self.silent_after
 
     @property
     def silent_for(self) -> int:
-        """For how long no set has left."""
-        return self.figures.now - (self.figures.began if self.figures.last_set is None else self.figures.last_set)
+        """For how long no set has left that might have: not while the group was paused."""
+        last = self.figures.began if self.figures.last_set is None else self.figures.last_set
+        return self.figures.now - (last if self.unpaused is None else max(last, self.unpaused))

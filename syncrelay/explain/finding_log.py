@@ -20,6 +20,8 @@ _OVER: Final = 10 * _SECOND
 _UNTIL_TRIED: Final = 10 * _SECOND
 
 
+# Who pauses a relay is told so at once.
+_TOLD_ELSEWHERE: Final = frozenset({Code.PAUSED})
 _OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OFFSET})
 
 
@@ -58,7 +60,9 @@ class FindingLog:
             if findings:
                 yield from self._silent(facts, explanation(findings), now)
             return
-        if self._quiet_since is not None:
+        last = facts.figures.last_set
+        # After a pause, a group is not silent though no set has left yet.
+        if self._quiet_since is not None and last is not None and last > self._quiet_since:
             if self._told:
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}", None)
             self._quiet_since, self._told, self._well_since = None, False, now
@@ -102,7 +106,7 @@ class FindingLog:
         self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code], now: int
     ) -> Iterator[Remark]:
         for finding in findings:
-            if finding.severity is Severity.OK:
+            if finding.severity is Severity.OK or finding.code in _TOLD_ELSEWHERE:
                 continue
             warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
             if now - warning.seen > _FORGOTTEN:

@@ -22,6 +22,7 @@ from syncrelay.explain.input_observation import WINDOW_NS
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     rules_graph.internal_error,
+    rules_flow.paused,
     of_each_input(rules_graph.refused_by_dds),
     of_each_input(rules_graph.type_not_importable),
     of_each_input(rules_graph.other_type),
@@ -87,6 +88,8 @@ _ORDER: Final = frozenset({Code.TIME_JUMP, Code.OUT_OF_ORDER, Code.DUPLICATES})
 
 EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.INTERNAL_ERROR: _Explained(_MATCHING),
+    # Stamps that are not set are seen by what the policy drops for them.
+    Code.PAUSED: _Explained(_MATCHING | {Code.UNSTAMPED}),
     Code.ALONE: _Explained(_MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
     Code.NO_PUBLISHER: _Explained(_MATCHING),
     Code.TYPE_NOT_IMPORTABLE: _Explained(_MATCHING),

@@ -116,6 +116,10 @@ class Observation:
         """Bear that others publish an input now than did."""
         self._inputs[index].forget_publishers()
 
+    def begin_sets_anew(self, now: int) -> None:
+        """Bear that sets may leave again, which could not: their rate is that from now on."""
+        self._resumed = now
+
     def recent(self) -> Sequence[Arrivals]:
         """Give the last messages of each input that have stamps, to try values on."""
         return [each.recent() for each in self._inputs]

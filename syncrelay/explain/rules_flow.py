@@ -106,6 +106,18 @@ def _pauses(an_input: InputFacts) -> Iterator[tuple[int, int]]:
     return ((one, other) for one, other in pairwise(figures.received) if other - one > _PAUSE_PERIODS * usual)
 
 
+def paused(facts: GroupFacts) -> Found:
+    """Find that somebody has paused the relay. A warning: it is as it was asked for, and may be forgotten."""
+    if facts.pause is not None:
+        since = words.seconds(facts.figures.now - min(facts.pause.since, facts.figures.now))
+        yield Finding(
+            Code.PAUSED,
+            Severity.WARN,
+            f"paused for {since}: no set leaves",
+            f"`ros2 service call {facts.pause.ended_by} std_srvs/srv/Trigger` ends the pause",
+        )
+
+
 def slowed(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find an input that comes at a much lower rate than it used to."""
     figures = an_input.figures

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable, Sequence
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.clocks import Step
-from syncrelay.explain.facts import ClockState, GraphSnapshot, GroupFacts, InputFacts, InputGraph, Standstill
+from syncrelay.explain.facts import ClockState, GraphSnapshot, GroupFacts, InputFacts, InputGraph, Pause, Standstill
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.suggestions import Evaluator
@@ -23,6 +23,8 @@ class GroupWatch:
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
         self._publishers = [0] * len(config.topics)
+        self._was_paused = False
+        self._unpaused: int | None = None
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
@@ -64,10 +66,12 @@ class GroupWatch:
         waited: int = 0,
         standstill: Standstill | None = None,
         failure: str | None = None,
+        pause: Pause | None = None,
         empty_graph: GraphSnapshot | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
         options = self.config.options
+        self._follow_pauses(now, is_paused=pause is not None)
         self._compare_publishers(graph)
         figures, input_figures = self._observation.figures(now=now)
         rows = zip(self.config.topics, graph, self._counts, input_figures, self._keys, strict=True)
@@ -100,9 +104,20 @@ class GroupWatch:
             waited=waited,
             standstill=standstill,
             failure=failure,
+            pause=pause,
+            unpaused=self._unpaused,
             evaluator=self._evaluator,
             empty_graph=empty_graph,
         )
+
+    def _follow_pauses(self, now: int, *, is_paused: bool) -> None:
+        if self._was_paused and not is_paused:
+            self._unpaused = now
+            self._observation.begin_sets_anew(now)
+        elif self._unpaused is not None:
+            # This machine's clock may be set back.
+            self._unpaused = min(self._unpaused, now)
+        self._was_paused = is_paused
 
     def _compare_publishers(self, graph: Sequence[InputGraph]) -> None:
         """See whether inputs have more or fewer publishers than they had; one that is restarted is the same."""

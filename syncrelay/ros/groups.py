@@ -44,6 +44,7 @@ class Groups:
         self.reloads = 0
         self.refused_reloads = 0
         self.reload_error: str | None = None
+        self.is_paused = False
         self._names = chosen
         self._node = node
         self._resolve = resolve
@@ -55,8 +56,8 @@ class Groups:
         self._started = time.monotonic()
         self._run(config)
 
-    def reload(self, config: Config) -> None:
-        """Run the groups of a file that was read again.
+    def reload(self, config: Config) -> str:
+        """Run the groups of a file that was read again, and say what changed.
 
         Unchanged groups keep their queues; those that failed start again. Whatever it raises, the groups
         of the file before keep running: ReloadError where the file asks for what needs a restart, or for a publisher
@@ -76,8 +77,9 @@ class Groups:
         self._announced = {name: said for name, said in self._announced.items() if name in kept}
         self.reloads += 1
         self.reload_error = None
-        started = len(self.bindings.groups) - len(kept)
-        _LOG.info("reloaded: %s unchanged, %s started", counted(len(kept), "group"), counted(started, "group"))
+        changed = _changes(before, self.bindings.groups)
+        _LOG.info("%s", changed)
+        return changed
 
     def refuse_reload(self, reason: str) -> None:
         """Remember that a reload failed, and why."""
@@ -88,15 +90,38 @@ class Groups:
         running = [group for group in self.bindings.groups if group.failure is None]
         chosen = _chosen(config, self._names)
         unchanged = [next((group for group in running if group.config == each), None) for each in chosen]
-        self.bindings.run(
-            [group or GroupRelay(each, now=self._clock.now) for group, each in zip(unchanged, chosen, strict=True)]
-        )
+        self.bindings.run([group or self._begun(each) for group, each in zip(unchanged, chosen, strict=True)])
         limited = self._limited
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         asks = bool(limited) and not self._clock.is_simulated
         self._loop.deadline = (lambda: _next_deadline(limited)) if asks else None
         self._loop.wake()
         self._changed(config)
+
+    def _begun(self, config: GroupConfig) -> GroupRelay:
+        group = GroupRelay(config, now=self._clock.now)
+        if self.is_paused:
+            group.pause()
+        return group
+
+    def pause(self) -> None:
+        """Let nothing leave any more, when this returns, of these groups and of those that a reload brings."""
+        self.is_paused = True
+        self._of_each(GroupRelay.pause)
+
+    def resume(self) -> None:
+        """Let sets leave again."""
+        self.is_paused = False
+        self._of_each(GroupRelay.unpause)
+
+    def _of_each(self, step: Callable[[GroupRelay], None]) -> None:
+        """Take a step of each group between two messages."""
+
+        def take() -> None:
+            for group in self.bindings.groups:
+                step(group)
+
+        self._loop.call(take).result()
 
     @property
     def _limited(self) -> list[GroupRelay]:
@@ -160,6 +185,19 @@ def _require_same_node(running: Config, asked: Config) -> None:
     ):
         if before != now:
             raise ReloadError(f"`{name}` cannot change while the relay runs: restart it")
+
+
+def _changes(before: Sequence[GroupRelay], now: Sequence[GroupRelay]) -> str:
+    """Say which groups a reload left alone, which it built anew, and which it started and ended."""
+    names_before, names = ([group.config.name for group in groups] for groups in (before, now))
+    begun = [group.config.name for group in now if group not in before]
+    parts = {
+        "rebuilt": [name for name in begun if name in names_before],
+        "started": [name for name in begun if name not in names_before],
+        "ended": [name for name in names_before if name not in names],
+    }
+    told = [f"{verb} {', '.join(those)}" for verb, those in parts.items() if those]
+    return "; ".join([f"reloaded: {counted(len(now) - len(begun), 'group')} unchanged", *told])
 
 
 def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:

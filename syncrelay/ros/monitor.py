@@ -18,6 +18,7 @@ from syncrelay.explain import (
     GroupReport,
     GroupWatch,
     Judge,
+    Pause,
     Severity,
     TryBudget,
 )
@@ -64,6 +65,7 @@ class Monitor:
         self._system_clock = SystemClock()
         self._try_budget = TryBudget()
         self._empty_graph: GraphSnapshot | None = None
+        self._ends_pauses = node.resolve_service_name("~/resume")
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -149,6 +151,7 @@ class Monitor:
             waited=max(self._waits[each.topic].longest for each in binding.inputs),
             standstill=self.standstills.longest,
             failure=binding.group.failure,
+            pause=None if binding.group.paused_since is None else Pause(binding.group.paused_since, self._ends_pauses),
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
         )
         found = judge.judge(facts)

@@ -28,6 +28,7 @@ from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
+from syncrelay.ros.services import Offered, Services
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
 from syncrelay.status import Phase, RelayState
@@ -134,8 +135,9 @@ class Relay:
         self._wake = Wakeup()
         self._calls = Calls(self._wake.set)
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
-        self._services = SingleThreadedExecutor(context=self._context)
-        self._services.add_node(self.node)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._services = Services(self.node, {}, bugs=self._bugs)
         self._receiving: Future[None] | None = None
 
     def __enter__(self) -> Self:
@@ -153,11 +155,37 @@ class Relay:
     ) -> None:
         self.close()
 
-    def reload(self, config: Config) -> None:
-        """Run the groups of a file that was read again. On the main thread; raises as `Groups.reload`."""
-        self._groups.reload(config)
+    def offer(self, services: Offered) -> None:
+        """Offer services on the node; what they call is called on a thread that must not wait, or all of them would."""
+        self._services = Services(self.node, services, bugs=self._bugs)
+
+    def reload(self, config: Config) -> str:
+        """Run the groups of a file that was read again, and say what changed.
+
+        On the main thread; raises as `Groups.reload`.
+        """
+        changed = self._groups.reload(config)
         # New groups are to be evaluated at once.
         self._next_evaluation = time.monotonic()
+        return changed
+
+    def pause(self) -> str:
+        """Let nothing leave until `resume`; say what changed. On the main thread."""
+        if self._groups.is_paused:
+            return "paused already"
+        self._groups.pause()
+        _LOG.warning("paused: nothing leaves until %s is called", self.node.resolve_service_name("~/resume"))
+        self.evaluate()
+        return "paused: nothing leaves until ~/resume is called"
+
+    def resume(self) -> str:
+        """Let sets leave again; say what changed. On the main thread."""
+        if not self._groups.is_paused:
+            return "not paused"
+        self._groups.resume()
+        _LOG.info("resumed")
+        self.evaluate()
+        return "resumed"
 
     def refuse_reload(self, reason: str) -> None:
         """Report in `state` that a reload failed, and why."""
@@ -221,7 +249,7 @@ class Relay:
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
-        self._phase = Phase.RUNNING
+        self._phase = Phase.PAUSED if self._groups.is_paused else Phase.RUNNING
         self._reporters.publish(self.monitor.reports)
         return self.monitor.reports
 
@@ -245,6 +273,7 @@ class Relay:
     def drain(self) -> tuple[GroupReport, ...]:
         """Take in what has arrived, let go of what is buffered, stop receiving; report on each group a last time."""
         self._calls.end()
+        self._services.end()
         receiving, self._receiving = self._receiving, None
         self._phase = Phase.DRAINING
         if receiving is not None:
@@ -264,7 +293,7 @@ class Relay:
             self.drain()
         finally:
             self._clock.close()
-            self._services.shutdown()
+            self._executor.shutdown()
             self._threads.shutdown()
             self._loop.close()
             _LOG.removeHandler(self._rosout)
@@ -276,7 +305,10 @@ class Relay:
 
     def _serve(self) -> None:
         while self._context.ok():
-            with self._bugs.contained("serving parameters and the clock"), suppress(ExternalShutdownException):
-                self._services.spin()
+            with (
+                self._bugs.contained("serving services and the clock"),
+                suppress(ExternalShutdownException),
+            ):
+                self._executor.spin()
                 return
             time.sleep(_AFTER_FAILURE_S)

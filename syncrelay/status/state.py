@@ -11,6 +11,7 @@ class Phase(Enum):
 
     STARTING = "starting"
     RUNNING = "running"
+    PAUSED = "paused"
     DRAINING = "draining"
 
 
@@ -54,7 +55,7 @@ def level(report: GroupReport) -> Level:
 
 
 def is_ready(state: RelayState) -> bool:
-    """Whether the relay runs, and every required input of every group is served and let through."""
+    """Whether the relay runs and is not paused, and every required input of every group is served and let through."""
     inputs = [each for report in state.groups for each in report.facts.inputs if each.required]
     return (
         state.phase is Phase.RUNNING

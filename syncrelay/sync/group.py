@@ -126,6 +126,15 @@ class SyncGroup:
         self._ledger.note(drops)
         return drops
 
+    def let_go(self, reason: DropReason) -> Sequence[Drop]:
+        """Drop what waits for others, and forget nothing else: what comes next leads to no set older than those before.
+
+        The latest messages that serve trigger after trigger stay.
+        """
+        drops = self._matching.let_go(reason)
+        self._ledger.note(drops)
+        return drops
+
     def counts(self) -> tuple[InputCounts, ...]:
         """Where the messages of each input went since the group was made."""
         inputs = range(len(self._offsets))

@@ -120,6 +120,15 @@ class LatestTime(Policy):
         self.waits_ended = self.waits_started
         return drops
 
+    def let_go(self, reason: DropReason) -> list[Drop]:
+        """Drop the triggers that wait, and all but the latest message of every other input."""
+        drops = []
+        for place, queue in enumerate(self._queues):
+            kept = int(place != self._trigger)
+            drops += self._drop_oldest(place, max(0, len(queue.stamps) - kept), reason)
+        self.waits_ended = self.waits_started
+        return drops
+
     def buffered(self, place: int) -> int:
         return len(self._queues[place].stamps) - self._served[place]
 

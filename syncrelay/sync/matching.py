@@ -30,6 +30,10 @@ class Matching(Protocol):
         """Drop all that is buffered, and be as new."""
         ...
 
+    def let_go(self, reason: DropReason) -> list[Drop]:
+        """Drop what waits for others; see Policy."""
+        ...
+
     def buffered(self, index: int) -> int:
         """How many messages of this input are buffered and have been in no set."""
         ...
@@ -60,6 +64,9 @@ class Unlimited:
 
     def flush(self, reason: DropReason) -> list[Drop]:
         return self._policy.flush(reason)
+
+    def let_go(self, reason: DropReason) -> list[Drop]:
+        return self._policy.let_go(reason)
 
     def buffered(self, index: int) -> int:
         return self._policy.buffered(index)
@@ -137,6 +144,11 @@ class Limited(Matching):
 
     def flush(self, reason: DropReason) -> list[Drop]:
         drops = self._policy.flush(reason) + self._stage.flush(reason)
+        self._note_waits(self._now)
+        return drops
+
+    def let_go(self, reason: DropReason) -> list[Drop]:
+        drops = self._policy.let_go(reason) + self._stage.flush(reason)
         self._note_waits(self._now)
         return drops
 

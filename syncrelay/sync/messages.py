@@ -26,6 +26,7 @@ class DropReason(Enum):
     UNSTAMPED = "unstamped"
     MALFORMED = "malformed"
     THINNED = "thinned"
+    PAUSED = "paused"
     SHUTDOWN = "shutdown"
 
     @property
@@ -46,6 +47,7 @@ _MEANINGS: Final[Mapping[DropReason, str]] = MappingProxyType(
         DropReason.UNSTAMPED: "its stamp is 0",
         DropReason.MALFORMED: "no stamp could be read",
         DropReason.THINNED: "its set was left out",
+        DropReason.PAUSED: "the relay was paused",
         DropReason.SHUTDOWN: "the relay ended",
     }
 )

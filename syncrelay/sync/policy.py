@@ -88,6 +88,10 @@ class Policy(Protocol):
         """Drop all that is buffered, input by input, oldest first, and be as new."""
         ...
 
+    def let_go(self, reason: DropReason) -> list[Drop]:
+        """Drop what waits for others; the latest of what serves in many sets may stay."""
+        return self.flush(reason)
+
     def buffered(self, place: int) -> int:
         """How many messages of this input are in here and have been in no set."""
         ...

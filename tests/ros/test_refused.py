@@ -184,7 +184,7 @@ def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_o
     assert "internal_error" not in findings(file.relay)
     assert file.relay.stderr.count("Traceback") == 1
     file.reload(front=_FRONT, failing=failing)
-    file.relay.wait_for_log("reloaded: 1 group unchanged, 1 group started")
+    file.relay.wait_for_log("reloaded: 1 group unchanged; ")
     relaying.conclude(player, collector, recording, of_failing)
     assert [len(relaying.within(recording, collector.payloads(each))) for each in of_failing] == [2, 2]
 

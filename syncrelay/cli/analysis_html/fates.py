@@ -33,6 +33,7 @@ _SHAPES: Final = {
     DropReason.UNSTAMPED: ("M-4 0A4 4 0 1 0 4 0A4 4 0 1 0-4 0M-3 3L3-3", False),
     DropReason.MALFORMED: ("M-4-4H4V4H-4Z", True),
     DropReason.THINNED: ("M-4-4H4V4H-4Z", False),
+    DropReason.PAUSED: ("M-2-4.5V4.5M2-4.5V4.5", False),
     DropReason.SHUTDOWN: ("M-4.5 0H4.5M0-4.5V4.5", False),
 }
 

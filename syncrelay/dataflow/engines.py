@@ -1,0 +1,82 @@
+"""What stands in for a group's engine while that gives nothing: it failed, is suspended, or the group is paused."""
+
+from collections import deque
+from collections.abc import Sequence
+
+from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
+from syncrelay.sync.counts import InputCounts
+
+
+class StoppedEngine:
+    """Stands in for an engine that failed or is suspended: gives nothing. The counts stay as they were.
+
+    Of what comes it holds the newest `most` messages, with the reason of one that is to be rejected.
+    """
+
+    def __init__(self, sets: int, counts: tuple[InputCounts, ...], *, most: int = 0) -> None:
+        self.sets = sets
+        self.held: deque[tuple[Message, DropReason | None]] = deque(maxlen=most)
+        self._counts = counts
+
+    def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002  an engine's signature
+        self.held.append((message, None))
+        return ()
+
+    def reject(self, message: Message, reason: DropReason) -> Drop:
+        self.held.append((message, reason))
+        return Drop(message, reason)
+
+    def expire(self, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002
+        return ()
+
+    def flush(self, reason: DropReason) -> Sequence[Drop]:  # noqa: ARG002
+        return ()
+
+    def let_go(self, reason: DropReason) -> Sequence[Drop]:  # noqa: ARG002
+        return ()
+
+    def next_deadline(self) -> int | None:
+        return None
+
+    def counts(self) -> tuple[InputCounts, ...]:
+        return self._counts
+
+
+class PausedEngine:
+    """Stands in for an engine whose group is paused: lets go what waits in it, and all that comes, as `paused`.
+
+    But the latest message of an input that a `trigger` takes the latest of is kept: it may be the only one for long,
+    as a map, and is what the first set after the pause needs.
+    """
+
+    def __init__(self, engine: SyncGroup, *, trigger: int | None) -> None:
+        self.engine = engine
+        self._trigger = trigger
+
+    @property
+    def sets(self) -> int:
+        return self.engine.sets
+
+    def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:
+        if self._trigger in (None, message.input):
+            return (self.engine.reject(message, DropReason.PAUSED),)
+        # No set leaves of it: there is no trigger.
+        return [*self.engine.add(message, now=now), *self.engine.let_go(DropReason.PAUSED)]
+
+    def reject(self, message: Message, reason: DropReason) -> Drop:
+        return self.engine.reject(message, reason)
+
+    def expire(self, *, now: int) -> Sequence[Match | Drop]:  # noqa: ARG002  an engine's signature
+        return ()
+
+    def flush(self, reason: DropReason) -> Sequence[Drop]:
+        return self.engine.flush(reason)
+
+    def let_go(self, reason: DropReason) -> Sequence[Drop]:
+        return self.engine.let_go(reason)
+
+    def next_deadline(self) -> int | None:
+        return None
+
+    def counts(self) -> tuple[InputCounts, ...]:
+        return self.engine.counts()
