@@ -120,9 +120,16 @@ def run(
     _require_groups(groups, config, config_paths)
     require_rclpy()
     from syncrelay.cli.explain import explain
-    from syncrelay.cli.summary import summarize
+    from syncrelay.cli.managed import Managed
+    from syncrelay.cli.summary import log_summary
     from syncrelay.ros.entities import Purpose
     from syncrelay.ros.relay import Relay
+
+    def managed(relay: Relay) -> Managed:
+        def require(config: "Config") -> None:
+            _require_groups(groups, config, config_paths)
+
+        return Managed(relay, paths=config_paths, require=require, stop=stop)
 
     stop.defer()
     with (
@@ -135,6 +142,7 @@ def run(
             ros_args=ros_args,
             on_turn=heartbeat.beat if heartbeat else None,
             purpose=Purpose.RELAY if explain_s is None else Purpose.OBSERVE,
+            manage=managed if config.node.lifecycle and explain_s is None else None,
         ) as relay,
         files,
     ):
@@ -153,10 +161,7 @@ def run(
                 files.read_again()
             if (read := files.take()) is not None:
                 _reload(relay, read, config_paths, groups)
-        for report in relay.drain():
-            facts = report.facts
-            for line in summarize(facts.name, facts.figures.sets, [(each.name, each.counts) for each in facts.inputs]):
-                LOGGER.info(line, extra={"group": facts.name})
+        log_summary(relay.drain())
     return 0
 
 

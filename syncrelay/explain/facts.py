@@ -151,7 +151,8 @@ class GroupFacts:
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
     late; `failure` what stopped the group for good; `empty_graph` the graph, where it holds no node but our own.
-    `evaluator` tries other values of the file on the last messages, None where they cannot be run again.
+    `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
+    the name of a managed node that waits to be activated.
     """
 
     name: str
@@ -173,6 +174,7 @@ class GroupFacts:
     failure: str | None = None
     evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
+    inactive: str | None = None
 
     @property
     def required_first(self) -> Sequence[int]:
@@ -211,7 +213,7 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        return self.silent_for >= self.silent_after
+        return self.inactive is None and self.silent_for >= self.silent_after
 
     @property
     def silent_for(self) -> int:

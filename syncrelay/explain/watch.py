@@ -65,6 +65,7 @@ class GroupWatch:
         standstill: Standstill | None = None,
         failure: str | None = None,
         empty_graph: GraphSnapshot | None = None,
+        inactive: str | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
         options = self.config.options
@@ -102,6 +103,7 @@ class GroupWatch:
             failure=failure,
             evaluator=self._evaluator,
             empty_graph=empty_graph,
+            inactive=inactive,
         )
 
     def _compare_publishers(self, graph: Sequence[InputGraph]) -> None:

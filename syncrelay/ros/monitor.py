@@ -64,6 +64,8 @@ class Monitor:
         self._system_clock = SystemClock()
         self._try_budget = TryBudget()
         self._empty_graph: GraphSnapshot | None = None
+        self.inactive: str | None = None
+        """The node's name, while it is managed and waits to be activated."""
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -150,6 +152,7 @@ class Monitor:
             standstill=self.standstills.longest,
             failure=binding.group.failure,
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
+            inactive=self.inactive,
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)

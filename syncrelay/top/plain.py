@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from textwrap import wrap
 
-from syncrelay.status import Level
+from syncrelay.status import Level, advice
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
 from syncrelay.top.state import Finding, Group, Input
@@ -23,6 +23,8 @@ def _lines(answer: Answer) -> Iterator[str]:
         f" syncrelay {relay.version}, {relay.config}",
         indent="",
     )
+    if (needed := advice(relay.phase, relay.node)) is not None:
+        yield from _wrapped(needed, indent="  ")
     for group in answer.state.groups:
         yield ""
         yield from group_lines(group)
