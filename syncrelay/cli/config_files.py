@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final, NamedTuple, Self
 
 if TYPE_CHECKING:
     from syncrelay.config import Config
@@ -16,6 +16,18 @@ _PATIENCE_S: Final = 6.0
 # Of it, what a pipe may take to come to its end: it says so itself.
 _PIPE_S: Final = 5.0
 _LOOK_S: Final = 0.5
+
+
+class Reading(NamedTuple):
+    """What came of reading the files: a Config, or what it raised. `asked` wait to be told what it led to, in words."""
+
+    config: "Future[Config]"
+    asked: "tuple[Future[str], ...]"
+
+
+class _Request(NamedTuple):
+    since: float
+    told: "Future[str]"
 
 
 class ConfigFiles:
@@ -31,10 +43,8 @@ class ConfigFiles:
         self._lock = threading.Lock()
         self._wanted = threading.Event()
         self._ended = False
-        self._read: Future[Config] | None = None
-        # Since when somebody waits for what is being read, and whether they were told that it takes long.
-        self._since: float | None = None
-        self._is_given_up = False
+        self._waiting: list[_Request] = []
+        self._read: Reading | None = None
         self._done: Callable[[], None] = lambda: None
 
     def __enter__(self) -> Self:
@@ -51,29 +61,37 @@ class ConfigFiles:
         """Call `done`, on the thread that reads, when there is something to take."""
         self._done = done
 
-    def read_again(self) -> None:
-        """Read the files, on the thread that reads."""
+    def read_again(self) -> "Future[str]":
+        """Read the files, on the thread that reads. Any thread.
+
+        The future is for who takes what is read from now on, to tell what it led to.
+        """
+        request = _Request(time.monotonic(), Future())
         with self._lock:
-            self._since = self._since or time.monotonic()
+            self._waiting.append(request)
         self._wanted.set()
+        return request.told
 
-    def take(self) -> "Future[Config] | None":
-        """Return what was read since this was last asked: a Config, or what reading raised.
+    def take(self) -> Reading | None:
+        """Return what was read since this was last asked.
 
-        A read that takes too long is a ConfigError. If it ends after all, its Config is returned then.
+        For who has waited too long, that is a ConfigError. If the read ends after all, its Config is returned then.
         """
         with self._lock:
             read, self._read = self._read, None
-            is_late = self._since is not None and time.monotonic() - self._since > _PATIENCE_S
-            if read is not None or self._is_given_up or not is_late:
+            if read is not None:
                 return read
-            self._is_given_up = True
-        return _failed(self._paths)
+            latest = time.monotonic() - _PATIENCE_S
+            late = tuple(request.told for request in self._waiting if request.since < latest)
+            self._waiting = [request for request in self._waiting if request.since >= latest]
+        return Reading(_failed(self._paths), late) if late else None
 
     def _run(self) -> None:
         while not self._ended:
             self._wanted.wait(None if self._known is None else _LOOK_S)
-            if (self._have_changed() or self._wanted.is_set()) and not self._ended:
+            if self._have_changed():
+                self.read_again()
+            if self._wanted.is_set() and not self._ended:
                 self._wanted.clear()
                 self._read_now()
 
@@ -81,17 +99,19 @@ class ConfigFiles:
         from syncrelay.config import load
 
         with self._lock:
-            self._since = self._since or time.monotonic()
+            # Who asks while it is being read wants to know what the files are then.
+            asked = list(self._waiting)
         read: Future[Config] = Future()
         try:
             read.set_result(load(*self._paths, patience_s=_PIPE_S))
         except BaseException as error:  # noqa: BLE001  it is raised where the result is asked for
             read.set_exception(error)
         with self._lock:
-            if not (self._is_given_up and read.exception()):
-                self._read = read
-            self._since = time.monotonic() if self._wanted.is_set() else None
-            self._is_given_up = False
+            told = [request.told for request in self._waiting if request in asked]
+            self._waiting = [request for request in self._waiting if request not in asked]
+            if told or not read.exception():
+                earlier = self._read.asked if self._read is not None else ()
+                self._read = Reading(read, (*earlier, *told))
         self._done()
 
     def _have_changed(self) -> bool:

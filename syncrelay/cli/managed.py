@@ -89,4 +89,4 @@ class Managed:
                 if self._stop.requested:
                     raise CancelledError
                 is_read.wait(_LOOK_S)
-            return read.result()
+            return read.config.result()

@@ -2,21 +2,19 @@
 
 import os
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import DONE, put
-from syncrelay.cli.config_files import ConfigFiles
+from syncrelay.cli.config_files import ConfigFiles, Reading
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
 from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
-from syncrelay.errors import ListenError, SyncRelayError, UsageError
+from syncrelay.errors import ListenError, ReloadError, SyncRelayError, UsageError
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from syncrelay.config import Config, Listen
     from syncrelay.ros.relay import Relay
     from syncrelay.status import Server
@@ -28,6 +26,7 @@ _ABOUT: Final = "Matches ROS 2 messages by time, as a YAML file describes, and r
 _CODES: Final = """\
 exit codes: 0 done, 1 the file or data has a problem, 2 wrong usage,
   69 ROS cannot be used here, 70 a bug in syncrelay, 130 interrupted"""
+_FAILED: Final = "reload failed; keeping the running configuration:"
 _BUG: Final = (
     "reload failed because of a bug in syncrelay; keeping the running configuration;"
     " please report it with these lines and the file:"
@@ -121,6 +120,7 @@ def run(
     require_rclpy()
     from syncrelay.cli.explain import explain
     from syncrelay.cli.managed import Managed
+    from syncrelay.cli.services import services
     from syncrelay.cli.summary import log_summary
     from syncrelay.ros.entities import Purpose
     from syncrelay.ros.relay import Relay
@@ -155,30 +155,44 @@ def run(
             )
         if explain_s is not None:
             return explain(relay, explain_s, stop=stop)
-        while not stop.requested:
-            relay.step()
-            if stop.take_reload():
-                files.read_again()
-            if (read := files.take()) is not None:
-                _reload(relay, read, config_paths, groups)
+        if config.node.services:
+            relay.offer(services(relay, files))
+        _relay_until(stop, relay, files, lambda read: _reload(relay, read, config_paths, groups))
         log_summary(relay.drain())
     return 0
 
 
-def _reload(relay: "Relay", read: "Future[Config]", config_paths: Sequence[str], groups: Sequence[str]) -> None:
+def _relay_until(stop: StopRequest, relay: "Relay", files: ConfigFiles, reload: Callable[[Reading], None]) -> None:
+    while not stop.requested:
+        relay.step()
+        if stop.take_reload():
+            files.read_again()
+        if (read := files.take()) is not None:
+            reload(read)
+
+
+def _reload(relay: "Relay", read: Reading, config_paths: Sequence[str], groups: Sequence[str]) -> None:
     """Take on the files as they were read again; whatever is wrong with them, the relay keeps its configuration."""
     from syncrelay.logs import LOGGER
 
     try:
-        config = read.result()
+        config = read.config.result()
         _require_groups(groups, config, config_paths)
-        relay.reload(config)
+        changed = relay.reload(config)
     except SyncRelayError as error:
-        LOGGER.error("reload failed; keeping the running configuration:\n%s", error)
+        refusal = f"{_FAILED}\n{error}"
+        LOGGER.error("%s", refusal)
         relay.refuse_reload(str(error))
     except Exception as error:  # noqa: BLE001  a file that finds a bug of ours is no reason to end what runs
+        refusal = f"{_BUG}\n{''.join(traceback.format_exception(error)).rstrip()}"
         LOGGER.exception("%s", _BUG)
-        relay.refuse_reload(f"{_BUG}\n{''.join(traceback.format_exception(error)).rstrip()}")
+        relay.refuse_reload(refusal)
+    else:
+        for each in read.asked:
+            each.set_result(changed)
+        return
+    for each in read.asked:
+        each.set_exception(ReloadError(refusal))
 
 
 def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:

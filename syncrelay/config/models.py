@@ -63,6 +63,14 @@ class NodeConfig(Keys):
         ),
     )
 
+    services: bool = Field(
+        default=True,
+        description=(
+            "Offer the services ~/reload, ~/status, ~/pause and ~/resume, which anyone on the ROS graph can call."
+            " Default: true."
+        ),
+    )
+
     def absolute(self, name: str) -> str:
         """Return the absolute name of a topic that the file names, before any remapping."""
         return expand(name, node=self.name, namespace=self.namespace)

@@ -55,8 +55,8 @@ class Groups:
         self._started = time.monotonic()
         self._run(config)
 
-    def reload(self, config: Config) -> None:
-        """Run the groups of a file that was read again.
+    def reload(self, config: Config) -> str:
+        """Run the groups of a file that was read again, and say what changed.
 
         Unchanged groups keep their queues; those that failed start again. Whatever it raises, the groups
         of the file before keep running: ReloadError where the file asks for what needs a restart, or for a publisher
@@ -76,8 +76,9 @@ class Groups:
         self._announced = {name: said for name, said in self._announced.items() if name in kept}
         self.reloads += 1
         self.reload_error = None
-        started = len(self.bindings.groups) - len(kept)
-        _LOG.info("reloaded: %s unchanged, %s started", counted(len(kept), "group"), counted(started, "group"))
+        changed = _changes(before, self.bindings.groups)
+        _LOG.info("%s", changed)
+        return changed
 
     def configure(self, config: Config) -> None:
         """Prepare the groups of a file that was read again: they receive and publish nothing before `begin`.
@@ -197,6 +198,19 @@ def _require_same_node(running: Config, asked: Config) -> None:
     ):
         if before != now:
             raise ReloadError(f"`{name}` cannot change while the relay runs: restart it")
+
+
+def _changes(before: Sequence[GroupRelay], now: Sequence[GroupRelay]) -> str:
+    """Say which groups a reload left alone, which it built anew, and which it started and ended."""
+    names_before, names = ([group.config.name for group in groups] for groups in (before, now))
+    begun = [group.config.name for group in now if group not in before]
+    parts = {
+        "rebuilt": [name for name in begun if name in names_before],
+        "started": [name for name in begun if name not in names_before],
+        "ended": [name for name in names_before if name not in names],
+    }
+    told = [f"{verb} {', '.join(those)}" for verb, those in parts.items() if those]
+    return "; ".join([f"reloaded: {counted(len(now) - len(begun), 'group')} unchanged", *told])
 
 
 def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:

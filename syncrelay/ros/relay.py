@@ -31,6 +31,7 @@ from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
 from syncrelay.ros.lifecycle import ManagedNode, Transitions
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
+from syncrelay.ros.services import Offered, Services
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
 from syncrelay.status import Phase, RelayState, advice
@@ -144,8 +145,9 @@ class Relay:
         self._wake = Wakeup()
         self._calls = Calls(self._wake.set)
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
-        self._services = SingleThreadedExecutor(context=self._context)
-        self._services.add_node(self.node)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._services = Services(self.node, {}, bugs=self._bugs)
         self._receiving: Future[None] | None = None
 
     def __enter__(self) -> Self:
@@ -171,16 +173,21 @@ class Relay:
         """The names of the groups that run, or will once the node is active."""
         return tuple(group.config.name for group in self._groups.bindings.groups)
 
-    def reload(self, config: Config) -> None:
-        """Run the groups of a file that was read again. On the main thread; raises as `Groups.reload`.
+    def offer(self, services: Offered) -> None:
+        """Offer services on the node; what they call is called on a thread that must not wait, or all of them would."""
+        self._services = Services(self.node, services, bugs=self._bugs)
 
-        Raises ReloadError too where a managed node has no groups.
+    def reload(self, config: Config) -> str:
+        """Run the groups of a file that was read again, and say what changed.
+
+        On the main thread; raises as `Groups.reload`, and ReloadError where a managed node has no groups.
         """
         if (advice := self._advice) is not None:
             raise ReloadError(advice)
-        self._groups.reload(config)
+        changed = self._groups.reload(config)
         # New groups are to be evaluated at once.
         self._next_evaluation = time.monotonic()
+        return changed
 
     def configure(self, config: Config) -> None:
         """Prepare the groups of a file, of a managed node that has none. On the main thread; raises as `reload`."""
@@ -308,6 +315,7 @@ class Relay:
         What became of the messages of one that is inactive was reported as it was deactivated.
         """
         self._calls.end()
+        self._services.end()
         receiving, self._receiving = self._receiving, None
         self._phase = Phase.DRAINING
         if receiving is not None:
@@ -325,7 +333,7 @@ class Relay:
             self.drain()
         finally:
             self._clock.close()
-            self._services.shutdown()
+            self._executor.shutdown()
             self._threads.shutdown()
             self._loop.close()
             _LOG.removeHandler(self._rosout)
@@ -337,7 +345,10 @@ class Relay:
 
     def _serve(self) -> None:
         while self._context.ok():
-            with self._bugs.contained("serving parameters and the clock"), suppress(ExternalShutdownException):
-                self._services.spin()
+            with (
+                self._bugs.contained("serving services and the clock"),
+                suppress(ExternalShutdownException),
+            ):
+                self._executor.spin()
                 return
             time.sleep(_AFTER_FAILURE_S)

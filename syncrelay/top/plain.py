@@ -6,7 +6,7 @@ from textwrap import wrap
 from syncrelay.status import Level, advice
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
-from syncrelay.top.state import Finding, Group, Input
+from syncrelay.top.state import Finding, Group, Input, Relay, State
 
 _WIDTH = 80
 
@@ -16,15 +16,36 @@ def plain_text(answer: Answer) -> str:
     return "\n".join(_lines(answer))
 
 
+def summary(state: State) -> str:
+    """Say most of it: a line for the relay, and one for each group with what explains most."""
+    return "\n".join([f"{state.relay.node}: {_of_relay(state.relay)}", *map(_summary_of, state.groups)])
+
+
+def _summary_of(group: Group) -> str:
+    finding = group.explanation
+    if finding is None:
+        return _of_group(group)
+    # That a group is well is said in its figures.
+    state = _of_group(group) if finding.severity is not Level.OK else f"{group.name}: {phrases.LEVELS[group.level]}"
+    return "; ".join(filter(None, [state, finding.text, finding.suggestion]))
+
+
+def _of_relay(relay: Relay) -> str:
+    up = phrases.seconds(relay.uptime_s)
+    needed = advice(relay.phase, relay.node)
+    return "; ".join(
+        filter(None, [f"{phrases.phase(relay)}, up {up}, syncrelay {relay.version}, {relay.config}", needed])
+    )
+
+
+def _of_group(group: Group) -> str:
+    rate = f"{phrases.sets_of_possible(group)} possible sets a second, {phrases.last_set(group)}"
+    return f"{group.name}: {phrases.LEVELS[group.level]}, {rate}"
+
+
 def _lines(answer: Answer) -> Iterator[str]:
     relay = answer.state.relay
-    yield from _wrapped(
-        f"{relay.node} at {answer.url}: {phrases.phase(relay)}, up {phrases.seconds(relay.uptime_s)},"
-        f" syncrelay {relay.version}, {relay.config}",
-        indent="",
-    )
-    if (needed := advice(relay.phase, relay.node)) is not None:
-        yield from _wrapped(needed, indent="  ")
+    yield from _wrapped(f"{relay.node} at {answer.url}: {_of_relay(relay)}", indent="")
     for group in answer.state.groups:
         yield ""
         yield from group_lines(group)
@@ -32,8 +53,7 @@ def _lines(answer: Answer) -> Iterator[str]:
 
 def group_lines(group: Group) -> Iterator[str]:
     """Say all of a group."""
-    rate = f"{phrases.sets_of_possible(group)} possible sets a second, {phrases.last_set(group)}"
-    yield from _wrapped(f"{group.name}: {phrases.LEVELS[group.level]}, {rate}", indent="")
+    yield from _wrapped(_of_group(group), indent="")
     yield from _wrapped(phrases.options(group), indent="  ")
     for name, sample in (("span", group.span_ms), ("latency", group.latency_ms)):
         if sample is not None:

@@ -10,7 +10,7 @@ import pytest
 
 import syncrelay.config
 from syncrelay.cli import config_files
-from syncrelay.cli.config_files import ConfigFiles
+from syncrelay.cli.config_files import ConfigFiles, Reading
 from syncrelay.config import Config, ConfigError
 from tests.cli.command import GOOD
 from tests.ros.processes import wait_until
@@ -38,7 +38,12 @@ def files(path: Path) -> Iterator[ConfigFiles]:
 
 def taken(files: ConfigFiles) -> Future[Config]:
     """What is read next."""
-    found: list[Future[Config]] = []
+    return reading(files).config
+
+
+def reading(files: ConfigFiles) -> Reading:
+    """What is read next, and who asked for it."""
+    found: list[Reading] = []
 
     def is_read() -> bool:
         read = files.take()
@@ -128,10 +133,34 @@ def test_what_hangs_is_told_once_and_taken_when_it_comes_after_all(files: Config
     files.read_again()
     with pytest.raises(ConfigError, match=r"fusion.yaml: could not be read within 0.05 s$"):
         taken(files).result()
-    files.read_again()
     assert files.take() is None
     path.write_text(OTHER)
     assert names(taken(files)) == ["rear"]
+
+
+@pytest.mark.usefixtures("impatient")
+def test_each_who_asks_while_a_read_hangs_is_told_so_once(files: ConfigFiles, path: Path):
+    fifo_over(path)
+    for _ in range(2):
+        asked = files.read_again()
+        assert reading(files).asked == (asked,)
+        assert files.take() is None
+
+
+def test_who_asks_while_the_files_are_read_is_told_of_what_they_are_then(files: ConfigFiles, path: Path):
+    fifo = fifo_over(path)
+    first = files.read_again()
+    # Opens as soon as it is being read.
+    with fifo.open("w") as pipe:
+        second = files.read_again()
+        replace(path, OTHER)
+        pipe.write(GOOD)
+    told = {}
+    while second not in told:
+        read = reading(files)
+        told |= {asked: names(read.config) for asked in read.asked}
+    assert told[second] == ["rear"]
+    assert first in told
 
 
 @pytest.mark.usefixtures("impatient")

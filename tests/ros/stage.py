@@ -103,6 +103,40 @@ class Collector:
         self._read += size
 
 
+class Caller:
+    """Calls services of a node; see tests/ros/caller.py."""
+
+    def __init__(self, process: Process, node: str) -> None:
+        self.process = process
+        self.node = node
+
+    def call(self, service: str) -> tuple[bool, str]:
+        """Call ~/service; whether it succeeded, and its words."""
+        success, message = json.loads(self.process.ask(f"call {self.node}/{service}"))
+        return success, message
+
+    def begin(self, service: str) -> None:
+        """Call ~/service without waiting for the answer, for which `end` waits."""
+        self.process.ask(f"begin {self.node}/{service}")
+
+    def end(self) -> list[tuple[bool, str]]:
+        return [(success, message) for success, message in json.loads(self.process.ask("end"))]
+
+    def get(self, *names: str) -> list[object]:
+        return list(json.loads(self.process.ask(f"get {self.node} {' '.join(names)}")))
+
+    def set(self, name: str, value: object) -> tuple[bool, str]:
+        words = json.dumps(value, separators=(",", ":"))
+        successful, reason = json.loads(self.process.ask(f"set {self.node} {name} {words}"))
+        return successful, reason
+
+    def is_read_only(self, name: str) -> bool:
+        return bool(json.loads(self.process.ask(f"describe {self.node} {name}")))
+
+    def services(self) -> list[str]:
+        return list(json.loads(self.process.ask(f"services {self.node}")))
+
+
 class Stage:
     """Starts the processes of one test on one domain."""
 
@@ -156,6 +190,11 @@ class Stage:
         output.touch()
         argv = _module("tests.ros.collector", topics or {}, node=node, reliability=reliability, durability=durability)
         return Collector(self.start("collector", [*argv, "--output", str(output)], stdin=subprocess.PIPE), output)
+
+    def caller(self, node: str = "/syncrelay") -> Caller:
+        """A process that calls services of a node."""
+        argv = [sys.executable, "-m", "tests.ros.caller"]
+        return Caller(self.start("caller", argv, stdin=subprocess.PIPE), node)
 
     def before_each_sensor(self, statements: str) -> None:
         """Have each sensor of a rig that is started from now on run these statements before all else."""

@@ -154,7 +154,7 @@ def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
     assert [group["name"] for group in state["groups"]] == ["front", "rear"]
     assert state["relay"]["config"] == f"{file.path}, {second}"
     second.write_text(config({"rear": _rear(), "left": _rear(output_prefix="/left")}))
-    file.relay.wait_for_log("reloaded: 2 groups unchanged, 1 group started")
+    file.relay.wait_for_log("reloaded: 2 groups unchanged; ")
     file.write(config({"left": _FRONT}, metrics=ANY_PORT))
     file.relay.wait_for_log(f"of {file.path}: rename one of them")
 
@@ -189,7 +189,7 @@ def test_a_watched_file_that_changes_while_the_relay_starts_is_read_again(stage:
     path.write_text(config({"front": _FRONT}))
     changed = config({"front": _FRONT, "rear": _rear()})
     relay = stage.start("relay", [sys.executable, "-c", _CHANGED_AS_IT_STARTS, str(path), changed])
-    relay.wait_for_log("reloaded: 1 group unchanged, 1 group started")
+    relay.wait_for_log("reloaded: 1 group unchanged; ")
 
 
 def _command(stage: Stage, relay: Process) -> subprocess.CompletedProcess[str]:

@@ -1,0 +1,28 @@
+"""What the services of a running relay do."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import TYPE_CHECKING
+
+from syncrelay.cli.config_files import ConfigFiles
+from syncrelay.status import RelayState, document
+from syncrelay.top.plain import summary
+from syncrelay.top.state import state_of
+
+if TYPE_CHECKING:
+    from syncrelay.ros.relay import Relay
+    from syncrelay.ros.services import Offered
+
+
+def services(relay: "Relay", files: ConfigFiles) -> "Offered":
+    """Return the services of a relay whose files these are."""
+    return {
+        "reload": files.read_again,
+        "status": lambda: _status(relay.state),
+    }
+
+
+def _status(state: Callable[[], RelayState]) -> "Future[str]":
+    told: Future[str] = Future()
+    told.set_result(summary(state_of(document(state()))))
+    return told

@@ -1,0 +1,83 @@
+"""Services of the relay's node that answer in words: std_srvs/srv/Trigger, which every ROS has."""
+
+from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import CancelledError, Future
+from typing import Any, Final, TypeAlias
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from std_srvs.srv import Trigger
+
+from syncrelay.dataflow.bugs import Bugs
+from syncrelay.errors import SyncRelayError
+from syncrelay.printable import one_entry
+
+Offered: TypeAlias = Mapping[str, Callable[[], "Future[str]"]]
+"""What is called for each service, by its name below the node's; the words of its answer come in the future.
+
+A SyncRelayError is an answer too, of a call that did not succeed.
+"""
+
+# A client that never waits for its answers gets no more than so many: each takes a little of every turn.
+_MOST_WAITING: Final = 64
+_ENDING: Final = "the relay is ending"
+
+
+class Services:
+    """Offers services on a node until `end`. They are called on the thread of its executor, and none holds it up."""
+
+    def __init__(self, node: Any, offered: Offered, *, bugs: Bugs) -> None:
+        self._node = node
+        self._bugs = bugs
+        self._waiting = 0
+        self._ended = False
+        # A call that waits for its answer keeps away no other, nor those for parameters.
+        self._group = ReentrantCallbackGroup()
+        for name, function in offered.items():
+            self._offer(name, function)
+
+    def end(self) -> None:
+        """Tell all who wait, and who still call, that the relay is ending."""
+        self._ended = True
+        self._node.executor.wake()
+
+    def _offer(self, name: str, function: Callable[[], "Future[str]"]) -> None:
+        # rclpy waits only for what was made by `async def`.
+        async def answer(_: Any, response: Any) -> Any:
+            response.success, text = await self._answer(name, function)
+            response.message = one_entry(text)
+            return response
+
+        self._node.create_service(Trigger, f"~/{name}", answer, callback_group=self._group)
+
+    async def _answer(self, name: str, function: Callable[[], "Future[str]"]) -> tuple[bool, str]:
+        if self._waiting >= _MOST_WAITING:
+            return False, f"{_MOST_WAITING} calls wait for their answers already"
+        self._waiting += 1
+        try:
+            future = function()
+            future.add_done_callback(lambda _: self._node.executor.wake())
+            return True, await _Answered(future, lambda: self._ended)
+        except CancelledError:
+            return False, _ENDING
+        except SyncRelayError as error:
+            return False, str(error)
+        except Exception as error:  # noqa: BLE001  who calls is answered whatever happens
+            self._bugs.log(f"answering ~/{name}", error)
+            return False, f"a bug in syncrelay while answering ~/{name}: {error!r}; its traceback is in the log"
+        finally:
+            self._waiting -= 1
+
+
+class _Answered:
+    """Waits for a future of another thread as rclpy waits for its own: by being asked again whenever it wakes."""
+
+    def __init__(self, future: "Future[str]", has_ended: Callable[[], bool]) -> None:
+        self._future = future
+        self._has_ended = has_ended
+
+    def __await__(self) -> Generator[None, None, str]:
+        while not self._future.done():
+            if self._has_ended():
+                raise CancelledError
+            yield
+        return self._future.result()
