@@ -45,7 +45,7 @@ class Reporters:
         self._make()
 
     def publish(self, reports: Sequence[GroupReport], *, advice: str | None = None) -> None:
-        """Publish the state of all groups, and what the node needs to have some."""
+        """Publish the state of all groups, and why a managed node gives nothing."""
         self._make()
         if isinstance(diagnostics := self._reporters.get(_ALL), Diagnostics):
             diagnostics.publish(reports, advice=advice)
@@ -81,7 +81,7 @@ class Diagnostics:
         self._publisher = entities.publisher(DiagnosticArray, DIAGNOSTICS, 10)
 
     def publish(self, reports: Sequence[GroupReport], *, advice: str | None) -> None:
-        """Publish the state of all groups, and of a node without groups what it needs, if anyone listens."""
+        """Publish the state of all groups, and of a managed node that gives nothing, if anyone listens."""
         if self._publisher.get_subscription_count():
             array = DiagnosticArray(status=[self._status(report) for report in reports])
             if advice is not None:

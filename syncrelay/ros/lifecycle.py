@@ -3,8 +3,10 @@
 import logging
 from collections.abc import Callable
 from concurrent.futures import CancelledError
+from threading import Event
 from typing import Any, Protocol
 
+from lifecycle_msgs.srv import GetState
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from syncrelay.errors import SyncRelayError
@@ -80,6 +82,20 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]  # LifecycleNode is unty
             response.success = False
             return response
         return self._change_state(request, response)
+
+
+def state_of(node: Any, managed: str, *, patience_s: float) -> str | None:
+    """Ask for the state of a managed node, by another that is spun elsewhere; None where nobody answers in time."""
+    client = node.create_client(GetState, f"{managed}/get_state")
+    try:
+        answered = Event()
+        if not client.wait_for_service(patience_s):
+            return None
+        answer = client.call_async(GetState.Request())
+        answer.add_done_callback(lambda _: answered.set())
+        return str(answer.result().current_state.label) if answered.wait(patience_s) else None
+    finally:
+        node.destroy_client(client)
 
 
 def _carried_out(name: str, verb: Callable[[], None]) -> TransitionCallbackReturn:

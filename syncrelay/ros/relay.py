@@ -49,6 +49,7 @@ _POLL_S = 1.0
 _ASKED_S = 3.0
 # What fails again at once must not take all of a core.
 _AFTER_FAILURE_S = 0.1
+_WITHOUT_GROUPS = (Phase.UNCONFIGURED, Phase.FINALIZED)
 # How long an end may take to see that reliable subscribers have what was published on all outputs. They say so
 # at the writer's next heartbeat only, which may be 3 s away.
 _ACKNOWLEDGE_NS = 300_000_000
@@ -182,8 +183,8 @@ class Relay:
 
         On the main thread; raises as `Groups.reload`, and ReloadError where a managed node has no groups.
         """
-        if (advice := self._advice) is not None:
-            raise ReloadError(advice)
+        if self._phase in _WITHOUT_GROUPS:
+            raise ReloadError(self._advice)
         changed = self._groups.reload(config)
         # New groups are to be evaluated at once.
         self._next_evaluation = time.monotonic()

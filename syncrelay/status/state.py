@@ -57,10 +57,12 @@ def level(report: GroupReport) -> Level:
 
 
 def advice(phase: Phase, node: str) -> str | None:
-    """Say why a managed node has no groups, and what to do; None of one that has some."""
+    """Say why a managed node gives nothing, and what to do; None where its state is no reason."""
     match phase:
         case Phase.UNCONFIGURED:
             return f"the node is unconfigured: configure it with `ros2 lifecycle set {node} configure`"
+        case Phase.INACTIVE:
+            return f"the node is inactive: activate it with `ros2 lifecycle set {node} activate`"
         case Phase.FINALIZED:
             return "the node is finalized: only a restart of its process brings it back"
         case _:

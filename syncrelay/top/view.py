@@ -59,7 +59,7 @@ class View:
 
 
 def title(view: View, width: int) -> list[Text]:
-    """Draw which relay it is and how it fares; more lines where it has no groups, or what is shown is not as of now."""
+    """Draw which relay it is and how it fares; more lines say what a managed node needs, or that it is stale."""
     relay = view.answer.state.relay
     place = view.answer.url.removeprefix("http://")
     fares = f"{phrases.phase(relay)}, up {phrases.seconds(relay.uptime_s)}"
