@@ -119,10 +119,17 @@ def run(
     _require_groups(groups, config, config_paths)
     require_rclpy()
     from syncrelay.cli.explain import explain
+    from syncrelay.cli.managed import Managed
     from syncrelay.cli.services import services
-    from syncrelay.cli.summary import summarize
+    from syncrelay.cli.summary import log_summary
     from syncrelay.ros.entities import Purpose
     from syncrelay.ros.relay import Relay
+
+    def managed(relay: Relay) -> Managed:
+        def require(config: "Config") -> None:
+            _require_groups(groups, config, config_paths)
+
+        return Managed(relay, paths=config_paths, require=require, stop=stop)
 
     stop.defer()
     with (
@@ -135,6 +142,7 @@ def run(
             ros_args=ros_args,
             on_turn=heartbeat.beat if heartbeat else None,
             purpose=Purpose.RELAY if explain_s is None else Purpose.OBSERVE,
+            manage=managed if config.node.lifecycle and explain_s is None else None,
         ) as relay,
         files,
     ):
@@ -150,10 +158,7 @@ def run(
         if config.node.services:
             relay.offer(services(relay, files))
         _relay_until(stop, relay, files, lambda read: _reload(relay, read, config_paths, groups))
-        for report in relay.drain():
-            facts = report.facts
-            for line in summarize(facts.name, facts.figures.sets, [(each.name, each.counts) for each in facts.inputs]):
-                LOGGER.info(line, extra={"group": facts.name})
+        log_summary(relay.drain())
     return 0
 
 

@@ -1,9 +1,22 @@
 """What became of every message: the last thing that a relay and a replay say."""
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 from syncrelay.config.wording import counted
+from syncrelay.logs import LOGGER
 from syncrelay.sync.counts import InputCounts
+
+if TYPE_CHECKING:
+    from syncrelay.explain import GroupReport
+
+
+def log_summary(reports: "Iterable[GroupReport]") -> None:
+    """Log what became of every message of groups."""
+    for report in reports:
+        facts = report.facts
+        for line in summarize(facts.name, facts.figures.sets, [(each.name, each.counts) for each in facts.inputs]):
+            LOGGER.info(line, extra={"group": facts.name})
 
 
 def summarize(group: str, sets: int, inputs: Iterable[tuple[str, InputCounts]]) -> Iterator[str]:

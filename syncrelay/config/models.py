@@ -55,6 +55,13 @@ class NodeConfig(Keys):
         ),
         examples=["default", "large_messages"],
     )
+    lifecycle: bool = Field(
+        default=False,
+        description=(
+            "Make it a managed node: it starts unconfigured, and `ros2 lifecycle set`, a launch file or nav2's"
+            " lifecycle manager configures and activates it. Default: false, it starts active."
+        ),
+    )
 
     services: bool = Field(
         default=True,

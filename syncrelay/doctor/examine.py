@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from syncrelay.config import Config, ConfigError, Problem, load
 from syncrelay.config.interfaces import Interfaces
@@ -11,7 +12,7 @@ from syncrelay.doctor.container import check_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, info, worst_first
 from syncrelay.doctor.discovery import check_discovery
 from syncrelay.doctor.folders import check_folders
-from syncrelay.doctor.graph import check_clock, check_graph, check_own_name
+from syncrelay.doctor.graph import check_clock, check_graph, check_own_name, check_state
 from syncrelay.doctor.groups import check_groups, check_sizes
 from syncrelay.doctor.installation import Installation, check_installation, middleware_of
 from syncrelay.doctor.listen import check_listen
@@ -29,6 +30,9 @@ from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shar
 from syncrelay.environment.domain import domain_of, range_of
 from syncrelay.explain import GraphSnapshot, GroupReport
 
+# Of a managed node that does not answer nothing is known.
+_PATIENCE_S: Final = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class Request:
@@ -43,12 +47,16 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """What a look at the graph gave; `unjudged` are groups without a report."""
+    """What a look at the graph gave; `unjudged` are groups without a report.
+
+    `state` is that of the managed node that has the relay's name, None where there is none.
+    """
 
     seconds: float
     graph: GraphSnapshot
     reports: tuple[GroupReport, ...] = ()
     unjudged: tuple[str, ...] = ()
+    state: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +93,7 @@ def examine(request: Request) -> Examination:
     observed = None
     if request.live_s is not None:
         if started is not None and started.failed is None:
-            observed = _observe(config, request.ros_args, seconds=request.live_s)
+            observed = _observe(config, request.ros_args, started.node, seconds=request.live_s)
         if started is None or observed is None:
             found.append(_not_looked())
         else:
@@ -155,7 +163,7 @@ def _not_looked() -> Diagnosis:
     )
 
 
-def _observe(config: Config | None, ros_args: Sequence[str], *, seconds: float) -> Observed | None:
+def _observe(config: Config | None, ros_args: Sequence[str], node: str, *, seconds: float) -> Observed | None:
     """Observe the groups as `--explain` does, or the graph alone; None where remaps make names of the file meet."""
     from syncrelay.ros.environment import require_rclpy  # noqa: PLC0415  rclpy is imported where the graph is wanted
 
@@ -163,6 +171,7 @@ def _observe(config: Config | None, ros_args: Sequence[str], *, seconds: float) 
     from syncrelay.ros.entities import Purpose  # noqa: PLC0415
     from syncrelay.ros.graph import snapshot  # noqa: PLC0415
     from syncrelay.ros.hidden_node import watch_graph  # noqa: PLC0415
+    from syncrelay.ros.lifecycle import state_of  # noqa: PLC0415
     from syncrelay.ros.relay import Relay  # noqa: PLC0415
 
     if config is None:
@@ -176,7 +185,10 @@ def _observe(config: Config | None, ros_args: Sequence[str], *, seconds: float) 
         while (left := end - time.monotonic()) > 0:
             relay.step(left)
         reports = relay.evaluate()
-        return Observed(seconds, snapshot(relay.node), reports, relay.monitor.unjudged)
+        graph = snapshot(relay.node)
+        is_there = config.node.lifecycle and node in graph.nodes
+        state = state_of(relay.node, node, patience_s=_PATIENCE_S) if is_there else None
+        return Observed(seconds, graph, reports, relay.monitor.unjudged, state)
 
 
 def _of_graph(
@@ -187,6 +199,7 @@ def _of_graph(
         return
     yield from check_clock(observed.graph, use_sim_time=started.use_sim_time)
     yield from check_own_name(observed.graph, started.node)
+    yield from check_state(observed.state, started.node)
     yield from check_groups(observed.reports, observed.unjudged)
     if config.node.transport == "default" and uses_defaults(environ):
         yield from check_sizes(observed.reports)

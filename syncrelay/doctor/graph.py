@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 
-from syncrelay.doctor.diagnosis import Diagnosis, error, info
+from syncrelay.doctor.diagnosis import Diagnosis, Severity, error, info
 from syncrelay.doctor.discovery import ports_of
 from syncrelay.explain import GraphSnapshot, no_other_node
+from syncrelay.status import Phase, advice
 
 
 def check_graph(graph: GraphSnapshot) -> Iterator[Diagnosis]:
@@ -48,6 +49,14 @@ def check_own_name(graph: GraphSnapshot, node: str) -> Iterator[Diagnosis]:
             impact="each of them sends every set, and a request to the node reaches any one of them",
             fix="stop all but one, or give each a name of its own: node: {name: ...} in the file",
         )
+
+
+def check_state(state: str | None, node: str) -> Iterator[Diagnosis]:
+    """Yield that a managed node of the relay's name is not active; `state` is what it says, None where it is none."""
+    phase = next((each for each in Phase if each.value == state), None)
+    if phase is not None and (what := advice(phase, node)) is not None:
+        text, _, fix = what.partition(": ")
+        yield Diagnosis("inactive", Severity.WARNING, f"{node}: {text}", "no set leaves", fix)
 
 
 def check_clock(graph: GraphSnapshot, *, use_sim_time: bool) -> Iterator[Diagnosis]:

@@ -159,7 +159,8 @@ class GroupFacts:
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
     late; `failure` what stopped the group for good; `pause` since when it is paused, and `unpaused` when the last pause
     ended; `empty_graph` the graph, where it holds no node but our own.
-    `evaluator` tries other values of the file on the last messages, None where they cannot be run again.
+    `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
+    the name of a managed node that waits to be activated.
     """
 
     name: str
@@ -183,6 +184,7 @@ class GroupFacts:
     unpaused: int | None = None
     evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
+    inactive: str | None = None
 
     @property
     def required_first(self) -> Sequence[int]:
@@ -221,7 +223,7 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        return self.pause is None and self.silent_for >= self.silent_after
+        return self.pause is None and self.inactive is None and self.silent_for >= self.silent_after
 
     @property
     def silent_for(self) -> int:

@@ -22,6 +22,7 @@ class Code(Enum):
     """What a finding is, for programs. In the order in which findings explain a silence."""
 
     INTERNAL_ERROR = "internal_error"
+    INACTIVE = "inactive"
     PAUSED = "paused"
     REFUSED_BY_DDS = "refused_by_dds"
     TYPE_NOT_IMPORTABLE = "type_not_importable"

@@ -22,6 +22,7 @@ from syncrelay.explain.input_observation import WINDOW_NS
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     rules_graph.internal_error,
+    rules_graph.inactive,
     rules_flow.paused,
     of_each_input(rules_graph.refused_by_dds),
     of_each_input(rules_graph.type_not_importable),
@@ -86,10 +87,16 @@ _MATCHING: Final = frozenset(
 )
 _ORDER: Final = frozenset({Code.TIME_JUMP, Code.OUT_OF_ORDER, Code.DUPLICATES})
 
+# What can be mended before the node is activated.
+_SAID_OF_THE_INACTIVE: Final = frozenset(
+    {Code.INTERNAL_ERROR, Code.INACTIVE, Code.TYPE_NOT_IMPORTABLE, Code.OTHER_TYPE}
+)
+
 EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.INTERNAL_ERROR: _Explained(_MATCHING),
     # Stamps that are not set are seen by what the policy drops for them.
     Code.PAUSED: _Explained(_MATCHING | {Code.UNSTAMPED}),
+    Code.INACTIVE: _Explained(frozenset(Code) - _SAID_OF_THE_INACTIVE),
     Code.ALONE: _Explained(_MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
     Code.NO_PUBLISHER: _Explained(_MATCHING),
     Code.TYPE_NOT_IMPORTABLE: _Explained(_MATCHING),

@@ -35,6 +35,17 @@ def internal_error(facts: GroupFacts) -> Found:
         )
 
 
+def inactive(facts: GroupFacts) -> Found:
+    """Find that the group belongs to a managed node that waits to be activated."""
+    if facts.inactive is not None:
+        yield Finding(
+            Code.INACTIVE,
+            Severity.WARN,
+            "the node is inactive: it receives and publishes nothing",
+            f"activate it with `ros2 lifecycle set {facts.inactive} activate`",
+        )
+
+
 def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find a topic that DDS lets the group not subscribe to or publish."""
     if (refusal := an_input.graph.refusal) is not None:

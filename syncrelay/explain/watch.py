@@ -68,6 +68,7 @@ class GroupWatch:
         failure: str | None = None,
         pause: Pause | None = None,
         empty_graph: GraphSnapshot | None = None,
+        inactive: str | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
         options = self.config.options
@@ -108,6 +109,7 @@ class GroupWatch:
             unpaused=self._unpaused,
             evaluator=self._evaluator,
             empty_graph=empty_graph,
+            inactive=inactive,
         )
 
     def _follow_pauses(self, now: int, *, is_paused: bool) -> None:

@@ -1,5 +1,6 @@
 """Which groups run, and on which topics: how others take their place while messages flow."""
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -38,6 +39,8 @@ class GroupBindings:
 
     def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop) -> None:
         self.all: tuple[GroupBinding, ...] = ()
+        self.is_held = False
+        """Whether nothing is received nor published."""
         self._entities = entities
         self._node = node
         self._backend = backend
@@ -80,6 +83,27 @@ class GroupBindings:
         self._end_publishers(_inputs_of(ended))
         for topic in unused:
             topic.close()
+
+    def hold(self) -> None:
+        """Receive nothing until `release`; when all that is buffered has left, `end_publishers` is to follow."""
+        self.is_held = True
+        for topic in self.topics:
+            topic.hold()
+
+    def end_publishers(self) -> None:
+        """End the publishers of all groups, which nothing feeds any more."""
+        self._end_publishers(_inputs_of(self.all))
+
+    def release(self) -> None:
+        """End the groups that were held; those that are run from now on receive and publish."""
+        self.run(())
+        self.is_held = False
+
+    def wait_until_acknowledged(self, *, patience_ns: int) -> None:
+        """Give reliable subscribers so many nanoseconds to get what was published last."""
+        deadline = time.monotonic_ns() + patience_ns
+        for topic in self.topics:
+            topic.outputs.wait_until_acknowledged(deadline)
 
     def _exchange(
         self, ended: Sequence[GroupBinding], unused: Sequence[TopicInput], begun: Sequence[InputBinding]
@@ -145,6 +169,8 @@ class GroupBindings:
             topics[key] = TopicInput(
                 config, name=name, entities=self._entities, node=self._node, backend=self._backend, loop=self._loop
             )
+            if self.is_held:
+                topics[key].hold()
         return topics[key]
 
 

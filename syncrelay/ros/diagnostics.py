@@ -44,13 +44,13 @@ class Reporters:
             self._reporters.pop(key).close()
         self._make()
 
-    def publish(self, reports: Sequence[GroupReport]) -> None:
-        """Publish the state of all groups."""
+    def publish(self, reports: Sequence[GroupReport], *, advice: str | None = None) -> None:
+        """Publish the state of all groups, and why a managed node gives nothing."""
         self._make()
-        if (diagnostics := self._reporters.get(_ALL)) is not None:
-            diagnostics.publish(reports)
+        if isinstance(diagnostics := self._reporters.get(_ALL), Diagnostics):
+            diagnostics.publish(reports, advice=advice)
         for report in reports:
-            if (scalars := self._reporters.get(report.facts.name)) is not None:
+            if isinstance(scalars := self._reporters.get(report.facts.name), Scalars):
                 scalars.publish([report])
 
     def _make(self) -> None:
@@ -80,16 +80,22 @@ class Diagnostics:
         self._name = node.get_fully_qualified_name()
         self._publisher = entities.publisher(DiagnosticArray, DIAGNOSTICS, 10)
 
-    def publish(self, reports: Sequence[GroupReport]) -> None:
-        """Publish the state of all groups, if anyone listens."""
+    def publish(self, reports: Sequence[GroupReport], *, advice: str | None) -> None:
+        """Publish the state of all groups, and of a managed node that gives nothing, if anyone listens."""
         if self._publisher.get_subscription_count():
             array = DiagnosticArray(status=[self._status(report) for report in reports])
+            if advice is not None:
+                array.status.append(self._of_node(advice))
             array.header.stamp = self._node.get_clock().now().to_msg()
             self._publisher.publish(array)
 
     def close(self) -> None:
         """Publish no more."""
         self._entities.end(self._publisher)
+
+    def _of_node(self, advice: str) -> DiagnosticStatus:
+        name = self._name.lstrip("/")
+        return DiagnosticStatus(level=DiagnosticStatus.WARN, name=name, message=advice, hardware_id=self._name)
 
     def _status(self, report: GroupReport) -> DiagnosticStatus:
         return DiagnosticStatus(

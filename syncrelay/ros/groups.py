@@ -81,6 +81,41 @@ class Groups:
         _LOG.info("%s", changed)
         return changed
 
+    def configure(self, config: Config) -> None:
+        """Prepare the groups of a file that was read again: they receive and publish nothing before `begin`.
+
+        What it raises is as for `reload`; then no groups run.
+        """
+        _require_same_node(self.config, config)
+        require_distinct_names(config, self._names, self._resolve)
+        self.bindings.is_held = True
+        self._run(config)
+        self.config = config
+        self.reload_error = None
+
+    def begin(self) -> None:
+        """Receive and publish, each group anew."""
+        self.bindings.release()
+        self._announced.clear()
+        self._started = time.monotonic()
+        self._run(self.config)
+
+    def hold(self, *, patience_ns: int) -> None:
+        """Receive and publish nothing until `begin`: what is buffered is dropped.
+
+        Reliable subscribers have so many nanoseconds to get what was published last.
+        """
+        self.bindings.hold()
+        self._loop.call(lambda: self.flush(DropReason.SHUTDOWN)).result()
+        self.bindings.wait_until_acknowledged(patience_ns=patience_ns)
+        self.bindings.end_publishers()
+
+    def forget(self) -> None:
+        """Run no groups."""
+        self.bindings.run(())
+        self._loop.deadline = None
+        self._changed(self.config)
+
     def refuse_reload(self, reason: str) -> None:
         """Remember that a reload failed, and why."""
         self.reload_error = reason
@@ -129,6 +164,8 @@ class Groups:
 
     def announce(self) -> None:
         """Log once what each group waits for, and once that it runs."""
+        if self.bindings.is_held:
+            return
         for binding in self.bindings.all:
             name, waiting_for = binding.group.config.name, binding.waiting_for
             if waiting_for and time.monotonic() - self._started < _GRACE_S:

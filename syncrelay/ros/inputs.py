@@ -60,6 +60,7 @@ class TopicInput:
         self._message_type: Any = None
         self._lost: Any = None
         self._failure: Exception | None = None
+        self._is_held = False
         self._force_poll = True
         self._try_again = 0.0
         self._said: set[str] = set()
@@ -115,6 +116,11 @@ class TopicInput:
             self._entities.end(self.entity)
             self.entity = None
 
+    def hold(self) -> None:
+        """Receive nothing any more; the graph is polled all the same. On the main thread."""
+        self._is_held = True
+        self.close()
+
     def try_again(self) -> None:
         """Have the next poll ask DDS again for what it refused."""
         self._try_again, self._force_poll = 0.0, True
@@ -160,7 +166,7 @@ class TopicInput:
         endpoints = self._node.get_publishers_info_by_topic(self.name)
         fitting = [endpoint for endpoint in endpoints if endpoint.topic_type == self.type]
         profile = input_profile(self._qos, [endpoint.qos_profile for endpoint in fitting])
-        if profile is not None and (self._may_try or not self._is_refused):
+        if profile is not None and not self._is_held and (self._may_try or not self._is_refused):
             self._follow(profile)
         self.publishers = graph.publishers(endpoints, self.profile)
         for stranger in self.publishers:

@@ -66,6 +66,8 @@ class Monitor:
         self._try_budget = TryBudget()
         self._empty_graph: GraphSnapshot | None = None
         self._ends_pauses = node.resolve_service_name("~/resume")
+        self.inactive: str | None = None
+        """The node's name, while it is managed and waits to be activated."""
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -153,6 +155,7 @@ class Monitor:
             failure=binding.group.failure,
             pause=None if binding.group.paused_since is None else Pause(binding.group.paused_since, self._ends_pauses),
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
+            inactive=self.inactive,
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)

@@ -7,9 +7,11 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from types import TracebackType
 from typing import Self, TypeVar
 
+import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
 from syncrelay.config import Config
@@ -17,7 +19,7 @@ from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.calls import Calls
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.environment.transport import apply_transport
-from syncrelay.errors import SyncRelayError
+from syncrelay.errors import ReloadError, SyncRelayError
 from syncrelay.explain import GroupReport
 from syncrelay.logs import name_after
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
@@ -27,11 +29,12 @@ from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
+from syncrelay.ros.lifecycle import ManagedNode, Transitions
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.services import Offered, Services
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.status import Phase, RelayState
+from syncrelay.status import Phase, RelayState, advice
 from syncrelay.sync import DropReason
 from syncrelay.wakeup import Wakeup
 
@@ -46,6 +49,8 @@ _POLL_S = 1.0
 _ASKED_S = 3.0
 # What fails again at once must not take all of a core.
 _AFTER_FAILURE_S = 0.1
+_ACTIVE = (Phase.STARTING, Phase.RUNNING, Phase.PAUSED)
+_WITHOUT_GROUPS = (Phase.UNCONFIGURED, Phase.FINALIZED)
 # How long an end may take to see that reliable subscribers have what was published on all outputs. They say so
 # at the writer's next heartbeat only, which may be 3 s away.
 _ACKNOWLEDGE_NS = 300_000_000
@@ -67,6 +72,7 @@ class Relay:
         ros_args: Sequence[str] = (),
         on_turn: Callable[[], None] | None = None,
         purpose: Purpose = Purpose.RELAY,
+        manage: "Callable[[Relay], Transitions] | None" = None,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
 
@@ -74,7 +80,8 @@ class Relay:
 
         Raises ConfigError where remaps give two topics one name, UsageError where ROS rejects `ros_args`.
         `config_path` is what `state` calls the file. `on_turn` is called on the receive thread for as long as that
-        turns, once a second at least.
+        turns, once a second at least. `manage` gives what carries out the transitions of a managed node, which starts
+        without groups; without it the node is none, and all groups run.
         """
         apply_transport(config.node.transport, os.environ)
         if purpose is Purpose.OBSERVE:
@@ -82,7 +89,11 @@ class Relay:
         else:
             self._context = start(ros_args, simulated=config.node.use_sim_time)
             self.node = make_node(
-                config.node.name, namespace=config.node.namespace, context=self._context, ros_args=ros_args
+                config.node.name,
+                namespace=config.node.namespace,
+                context=self._context,
+                ros_args=ros_args,
+                make=rclpy.create_node if manage is None else partial(ManagedNode, transitions=manage(self)),
             )
             relay_name = self.node.get_fully_qualified_name()
         resolve = resolver(self.node, ros_args)
@@ -128,6 +139,7 @@ class Relay:
             changed=lambda config: self._report_on(bindings, config),
         )
         self._config_path = config_path
+        self._is_managed = manage is not None
         self._phase = Phase.STARTING
         self._asked = -_ASKED_S
         self._next_evaluation = time.monotonic() + EVALUATE_S
@@ -146,6 +158,9 @@ class Relay:
         gc.freeze()
         self._receiving = self._threads.submit(self._loop.run)
         self._receiving.add_done_callback(lambda _: self._wake.set())
+        if self._is_managed:
+            self.forget_groups(Phase.UNCONFIGURED)
+            _LOG.info("%s", self._advice)
         self._threads.submit(self._serve)
         self._clock.follow(jumped_back=self._groups.clock_jumped_back, ticked=self._groups.clock_ticked)
         return self
@@ -155,6 +170,11 @@ class Relay:
     ) -> None:
         self.close()
 
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The names of the groups that run, or will once the node is active."""
+        return tuple(group.config.name for group in self._groups.bindings.groups)
+
     def offer(self, services: Offered) -> None:
         """Offer services on the node; what they call is called on a thread that must not wait, or all of them would."""
         self._services = Services(self.node, services, bugs=self._bugs)
@@ -162,8 +182,10 @@ class Relay:
     def reload(self, config: Config) -> str:
         """Run the groups of a file that was read again, and say what changed.
 
-        On the main thread; raises as `Groups.reload`.
+        On the main thread; raises as `Groups.reload`, and ReloadError where a managed node has no groups.
         """
+        if self._phase in _WITHOUT_GROUPS:
+            raise ReloadError(self._advice)
         changed = self._groups.reload(config)
         # New groups are to be evaluated at once.
         self._next_evaluation = time.monotonic()
@@ -186,6 +208,41 @@ class Relay:
         _LOG.info("resumed")
         self.evaluate()
         return "resumed"
+    def configure(self, config: Config) -> None:
+        """Prepare the groups of a file, of a managed node that has none. On the main thread; raises as `reload`."""
+        self._groups.configure(config)
+        self._be_inactive()
+
+    def activate(self) -> None:
+        """Begin to receive and publish, as soon as there are publishers. On the main thread."""
+        self._groups.begin()
+        self.monitor.inactive = None
+        self._enter(Phase.STARTING)
+        self._poll_graph()
+
+    def deactivate(self) -> tuple[GroupReport, ...]:
+        """Drop what is buffered, stop receiving and publishing; report on each group. On the main thread."""
+        self._groups.hold(patience_ns=_ACKNOWLEDGE_NS)
+        self._be_inactive()
+        return self.evaluate()
+
+    def forget_groups(self, phase: Phase) -> None:
+        """Run no groups; `phase` is why. On the main thread."""
+        self._groups.forget()
+        self.monitor.inactive = None
+        self._enter(phase)
+
+    def _be_inactive(self) -> None:
+        self.monitor.inactive = self.node.get_fully_qualified_name()
+        self._enter(Phase.INACTIVE)
+
+    @property
+    def _advice(self) -> str | None:
+        return advice(self._phase, self.node.get_fully_qualified_name())
+
+    def _enter(self, phase: Phase) -> None:
+        self._phase = phase
+        self._next_evaluation = time.monotonic()
 
     def refuse_reload(self, reason: str) -> None:
         """Report in `state` that a reload failed, and why."""
@@ -249,8 +306,9 @@ class Relay:
         except CancelledError:
             # The receive thread has ended: the next turn raises why.
             return self.monitor.reports
-        self._phase = Phase.PAUSED if self._groups.is_paused else Phase.RUNNING
-        self._reporters.publish(self.monitor.reports)
+        if self._phase in _ACTIVE:
+            self._phase = Phase.PAUSED if self._groups.is_paused else Phase.RUNNING
+        self._reporters.publish(self.monitor.reports, advice=self._advice)
         return self.monitor.reports
 
     def state(self) -> RelayState:
@@ -271,7 +329,10 @@ class Relay:
         )
 
     def drain(self) -> tuple[GroupReport, ...]:
-        """Take in what has arrived, let go of what is buffered, stop receiving; report on each group a last time."""
+        """Take in what has arrived, let go of what is buffered, stop receiving; report on each group a last time.
+
+        What became of the messages of one that is inactive was reported as it was deactivated.
+        """
         self._calls.end()
         self._services.end()
         receiving, self._receiving = self._receiving, None
@@ -280,12 +341,10 @@ class Relay:
             self._loop.stop()
             receiving.result()
             self._groups.flush(DropReason.SHUTDOWN)
-            deadline = time.monotonic_ns() + _ACKNOWLEDGE_NS
-            for topic in self._groups.bindings.topics:
-                with self._bugs.contained(f"ending {topic.name}"):
-                    topic.outputs.wait_until_acknowledged(deadline)
+            with self._bugs.contained("ending the outputs"):
+                self._groups.bindings.wait_until_acknowledged(patience_ns=_ACKNOWLEDGE_NS)
             self.monitor.conclude()
-        return self.monitor.reports
+        return () if self._groups.bindings.is_held else self.monitor.reports
 
     def close(self) -> None:
         """Drain, then leave the ROS graph, also when draining fails."""

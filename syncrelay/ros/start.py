@@ -50,10 +50,17 @@ def start(ros_args: Sequence[str], *, simulated: bool) -> Context:
     return context
 
 
-def make_node(name: str, *, namespace: str, context: Context, ros_args: Sequence[str]) -> Any:
+def make_node(
+    name: str,
+    *,
+    namespace: str,
+    context: Context,
+    ros_args: Sequence[str],
+    make: Callable[..., Any] = rclpy.create_node,
+) -> Any:
     """Make the relay's node; raises as `start`."""
     try:
-        return rclpy.create_node(name, namespace=namespace, context=context)
+        return make(name, namespace=namespace, context=context)
     except NameValidationException as error:
         what, name, *_ = (line.strip(" '") for line in str(error).splitlines())
         raise _rejected(ros_args, f"{what} {quoted(name)}") from error

@@ -2,6 +2,6 @@
 
 from syncrelay.status.document import document, group_document
 from syncrelay.status.server import Server
-from syncrelay.status.state import Level, Phase, RelayState, is_ready, level
+from syncrelay.status.state import Level, Phase, RelayState, advice, is_ready, level
 
-__all__ = ["Level", "Phase", "RelayState", "Server", "document", "group_document", "is_ready", "level"]
+__all__ = ["Level", "Phase", "RelayState", "Server", "advice", "document", "group_document", "is_ready", "level"]

@@ -7,12 +7,15 @@ from syncrelay.explain import Endpoint, GroupReport, InputFacts
 
 
 class Phase(Enum):
-    """Where a relay is in its life."""
+    """Where a relay is in its life. Unconfigured, inactive and finalized are only managed nodes."""
 
+    UNCONFIGURED = "unconfigured"
+    INACTIVE = "inactive"
     STARTING = "starting"
     RUNNING = "running"
     PAUSED = "paused"
     DRAINING = "draining"
+    FINALIZED = "finalized"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,19 @@ def level(report: GroupReport) -> Level:
     if facts.is_silent and not any(each.figures.rate_hz for each in facts.inputs):
         return Level.STALE
     return [Level.OK, Level.WARN, Level.ERROR][max(finding.severity for finding in report.findings)]
+
+
+def advice(phase: Phase, node: str) -> str | None:
+    """Say why a managed node gives nothing, and what to do; None where its state is no reason."""
+    match phase:
+        case Phase.UNCONFIGURED:
+            return f"the node is unconfigured: configure it with `ros2 lifecycle set {node} configure`"
+        case Phase.INACTIVE:
+            return f"the node is inactive: activate it with `ros2 lifecycle set {node} activate`"
+        case Phase.FINALIZED:
+            return "the node is finalized: only a restart of its process brings it back"
+        case _:
+            return None
 
 
 def is_ready(state: RelayState) -> bool:

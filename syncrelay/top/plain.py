@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from textwrap import wrap
 
-from syncrelay.status import Level
+from syncrelay.status import Level, advice
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
 from syncrelay.top.state import Finding, Group, Input, Relay, State
@@ -32,7 +32,10 @@ def _summary_of(group: Group) -> str:
 
 def _of_relay(relay: Relay) -> str:
     up = phrases.seconds(relay.uptime_s)
-    return f"{phrases.phase(relay)}, up {up}, syncrelay {relay.version}, {relay.config}"
+    needed = advice(relay.phase, relay.node)
+    return "; ".join(
+        filter(None, [f"{phrases.phase(relay)}, up {up}, syncrelay {relay.version}, {relay.config}", needed])
+    )
 
 
 def _of_group(group: Group) -> str:

@@ -6,7 +6,7 @@ from typing import Final
 
 from rich.text import Text
 
-from syncrelay.status import Level
+from syncrelay.status import Level, advice
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
 from syncrelay.top.pieces import STYLES, line
@@ -59,13 +59,15 @@ class View:
 
 
 def title(view: View, width: int) -> list[Text]:
-    """Draw which relay it is and how it fares; a second line only where what is shown is not as of now."""
+    """Draw which relay it is and how it fares; more lines say what a managed node needs, or that it is stale."""
     relay = view.answer.state.relay
     place = view.answer.url.removeprefix("http://")
     fares = f"{phrases.phase(relay)}, up {phrases.seconds(relay.uptime_s)}"
     name = Text.assemble((relay.node, "bold"), f" at {place}")
     name.truncate(max(0, width - len(fares) - 2), overflow="ellipsis", pad=True)
     lines = [line(name, "  ", (fares, "" if relay.ready else STYLES[Level.WARN]))]
+    if (needed := advice(relay.phase, relay.node)) is not None:
+        lines.append(line((needed, STYLES[Level.WARN])))
     if view.trouble is not None:
         lines.append(
             line((f" STALE: no answer for {phrases.seconds(view.quiet_s)}: {view.trouble}; still trying ", "reverse"))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.graph import check_clock, check_graph, check_own_name
+from syncrelay.doctor.graph import check_clock, check_graph, check_own_name, check_state
 from syncrelay.doctor.groups import check_groups, check_sizes
 from syncrelay.explain import Code, Endpoint, GraphSnapshot, GroupReport, judge
 from syncrelay.sync.counts import InputCounts
@@ -50,6 +50,17 @@ def test_nodes_that_are_found_but_do_not_get_through_are_not_taken_for_absent():
     facts = a_silent_group(silent(publishers=(unreached,)), an_input("/lidar"))
     assert [each.code for each in judge(facts)] == [Code.SILENT]
     assert list(check_groups([report(facts)], [])) == []
+
+
+def test_a_managed_node_that_is_not_active_is_told_with_its_next_transition():
+    (found,) = check_state("inactive", "/robot/syncrelay")
+    assert (found.code, found.severity) == ("inactive", WARNING)
+    assert found.what == "/robot/syncrelay: the node is inactive"
+    assert found.fix == "activate it with `ros2 lifecycle set /robot/syncrelay activate`"
+    (found,) = check_state("unconfigured", "/syncrelay")
+    assert found.fix == "configure it with `ros2 lifecycle set /syncrelay configure`"
+    assert "restart" in next(check_state("finalized", "/syncrelay")).fix
+    assert [*check_state("active", "/syncrelay"), *check_state("activating", "/s"), *check_state(None, "/s")] == []
 
 
 @pytest.mark.parametrize(("count", "found"), [(0, []), (1, [("node_name", INFO)]), (2, [("node_name", ERROR)])])

@@ -49,6 +49,19 @@ def test_what_is_explained_is_not_found_while_its_cause_is():
     assert codes(judge(a_group(figures=WIDE))) == [Code.OVER_SLOP]
 
 
+def test_an_inactive_node_explains_all_but_what_can_be_mended_before_it_is_active():
+    ill = camera(publishers=(), figures={"last_received": None}, counts=overflowing(40).counts)
+    silent = a_silent_group(ill, LIDAR, figures=WIDE, waited=3 * S, inactive="/syncrelay")
+    assert codes(judge(silent)) == [Code.INACTIVE]
+    assert explanation(with_ok(silent, judge(silent))).severity is Severity.WARN
+    stranger = camera(publishers=(Endpoint("/usb_cam", "std_msgs/msg/Int64"),))
+    assert codes(judge(a_silent_group(stranger, LIDAR, inactive="/syncrelay"))) == [Code.INACTIVE, Code.OTHER_TYPE]
+    assert codes(judge(a_group(LIDAR, failure="KeyError", inactive="/syncrelay"))) == [
+        Code.INTERNAL_ERROR,
+        Code.INACTIVE,
+    ]
+
+
 def test_a_cause_is_remembered_while_the_messages_of_its_time_are_judged_by():
     a_judge = Judge()
     assert codes(a_judge.judge(a_group(figures=WIDE, waited=3 * S))) == [Code.TOO_SLOW]

@@ -24,6 +24,13 @@ FOUND = {
         "a bug in syncrelay stopped this group: KeyError: 'x'",
         "report it with the traceback in the log; `syncrelay reload` starts the group again",
     ),
+    "a managed node that waits to be activated": (
+        Code.INACTIVE,
+        Severity.WARN,
+        a_silent_group(camera(publishers=()), LIDAR, inactive="/robot/syncrelay"),
+        "the node is inactive: it receives and publishes nothing",
+        "activate it with `ros2 lifecycle set /robot/syncrelay activate`",
+    ),
     "an output whose topic has another type here": (
         Code.REFUSED_BY_DDS,
         Severity.ERROR,
