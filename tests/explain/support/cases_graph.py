@@ -50,7 +50,7 @@ FOUND = {
         Severity.ERROR,
         a_group(camera(not_readable="sensor_msgs/msg/Image has no usable field trigger: no such field"), LIDAR),
         "/camera: sensor_msgs/msg/Image has no usable field trigger: no such field",
-        "name another field at `stamp` or `key`, then `syncrelay reload`",
+        "name a field that it has at `stamp` or `key`, or write `stamp: receive`, then `syncrelay reload`",
     ),
     "a publisher of another type": (
         Code.OTHER_TYPE,
