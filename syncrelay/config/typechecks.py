@@ -103,7 +103,7 @@ def _no_header(
         f"{quoted(type_name)} does not begin with a std_msgs/msg/Header, so it has no stamp there:"
         f" write `stamp: receive` to use the time of arrival{own}"
     )
-    key = "stamp" if document.has((*path, "stamp")) else "type"
+    key = next((key for key in ("stamp", "type") if document.has((*path, key))), "topic")
     return document.problem((*path, key), text, code="no_header", subject=type_name)
 
 
