@@ -15,7 +15,7 @@ from syncrelay.ros.inputs import TopicInput
 from syncrelay.ros.outputs import InputBinding
 from syncrelay.sync import DropReason
 
-_Key: TypeAlias = tuple[str, str, str]
+_Key: TypeAlias = tuple[str, str | None, str]
 
 
 @dataclass(frozen=True, slots=True)
