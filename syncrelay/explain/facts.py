@@ -150,7 +150,8 @@ class GroupFacts:
     of the others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
-    late; `failure` what stopped the group for good; `empty_graph` the graph, where it holds no node but our own.
+    late; `failure` what stopped the group for good; `asleep` that it is lazy and nobody subscribes to what it gives, so
+    that it receives nothing; `empty_graph` the graph, where it holds no node but our own.
     `evaluator` tries other values of the file on the last messages, None where they cannot be run again.
     """
 
@@ -171,6 +172,7 @@ class GroupFacts:
     waited: int = 0
     standstill: Standstill | None = None
     failure: str | None = None
+    asleep: bool = False
     evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
 
@@ -211,7 +213,7 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        return self.silent_for >= self.silent_after
+        return not self.asleep and self.silent_for >= self.silent_after
 
     @property
     def silent_for(self) -> int:

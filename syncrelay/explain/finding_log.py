@@ -52,6 +52,9 @@ class FindingLog:
         if now < self._now:
             self._set_back(self._now - now)
         self._now = now
+        if facts.asleep:
+            # That no set leaves is as it should be, and no recovery.
+            self._quiet_since, self._told = None, False
         if facts.is_silent:
             if findings:
                 yield from self._silent(facts, explanation(findings), now)

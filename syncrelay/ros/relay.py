@@ -198,6 +198,8 @@ class Relay:
 
     def _poll_graph(self) -> None:
         has_changed = self._graph_changes.seen()
+        with self._bugs.contained("counting subscribers"):
+            self._groups.bindings.count_listeners()
         for topic in self._groups.bindings.topics:
             if has_changed or topic.is_due:
                 with self._bugs.contained(f"polling {topic.name}"):

@@ -46,7 +46,7 @@ _MEANINGS: Final[Mapping[DropReason, str]] = MappingProxyType(
         DropReason.UNSTAMPED: "its stamp is 0",
         DropReason.MALFORMED: "no stamp could be read",
         DropReason.THINNED: "its set was left out",
-        DropReason.SHUTDOWN: "the relay ended",
+        DropReason.SHUTDOWN: "its group stopped",
     }
 )
 
