@@ -254,7 +254,7 @@ class TopicInput:
                 self._entities.end(entity)
 
     def _swap(self, source: Source | None, publishers: Mapping[InputBinding, Any]) -> list[Any]:
-        """Receive from another source, or none, and publish by others; the publishers that end. On the loop's thread."""
+        """Receive from another source, or none, publish by others; the publishers that end. On the loop's thread."""
         # First what may fail.
         if source is not None:
             self._loop.add(source, self._fail)
