@@ -1,8 +1,6 @@
 """Lazy groups: they receive while somebody listens, and only then."""
 
-import json
 import re
-from typing import Any
 
 import pytest
 
@@ -32,8 +30,9 @@ def _subscribed(observer: Collector, topic: str = "/camera") -> bool:
     return bool(observer.endpoints(topic, kind="subscription", node="/syncrelay"))
 
 
-def _inputs(relay: Process, group: str = "front") -> list[dict[str, Any]]:
-    return next(each["inputs"] for each in status(relay)["groups"] if each["name"] == group)
+def _received(relay: Process, group: str) -> int:
+    """How many messages of its first input a group has received; 0 of one that was not looked at yet."""
+    return sum(each["inputs"][0]["received"] for each in status(relay)["groups"] if each["name"] == group)
 
 
 def _said_of_groups(relay: Process) -> list[str]:
@@ -62,7 +61,47 @@ def test_a_lazy_group_receives_only_while_somebody_listens(stage: Stage):
         listener.process.ask_to_end()
         wait_until(lambda: not _subscribed(observer) and not _subscribed(observer, "/lidar"), "the end of the inputs")
         wait_for_finding(relay, "nobody_listens")
-    for each in _inputs(relay):
+    for each in status(relay)["groups"][0]["inputs"]:
         assert each["buffered"] == 0
         assert each["received"] == each["matched"] + sum(each["dropped"].values())
     assert _said_of_groups(relay) == [_WAITS, _RUNS, _WAITS, _RUNS, _WAITS]
+
+
+def test_a_sleeping_group_gets_nothing_of_a_topic_that_another_group_receives(stage: Stage):
+    observer, player = stage.collector(node="observer"), stage.player(_PAIR)
+    player.start(_stream(*_PAIR), speed=1)
+    rear = {"policy": "exact_time", "topics": inputs(_PAIR)}
+    file = ReloadedFile(stage, front=_LAZY, rear=rear)
+    wait_until(lambda: _received(file.relay, "rear") >= 20, "messages of the group that is awake")
+    assert _received(file.relay, "front") == 0
+    listener = stage.collector({"/front/lidar": VECTOR})
+    listener.wait_for("/front/lidar", 20)
+    assert len(observer.endpoints("/camera", kind="subscription", node="/syncrelay")) == 1
+    file.reload(front={**_LAZY, "lazy": False})
+    file.reload(front=_LAZY)
+    # The outputs keep their subscriber, and the group does not sleep for a moment.
+    listener.wait_for("/front/lidar", listener.count("/front/lidar") + 20)
+    assert _WAITS not in file.relay.stderr.split("reloaded")[-1]
+    listener.process.ask_to_end()
+    wait_until(lambda: not _subscribed(observer), "the end of the inputs")
+    file.reload(front={**_LAZY, "lazy": False})
+    wait_until(lambda: _received(file.relay, "front") >= 20, "messages of the group that is lazy no more")
+
+
+def test_a_sleeping_group_offers_what_its_publishers_offer_now(stage: Stage):
+    observer = stage.collector(node="observer")
+    relay = stage.relay(config({"front": _LAZY}, metrics=ANY_PORT))
+    wait_for_finding(relay, "no_publisher")
+    for reliability in ("reliable", "best_effort"):
+        player = stage.player(_PAIR, node=reliability, reliability=reliability)
+        wait_until(lambda offered=reliability: _offered(observer) == [offered], "the QoS of the publishers")
+    assert not _subscribed(observer)
+    assert [each["code"] for each in status(relay)["groups"][0]["findings"]] == ["nobody_listens"]
+    listener = stage.collector({"/front/lidar": VECTOR}, reliability="best_effort")
+    player.match()
+    player.start(_stream(*_PAIR), speed=1)
+    listener.wait_for("/front/lidar", 5)
+
+
+def _offered(observer: Collector) -> list[str]:
+    return [each["reliability"] for each in observer.endpoints("/front/lidar", kind="publisher")]
