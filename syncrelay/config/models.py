@@ -303,6 +303,13 @@ class Group(Keys):
         ),
         examples=["none", "earliest", "latest", "/lidar/points"],
     )
+    lazy: bool = Field(
+        default=False,
+        description=(
+            "Subscribe to the inputs only while somebody subscribes to one of the outputs; what waits when the last"
+            " one has gone is dropped. Default: false."
+        ),
+    )
     output_prefix: Annotated[OutputPrefix | None, NOT_NULL] = Field(
         default=None,
         description="What default output names begin with. Default: / and the group's name.",

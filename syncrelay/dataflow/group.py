@@ -65,6 +65,10 @@ class GroupRelay:
         """Since when it is paused, in nanoseconds of the system clock; None of one that is not."""
         self.last: deque[tuple[int | None, ...] | RecentDrop] = deque(maxlen=_RECENT)
         """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
+        self.sleeps = False
+        """Whether nothing is fed, because nobody listens."""
+        self.woke: int | None = None
+        """When it was last fed again after a sleep, by the system clock in nanoseconds."""
         self.unpublished: dict[int, Unpublished] = {}
         """The inputs of which the last message could not be published."""
         self._now = now
@@ -123,6 +127,15 @@ class GroupRelay:
                 self._conclude(self._resumed(message, DropReason.SHUTDOWN if lacks else reason))
         except Exception as error:  # noqa: BLE001  it is this group's alone
             self.fail(error)
+
+    def sleep(self) -> None:
+        """Drop all that is buffered: nothing more is fed until `wake`."""
+        self.sleeps = True
+        self.flush(DropReason.SHUTDOWN)
+
+    def wake(self) -> None:
+        """Be fed again."""
+        self.sleeps, self.woke = False, time.time_ns()
 
     def _resumed(self, message: Message, reason: DropReason | None) -> Sequence[Match | Drop]:
         if reason is not None:

@@ -161,7 +161,8 @@ class GroupFacts:
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
     graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
     late; `failure` what stopped the group for good; `pause` since when it is paused, and `unpaused` when the last pause
-    ended; `empty_graph` the graph, where it holds no node but our own.
+    ended; `asleep` that it is lazy and nobody subscribes to what it gives; `empty_graph` the graph, where it holds no
+    node but our own.
     `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
     the name of a managed node that waits to be activated.
     """
@@ -185,6 +186,7 @@ class GroupFacts:
     failure: str | None = None
     pause: Pause | None = None
     unpaused: int | None = None
+    asleep: bool = False
     evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
     inactive: str | None = None
@@ -226,7 +228,8 @@ class GroupFacts:
     @property
     def is_silent(self) -> bool:
         """Whether sets that should have come did not."""
-        return self.pause is None and self.inactive is None and self.silent_for >= self.silent_after
+        is_resting = self.asleep or self.pause is not None or self.inactive is not None
+        return not is_resting and self.silent_for >= self.silent_after
 
     @property
     def silent_for(self) -> int:

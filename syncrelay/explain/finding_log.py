@@ -56,6 +56,11 @@ class FindingLog:
         if now < self._now:
             self._set_back(self._now - now)
         self._now = now
+        if facts.asleep:
+            # That no set leaves is as it should be, and that nothing is found no sign that anything is over.
+            self._quiet_since, self._told = None, False
+            for (code, _), warning in self._warned.items():
+                warning.holds = warning.holds and code not in explained
         if facts.is_silent:
             if findings:
                 yield from self._silent(facts, explanation(findings), now)

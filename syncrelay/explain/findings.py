@@ -31,6 +31,7 @@ class Code(Enum):
     ALONE = "alone"
     NO_PUBLISHER = "no_publisher"
     INCOMPATIBLE_QOS = "incompatible_qos"
+    NOBODY_LISTENS = "nobody_listens"
     NO_CLOCK = "no_clock"
     CLOCK_STOPPED = "clock_stopped"
     TOO_SLOW = "too_slow"

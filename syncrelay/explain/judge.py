@@ -31,6 +31,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     rules_graph.alone,
     rules_graph.no_publisher,
     of_each_input(rules_graph.incompatible_qos),
+    rules_graph.nobody_listens,
     rules_graph.no_clock,
     rules_graph.clock_stopped,
     rules_flow.too_slow,
@@ -60,7 +61,7 @@ _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
 _OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET})
 """What a drift brings about, and sooner than it can be proven."""
 _OF_GRAPH: Final = frozenset(
-    {Code.ALONE, Code.NO_PUBLISHER, Code.TYPE_NOT_IMPORTABLE, Code.SEVERAL_TYPES, Code.NO_CLOCK}
+    {Code.ALONE, Code.NO_PUBLISHER, Code.TYPE_NOT_IMPORTABLE, Code.SEVERAL_TYPES, Code.NOBODY_LISTENS, Code.NO_CLOCK}
 )
 _WAIT: Final = "wait some seconds: it is not known yet whether a clock drifts"
 
@@ -89,6 +90,27 @@ _MATCHING: Final = frozenset(
     }
 )
 _ORDER: Final = frozenset({Code.TIME_JUMP, Code.OUT_OF_ORDER, Code.DUPLICATES})
+_FLOW: Final = (
+    _MATCHING
+    | _ORDER
+    | {
+        Code.NO_CLOCK,
+        Code.CLOCK_STOPPED,
+        Code.TOO_SLOW,
+        Code.SILENT,
+        Code.MALFORMED,
+        Code.UNSTAMPED,
+        Code.SEVERAL_PUBLISHERS,
+        Code.CLOCK_STEP,
+        Code.CLOCK_DRIFT,
+        Code.OTHER_CLOCK,
+        Code.NO_COMMON_KEY,
+        Code.SLOWED,
+        Code.BURSTS,
+        Code.MESSAGES_LOST,
+    }
+)
+"""What messages tell, and not the graph."""
 
 # What can be mended before the node is activated.
 _SAID_OF_THE_INACTIVE: Final = frozenset(
@@ -104,6 +126,7 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.NO_PUBLISHER: _Explained(_MATCHING),
     Code.TYPE_NOT_IMPORTABLE: _Explained(_MATCHING),
     Code.SEVERAL_TYPES: _Explained(_MATCHING),
+    Code.NOBODY_LISTENS: _Explained(_FLOW),
     Code.NO_CLOCK: _Explained(frozenset({Code.SILENT, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.CLOCK_STOPPED: _Explained(_MATCHING | {Code.SILENT, Code.SLOWED}),
     Code.TOO_SLOW: _Explained(
@@ -259,7 +282,7 @@ def _seen_since(code: Code, facts: GroupFacts) -> int:
 
 def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Add to what is not as usual that a group is well, or starts; in figures that cost more than all rules."""
-    if not _is_well(found):
+    if facts.asleep or not _is_well(found):
         return found
     if facts.figures.last_set is None:
         since = words.seconds(facts.figures.now - facts.figures.began)

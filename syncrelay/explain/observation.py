@@ -112,6 +112,16 @@ class Observation:
         )
         return group, inputs
 
+    def begin_again(self, at: int) -> None:
+        """Bear that nothing was fed for a while, until now: what came before tells nothing. What left is kept."""
+        self._began, self._last_set, self._resumed = at, None, None
+        self._polls = deque(poll._replace(at=at, sent=0) for poll in [*self._polls][-1:])
+        self._inputs = [InputObservation() for _ in self._inputs]
+        self._paces = [None] * len(self._inputs)
+        self._sets_since_without = [0] * len(self._inputs)
+        self._forget_nearest()
+        self._clear_nearest_spans()
+
     def forget_publishers(self, index: int) -> None:
         """Bear that others publish an input now than did."""
         self._inputs[index].forget_publishers()
@@ -136,11 +146,14 @@ class Observation:
         for kept in (self._nearest, self._nearest_at, self._nearest_since):
             del kept[:]
 
+    def _clear_nearest_spans(self) -> None:
+        for spans in (self._nearest_spans, *self._with_optional.values()):
+            spans.clear()
+
     def _measure_nearest(self, arrivals: Sequence[Arrivals], now: int, *, has_jumped: bool) -> None:
         if has_jumped:
             del self._nearest_since[:]
-            for spans in (self._nearest_spans, *self._with_optional.values()):
-                spans.clear()
+            self._clear_nearest_spans()
             return
         shifted = [
             [stamp + offset for stamp, _ in came if stamp] for came, offset in zip(arrivals, self._offsets, strict=True)

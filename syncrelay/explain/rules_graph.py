@@ -244,6 +244,16 @@ def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Fou
             )
 
 
+def nobody_listens(facts: GroupFacts) -> Found:
+    """Find that a lazy group sleeps, as it should."""
+    if facts.asleep:
+        outputs = [each for each in facts.inputs if each.graph.publishers] or facts.inputs
+        names = one_of(each.output for each in outputs)
+        some = any(each.graph.subscribers for each in outputs)
+        who = f"no subscriber of {names} fits what the relay offers" if some else f"nobody subscribes to {names}"
+        yield Finding(Code.NOBODY_LISTENS, Severity.OK, f"{who}, so this lazy group receives nothing")
+
+
 def no_clock(facts: GroupFacts) -> Found:
     """Find that time is simulated and that nobody has told it."""
     if facts.clock is not None and not facts.clock.received and facts.clock.stopped is not None:
@@ -292,11 +302,12 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
     if not fitting:
         return None
     node, quiet = fitting[0].node, now - (figures.last_received or now)
-    if an_input.counts.fed == 0 and now - facts.figures.began >= _NO_MESSAGE:
+    if figures.last_received is None and not figures.fed and now - facts.figures.began >= _NO_MESSAGE:
+        lately = " lately" if an_input.counts.fed else ""
         return Finding(
             Code.SILENT,
             blocks(facts, an_input),
-            f"{node} publishes {an_input.name}, but no message has arrived",
+            f"{node} publishes {an_input.name}, but no message has arrived{lately}",
             f"check with `ros2 topic hz {an_input.name}` whether {node} is sending; if so, run `syncrelay doctor"
             " --config FILE --live`",
             index,

@@ -25,6 +25,7 @@ class GroupWatch:
         self._publishers = [0] * len(config.topics)
         self._was_paused = False
         self._unpaused: int | None = None
+        self._woke: int | None = None
         self._observation = Observation(
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
@@ -44,12 +45,18 @@ class GroupWatch:
         *,
         keys: Sequence[Hashable] | None = None,
         by_clock: Callable[[int], int] | None = None,
+        woke: int | None = None,
         now: int,
     ) -> None:
         """Take what came and left since the last call; see Observation. `keys` are the newest messages'.
 
-        `by_clock` tells, where time is simulated, what its clock showed at a time of receipt.
+        `by_clock` tells, where time is simulated, what its clock showed at a time of receipt. `woke` is when the group
+        was last fed again after a sleep: it is judged by what came since.
         """
+        if woke is not None and woke != self._woke:
+            self._woke = woke
+            self._observation.begin_again(woke)
+            arrivals = [[each for each in came if each[1] >= woke] for came in arrivals]
         self._counts = tuple(counts)
         if keys is not None:
             self._keys = keys
@@ -67,6 +74,7 @@ class GroupWatch:
         standstill: Standstill | None = None,
         failure: str | None = None,
         pause: Pause | None = None,
+        asleep: bool = False,
         empty_graph: GraphSnapshot | None = None,
         inactive: str | None = None,
     ) -> GroupFacts:
@@ -107,6 +115,7 @@ class GroupWatch:
             failure=failure,
             pause=pause,
             unpaused=self._unpaused,
+            asleep=asleep,
             evaluator=self._evaluator,
             empty_graph=empty_graph,
             inactive=inactive,

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from syncrelay.config import TopicConfig
+from syncrelay.config.wording import one_of
 from syncrelay.dataflow.backend import RclBackend
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
-from syncrelay.ros.entities import Entities, RefusedError
+from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.ros.inputs import TopicInput
+from syncrelay.ros.listeners import Listeners
 from syncrelay.ros.outputs import InputBinding
 from syncrelay.sync import DropReason
 
@@ -31,7 +33,15 @@ class GroupBinding:
         if self.group.failure is not None:
             return "a reload or restart: a bug stopped it"
         required = [each for each in self.inputs if self.group.config.topics[each.index].required]
-        return ", ".join(filter(None, (each.missing for each in required))) or None
+        missing = ", ".join(filter(None, (each.missing for each in required)))
+        if self.group.sleeps and self.publishers and not missing:
+            return f"a subscriber of {one_of(each.topic_name for each in self.publishers)}"
+        return missing or None
+
+    @property
+    def publishers(self) -> list[Any]:
+        """Those whose subscribers keep a lazy group awake. On the main thread."""
+        return [each.publisher for each in self.inputs if each.publisher is not None]
 
 
 class GroupBindings:
@@ -46,6 +56,7 @@ class GroupBindings:
         self._backend = backend
         self._loop = loop
         self._topics: dict[_Key, TopicInput] = {}
+        self._listeners = Listeners(loop)
 
     @property
     def groups(self) -> list[GroupRelay]:
@@ -56,6 +67,14 @@ class GroupBindings:
     def topics(self) -> list[TopicInput]:
         """Each topic once."""
         return list(self._topics.values())
+
+    def count_listeners(self) -> None:
+        """Have lazy groups sleep while nobody subscribes to what they give. One that only observes has none.
+
+        On the main thread.
+        """
+        if self._entities.purpose is Purpose.RELAY:
+            self._listeners.count([binding for binding in self.all if binding.group.config.options.lazy])
 
     def run(self, groups: Sequence[GroupRelay]) -> None:
         """Run these groups and no other; those that ran already are left as they are. On the main thread.
@@ -160,7 +179,14 @@ class GroupBindings:
 
     def _binding(self, group: GroupRelay, topics: dict[_Key, TopicInput]) -> GroupBinding:
         inputs = enumerate(self._topic(config, topics) for config in group.config.topics)
+        if group.config.options.lazy and self._entities.purpose is Purpose.RELAY and not self._may_be_heard(group):
+            group.sleep()
         return GroupBinding(group, tuple(topic.bind(group, index) for index, topic in inputs))
+
+    def _may_be_heard(self, group: GroupRelay) -> bool:
+        """Whether a group's outputs have subscribers, of whatever QoS, as where a reload puts it in another's place."""
+        names = [self._node.resolve_topic_name(topic.output) for topic in group.config.topics]
+        return any(map(self._node.count_subscribers, names))
 
     def _topic(self, config: TopicConfig, topics: dict[_Key, TopicInput]) -> TopicInput:
         name = self._node.resolve_topic_name(config.topic)

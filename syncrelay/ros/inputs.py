@@ -52,7 +52,7 @@ class TopicInput:
         self.profile: Any = None
         """The QoS of the subscription and of the outputs; None as long as nothing can come in."""
         self.entity: Any = None
-        """The subscription; None as long as there is none."""
+        """The subscription; None as long as there is none, or all groups that use it sleep."""
         self._topic = config.topic
         self._qos = config.qos
         self._entities = entities
@@ -83,6 +83,11 @@ class TopicInput:
     @property
     def _is_refused(self) -> bool:
         return self.refusal is not None or self.outputs.are_refused
+
+    @property
+    def _is_wanted(self) -> bool:
+        """Whether a group that uses it is awake."""
+        return not all(binding.group.sleeps for binding in self.outputs.bindings)
 
     @property
     def _may_try(self) -> bool:
@@ -220,9 +225,9 @@ class TopicInput:
             _LOG.log(level, "%s", text)
 
     def _follow(self, profile: Any) -> None:
-        """Have a subscription of this QoS, and all publishers, as far as DDS makes them."""
+        """Have a subscription of this QoS, if one is wanted, and all publishers, as far as DDS makes them."""
         try:
-            if profile != self.profile:
+            if profile != self.profile or self._is_wanted is (self.entity is None):
                 self._exchange(profile)
         except RefusedError as error:
             self._refused(error.refusal)
@@ -246,28 +251,31 @@ class TopicInput:
         self._say_once(logging.ERROR, refusal.text)
 
     def _exchange(self, profile: Any) -> None:
-        """Replace the subscription and its outputs by ones of another QoS; raises RefusedError, with nothing changed.
+        """Replace the subscription, by none if none is wanted; of another QoS, the outputs too.
 
-        An output that DDS does not make again stays as it was.
+        Raises RefusedError, with nothing changed. An output that DDS does not make again stays as it was.
         """
-        subscription = self._entities.subscription(self._message_type, self._topic, profile)
-        publishers, refused = self.outputs.remake(self._message_type, profile)
+        is_wanted, publishers, refused = self._is_wanted, dict[InputBinding, Any](), list[Refusal]()
+        subscription = self._entities.subscription(self._message_type, self._topic, profile) if is_wanted else None
+        if profile != self.profile:
+            publishers, refused = self.outputs.remake(self._message_type, profile)
         for refusal in refused:
             self._put_off(refusal)
-        lost = None
+        lost = source = None
         try:
-            lost = _loss_counter(subscription)
-            source = self._backend.source(subscription, self.outputs.deliver)
+            if subscription is not None:
+                lost = _loss_counter(subscription)
+                source = self._backend.source(subscription, self.outputs.deliver)
             old = self._loop.call(lambda: self._swap(source, publishers)).result()
         except BaseException as error:
             # It would hold on to the subscription.
             lost = None
-            for entity in (*publishers.values(), subscription):
+            for entity in filter(None, (*publishers.values(), subscription)):
                 self._entities.end(entity)
             if isinstance(error, _OF_RCL):
                 raise RefusedError(self._refusal(str(error))) from error
             raise
-        if self.profile is not None:
+        if self.entity is not None and subscription is not None:
             _LOG.info("%s: subscribed again, because the QoS of its publishers changed", self.name)
         old.append(self.entity)
         self.profile, self._lost, self.entity = profile, lost, subscription
@@ -275,10 +283,11 @@ class TopicInput:
             if entity is not None:
                 self._entities.end(entity)
 
-    def _swap(self, source: Source, publishers: Mapping[InputBinding, Any]) -> list[Any]:
-        """Receive from another source, and publish by others; the publishers that are over. On the loop's thread."""
+    def _swap(self, source: Source | None, publishers: Mapping[InputBinding, Any]) -> list[Any]:
+        """Receive from another source, or none, publish by others; the publishers that end. On the loop's thread."""
         # First what may fail.
-        self._loop.add(source, self._fail)
+        if source is not None:
+            self._loop.add(source, self._fail)
         before = self.outputs.source
         old = self.outputs.exchange(source, publishers)
         if before is not None:

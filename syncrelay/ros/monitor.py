@@ -129,7 +129,8 @@ class Monitor:
         if self._clock is not None:
             self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
         for topic, losses in self._losses.items():
-            losses.observe(topic.lost(), publishers=len(topic.publishers))
+            # A new subscription hears them anew.
+            losses.observe(topic.lost(), publishers=len(topic.publishers) if topic.entity is not None else 0)
         self._empty_graph = self._surroundings.empty_graph()
         for binding, batch in zip(bindings, batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
@@ -143,7 +144,16 @@ class Monitor:
     def _evaluate_group(self, binding: GroupBinding, batch: Batch, now: int) -> None:
         watch, judge, log = self._watched[binding.group]
         by_clock = self._clock.at if self._clock and self._clock.is_steady else None
-        watch.add(batch.arrivals, batch.sets, batch.counts, batch.n_sets, keys=batch.keys, by_clock=by_clock, now=now)
+        watch.add(
+            batch.arrivals,
+            batch.sets,
+            batch.counts,
+            batch.n_sets,
+            keys=batch.keys,
+            by_clock=by_clock,
+            woke=binding.group.woke,
+            now=now,
+        )
         shown = [self._surroundings.of(each, lost=self._losses[each.topic].recent) for each in binding.inputs]
         facts = watch.facts(
             shown,
@@ -154,6 +164,7 @@ class Monitor:
             standstill=self.standstills.longest,
             failure=binding.group.failure,
             pause=None if binding.group.paused_since is None else Pause(binding.group.paused_since, self._ends_pauses),
+            asleep=binding.group.sleeps,
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
         )

@@ -122,7 +122,7 @@ class Outputs:
         self.bindings = [binding for binding in self.bindings if binding.group is not group]
         self.feed()
 
-    def exchange(self, source: Source, publishers: Mapping[InputBinding, Any]) -> list[Any]:
+    def exchange(self, source: Source | None, publishers: Mapping[InputBinding, Any]) -> list[Any]:
         """Be fed by another source, and publish by these publishers; those that they replace."""
         self.source = source
         old = [binding.publisher for binding in publishers]
@@ -141,8 +141,9 @@ class Outputs:
         self.feed()
 
     def feed(self) -> None:
-        """Feed those that have a handler, and whose messages can leave."""
-        self._handlers = [each.handler for each in self.bindings if each.handler and not each.publisher_refusal]
+        """Feed those that have a handler, whose messages can leave, and whose group is awake."""
+        fed = [each for each in self.bindings if not each.publisher_refusal and not each.group.sleeps]
+        self._handlers = [each.handler for each in fed if each.handler]
         if self.source is None:
             return
         if self._publishes:

@@ -208,6 +208,7 @@ class Relay:
         _LOG.info("resumed")
         self.evaluate()
         return "resumed"
+
     def configure(self, config: Config) -> None:
         """Prepare the groups of a file, of a managed node that has none. On the main thread; raises as `reload`."""
         self._groups.configure(config)
@@ -283,6 +284,8 @@ class Relay:
 
     def _poll_graph(self) -> None:
         has_changed = self._graph_changes.seen()
+        with self._bugs.contained("counting subscribers"):
+            self._groups.bindings.count_listeners()
         for topic in self._groups.bindings.topics:
             if has_changed or topic.is_due:
                 with self._bugs.contained(f"polling {topic.name}"):

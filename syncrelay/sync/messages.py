@@ -48,7 +48,7 @@ _MEANINGS: Final[Mapping[DropReason, str]] = MappingProxyType(
         DropReason.MALFORMED: "no stamp could be read",
         DropReason.THINNED: "its set was left out",
         DropReason.PAUSED: "the relay was paused",
-        DropReason.SHUTDOWN: "the relay ended",
+        DropReason.SHUTDOWN: "its group stopped",
     }
 )
 

@@ -29,7 +29,7 @@ from syncrelay.explain import (
     Standstill,
 )
 from syncrelay.ros.types import SettlingType
-from syncrelay.sync import Match, Message, Outcome
+from syncrelay.sync import DropReason, Match, Message, Outcome
 
 S = 1_000_000_000
 MS = 1_000_000
@@ -132,6 +132,7 @@ def run(
     options: dict[str, Any] | None = None,
     stops: Sequence[tuple[float, float]] = (),
     starved: Sequence[tuple[float, float]] = (),
+    sleeps: Sequence[tuple[int, int]] = (),
     publishers: Callable[[str, float], tuple[Endpoint, ...]] | None = None,
     facts: Callable[[float], dict[str, Any]] | None = None,
 ) -> Told:
@@ -139,8 +140,8 @@ def run(
 
     `stops` are when the whole process stands still, as by SIGSTOP, each from one second to another: what comes
     meanwhile is received at the end. `starved` is the same of the thread that takes messages: they are received in
-    time, and lie there. `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of
-    `GroupWatch.facts`.
+    time, and lie there. `sleeps` is when nobody listens to a lazy group: it receives nothing. `publishers` gives
+    what the graph shows of a topic at a second, `facts` more keywords of `GroupWatch.facts`.
     """
     config = group_of(sources, options or {})
     names = [topic.topic for topic in config.topics]
@@ -148,7 +149,8 @@ def run(
         *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources))
     )
     relay = _Relay(config)
-    waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in arrivals)
+    heard = (each for each in arrivals if _until(sleeps, each[0]) == each[0])
+    waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in heard)
     taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)
     place = 0
     shown = publishers or (lambda topic, _: tuple(each.endpoint for each in sources if each.topic == topic))
@@ -161,6 +163,8 @@ def run(
             relay.take(Arrival(index, stamp, _ns(received)), now=_ns(at), waited=_ns(at) - _ns(received))
             place += 1
         stop = next(((begin, end) for begin, end in stops if second - 1 <= end <= second), None)
+        relay.asleep = _until(sleeps, second) > second
+        relay.woke = max((_ns(end) for _, end in sleeps if end <= second), default=None)
         standstill = stop and Standstill(_ns(stop[1]), round((stop[1] - stop[0]) * S))
         relay.poll(
             second, [shown(name, float(second)) for name in names], standstill, (facts or (lambda _: {}))(second)
@@ -226,6 +230,8 @@ class _Relay:
         self._sent: list[tuple[tuple[int | None, ...], int]] = []
         self._waits: list[int] = [0]
         self._standstills: list[Standstill | None] = []
+        self.asleep = False
+        self.woke: int | None = None
         self.lines: list[Line] = []
         self.found: list[tuple[int, tuple[Finding, ...]]] = []
         self.facts: GroupFacts | None = None
@@ -255,9 +261,11 @@ class _Relay:
         """Poll as the monitor does, and write what the log is told."""
         now = BEGAN + second * S
         self._driver.expire(now)
+        if self.asleep:
+            self._driver.engine.flush(DropReason.SHUTDOWN)
         self._standstills = [*self._standstills[-9:], standstill]
         engine = self._driver.engine
-        self._watch.add(self._arrived, self._sent, engine.counts(), engine.sets, now=now)
+        self._watch.add(self._arrived, self._sent, engine.counts(), engine.sets, woke=self.woke, now=now)
         self._arrived, self._sent = tuple([] for _ in range(self._n_inputs)), []
         for index, settling in enumerate(self._settling):
             if settling is not None and self._taken[index] is None:
@@ -269,7 +277,9 @@ class _Relay:
         worst = max((each for each in self._standstills if each), key=lambda each: each.ns, default=None)
         waited = max(self._waits[-10:])
         self._waits.append(0)
-        self.facts = self._watch.facts(graph, now=now, **{"waited": waited, "standstill": worst, **more})
+        self.facts = self._watch.facts(
+            graph, now=now, **{"waited": waited, "standstill": worst, "asleep": self.asleep, **more}
+        )
         found = self._judge.judge(self.facts)
         self.found.append((second, found))
         for remark in self._log.remarks(self.facts, found, self._judge.explained(self.facts)):

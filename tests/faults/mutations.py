@@ -121,8 +121,8 @@ def mutated(content: bytes, chance: random.Random) -> bytes:
 # Words that mean something somewhere in the file, and some that never do.
 _NAMES = """\
 version node metrics diagnostics defaults groups name namespace use_sim_time transport listen scalars front rear
-policy queue_size slop age_penalty max_wait max_rate every restamp output_prefix trigger max_age key topics topic type
-output qos required offset stamp min_period field history depth reliability durability deadline lifespan liveliness
+policy queue_size slop age_penalty max_wait max_rate every restamp lazy output_prefix trigger max_age key topics topic
+type output qos required offset stamp min_period field history depth reliability durability deadline lifespan liveliness
 sec nsec exact_time latest_time equal_key approximate_time earliest /a /b sensor_msgs/msg/Image /clock << ? $ frnot"""
 _WORDS = _NAMES.split()
 

@@ -6,6 +6,8 @@ from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Severity
 from syncrelay.sync.counts import InputCounts
 
+PICKY = Endpoint("/fusion", IMAGE, Mismatch("durability", "volatile", "transient_local"))
+
 
 def unpublished(alike=None, /, **figures):
     """Inputs that nobody publishes, by their names; nothing came of those without figures."""
@@ -195,6 +197,30 @@ FOUND = {
         "/usb_cam offers /camera with reliability best_effort, the group requests reliable",
         "write `qos: auto` at /camera, or have /usb_cam offer reliable",
     ),
+    "nobody listens to a lazy group": (
+        Code.NOBODY_LISTENS,
+        Severity.OK,
+        a_silent_group(asleep=True),
+        "nobody subscribes to /front/camera or /front/lidar, so this lazy group receives nothing",
+        None,
+    ),
+    "nobody listens to a lazy group of which one input is published": (
+        Code.NOBODY_LISTENS,
+        Severity.OK,
+        a_silent_group(camera(publishers=()), LIDAR, asleep=True),
+        "nobody subscribes to /front/lidar, so this lazy group receives nothing",
+        None,
+    ),
+    "a lazy group whose only subscriber gets nothing": (
+        Code.NOBODY_LISTENS,
+        Severity.OK,
+        a_silent_group(camera(subscribers=(PICKY,)), LIDAR, asleep=True),
+        (
+            "no subscriber of /front/camera or /front/lidar fits what the relay offers,"
+            " so this lazy group receives nothing"
+        ),
+        None,
+    ),
     "a clock that stands still": (
         Code.CLOCK_STOPPED,
         Severity.ERROR,
@@ -247,7 +273,7 @@ FOUND = {
         Code.SUBSCRIBER_QOS,
         Severity.WARN,
         a_group(
-            camera(subscribers=(Endpoint("/fusion", IMAGE, Mismatch("durability", "volatile", "transient_local")),)),
+            camera(subscribers=(PICKY,)),
             LIDAR,
         ),
         "/fusion requests /front/camera with durability transient_local, the relay offers volatile, so it gets nothing",
