@@ -12,6 +12,7 @@ from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.ros.bindings import GroupBindings
 from syncrelay.ros.clock import WaitingClock
+from syncrelay.ros.manifests import Manifests
 from syncrelay.sync import DropReason
 
 _LOG = logging.getLogger("syncrelay")
@@ -31,6 +32,7 @@ class Groups:
         node: Any,
         resolve: Callable[[str], str],
         bindings: GroupBindings,
+        manifests: Manifests,
         loop: ReceiveLoop,
         clock: WaitingClock,
         changed: Callable[[Config], None],
@@ -41,6 +43,7 @@ class Groups:
         """
         self.config = config
         self.bindings = bindings
+        self.manifests = manifests
         self.reloads = 0
         self.refused_reloads = 0
         self.reload_error: str | None = None
@@ -88,7 +91,7 @@ class Groups:
         running = [group for group in self.bindings.groups if group.failure is None]
         chosen = _chosen(config, self._names)
         unchanged = [next((group for group in running if group.config == each), None) for each in chosen]
-        self.bindings.run(
+        self._exchange(
             [group or GroupRelay(each, now=self._clock.now) for group, each in zip(unchanged, chosen, strict=True)]
         )
         limited = self._limited
@@ -97,6 +100,15 @@ class Groups:
         self._loop.deadline = (lambda: _next_deadline(limited)) if asks else None
         self._loop.wake()
         self._changed(config)
+
+    def _exchange(self, groups: Sequence[GroupRelay]) -> None:
+        self.manifests.begin(groups)
+        try:
+            self.bindings.run(groups)
+        finally:
+            self.manifests.end_others(self.bindings.groups)
+        # What DDS made only once others were gone.
+        self.manifests.begin(groups)
 
     @property
     def _limited(self) -> list[GroupRelay]:

@@ -27,6 +27,7 @@ from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
+from syncrelay.ros.manifests import Manifests
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
@@ -122,6 +123,7 @@ class Relay:
             node=self.node,
             resolve=resolve,
             bindings=bindings,
+            manifests=Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop),
             loop=self._loop,
             clock=self._clock,
             changed=lambda config: self._report_on(bindings, config),
@@ -255,6 +257,8 @@ class Relay:
             for topic in self._groups.bindings.topics:
                 with self._bugs.contained(f"ending {topic.name}"):
                     topic.outputs.wait_until_acknowledged(deadline)
+            with self._bugs.contained("ending the manifests"):
+                self._groups.manifests.wait_until_acknowledged(deadline)
             self.monitor.conclude()
         return self.monitor.reports
 
