@@ -19,6 +19,9 @@ SCALARS: Final = ("sets_hz", "span_ms", "latency_ms")
 """Figures of a group, each on a topic `~/GROUP/FIGURE`."""
 
 
+MANIFEST_TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
+
+
 def manifest_topic(group: str) -> str:
     """Return where a group tells its sets, as a file would name it."""
     return f"~/{group}/sets"
@@ -66,7 +69,7 @@ class NamesInFile:
             if group.options.manifest:
                 manifest = _manifest(group, self.document, self.node.absolute, resolve)
                 yield from _misnamed_manifest(manifest, own, topics, self.document)
-                own.setdefault(manifest.text, _OwnTopic(_MANIFEST_TYPE, f"the manifest of the group {group.name}"))
+                own.setdefault(manifest.text, _OwnTopic(MANIFEST_TYPE, f"the manifest of the group {group.name}"))
         yield from _meeting_own_topics(topics, own, self.document)
 
     def _topics(self, group: GroupConfig, resolve: Resolve) -> list["_Topic"]:
@@ -206,9 +209,6 @@ def _too_many_characters(name: _Name) -> str:
     return f"{len(name.text)} characters, at most {LONGEST_TOPIC} are allowed"
 
 
-_MANIFEST_TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
-
-
 class _OwnTopic(NamedTuple):
     """The type of a topic that the node publishes or listens to by itself, and what it is for."""
 
@@ -255,7 +255,7 @@ def _misnamed_manifest(
         text = f"its manifest {name.said} is a topic that the node itself uses for {taken.purpose}: {instead}"
         yield document.problem(name.path, text, code="own_topic", span=span)
     for topic in topics:
-        if topic.input.text == name.text and topic.config.type in ("", _MANIFEST_TYPE):
+        if topic.input.text == name.text and topic.config.type in ("", MANIFEST_TYPE):
             text = f"{topic.input.said} is the manifest of a group of the same node, which makes a loop"
             yield document.problem(topic.input.path, text, code="loop")
 

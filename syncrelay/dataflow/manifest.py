@@ -10,8 +10,10 @@ from typing import Final, NamedTuple
 from syncrelay.config import GroupConfig
 from syncrelay.sync import Match
 
-MANIFEST_TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
-VERSION: Final = 1
+MANIFEST_DEPTH: Final = 500
+"""How many DDS keeps of a group: who joins sets needs each one, and a hiccup of some seconds must cost none."""
+
+_VERSION: Final = 1
 
 _NS_PER_SECOND: Final = 1_000_000_000
 # As DiagnosticStatus has them.
@@ -108,7 +110,7 @@ class ManifestWriter:
         faults += [f"{unpublished} of {of} not published"] if unpublished else []
         level = _ERROR if unpublished else _WARN if missing else _OK
         message = _text(", ".join(faults) or "complete")
-        version = _COUNT(7) + _key("version") + _text(str(VERSION)) + _key("set")
+        version = _COUNT(7) + _key("version") + _text(str(_VERSION)) + _key("set")
         head = _text("") + _COUNT(1 + of) + _level(level, 0) + self._name + message + self._node + version
         self._heads[missing, unpublished] = head
         return head

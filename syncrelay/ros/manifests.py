@@ -12,17 +12,15 @@ from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReli
 from syncrelay.config.names_in_graph import manifest_topic
 from syncrelay.dataflow.backend import Outlet, RclBackend
 from syncrelay.dataflow.group import GroupRelay
-from syncrelay.dataflow.manifest import ManifestWriter
+from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 
 _LOG = logging.getLogger("syncrelay")
 
-# Who joins sets by them needs each one: a hiccup of some seconds must not cost a 100 Hz group any.
-_DEPTH: Final = 500
 _PROFILE: Final = QoSProfile(
     history=QoSHistoryPolicy.KEEP_LAST,
-    depth=_DEPTH,
+    depth=MANIFEST_DEPTH,
     reliability=QoSReliabilityPolicy.RELIABLE,
     durability=QoSDurabilityPolicy.VOLATILE,
 )
