@@ -1,51 +1,85 @@
 """Sets of a replay as a recording: what the relay would have published."""
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import NamedTuple
 
 from syncrelay.bag.bindings import GroupBinding, Input
-from syncrelay.bag.definitions import as_ros2, begins_with_header, converter
+from syncrelay.bag.definitions import as_ros2, begins_with_header, converter, jazzy_definition
 from syncrelay.bag.mcap_output import McapOutput, Output
-from syncrelay.bag.qos import output_profile
+from syncrelay.bag.qos import Profile, output_profile
 from syncrelay.bag.recording import Channel, Encoding
 from syncrelay.cdr import patch_stamp
+from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
+from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Member
 from syncrelay.errors import BagError
 from syncrelay.sync import Match, Message, Outcome
 
-_Payload: TypeAlias = Callable[[bytes, int | None], bytes]
-"""From a recorded payload and a set's common stamp to what leaves."""
+
+class _Payload(NamedTuple):
+    """From a recorded payload and a set's common stamp to what leaves; whether it gets that stamp."""
+
+    written: Callable[[bytes, int | None], bytes]
+    is_restamped: bool
+
+
+class _Manifest(NamedTuple):
+    """What serializes the manifests of a group, and where they are written."""
+
+    writer: ManifestWriter
+    output: Output
 
 
 class SetWriter:
     """Writes the sets of a replay as the relay would publish them, at the time at which they leave.
 
     Payloads are those that were recorded, with the stamp of `restamp` in their place if the file has one. Those of a
-    ROS 1 bag are written as ROS 2 has them: CDR, without the header's seq.
+    ROS 1 bag are written as ROS 2 has them: CDR, without the header's seq. Manifests stand behind their sets.
     """
 
     def __init__(self, recording: McapOutput) -> None:
         self._recording = recording
         self._outputs: dict[str, Output] = {}
         self._payloads: dict[tuple[str, Channel], _Payload] = {}
+        self._manifests: dict[str, _Manifest] = {}
+        self.messages = 0
+        """How many messages of sets were written."""
 
     def begin(self, binding: GroupBinding) -> None:
         """Make the outputs of a group, so that those without a message are there too."""
         for each in binding.inputs:
             if each.channels:
                 self._add(each)
+        if binding.group.options.manifest:
+            self._manifests[binding.group.name] = self._manifest(binding)
 
     def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
         """Write a set that leaves at `now`; drops are none."""
         if not isinstance(outcome, Match):
             return
-        for each, message in zip(binding.inputs, outcome.messages, strict=True):
-            if message is not None:
-                self._write(each, message, outcome.stamp, now)
+        pairs = zip(binding.inputs, outcome.messages, strict=True)
+        members = [
+            None if message is None else self._write(each, message, outcome.stamp, now) for each, message in pairs
+        ]
+        manifest = self._manifests.get(binding.group.name)
+        if manifest is not None:
+            newest = max(member.received for member in members if member is not None)
+            content = manifest.writer.write(manifest.output.count + 1, outcome, members, now - newest)
+            self._recording.write(manifest.output, content, now)
 
-    def _write(self, each: Input, message: Message, stamp: int | None, now: int) -> None:
-        channel, _, payload = message.payload
-        written = self._payloads[each.output, channel](payload, stamp)
-        self._recording.write(self._outputs[each.output], written, now)
+    def _write(self, each: Input, message: Message, stamp: int | None, now: int) -> Member:
+        channel, received, payload = message.payload
+        output, payload_of = self._outputs[each.output], self._payloads[each.output, channel]
+        self._recording.write(output, payload_of.written(payload, stamp), now)
+        self.messages += 1
+        leaves_as = stamp if stamp is not None and payload_of.is_restamped else message.stamp
+        return Member(leaves_as, message.stamp, received, output.count)
+
+    def _manifest(self, binding: GroupBinding) -> "_Manifest":
+        node = binding.group.inputs.node
+        topics = [(each.topic, each.output) for each in binding.inputs]
+        writer = ManifestWriter(binding.group, node=node.absolute("~"), topics=topics)
+        topic, profile = node.absolute(manifest_topic(binding.group.name)), Profile(depth=MANIFEST_DEPTH)
+        return _Manifest(writer, self._recording.add(topic, MANIFEST_TYPE, *jazzy_definition(MANIFEST_TYPE), profile))
 
     def _add(self, each: Input) -> None:
         first = each.channels[0]
@@ -68,4 +102,4 @@ def _payload(each: Input, channel: Channel) -> _Payload:
             raise BagError(f"{channel.topic}: a message does not fit the definition of {channel.type} in the bag")
         return payload if stamp is None or not restamped else patch_stamp(payload, stamp)
 
-    return payload_of
+    return _Payload(payload_of, restamped)

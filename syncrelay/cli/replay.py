@@ -71,13 +71,13 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         bindings = bind(config, recording)
         _say_all(problem for binding in bindings for problem in binding.problems)
         written = _written(wanted.output, bindings, opened)
-        listeners = [*_printing(wanted), *([] if written is None else [_writing(written, bindings)])]
+        listeners = [*_printing(wanted), *([] if written is None else [written.take])]
         with reading(recording):
             results = replay_groups(recording, bindings, listeners=listeners)
         _say_all(recording.faults)
     if written is not None:
         sets = sum(result.sets for result in results)
-        remark(f"wrote {wanted.output}: {counted(written.count, 'message')} of {counted(sets, 'set')}")
+        remark(f"wrote {wanted.output}: {counted(written.messages, 'message')} of {counted(sets, 'set')}")
     tell = say if wanted.sets or wanted.drops else put
     for result in results:
         for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):
@@ -105,19 +105,15 @@ def _printing(wanted: Wanted) -> Iterator[Listener]:
         yield print_drop
 
 
-def _written(output: str | None, bindings: Sequence[GroupBinding], opened: ExitStack) -> McapOutput | None:
-    """Return the recording to be written, if one is, with what there is to say of it."""
+def _written(output: str | None, bindings: Sequence[GroupBinding], opened: ExitStack) -> SetWriter | None:
+    """Return what writes the recording, if one is to be written, and say what there is to say of it."""
     if output is None:
         return None
     channels = (channel for binding in bindings for each in binding.inputs for channel in each.channels)
     recording = opened.enter_context(McapOutput(Path(output)))
     if any(channel.encoding is Encoding.ROS1 for channel in channels):
         remark("this is a ROS 1 recording: its messages are written as ROS 2 CDR, without header.seq")
-    return recording
-
-
-def _writing(recording: McapOutput, bindings: Sequence[GroupBinding]) -> Listener:
     writer = SetWriter(recording)
     for binding in bindings:
         writer.begin(binding)
-    return writer.take
+    return writer

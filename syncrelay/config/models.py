@@ -310,6 +310,13 @@ class Group(Keys):
             " one has gone is dropped. Default: false."
         ),
     )
+    manifest: bool = Field(
+        default=True,
+        description=(
+            "Publish a small message for each set on ~/GROUP/sets, behind the set's own: which messages belong"
+            " together, which are missing, span and latency; see docs/manifest.md. Default: true."
+        ),
+    )
     output_prefix: Annotated[OutputPrefix | None, NOT_NULL] = Field(
         default=None,
         description="What default output names begin with. Default: / and the group's name.",

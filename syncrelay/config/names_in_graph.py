@@ -18,6 +18,15 @@ DIAGNOSTICS: Final = "/diagnostics"
 SCALARS: Final = ("sets_hz", "span_ms", "latency_ms")
 """Figures of a group, each on a topic `~/GROUP/FIGURE`."""
 
+
+MANIFEST_TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
+
+
+def manifest_topic(group: str) -> str:
+    """Return where a group tells its sets, as a file would name it."""
+    return f"~/{group}/sets"
+
+
 Resolve: TypeAlias = Callable[[str], str]
 """Makes of a name that the file has, relative or not, the one in the graph."""
 
@@ -56,6 +65,11 @@ class NamesInFile:
         yield from _outputs(topics, self.document)
         yield from _too_long(topics, self.document)
         own = _own_topics(self.diagnostics, [group.name for group in chosen], resolve)
+        for group in chosen:
+            if group.options.manifest:
+                manifest = _manifest(group, self.document, self.node.absolute, resolve)
+                yield from _misnamed_manifest(manifest, own, topics, self.document)
+                own.setdefault(manifest.text, _OwnTopic(MANIFEST_TYPE, f"the manifest of the group {group.name}"))
         yield from _meeting_own_topics(topics, own, self.document)
 
     def _topics(self, group: GroupConfig, resolve: Resolve) -> list["_Topic"]:
@@ -195,9 +209,12 @@ def _too_long(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]
     """Yield names that only their namespace or prefix makes too long."""
     for name in (name for topic in topics for name in (topic.input, topic.output)):
         if len(name.text) > LONGEST_TOPIC:
-            size = f"{len(name.text)} characters, at most {LONGEST_TOPIC} are allowed"
-            text = f"the full name {quoted(name.text)} has {size}"
+            text = f"the full name {quoted(name.text)} has {_too_many_characters(name)}"
             yield document.problem(name.path, text, code="bad_value")
+
+
+def _too_many_characters(name: _Name) -> str:
+    return f"{len(name.text)} characters, at most {LONGEST_TOPIC} are allowed"
 
 
 class _OwnTopic(NamedTuple):
@@ -224,6 +241,31 @@ def _own_topics(asked: DiagnosticsConfig | None, groups: Sequence[str], resolve:
                 purpose = f"`{figure}` of the group {group}"
                 own[resolve(f"~/{group}/{figure}")] = _OwnTopic("std_msgs/msg/Float64", purpose)
     return own
+
+
+def _manifest(group: GroupConfig, document: Document, absolute: Resolve, resolve: Resolve) -> _Name:
+    name, path = manifest_topic(group.name), (*group.path, "manifest")
+    before, after = absolute(name), resolve(name)
+    return _Name(after, path if document.has(path) else group.path, before if before != after else "")
+
+
+def _misnamed_manifest(
+    name: _Name, own: dict[str, _OwnTopic], topics: Sequence[_Topic], document: Document
+) -> Iterator[Problem]:
+    """Yield what is wrong with the name of a manifest: its length, what else it names."""
+    span = document.value_span(name.path) if name.path[-1] == "manifest" else document.key_span(name.path)
+    instead = "remap it to another name, or set `manifest: false`"
+    if len(name.text) > LONGEST_TOPIC:
+        text = f"the full name of its manifest, {quoted(name.text)}, has {_too_many_characters(name)}"
+        yield document.problem(name.path, text, code="bad_value", span=span)
+    taken = own.get(name.text)
+    if taken is not None:
+        text = f"its manifest {name.said} is a topic that the node itself uses for {taken.purpose}: {instead}"
+        yield document.problem(name.path, text, code="own_topic", span=span)
+    for topic in topics:
+        if topic.input.text == name.text and topic.config.type in ("", MANIFEST_TYPE):
+            text = f"{topic.input.said} is the manifest of a group of the same node, which makes a loop"
+            yield document.problem(topic.input.path, text, code="loop")
 
 
 def _meeting_own_topics(topics: Sequence[_Topic], own: dict[str, _OwnTopic], document: Document) -> Iterator[Problem]:

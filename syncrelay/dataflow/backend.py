@@ -42,6 +42,9 @@ class PublishError(Exception):
 class Outlet(Protocol):
     """A publisher of payloads as they came. Raises PublishError."""
 
+    sent: int
+    """How many messages it has published: what DDS numbers them by."""
+
     @property
     def topic(self) -> str:
         """Where it publishes, after all remaps."""
@@ -53,6 +56,14 @@ class Outlet(Protocol):
 
     def send_stamped(self, payload: Any, stamp: int) -> None:
         """Publish a payload with another stamp, in nanoseconds, in its leading Header; the payload keeps its own."""
+        ...
+
+    def send_content(self, content: bytes) -> None:
+        """Publish a message that was serialized here."""
+        ...
+
+    def is_heard(self) -> bool:
+        """Whether anyone subscribes."""
         ...
 
 

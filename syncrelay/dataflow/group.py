@@ -11,6 +11,7 @@ from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
+from syncrelay.dataflow.manifest import ManifestWriter, Member
 from syncrelay.explain import Code, RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
@@ -80,6 +81,9 @@ class GroupRelay:
         self._suspended: _Engine = self.engine
         self._held_by = StoppedEngine(0, ())
         self._was_connected: list[bool] = []
+        self._left = 0
+        self._manifest: tuple[ManifestWriter, Outlet] | None = None
+        self._manifest_failed = False
 
     def connect(self, index: int, outlet: Outlet, *, restamped: bool) -> None:
         """Publish one input's messages through an outlet from now on.
@@ -103,6 +107,15 @@ class GroupRelay:
         self.paused_since = None
         if isinstance(self.engine, PausedEngine):
             self.engine = self.engine.engine
+
+    @property
+    def tells_sets(self) -> bool:
+        """Whether it has where to publish its manifests. Any thread."""
+        return self._manifest is not None
+
+    def tell_sets(self, writer: ManifestWriter, outlet: Outlet) -> None:
+        """Publish a manifest behind each set from now on, while anyone subscribes to it."""
+        self._manifest = writer, outlet
 
     def suspend(self) -> None:
         """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
@@ -211,9 +224,12 @@ class GroupRelay:
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 newest = self._send(outcome)
-                stamps = outcome.stamps
-                self._sets.append((stamps, time.time_ns() - newest))
+                stamps, latency = outcome.stamps, time.time_ns() - newest
+                self._sets.append((stamps, latency))
                 self.last.append(stamps)
+                self._left += 1
+                if self._manifest is not None and self._manifest[1].is_heard():
+                    self._tell(outcome, latency, *self._manifest)
             else:
                 message = outcome.message
                 self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
@@ -241,6 +257,26 @@ class GroupRelay:
                 if self.unpublished:
                     self._published(message.input, outlet)
         return newest
+
+    def _tell(self, match: Match, latency: int, writer: ManifestWriter, outlet: Outlet) -> None:
+        """Publish the manifest of the set that was just sent."""
+        members = [None if message is None else self._member(message, match.stamp) for message in match.messages]
+        try:
+            outlet.send_content(writer.write(self._left, match, members, latency))
+        except PublishError as error:
+            if not self._manifest_failed:
+                _LOG.error("%s: a manifest could not be published: %s", self.config.name, error)
+            self._manifest_failed = True
+        else:
+            self._manifest_failed = False
+
+    def _member(self, message: Message, common_stamp: int | None) -> Member:
+        index, stamp, (_, received) = message.input, message.stamp, message.payload
+        leaves_as = common_stamp if common_stamp is not None and self._restamped[index] else stamp
+        outlet = self._outlets[index]
+        if self.unpublished and index in self.unpublished:
+            return Member(leaves_as, stamp, received, 0, self.unpublished[index].why)
+        return Member(leaves_as, stamp, received, 0 if outlet is None else outlet.sent)
 
     def _not_published(self, index: int, outlet: Outlet, why: str) -> None:
         before = self.unpublished.get(index)

@@ -1,11 +1,11 @@
 """Which groups run, and on which topics: how others take their place while messages flow."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from syncrelay.config import TopicConfig
+from syncrelay.config.names_in_graph import manifest_topic
 from syncrelay.config.wording import one_of
 from syncrelay.dataflow.backend import RclBackend
 from syncrelay.dataflow.group import GroupRelay
@@ -13,7 +13,7 @@ from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.ros.inputs import TopicInput
-from syncrelay.ros.listeners import Listeners
+from syncrelay.ros.listeners import Listeners, PublishersOf
 from syncrelay.ros.outputs import InputBinding
 from syncrelay.sync import DropReason
 
@@ -68,13 +68,13 @@ class GroupBindings:
         """Each topic once."""
         return list(self._topics.values())
 
-    def count_listeners(self) -> None:
+    def count_listeners(self, more: PublishersOf) -> None:
         """Have lazy groups sleep while nobody subscribes to what they give. One that only observes has none.
 
-        On the main thread.
+        `more` are publishers of a group beside its outputs'. On the main thread.
         """
         if self._entities.purpose is Purpose.RELAY:
-            self._listeners.count([binding for binding in self.all if binding.group.config.options.lazy])
+            self._listeners.count([binding for binding in self.all if binding.group.config.options.lazy], more)
 
     def run(self, groups: Sequence[GroupRelay]) -> None:
         """Run these groups and no other; those that ran already are left as they are. On the main thread.
@@ -118,9 +118,8 @@ class GroupBindings:
         self.run(())
         self.is_held = False
 
-    def wait_until_acknowledged(self, *, patience_ns: int) -> None:
-        """Give reliable subscribers so many nanoseconds to get what was published last."""
-        deadline = time.monotonic_ns() + patience_ns
+    def wait_until_acknowledged(self, deadline: int) -> None:
+        """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
         for topic in self.topics:
             topic.outputs.wait_until_acknowledged(deadline)
 
@@ -184,9 +183,11 @@ class GroupBindings:
         return GroupBinding(group, tuple(topic.bind(group, index) for index, topic in inputs))
 
     def _may_be_heard(self, group: GroupRelay) -> bool:
-        """Whether a group's outputs have subscribers, of whatever QoS, as where a reload puts it in another's place."""
-        names = [self._node.resolve_topic_name(topic.output) for topic in group.config.topics]
-        return any(map(self._node.count_subscribers, names))
+        """Whether what it publishes has subscribers, of whatever QoS, as where a reload puts it in another's place."""
+        names = [topic.output for topic in group.config.topics]
+        if group.config.options.manifest:
+            names.append(manifest_topic(group.config.name))
+        return any(map(self._node.count_subscribers, map(self._node.resolve_topic_name, names)))
 
     def _topic(self, config: TopicConfig, topics: dict[_Key, TopicInput]) -> TopicInput:
         name = self._node.resolve_topic_name(config.topic)

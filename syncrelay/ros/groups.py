@@ -12,6 +12,7 @@ from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.ros.bindings import GroupBindings
 from syncrelay.ros.clock import WaitingClock
+from syncrelay.ros.manifests import Manifests
 from syncrelay.sync import DropReason
 
 _LOG = logging.getLogger("syncrelay")
@@ -31,6 +32,7 @@ class Groups:
         node: Any,
         resolve: Callable[[str], str],
         bindings: GroupBindings,
+        manifests: Manifests,
         loop: ReceiveLoop,
         clock: WaitingClock,
         changed: Callable[[Config], None],
@@ -41,6 +43,7 @@ class Groups:
         """
         self.config = config
         self.bindings = bindings
+        self.manifests = manifests
         self.reloads = 0
         self.refused_reloads = 0
         self.reload_error: str | None = None
@@ -107,12 +110,24 @@ class Groups:
         """
         self.bindings.hold()
         self._loop.call(lambda: self.flush(DropReason.SHUTDOWN)).result()
-        self.bindings.wait_until_acknowledged(patience_ns=patience_ns)
+        self.wait_until_acknowledged(patience_ns=patience_ns)
         self.bindings.end_publishers()
+        self.manifests.end_others(())
+
+    def wait_until_acknowledged(self, *, patience_ns: int) -> None:
+        """Give reliable subscribers so many nanoseconds to get what was published last."""
+        deadline = time.monotonic_ns() + patience_ns
+        self.bindings.wait_until_acknowledged(deadline)
+        self.manifests.wait_until_acknowledged(deadline)
+
+    def count_listeners(self) -> None:
+        """Have lazy groups sleep while nobody subscribes to their outputs or manifests."""
+        self.bindings.count_listeners(self.manifests.publishers_of)
 
     def forget(self) -> None:
         """Run no groups."""
         self.bindings.run(())
+        self.manifests.end_others(())
         self._loop.deadline = None
         self._changed(self.config)
 
@@ -125,13 +140,25 @@ class Groups:
         running = [group for group in self.bindings.groups if group.failure is None]
         chosen = _chosen(config, self._names)
         unchanged = [next((group for group in running if group.config == each), None) for each in chosen]
-        self.bindings.run([group or self._begun(each) for group, each in zip(unchanged, chosen, strict=True)])
+        self._exchange([group or self._begun(each) for group, each in zip(unchanged, chosen, strict=True)])
         limited = self._limited
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         asks = bool(limited) and not self._clock.is_simulated
         self._loop.deadline = (lambda: _next_deadline(limited)) if asks else None
         self._loop.wake()
         self._changed(config)
+
+    def _exchange(self, groups: Sequence[GroupRelay]) -> None:
+        if self.bindings.is_held:
+            self.bindings.run(groups)
+            return
+        self.manifests.begin(groups)
+        try:
+            self.bindings.run(groups)
+        finally:
+            self.manifests.end_others(self.bindings.groups)
+        # What DDS made only once others were gone.
+        self.manifests.begin(groups)
 
     def _begun(self, config: GroupConfig) -> GroupRelay:
         group = GroupRelay(config, now=self._clock.now)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from syncrelay.dataflow.receive import ReceiveLoop
 
@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 # A subscriber that is restarted, or that waits for publishers of another QoS, is back by then.
 _GRACE_S: Final = 2.0
 
+PublishersOf: TypeAlias = "Callable[[GroupRelay], Sequence[Any]]"
+
 
 class Listeners:
     """Counts the subscribers of lazy groups. On the main thread."""
@@ -21,10 +23,13 @@ class Listeners:
         self._loop = loop
         self._unheard_since: dict[GroupRelay, float] = {}
 
-    def count(self, lazy: Sequence["GroupBinding"]) -> None:
-        """Wake the groups that have a subscriber, and let sleep those that have had none for a while."""
+    def count(self, lazy: Sequence["GroupBinding"], more: PublishersOf) -> None:
+        """Wake the groups that have a subscriber, and let sleep those that have had none for a while.
+
+        Beside those of their outputs, subscribers of `more` of a group's publishers count.
+        """
         now = time.monotonic()
-        unheard = [each for each in lazy if not any(map(_has_subscriber, each.publishers))]
+        unheard = [each for each in lazy if not any(map(_has_subscriber, (*each.publishers, *more(each.group))))]
         self._unheard_since = {each.group: self._unheard_since.get(each.group, now) for each in unheard}
         for binding in lazy:
             group, since = binding.group, self._unheard_since.get(binding.group)
@@ -46,5 +51,5 @@ class Listeners:
             each.topic.try_again()
 
 
-def _has_subscriber(publisher: object) -> bool:
-    return bool(publisher.get_subscription_count())  # type: ignore[attr-defined]  # rclpy is untyped
+def _has_subscriber(publisher: Any) -> bool:
+    return bool(publisher.get_subscription_count())

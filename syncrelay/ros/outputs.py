@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.duration import Duration
 
-from syncrelay.dataflow.backend import Content, Deliver, RclBackend, Source
+from syncrelay.dataflow.backend import Content, Deliver, Outlet, RclBackend, Source
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Refusal
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class InputBinding:
     """An input of a group: the topic that feeds it, what handles its messages, and where they leave."""
 
-    __slots__ = ("group", "handler", "index", "not_readable", "publisher", "publisher_refusal", "topic")
+    __slots__ = ("_outlet", "group", "handler", "index", "not_readable", "publisher", "publisher_refusal", "topic")
 
     def __init__(self, group: GroupRelay, index: int, topic: "TopicInput") -> None:
         self.group = group
@@ -34,6 +34,7 @@ class InputBinding:
         """Why DDS does not make its publisher. Until it does, nothing is fed: sets would lack the message."""
         self.not_readable: str | None = None
         """Why the stamp or key that the file names cannot be read from messages of the type."""
+        self._outlet: tuple[Any, Outlet] | None = None
 
     @property
     def output(self) -> str:
@@ -53,6 +54,12 @@ class InputBinding:
         if self.not_readable:
             return f"the field of {self.topic.name} that the file names"
         return f"DDS to let it {self.refusal.verb} {self.refusal.topic}" if self.refusal else None
+
+    def outlet(self, backend: RclBackend) -> Outlet:
+        """Return the outlet of its publisher: the same for as long as that is, so that it counts what was sent."""
+        if self._outlet is None or self._outlet[0] is not self.publisher:
+            self._outlet = self.publisher, backend.outlet(self.publisher)
+        return self._outlet[1]
 
     def find_handler(self, message_type: Any) -> None:
         """Have messages of this type handled; `not_readable` says why they cannot be."""
@@ -136,8 +143,7 @@ class Outputs:
         for binding in bindings:
             if binding.publisher is not None:
                 restamped = begins_with_header(binding.publisher.msg_type)
-                outlet = self._backend.outlet(binding.publisher)
-                binding.group.connect(binding.index, outlet, restamped=restamped)
+                binding.group.connect(binding.index, binding.outlet(self._backend), restamped=restamped)
         self.feed()
 
     def feed(self) -> None:

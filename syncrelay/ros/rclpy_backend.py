@@ -36,7 +36,9 @@ class RclpyOutlet:
 
     def __init__(self, publisher: Any) -> None:
         self.topic = publisher.topic_name
+        self.sent = 0
         self._publish = publisher.handle.publish_raw
+        self._count_subscriptions = publisher.handle.get_subscription_count
 
     def send(self, payload: bytes) -> None:
         """Publish a payload unchanged. Raises PublishError."""
@@ -44,10 +46,19 @@ class RclpyOutlet:
             self._publish(payload)
         except _rclpy.RCLError as error:
             raise PublishError(str(error)) from error
+        self.sent += 1
 
     def send_stamped(self, payload: bytes, stamp: int) -> None:
         """Publish a copy of the payload with this stamp."""
         self.send(patch_stamp(payload, stamp))
+
+    def send_content(self, content: bytes) -> None:
+        """Publish a message that was serialized here. Raises PublishError."""
+        self.send(content)
+
+    def is_heard(self) -> bool:
+        """Whether anyone subscribes."""
+        return bool(self._count_subscriptions())
 
 
 class WaitSetWatch:

@@ -30,6 +30,7 @@ from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
 from syncrelay.ros.lifecycle import ManagedNode, Transitions
+from syncrelay.ros.manifests import Manifests
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.services import Offered, Services
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
@@ -134,6 +135,7 @@ class Relay:
             node=self.node,
             resolve=resolve,
             bindings=bindings,
+            manifests=Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop),
             loop=self._loop,
             clock=self._clock,
             changed=lambda config: self._report_on(bindings, config),
@@ -285,7 +287,7 @@ class Relay:
     def _poll_graph(self) -> None:
         has_changed = self._graph_changes.seen()
         with self._bugs.contained("counting subscribers"):
-            self._groups.bindings.count_listeners()
+            self._groups.count_listeners()
         for topic in self._groups.bindings.topics:
             if has_changed or topic.is_due:
                 with self._bugs.contained(f"polling {topic.name}"):
@@ -345,7 +347,7 @@ class Relay:
             receiving.result()
             self._groups.flush(DropReason.SHUTDOWN)
             with self._bugs.contained("ending the outputs"):
-                self._groups.bindings.wait_until_acknowledged(patience_ns=_ACKNOWLEDGE_NS)
+                self._groups.wait_until_acknowledged(patience_ns=_ACKNOWLEDGE_NS)
             self.monitor.conclude()
         return () if self._groups.bindings.is_held else self.monitor.reports
 

@@ -22,6 +22,7 @@ from tests.bag.making import write_rosbag2 as write_folder
 from tests.ros.cdr_messages import STORE, VECTOR, stamp_of, with_stamp
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
+from tests.ros.manifests import read
 from tests.ros.streams import BEGIN, MS, at, merged
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
@@ -30,7 +31,7 @@ _RIG = rig(10)
 
 def _written(bag: Path, output: Path, **keys) -> list[Frame]:
     """What a replay with a group of a camera and a lidar writes, as rosbags reads it."""
-    group = {"policy": "approximate_time", "slop": "5ms", "topics": inputs(_PAIR), **keys}
+    group = {"policy": "approximate_time", "slop": "5ms", "manifest": False, "topics": inputs(_PAIR), **keys}
     with closing(open_recording([str(bag)])) as recording, McapOutput(output) as written:
         writer = SetWriter(written)
         bindings = bind(load_text(config({"front": group})), recording)
@@ -120,6 +121,26 @@ def test_outputs_without_a_set_are_there_too(tmp_path):
     assert _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", slop="1ms") == []
     with Reader(tmp_path / "out") as reader:
         assert {each.topic for each in reader.connections} == {"/front/camera", "/front/lidar"}
+
+
+def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
+    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", manifest=True, restamp="earliest")
+    sets = [written[at : at + 3] for at in range(0, len(written), 3)]
+    assert len(sets) == 9
+    for number, (camera, lidar, manifest) in enumerate(sets, 1):
+        assert (manifest.topic, manifest.time) == ("/syncrelay/front/sets", camera.time)
+        told = read(manifest.payload)
+        assert (told.number, told.common_stamp) == (number, stamp_of(camera.payload))
+        assert told.stamp == stamp_of(camera.payload) == stamp_of(lidar.payload)
+        assert [(each.output, each.sequence, each.stamp) for each in told.inputs] == [
+            ("/front/camera", number, told.stamp),
+            ("/front/lidar", number, told.stamp),
+        ]
+        newest = max(each.received for each in told.inputs)
+        assert told.latency == manifest.time - newest
+    with Reader(tmp_path / "out") as reader:
+        (connection,) = (each for each in reader.connections if each.topic == "/syncrelay/front/sets")
+        assert connection.digest == STORE.hash_rihs01(connection.msgtype)
 
 
 def test_nothing_is_overwritten(tmp_path):

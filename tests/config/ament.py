@@ -14,6 +14,7 @@ INTERFACES = {
     "geometry_msgs/msg/Point": "float64 x 0\nfloat64 y 0\nfloat64 z 0\n",
     "geometry_msgs/msg/Pose": "Point position\n",
     "std_srvs/srv/Trigger": "---\nbool success\nstring message\n",
+    "diagnostic_msgs/msg/DiagnosticArray": "std_msgs/Header header\n",
     "dock_msgs/msg/Status": "uint8 level\nTrigger trigger\nstd_msgs/Header[] past\nstring<=10 name\n",
     "dock_msgs/msg/Trigger": "builtin_interfaces/Time time\nbuiltin_interfaces/Duration exposure\n",
     "dock_msgs/msg/Headers": "std_msgs/Header[] headers\n",

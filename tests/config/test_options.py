@@ -60,6 +60,11 @@ def outputs(config: Config) -> object:
     return [topic.output for group in config.groups for topic in group.topics]
 
 
+def own_topics(config: Config) -> object:
+    """The names that the node must have for itself."""
+    return config.names.written
+
+
 def of_first_topic(name: str) -> Callable[[Config], object]:
     return lambda config: getattr(config.groups[0].topics[0], name)
 
@@ -117,6 +122,7 @@ OPTIONS = {
     "output": (file(), file(first={"output": "/z"}), outputs),
     "output_prefix": (file(), file({**APPROXIMATE, "output_prefix": "/z"}), outputs),
     "lazy": (file(), file({**APPROXIMATE, "lazy": True}), lambda config: config.groups[0].options.lazy),
+    "manifest": (file(), file({**APPROXIMATE, "manifest": False}), own_topics),
     "qos": (file(), file(first={"qos": "sensor_data"}), of_first_topic("qos")),
     "stamp": (file(), file(first={"stamp": "receive"}), of_first_topic("stamp")),
     "field": (file(), file(first={"stamp": {"field": "header.stamp"}}), of_first_topic("stamp")),
@@ -180,6 +186,7 @@ DEFAULTS = {
     "age_penalty": (0, 1, TWO_SPANS_TO_CHOOSE_FROM),
     "restamp": ("none", "latest", NEAR_PAIRS),
     "output_prefix": ("/y", "/z", outputs),
+    "manifest": (True, False, own_topics),
     "max_wait": ("10ms", "1s", OPEN_PAIR),
     "max_rate": ("1 Hz", "1 kHz", NEAR_PAIRS),
     "every": (1, 2, NEAR_PAIRS),

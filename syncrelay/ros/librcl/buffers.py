@@ -1,6 +1,6 @@
 """Memory of messages: lent to one payload at a time, and back in the pool when nobody holds that payload."""
 
-from ctypes import byref, c_uint8
+from ctypes import addressof, byref, c_uint8
 from typing import Final
 
 from syncrelay.ros.librcl.rcl import Rcl, SerializedMessage
@@ -42,6 +42,28 @@ class Memory:
 
     def __del__(self) -> None:
         self._rcl.array_fini(self.pointer)
+
+
+class OwnMessage:
+    """A serialized message that is filled from Python, and lies in memory of Python's."""
+
+    __slots__ = ("_message", "_room", "pointer")
+
+    def __init__(self, rcl: Rcl) -> None:
+        self._message = SerializedMessage(allocator=rcl.default_allocator())
+        self._room = memoryview(b"")
+        self.pointer = byref(self._message)
+
+    def fill(self, content: bytes) -> None:
+        """Take a copy of a message, in the place of the one before."""
+        size = len(content)
+        if size > len(self._room):
+            # As the numbers in it grow, so may the next.
+            room = (c_uint8 * (2 * size))()
+            self._room = memoryview(room).cast("B")
+            self._message.buffer, self._message.capacity = addressof(room), 2 * size
+        self._room[:size] = content
+        self._message.length = size
 
 
 class Pool:

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from syncrelay.cdr import STAMP_BYTES, write_stamp
 from syncrelay.dataflow.backend import Deliver, PublishError, Taken
-from syncrelay.ros.librcl.buffers import Payload, Pool
+from syncrelay.ros.librcl.buffers import OwnMessage, Payload, Pool
 from syncrelay.ros.librcl.rcl import NOTHING_TAKEN, MessageInfo, Rcl, RclCallError, pointer
 
 # More than any history holds.
@@ -59,6 +59,9 @@ class LibrclOutlet:
         self._rcl = rcl
         self._call = rcl.publish
         self.topic: str = publisher.topic_name
+        self.sent = 0
+        self._count_subscriptions = publisher.handle.get_subscription_count
+        self._own = OwnMessage(rcl)
         # It owns what the address points to.
         self._publisher = publisher
         self._pointer = pointer(publisher.handle.pointer)
@@ -67,10 +70,8 @@ class LibrclOutlet:
         """Publish a payload unchanged. Raises PublishError."""
         code = self._call(self._pointer, payload.memory.pointer, None)
         if code:
-            try:
-                self._rcl.require(code, "rcl_publish_serialized_message")
-            except RclCallError as error:
-                raise PublishError(str(error)) from error
+            self._fail(code)
+        self.sent += 1
 
     def send_stamped(self, payload: Payload, stamp: int) -> None:
         """Publish a payload with this stamp, and put its own back: another set may hold it too."""
@@ -81,3 +82,21 @@ class LibrclOutlet:
             self.send(payload)
         finally:
             content[STAMP_BYTES] = own
+
+    def send_content(self, content: bytes) -> None:
+        """Publish a message that was serialized here. Raises PublishError."""
+        self._own.fill(content)
+        code = self._call(self._pointer, self._own.pointer, None)
+        if code:
+            self._fail(code)
+        self.sent += 1
+
+    def is_heard(self) -> bool:
+        """Whether anyone subscribes."""
+        return bool(self._count_subscriptions())
+
+    def _fail(self, code: int) -> None:
+        try:
+            self._rcl.require(code, "rcl_publish_serialized_message")
+        except RclCallError as error:
+            raise PublishError(str(error)) from error

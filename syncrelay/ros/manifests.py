@@ -1,0 +1,88 @@
+"""The publishers of manifests, one a group, which outlive the group where a reload puts another in its place."""
+
+import logging
+import time
+from collections.abc import Iterable
+from typing import Any, Final
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
+from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReliabilityPolicy
+
+from syncrelay.config.names_in_graph import manifest_topic
+from syncrelay.dataflow.backend import Outlet, RclBackend
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter
+from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.ros.entities import Entities, Purpose, RefusedError
+
+_LOG = logging.getLogger("syncrelay")
+
+_PROFILE: Final = QoSProfile(
+    history=QoSHistoryPolicy.KEEP_LAST,
+    depth=MANIFEST_DEPTH,
+    reliability=QoSReliabilityPolicy.RELIABLE,
+    durability=QoSDurabilityPolicy.VOLATILE,
+)
+
+
+class Manifests:
+    """Has groups tell their sets. On the main thread."""
+
+    def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop) -> None:
+        self._entities = entities
+        self._node = node
+        self._backend = backend
+        self._loop = loop
+        self._publishers: dict[str, tuple[Any, Outlet]] = {}
+        self._said: set[str] = set()
+
+    def begin(self, groups: Iterable[GroupRelay]) -> None:
+        """Have these groups tell their sets, from their first on where they don't run yet; who does so goes on.
+
+        What DDS refuses is logged once: those groups run without.
+        """
+        for group in groups:
+            if self._is_wanted(group) and not group.tells_sets:
+                try:
+                    outlet = self._outlet(group.config.name)
+                except RefusedError as error:
+                    self._say_once(str(error))
+                else:
+                    self._connect(group, outlet)
+
+    def end_others(self, groups: Iterable[GroupRelay]) -> None:
+        """End the publishers that none of these groups needs, once no other runs."""
+        wanted = {group.config.name for group in groups if self._is_wanted(group)}
+        for name in [name for name in self._publishers if name not in wanted]:
+            self._entities.end(self._publishers.pop(name)[0])
+
+    def publishers_of(self, group: GroupRelay) -> list[Any]:
+        """Return the publisher of a group's manifests, if it has one."""
+        held = self._publishers.get(group.config.name)
+        return [held[0]] if held and self._is_wanted(group) else []
+
+    def wait_until_acknowledged(self, deadline: int) -> None:
+        """Give subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
+        for publisher, _ in self._publishers.values():
+            publisher.wait_for_all_acked(Duration(nanoseconds=max(0, deadline - time.monotonic_ns())))
+
+    def _is_wanted(self, group: GroupRelay) -> bool:
+        return group.config.options.manifest and self._entities.purpose is Purpose.RELAY
+
+    def _outlet(self, name: str) -> Outlet:
+        if name not in self._publishers:
+            publisher = self._entities.publisher(DiagnosticArray, manifest_topic(name), _PROFILE)
+            self._publishers[name] = publisher, self._backend.outlet(publisher)
+        return self._publishers[name][1]
+
+    def _connect(self, group: GroupRelay, outlet: Outlet) -> None:
+        resolve = self._node.resolve_topic_name
+        topics = [(resolve(each.topic), resolve(each.output)) for each in group.config.topics]
+        writer = ManifestWriter(group.config, node=self._node.get_fully_qualified_name(), topics=topics)
+        self._loop.call(lambda: group.tell_sets(writer, outlet))
+
+    def _say_once(self, text: str) -> None:
+        if text not in self._said:
+            self._said.add(text)
+            _LOG.warning("%s", text)
