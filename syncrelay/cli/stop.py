@@ -6,6 +6,7 @@ Imports nothing slow: the signals must be in hand before anything else is import
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable
 from types import FrameType
 
@@ -16,6 +17,9 @@ _FLAGS_AT = 8 + 128
 _SA_RESETHAND = 0x80000000
 # What a shell says of a process that a signal ended, added to the signal's number.
 _ENDED_BY = 128
+# `systemctl stop` and `timeout` signal all processes of a launch, and launch then signals its nodes once more, which it
+# also does after Ctrl-C where it has no terminal: what comes within a second is one request.
+_ONE_REQUEST_S = 1.0
 
 
 def release_signals() -> None:
@@ -29,7 +33,8 @@ def release_signals() -> None:
 class StopRequest:
     """A request to end: until `defer` it ends the process at once, from then on it is remembered.
 
-    A second SIGINT or SIGTERM ends the process at once in any case, whatever hangs by then.
+    A second SIGINT or SIGTERM ends the process at once, whatever hangs by then. From `wake_with` on, when there is
+    something to end in order, only one that comes more than a second after the first.
 
     A signal that arrives while modules are still being imported would kill the process, or be lost where it is
     PID 1: so this is installed before they are.
@@ -50,7 +55,7 @@ class StopRequest:
         signal.signal(signal.SIGHUP, self._request_reload)
         for number in _SIGNALS:
             _take_once(number)
-        _count_on_a_thread()
+        self._count_on_a_thread()
 
     def defer(self) -> None:
         """Only remember the request from here on: there is now something to end in order."""
@@ -61,6 +66,10 @@ class StopRequest:
         self._wake = wake
         if self.requested:
             wake()
+            return
+        for number in _SIGNALS:
+            # No longer taken once: the second must find its handler, however soon it comes.
+            signal.signal(number, self._request)
 
     def take_reload(self) -> bool:
         """Whether a reload was requested since this was last called."""
@@ -78,9 +87,11 @@ class StopRequest:
 
     def _request(self, number: int, _frame: FrameType | None) -> None:
         if self._signalled:
-            os._exit(_ENDED_BY + number)
+            if self._wake is None:
+                os._exit(_ENDED_BY + number)
+            return
         self._signalled = True
-        if os.getpid() != 1:
+        if self._wake is None and os.getpid() != 1:
             # The kernel needs no turn of this thread for it. Of PID 1 it takes no signal that has no handler.
             for each in _SIGNALS:
                 signal.signal(each, signal.SIG_DFL)
@@ -97,27 +108,55 @@ class StopRequest:
             # No exception: raised in the middle of an import, it could be swallowed there.
             os._exit(0)
 
+    def _count_on_a_thread(self) -> None:
+        """Let a second signal of another kind end the process too while Python cannot run the handlers."""
+        import threading
 
-def _count_on_a_thread() -> None:
-    """Let a second signal of another kind end the process too while Python cannot run the handlers."""
-    import threading
+        received, told = os.pipe()
+        os.set_blocking(told, False)
+        signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+        threading.Thread(
+            target=self._end_at_the_second, args=(received, told), daemon=True, name="syncrelay-signals"
+        ).start()
 
-    received, told = os.pipe()
-    os.set_blocking(told, False)
-    signal.set_wakeup_fd(told, warn_on_full_buffer=False)
-    threading.Thread(target=_end_at_the_second, args=(received,), daemon=True, name="syncrelay-signals").start()
-
-
-def _end_at_the_second(received: int) -> None:
-    seen = 0
-    while numbers := os.read(received, 64):
-        for number in numbers:
-            seen += number in _SIGNALS
-            if seen > 1 and os.getpid() == 1:
+    def _end_at_the_second(self, received: int, told: int) -> None:
+        second = _requests(received)[1:]
+        if self._wake is not None:
+            _pass_over_what_comes_in_a_second(received, told)
+            second = []
+        for number in second or _requests(received):
+            if os.getpid() == 1:
                 os._exit(_ENDED_BY + number)
-            elif seen > 1:
-                # Its handler is gone since it was taken once.
-                os.kill(os.getpid(), number)
+            # It has no handler any more.
+            os.kill(os.getpid(), number)
+
+
+def _requests(received: int) -> list[int]:
+    """Wait for signals that ask for an end."""
+    while True:
+        if found := [number for number in os.read(received, 64) if number in _SIGNALS]:
+            return found
+
+
+def _pass_over_what_comes_in_a_second(received: int, told: int) -> None:
+    for number in _SIGNALS:
+        # Should all of Python hang before that second is over, the third is the end.
+        _take_once(number)
+    time.sleep(_ONE_REQUEST_S)
+    # Not to wait where nothing came.
+    os.write(told, b"\0")
+    os.read(received, 64)
+    for number in _SIGNALS:
+        _leave_to_the_kernel(number)
+
+
+def _leave_to_the_kernel(number: int) -> None:
+    """As SIG_DFL, on any thread: the signal ends the process. Of PID 1 the kernel takes none that has no handler."""
+    if os.getpid() == 1:
+        return
+    import ctypes
+
+    ctypes.CDLL(None).signal(number, None)
 
 
 def _take_once(number: int) -> None:

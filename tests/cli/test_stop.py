@@ -74,6 +74,11 @@ def test_a_second_signal_ends_what_hangs(where: str, number: signal.Signals, tmp
     assert _signal_twice(_hanging(tmp_path, where), number, number) == -number
 
 
+@pytest.mark.parametrize("where", ["python", "library"])
+def test_a_second_signal_ends_what_hangs_while_it_runs(where: str, tmp_path: Path):
+    assert _signal_twice(_hanging(tmp_path, where, "running"), signal.SIGINT, signal.SIGINT) == -signal.SIGINT
+
+
 @pytest.mark.parametrize("since", ["deferred", "running"])
 def test_the_second_may_be_another_than_the_first(since: str, tmp_path: Path):
     hanging = _hanging(tmp_path, "python", since)
@@ -88,13 +93,83 @@ def test_the_second_may_be_another_though_the_handlers_turn_never_comes(tmp_path
     assert hanging.wait() == -signal.SIGTERM
 
 
-def test_of_pid_1_which_the_kernel_protects_the_second_signal_is_the_end_too(tmp_path: Path):
-    argv = ["unshare", "--pid", "--fork", "--kill-child", "--map-root-user", sys.executable, "-c", _SELF_SIGNALLED]
+_RUNNING = """
+import os, signal, sys, threading
+from syncrelay.cli.stop import StopRequest
+asked = threading.Event()
+stop = StopRequest()
+stop.install()
+stop.defer()
+stop.wake_with(asked.set)
+for name in sys.argv[1:]:
+    os.kill(os.getpid(), signal.Signals[name])
+print(os.getpid() == 1, stop.requested and asked.is_set())
+"""
+
+
+@pytest.mark.parametrize("names", ["SIGINT SIGINT", "SIGTERM SIGTERM", "SIGINT SIGTERM", "SIGTERM SIGINT"])
+def test_while_it_runs_a_second_signal_right_after_the_first_is_the_same_request(names: str, tmp_path: Path):
+    done = _run([sys.executable, "-c", _RUNNING, *names.split()], tmp_path)
+    assert (done.returncode, done.stdout) == (0, "False True\n")
+
+
+# As when DDS hangs as the relay leaves it, and holds all of Python: the thread that counts signals gets no turn.
+_HANGING_AT_ITS_END = """
+import ctypes, os, signal, time
+from syncrelay.cli import stop as module
+stop = module.StopRequest()
+stop.install()
+stop.defer()
+stop.wake_with(lambda: None)
+action = ctypes.create_string_buffer(module._ACTION_BYTES)
+
+def has_a_handler_for_ever():
+    ctypes.CDLL(None).sigaction(signal.SIGTERM, None, action)
+    taken_once = ctypes.c_uint.from_buffer(action, module._FLAGS_AT).value & module._SA_RESETHAND
+    return any(action.raw[:8]) and not taken_once
+
+os.kill(os.getpid(), signal.SIGTERM)
+while has_a_handler_for_ever():
+    time.sleep(0.001)
+print("ready", flush=True)
+mutex, python = ctypes.create_string_buffer(64), ctypes.PyDLL(None)
+python.pthread_mutex_lock(mutex)
+python.pthread_mutex_lock(mutex)
+"""
+
+
+def test_what_hangs_as_it_ends_is_ended_by_the_third_signal_at_the_latest(tmp_path: Path):
     environment = ros_environment(domain=0, folder=tmp_path, python_path=[ROOT])
-    done = subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    argv = [sys.executable, "-c", _HANGING_AT_ITS_END]
+    process = Process("hanging", argv, environment=environment, folder=tmp_path)
+    process.wait_until(lambda: process.stdout == "ready\n", "it to hang")
+    process.send(signal.SIGTERM)
+    process.wait_until(lambda: not process.running() or not process.handles(signal.SIGTERM), "the second to be taken")
+    process.send(signal.SIGTERM)
+    assert process.wait() == -signal.SIGTERM
+
+
+def test_of_pid_1_which_the_kernel_protects_the_second_signal_is_the_end_too(tmp_path: Path):
+    done = _run_as_pid_1(_SELF_SIGNALLED, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (128 + signal.SIGTERM, "1\n1 asked to end\n")
+
+
+def test_of_pid_1_too_a_second_signal_right_after_the_first_is_the_same_request(tmp_path: Path):
+    done = _run_as_pid_1(_RUNNING, "SIGTERM", "SIGINT", "SIGTERM", folder=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "True True\n")
+
+
+def _run_as_pid_1(script: str, *words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    unshare = ["unshare", "--pid", "--fork", "--kill-child", "--map-root-user"]
+    done = _run([*unshare, sys.executable, "-c", script, *words], folder)
     if "unshare" in done.stderr:
         pytest.skip(f"no process namespace can be made here: {done.stderr}")
-    assert (done.returncode, done.stdout) == (128 + signal.SIGTERM, "1\n1 asked to end\n")
+    return done
+
+
+def _run(argv: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = ros_environment(domain=0, folder=folder, python_path=[ROOT])
+    return subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=60)
 
 
 _SELF_SIGNALLED = """

@@ -69,6 +69,22 @@ def test_a_second_signal_ends_it_at_once(stage: Stage, step: str, first: signal.
     assert relay.wait() == -second
 
 
+# `systemctl stop` sends SIGTERM to launch and to its nodes, and launch then SIGINT to them; where launch has no terminal,
+# Ctrl-C comes twice.
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [(signal.SIGTERM, signal.SIGINT), (signal.SIGINT, signal.SIGTERM), (signal.SIGINT, signal.SIGINT)],
+    ids=lambda number: number.name,
+)
+def test_two_signals_of_one_request_end_it_in_order(stage: Stage, first: signal.Signals, second: signal.Signals):
+    relay = stage.relay(config({"front": _FRONT}))
+    relay.wait_for_log("front: waiting for")
+    relay.send(first)
+    relay.send(second)
+    assert relay.wait() == 0
+    assert set(read_summary(relay.stderr)) == {"front"}
+
+
 def test_whoever_has_the_file_read_while_it_ends_does_not_kill_it(stage: Stage):
     relay = stage.relay(config({"front": _FRONT}))
     relay.wait_for_log("front: waiting for")
