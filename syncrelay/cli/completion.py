@@ -26,12 +26,12 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 
 _PROGRAM: Final = "syncrelay"
-# A file system that hangs, or a recording that takes long to open, is given up on.
+# Of processor time: a recording without an index, or compressed as a whole, may take long to open.
 _PATIENCE_S: Final = 2.0
 # As syncrelay.config reads of a file, which takes longer to import than a press of TAB may take.
 _MOST_BYTES: Final = 1_000_000
 # What a line may have before a program's name; zsh gives the whole line.
-_BEFORE: Final = re.compile(r".*[;&|({=]|sudo|env|exec|nice|nohup|time|[!]")
+_BEFORE: Final = re.compile(r".*[;&|({]|\w+=.*|sudo|env|exec|nice|nohup|time|!")
 
 _Completer = Callable[[str, Namespace], Iterable[str] | Mapping[str, str]]
 
@@ -45,9 +45,9 @@ def command(words: Sequence[str], _stop: StopRequest) -> int:
 def complete() -> int:
     """Answer a shell, which speaks through argcomplete's variables, with the words that may stand at the cursor.
 
-    Whatever takes longer than a user waits for ends the process.
+    What takes longer than a user waits for ends the process.
     """
-    signal.setitimer(signal.ITIMER_REAL, _PATIENCE_S)
+    signal.setitimer(signal.ITIMER_PROF, _PATIENCE_S)
     before = split_line(os.environ["COMP_LINE"], int(os.environ["COMP_POINT"]))[3]
     start = max((place for place in range(len(before)) if _is_start(before, place)), default=0)
     words = before[start + 1 :]
@@ -57,15 +57,20 @@ def complete() -> int:
     parser = COMMANDS[words[0]].parser() if has_command else _relay_parser(words)
     parser.add_help_option()
     _set_completers(parser)
-    has_positionals = any(not action.option_strings for action in parser._actions)  # noqa: SLF001  nothing else tells
+    has_positionals = any(not action.option_strings for action in parser.actions)
     os.environ[COMPLETES] = str(start + 1 + has_command)
     ExclusiveCompletionFinder()(
         parser,
         # Where a file is expected, options are offered once a dash is typed.
+        exit_method=_return,
         always_complete_options=False if has_positionals and words else "long",
         validator=lambda completion, typed: completion.startswith(typed) and printable(completion) == completion,
     )
     return DONE
+
+
+def _return(_code: int) -> None:
+    """End nothing: the process ends as it does after any command."""
 
 
 def _is_start(words: Sequence[str], place: int) -> bool:
@@ -82,9 +87,9 @@ def _relay_parser(words: Sequence[str]) -> Parser:
 
 
 def _set_completers(parser: Parser) -> None:
-    for action in parser._actions:  # noqa: SLF001  nothing else tells
+    for action in parser.actions:
         if action.choices is None:
-            action.completer = _called(_COMPLETERS.get(str(action.metavar), _nothing))  # type: ignore[attr-defined]
+            action.completer = _called(COMPLETERS.get(str(action.metavar), _nothing))  # type: ignore[attr-defined]
 
 
 def _called(completer: _Completer) -> Callable[..., Iterable[str] | Mapping[str, str]]:
@@ -178,7 +183,7 @@ def _topics(_typed: str, arguments: Namespace) -> Iterator[str]:
 
 _YAML: Final = r".*\.ya?ml"
 _RECORDING: Final = r".*\.(mcap|db3|bag|active)(\.(bz2|zstd|zst|gz))?"
-_COMPLETERS: Final[Mapping[str, _Completer]] = {
+COMPLETERS: Final[Mapping[str, _Completer]] = {
     "COMMAND": _commands,
     "FILE": _files(_YAML),
     "NEW": _files(_YAML),
@@ -188,3 +193,4 @@ _COMPLETERS: Final[Mapping[str, _Completer]] = {
     "TOPIC": _topics,
     "REPORT": _files(r".*\.html"),
 }
+"""What completes a word, by its metavar. Where there are choices they do, and a number or a URL nothing does."""

@@ -54,6 +54,11 @@ class Parser(argparse.ArgumentParser):
         arguments.ros_args = ros_args
         return arguments
 
+    @property
+    def actions(self) -> Sequence[argparse.Action]:
+        """Return all options and positionals."""
+        return self._actions
+
     def add_help_option(self) -> None:
         """Take -h and --help, as the last of the options."""
         self.add_argument("-h", "--help", action="store_true", help="print this help")
