@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-container faults soak lint bench clean
+.PHONY: demo test test-container faults soak lint schema bench clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -31,6 +31,10 @@ lint: $(VENV)/lint
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The schema that editors read, where they find it; a test holds it to the models.
+schema: $(VENV)/test
+	$(BIN)/python -m syncrelay schema > schema/syncrelay-1.json
 
 bench: $(VENV)/test
 	$(BIN)/python bench/engine.py

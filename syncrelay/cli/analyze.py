@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from syncrelay.bag import Channel, Recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, with_changes
 from syncrelay.bag.bindings import bind
+from syncrelay.cli import parsers
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new
-from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
@@ -38,18 +38,7 @@ class Asked:
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay analyze`."""
-    parser = Parser(
-        "syncrelay analyze",
-        description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
-        "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
-        "Exit code 1 if the recording lacks a required topic.",
-    )
-    parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
-    parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics to match, if there is no file yet")
-    parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
-    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
-    parser.add_argument("--html", metavar="REPORT", help="write a report with charts: one HTML file, opens offline")
-    parser.add_argument("--json", action="store_true", help="print all figures as JSON")
+    parser = parsers.analyze()
     arguments = parser.read(words)
     config, *others = arguments.config or [None]
     if others:

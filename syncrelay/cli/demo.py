@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.demo_screen import Moment, frame, plain_line, summary
-from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
 from syncrelay.logs import LOGGER, configure
@@ -45,20 +45,7 @@ def shipped_config() -> str:
 
 def command(words: Sequence[str], stop: StopRequest) -> int:
     """Run `syncrelay demo`."""
-    parser = Parser(
-        "syncrelay demo",
-        description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it. "
-        "Exit code 1 if a group produced no set.",
-    )
-    parser.add_argument("--seconds", metavar="N", type=positive, help="end N seconds after the sensors are up")
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
-    parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays, and exit")
-    parser.add_argument(
-        "--record",
-        metavar="OUT",
-        help="write what the sensors send in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT"
-        " as a rosbag2 folder",
-    )
+    parser = parsers.demo()
     arguments = parser.read(words)
     if arguments.record is not None:
         from syncrelay.cli.demo_recording import record

@@ -1,53 +1,63 @@
-"""The commands, and the way from the words of the command line to one of them. Each command's file owns its parser."""
+"""The commands, and the way from the words of the command line to one of them. Each has a file for its work."""
 
+import os
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, USAGE, put, say
-from syncrelay.cli.parser import HelpRequested
+from syncrelay.cli.parser import HelpRequested, Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import UsageError
 
 
-class _Command(NamedTuple):
-    """A command: how it is called, what it does, and the module whose `command` runs it."""
+class Command(NamedTuple):
+    """A command: how it is called, what it does, its parser, and the module whose `command` runs it."""
 
     usage: str
     does: str
+    parser: Callable[[], Parser]
     module: str
 
 
-_COMMANDS: Final = {
+COMMANDS: Final = {
     each.usage.split()[0]: each
     for each in (
-        _Command("validate FILE...", "check files; show every error at its line", "validate"),
-        _Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", "init"),
-        _Command("analyze BAG", "measure a recording, and suggest values that fit it", "analyze"),
-        _Command("replay BAG...", "run a file's groups on a recording, without ROS", "replay"),
-        _Command("demo", "try it on simulated sensors; needs no robot", "demo"),
-        _Command("doctor", "find out why messages may not arrive", "doctor"),
-        _Command("top", "watch a running relay, here or on another machine", "top"),
-        _Command("reload", "make a running relay read its file again", "reload"),
-        _Command("healthcheck", "check that the relay is receiving", "heartbeat"),
-        _Command("schema", "print the JSON Schema of the file, for editors", "schema"),
+        Command("validate FILE...", "check files; show every error at its line", parsers.validate, "validate"),
+        Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", parsers.init, "init"),
+        Command("analyze BAG", "measure a recording, and suggest values that fit it", parsers.analyze, "analyze"),
+        Command("replay BAG...", "run a file's groups on a recording, without ROS", parsers.replay, "replay"),
+        Command("demo", "try it on simulated sensors; needs no robot", parsers.demo, "demo"),
+        Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),
+        Command("top", "watch a running relay, here or on another machine", parsers.top, "top"),
+        Command("reload", "make a running relay read its file again", parsers.reload, "reload"),
+        Command("healthcheck", "check that the relay is receiving", parsers.healthcheck, "heartbeat"),
+        Command("schema", "print the JSON Schema of the file, for editors", parsers.schema, "schema"),
+        Command("completion SHELL", "print a script for bash, zsh or fish", parsers.completion, "completion"),
     )
 }
 _RELAY: Final = "run"
+COMPLETES: Final = "_ARGCOMPLETE"
+"""The environment variable by which a shell's script asks for completion."""
 
 
 def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
     """Run what the command line asks for and return its exit code; raises UsageError where it makes no sense."""
+    if not words and COMPLETES in os.environ:
+        from syncrelay.cli.completion import complete
+
+        return complete()
     try:
         if not words or words[0].startswith("-"):
             return _command(_RELAY)(words or ["--help"], stop)
         first, *rest = words
         if first == "help":
             return _command(_RELAY)(["--help"], stop)
-        if first not in _COMMANDS:
+        if first not in COMMANDS:
             raise UsageError(_unknown_command(first))
-        return _command(_COMMANDS[first].module)(rest, stop)
+        return _command(COMMANDS[first].module)(rest, stop)
     except HelpRequested as help_requested:
         tell, code = (put, DONE) if words else (say, USAGE)
         tell(str(help_requested).rstrip("\n"))
@@ -62,7 +72,7 @@ def _command(module: str) -> Callable[[Sequence[str], StopRequest], int]:
 
 def commands_help() -> str:
     """Return a line for each command."""
-    return "\n".join(f"  {each.usage:<21}{each.does}" for each in _COMMANDS.values())
+    return "\n".join(f"  {each.usage:<21}{each.does}" for each in COMMANDS.values())
 
 
 def _unknown_command(word: str) -> str:
@@ -73,4 +83,4 @@ def _unknown_command(word: str) -> str:
             f"{word} is not a command\n  syncrelay --config {word}     to run the relay with it\n"
             f"  syncrelay validate {word}     to check it"
         )
-    return f"unknown command {word}{did_you_mean(word, _COMMANDS)}\n  syncrelay --help lists the commands"
+    return f"unknown command {word}{did_you_mean(word, COMMANDS)}\n  syncrelay --help lists the commands"

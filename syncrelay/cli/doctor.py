@@ -8,9 +8,9 @@ from dataclasses import asdict
 from logging import NullHandler
 from typing import Any, Final
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.cli.heartbeat import VARIABLE
-from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.examine import Examination, Observed, Request, examine
@@ -23,26 +23,7 @@ _LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay doctor`."""
-    parser = Parser(
-        "syncrelay doctor",
-        description="Finds out why messages may not arrive: what is wrong, what follows from it, how to fix it. "
-        "Exit code 1 if something must be fixed.",
-    )
-    parser.add_argument(
-        "--config",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="check FILE too, and whether its types can be used here; may be repeated",
-    )
-    parser.add_argument(
-        "--live",
-        action="store_true",
-        help="join the ROS graph and check the topics of FILE: publishers, types, QoS, stamps",
-    )
-    parser.add_argument("--seconds", metavar="N", type=positive, help="with --live: watch for N s (5)")
-    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
-    parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
+    parser = parsers.doctor()
     arguments = parser.read(words)
     if arguments.seconds and not arguments.live:
         parser.error("--seconds N needs --live: it is how long to observe the graph")

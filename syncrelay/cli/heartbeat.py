@@ -66,13 +66,9 @@ def ailment(path: Path) -> str | None:
 
 def command(words: Sequence[str], _stop: "StopRequest") -> int:
     """Run `syncrelay healthcheck`."""
-    from syncrelay.cli.parser import Parser
+    from syncrelay.cli import parsers
 
-    Parser(
-        "syncrelay healthcheck",
-        description=f"Checks that the relay is receiving: the relay writes a heartbeat into the file that {VARIABLE} "
-        "names. Exit code 1 if it is not receiving.",
-    ).read(words)
+    parsers.healthcheck().read(words)
     return healthcheck()
 
 

@@ -11,9 +11,9 @@ from syncrelay.bag.analysis import Proposal, inventory_of, propose, propose_for
 from syncrelay.bag.analysis.inventory import NO_HEADER
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.qos import Profile
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
-from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
@@ -25,16 +25,7 @@ if TYPE_CHECKING:
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay init`."""
-    parser = Parser(
-        "syncrelay init",
-        description="Proposes a file for a recording or for a live ROS graph: groups of its topics, their types, and "
-        "values that fit, with what was measured as comments.",
-    )
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
-    source.add_argument("--from-graph", action="store_true", help="listen to what is being published now")
-    parser.add_argument("--seconds", metavar="N", type=positive, help="with --from-graph: listen for N s (10)")
-    parser.add_argument("-o", "--output", metavar="NEW", help="write the file here instead of printing it")
+    parser = parsers.init()
     arguments = parser.read(words)
     if arguments.from_graph:
         return init_from_graph(arguments.seconds or 10.0, arguments.output)

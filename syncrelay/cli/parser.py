@@ -8,7 +8,7 @@ from typing import Any, Final, NoReturn
 
 from syncrelay.errors import UsageError
 
-_ROS_ARGS: Final = "--ros-args"
+ROS_ARGS: Final = "--ros-args"
 _WIDTH: Final = 78
 
 
@@ -38,7 +38,7 @@ class Parser(argparse.ArgumentParser):
 
         An unknown argument is an error with the nearest valid option.
         """
-        self.add_argument("-h", "--help", action="store_true", help="print this help")
+        self.add_help_option()
         own, ros_args = self._split(words)
         # Whatever else is there, or missing.
         if "-h" in own or "--help" in own:
@@ -54,10 +54,19 @@ class Parser(argparse.ArgumentParser):
         arguments.ros_args = ros_args
         return arguments
 
+    @property
+    def actions(self) -> Sequence[argparse.Action]:
+        """Return all options and positionals."""
+        return self._actions
+
+    def add_help_option(self) -> None:
+        """Take -h and --help, as the last of the options."""
+        self.add_argument("-h", "--help", action="store_true", help="print this help")
+
     def _split(self, words: Sequence[str]) -> tuple[Sequence[str], Sequence[str]]:
-        if _ROS_ARGS not in words or _ROS_ARGS not in self._option_string_actions:
+        if ROS_ARGS not in words or ROS_ARGS not in self._option_string_actions:
             return words, ()
-        at = words.index(_ROS_ARGS)
+        at = words.index(ROS_ARGS)
         return words[:at], words[at + 1 :]
 
     def refuse_repeated(self, files: Sequence[str]) -> None:

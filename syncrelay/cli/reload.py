@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
-from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find_one
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
@@ -24,13 +24,7 @@ _OTHERWISE: Final = "  If the relay's file says `metrics: null`, send SIGHUP to 
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay reload`."""
-    parser = Parser(
-        "syncrelay reload",
-        description="Makes the relay on this machine read its file again. Groups that did not change keep running and "
-        "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
-    )
-    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host:port or URL")
-    return reload(parser.read(words).url)
+    return reload(parsers.reload().read(words).url)
 
 
 def reload(named: str | None) -> int:

@@ -12,8 +12,8 @@ from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import Listener
 from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.writing import SetWriter
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
-from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
@@ -34,25 +34,7 @@ class Wanted:
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay replay`."""
-    parser = Parser(
-        "syncrelay replay",
-        description="Runs the groups of a file on a recording, without ROS, and says what became of every message. "
-        "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic.",
-    )
-    parser.add_argument(
-        "bags",
-        metavar="BAG",
-        nargs="+",
-        help="a rosbag2 folder, or an MCAP, sqlite3 or ROS 1 bag file, compressed or not; several are read as one",
-    )
-    parser.add_argument(
-        "--config", metavar="FILE", action="append", required=True, help="the file with the groups; may be repeated"
-    )
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
-    )
-    parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
-    parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
+    parser = parsers.replay()
     arguments = parser.read(words)
     parser.refuse_repeated(arguments.config)
     return replay(arguments.bags, arguments.config, Wanted(arguments.json, arguments.drops, arguments.output))

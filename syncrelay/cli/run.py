@@ -7,10 +7,10 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.config_files import ConfigFiles, Reading
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
-from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import ListenError, ReloadError, SyncRelayError, UsageError
 
@@ -19,13 +19,6 @@ if TYPE_CHECKING:
     from syncrelay.ros.relay import Relay
     from syncrelay.status import Server
 
-_USAGE: Final = """\
-syncrelay --config FILE [option ...] [--ros-args ...]
-       syncrelay COMMAND ..."""
-_ABOUT: Final = "Matches ROS 2 messages by time, as a YAML file describes, and republishes each matched set."
-_CODES: Final = """\
-exit codes: 0 done, 1 the file or data has a problem, 2 wrong usage,
-  69 ROS cannot be used here, 70 a bug in syncrelay, 130 interrupted"""
 _FAILED: Final = "reload failed; keeping the running configuration:"
 _BUG: Final = (
     "reload failed because of a bug in syncrelay; keeping the running configuration;"
@@ -35,7 +28,7 @@ _BUG: Final = (
 
 def command(words: Sequence[str], stop: StopRequest) -> int:
     """Run `syncrelay --config FILE`, or answer --help and --version."""
-    parser = _parser()
+    parser = parsers.relay()
     arguments = parser.read(words)
     if arguments.version:
         put(_version())
@@ -53,28 +46,6 @@ def command(words: Sequence[str], stop: StopRequest) -> int:
         watch=arguments.watch,
         stop=stop,
     )
-
-
-def _parser() -> Parser:
-    from syncrelay.cli.dispatch import commands_help
-
-    parser = Parser("syncrelay", description=_ABOUT, usage=_USAGE, epilog=f"commands:\n{commands_help()}\n\n{_CODES}")
-    add = parser.add_argument_group("the relay").add_argument
-    add("--config", metavar="FILE", action="append", default=[], help="run the groups of FILE; may be repeated")
-    add("--group", metavar="NAME", action="append", default=[], help="run this group only; may be repeated")
-    add("--watch", action="store_true", help="read FILE again when it changes, not only at SIGHUP")
-    add("--explain", metavar="N", type=positive, help="publish nothing; after N s say what is wrong")
-    add(
-        "--log-level",
-        choices=("debug", "info", "warning", "error"),
-        default="info",
-        metavar="LEVEL",
-        help="debug, info (default), warning or error",
-    )
-    add("--log-format", choices=("text", "json"), default="text", metavar="FORMAT", help="text (default) or json")
-    add("--ros-args", action="store_true", help="pass what follows to ROS, such as -r __ns:=/robot1")
-    parser.add_argument("--version", action="store_true", help="print the version")
-    return parser
 
 
 def _version() -> str:

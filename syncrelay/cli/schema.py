@@ -3,18 +3,15 @@
 import json
 from collections.abc import Sequence
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
-from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config.schema import json_schema
 
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay schema`."""
-    Parser(
-        "syncrelay schema",
-        description="Prints the JSON Schema (draft 7) of the file: with it, editors complete and check what you write.",
-    ).read(words)
+    parsers.schema().read(words)
     return schema()
 
 

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Sequence
 from enum import Enum
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
-from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find, find_one
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
@@ -24,17 +24,7 @@ class Output(Enum):
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay top`."""
-    parser = Parser(
-        "syncrelay top",
-        description="Shows a running relay live: its groups, their inputs, their last sets, and what is wrong. "
-        "Without --url it shows the relay of this machine, and asks which if there are several. "
-        "Exit code 1 if no relay answers.",
-    )
-    parser.add_argument(
-        "--url", metavar="URL", help="the relay's host, host:port or URL, such as robot or http://robot:9464"
-    )
-    parser.add_argument("--once", action="store_true", help="print the state once as text, and exit")
-    parser.add_argument("--json", action="store_true", help="with --once: print the state as JSON")
+    parser = parsers.top()
     arguments = parser.read(words)
     if arguments.json and not arguments.once:
         parser.error("--json goes with --once")

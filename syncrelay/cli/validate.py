@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
-from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 from syncrelay.config.source import shown_name
@@ -26,23 +26,7 @@ class Finding:
 
 def command(words: Sequence[str], _stop: StopRequest) -> int:
     """Run `syncrelay validate`."""
-    parser = Parser(
-        "syncrelay validate",
-        description="Checks files without ROS and shows every error at once, each at its line, with the nearest valid "
-        "word. Message types are checked where ROS is installed; a package that is missing there is only a note. "
-        "Exit code 1 if a file has an error.",
-    )
-    parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, or - for standard input")
-    parser.add_argument(
-        "--together", action="store_true", help="check the files as one, as the relay does: --config FILE ..."
-    )
-    parser.add_argument(
-        "--format",
-        choices=tuple(_PRINT),
-        default="text",
-        metavar="FORMAT",
-        help="text (default), json, or github: annotations for a workflow",
-    )
+    parser = parsers.validate()
     arguments = parser.read(words)
     files = arguments.files
     parser.refuse_repeated(files if arguments.together else [each for each in files if each == "-"])

@@ -11,6 +11,9 @@ from syncrelay.config.file import FileFormat, file_format
 
 Schema: TypeAlias = dict[str, Any]
 
+ID: Final = "urn:syncrelay:schema:1"
+"""The schema's name, whatever place it is read from; it ends in the `version` of the files that it describes."""
+
 _REF: Final = "#/definitions/"
 _VARIABLE: Final[Schema] = {
     "type": "string",
@@ -31,6 +34,7 @@ def json_schema() -> Schema:
     generated["properties"]["groups"]["additionalProperties"] = {"$ref": f"{_REF}Group"}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
+        "$id": ID,
         "title": "syncrelay file",
         **_mapping(generated),
         "if": {"not": {"required": ["defaults"]}},

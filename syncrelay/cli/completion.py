@@ -1,0 +1,196 @@
+"""`syncrelay completion SHELL`, and what its script asks for at every press of TAB.
+
+argcomplete tells from the words of the line what is expected next, and speaks with the shells. What completes a word
+is told by its metavar. Nothing slow is imported: what a file or a recording holds is read only where it is wanted.
+"""
+
+import os
+import re
+import signal
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from argcomplete.finders import ExclusiveCompletionFinder
+from argcomplete.lexers import split_line
+from argcomplete.shell_integration import shellcode
+
+from syncrelay.cli import parsers
+from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.dispatch import COMMANDS, COMPLETES
+from syncrelay.cli.parser import ROS_ARGS, Parser
+from syncrelay.cli.stop import StopRequest
+from syncrelay.printable import printable
+
+_PROGRAM: Final = "syncrelay"
+# Of processor time: a recording without an index, or compressed as a whole, may take long to open.
+_PATIENCE_S: Final = 2.0
+# As syncrelay.config reads of a file, which takes longer to import than a press of TAB may take.
+_MOST_BYTES: Final = 1_000_000
+# What a line may have before a program's name; zsh gives the whole line.
+_BEFORE: Final = re.compile(r".*[;&|({]|\w+=.*|sudo|env|exec|nice|nohup|time|!")
+
+_Completer = Callable[[str, Namespace], Iterable[str] | Mapping[str, str]]
+
+
+def command(words: Sequence[str], _stop: StopRequest) -> int:
+    """Run `syncrelay completion`."""
+    put(shellcode([_PROGRAM], shell=parsers.completion().read(words).shell).strip())
+    return DONE
+
+
+def complete() -> int:
+    """Answer a shell, which speaks through argcomplete's variables, with the words that may stand at the cursor.
+
+    What takes longer than a user waits for ends the process.
+    """
+    signal.setitimer(signal.ITIMER_PROF, _PATIENCE_S)
+    before = split_line(os.environ["COMP_LINE"], int(os.environ["COMP_POINT"]))[3]
+    start = max((place for place in range(len(before)) if _is_start(before, place)), default=0)
+    words = before[start + 1 :]
+    if ROS_ARGS in words:
+        return DONE
+    has_command = bool(words) and words[0] in COMMANDS
+    parser = COMMANDS[words[0]].parser() if has_command else _relay_parser(words)
+    parser.add_help_option()
+    _set_completers(parser)
+    has_positionals = any(not action.option_strings for action in parser.actions)
+    os.environ[COMPLETES] = str(start + 1 + has_command)
+    ExclusiveCompletionFinder()(
+        parser,
+        # Where a file is expected, options are offered once a dash is typed.
+        exit_method=_return,
+        always_complete_options=False if has_positionals and words else "long",
+        validator=lambda completion, typed: completion.startswith(typed) and printable(completion) == completion,
+    )
+    return DONE
+
+
+def _return(_code: int) -> None:
+    """End nothing: the process ends as it does after any command."""
+
+
+def _is_start(words: Sequence[str], place: int) -> bool:
+    is_program = Path(words[place]).name == _PROGRAM
+    return is_program and (place == 0 or _BEFORE.fullmatch(words[place - 1]) is not None)
+
+
+def _relay_parser(words: Sequence[str]) -> Parser:
+    """Return the relay's parser; as the first word, a command may stand too."""
+    parser = parsers.relay()
+    if not words:
+        parser.add_argument("command", metavar="COMMAND", nargs="?")
+    return parser
+
+
+def _set_completers(parser: Parser) -> None:
+    for action in parser.actions:
+        if action.choices is None:
+            action.completer = _called(COMPLETERS.get(str(action.metavar), _nothing))  # type: ignore[attr-defined]
+
+
+def _called(completer: _Completer) -> Callable[..., Iterable[str] | Mapping[str, str]]:
+    """Return a completer as argcomplete calls it."""
+
+    def call(*, prefix: str, parsed_args: Namespace, **_others: Any) -> Iterable[str] | Mapping[str, str]:
+        return completer(prefix, parsed_args)
+
+    return call
+
+
+def _nothing(_typed: str, _arguments: Namespace) -> Iterable[str]:
+    return ()
+
+
+def _commands(_typed: str, _arguments: Namespace) -> Mapping[str, str]:
+    return {name: command.does for name, command in COMMANDS.items()}
+
+
+def _files(pattern: str) -> _Completer:
+    """Return what completes the names of files that match, and of folders on the way to them."""
+    wanted = re.compile(pattern)
+
+    def complete_file(typed: str, _arguments: Namespace) -> Iterator[str]:
+        folder, slash, begun = typed.rpartition("/")
+        with suppress(OSError):
+            for entry in sorted(Path(folder + slash or ".").expanduser().iterdir()):
+                if entry.name.startswith(".") and not begun.startswith("."):
+                    continue
+                if entry.is_dir():
+                    yield f"{folder}{slash}{entry.name}/"
+                elif wanted.fullmatch(entry.name):
+                    yield f"{folder}{slash}{entry.name}"
+
+    return complete_file
+
+
+def _groups(_typed: str, arguments: Namespace) -> Iterator[str]:
+    """Give the groups of the files that --config names; of a faulty file, those before its fault."""
+    for name in arguments.config or ():
+        path = Path(name).expanduser()
+        # A pipe would be waited for, and emptied.
+        if path.is_file():
+            with path.open("rb") as file:
+                yield from group_names(file.read(_MOST_BYTES))
+
+
+def group_names(text: bytes) -> Iterator[str]:
+    """Give the keys below `groups` of a YAML text, up to its first fault."""
+    import yaml
+
+    # The open mappings and lists, each with the last of its scalars, and whether a mapping expects a key next.
+    opened: list[_Opened] = []
+    with suppress(yaml.YAMLError):
+        for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+            if isinstance(event, yaml.NodeEvent) and opened:
+                key = opened[-1].take(event.value if isinstance(event, yaml.ScalarEvent) else "")
+                if key and [each.key for each in opened[:-1]] == ["groups"]:
+                    yield key
+            if isinstance(event, yaml.CollectionStartEvent):
+                opened.append(_Opened(isinstance(event, yaml.MappingStartEvent)))
+            elif isinstance(event, yaml.CollectionEndEvent):
+                opened.pop()
+
+
+@dataclass(slots=True)
+class _Opened:
+    """A mapping or a list whose end has not come: its last key, and whether a key is next."""
+
+    is_mapping: bool
+    key: str = ""
+    expects_key: bool = True
+
+    def take(self, text: str) -> str:
+        """Take what comes next in it; return it if it is a key."""
+        is_key = self.is_mapping and self.expects_key
+        self.expects_key = not self.expects_key
+        if is_key:
+            self.key = text
+        return text if is_key else ""
+
+
+def _topics(_typed: str, arguments: Namespace) -> Iterator[str]:
+    """Give the topics of the recording that is named before."""
+    from syncrelay.bag import open_recording
+    from syncrelay.errors import BagError
+
+    with suppress(BagError), closing(open_recording([arguments.bag])) as recording:
+        yield from sorted({channel.topic for channel in recording.channels} - set(arguments.topics))
+
+
+_YAML: Final = r".*\.ya?ml"
+_RECORDING: Final = r".*\.(mcap|db3|bag|active)(\.(bz2|zstd|zst|gz))?"
+COMPLETERS: Final[Mapping[str, _Completer]] = {
+    "COMMAND": _commands,
+    "FILE": _files(_YAML),
+    "NEW": _files(_YAML),
+    "NAME": _groups,
+    "BAG": _files(_RECORDING),
+    "OUT": _files(_RECORDING),
+    "TOPIC": _topics,
+    "REPORT": _files(r".*\.html"),
+}
+"""What completes a word, by its metavar. Where there are choices they do, and a number or a URL nothing does."""

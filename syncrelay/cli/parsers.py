@@ -1,0 +1,226 @@
+"""What each command is called with. Imports nothing slow: completion reads it at every press of TAB.
+
+A metavar says what kind of word is expected, and so what completes it (syncrelay.cli.completion).
+"""
+
+from typing import Final
+
+from syncrelay.cli.parser import Parser, positive
+
+_RELAY_USAGE: Final = """\
+syncrelay --config FILE [option ...] [--ros-args ...]
+       syncrelay COMMAND ..."""
+_EXIT_CODES: Final = """\
+exit codes: 0 done, 1 the file or data has a problem, 2 wrong usage,
+  69 ROS cannot be used here, 70 a bug in syncrelay, 130 interrupted"""
+
+
+def relay() -> Parser:
+    """Return the parser of `syncrelay --config FILE`."""
+    from syncrelay.cli.dispatch import commands_help
+
+    parser = Parser(
+        "syncrelay",
+        description="Matches ROS 2 messages by time, as a YAML file describes, and republishes each matched set.",
+        usage=_RELAY_USAGE,
+        epilog=f"commands:\n{commands_help()}\n\n{_EXIT_CODES}",
+    )
+    add = parser.add_argument_group("the relay").add_argument
+    add("--config", metavar="FILE", action="append", default=[], help="run the groups of FILE; may be repeated")
+    add("--group", metavar="NAME", action="append", default=[], help="run this group only; may be repeated")
+    add("--watch", action="store_true", help="read FILE again when it changes, not only at SIGHUP")
+    add("--explain", metavar="N", type=positive, help="publish nothing; after N s say what is wrong")
+    add(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="info",
+        metavar="LEVEL",
+        help="debug, info (default), warning or error",
+    )
+    add("--log-format", choices=("text", "json"), default="text", metavar="FORMAT", help="text (default) or json")
+    add("--ros-args", action="store_true", help="pass what follows to ROS, such as -r __ns:=/robot1")
+    parser.add_argument("--version", action="store_true", help="print the version")
+    return parser
+
+
+def validate() -> Parser:
+    """Return the parser of `syncrelay validate`."""
+    parser = Parser(
+        "syncrelay validate",
+        description="Checks files without ROS and shows every error at once, each at its line, with the nearest valid "
+        "word. Message types are checked where ROS is installed; a package that is missing there is only a note. "
+        "Exit code 1 if a file has an error.",
+    )
+    parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, or - for standard input")
+    parser.add_argument(
+        "--together", action="store_true", help="check the files as one, as the relay does: --config FILE ..."
+    )
+    parser.add_argument(
+        "--format",
+        choices=("text", "json", "github"),
+        default="text",
+        metavar="FORMAT",
+        help="text (default), json, or github: annotations for a workflow",
+    )
+    return parser
+
+
+def init() -> Parser:
+    """Return the parser of `syncrelay init`."""
+    parser = Parser(
+        "syncrelay init",
+        description="Proposes a file for a recording or for a live ROS graph: groups of its topics, their types, and "
+        "values that fit, with what was measured as comments.",
+    )
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
+    source.add_argument("--from-graph", action="store_true", help="listen to what is being published now")
+    parser.add_argument("--seconds", metavar="N", type=positive, help="with --from-graph: listen for N s (10)")
+    parser.add_argument("-o", "--output", metavar="NEW", help="write the file here instead of printing it")
+    return parser
+
+
+def analyze() -> Parser:
+    """Return the parser of `syncrelay analyze`."""
+    parser = Parser(
+        "syncrelay analyze",
+        description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
+        "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
+        "Exit code 1 if the recording lacks a required topic.",
+    )
+    parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
+    parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics to match, if there is no file yet")
+    parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
+    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
+    parser.add_argument("--html", metavar="REPORT", help="write a report with charts: one HTML file, opens offline")
+    parser.add_argument("--json", action="store_true", help="print all figures as JSON")
+    return parser
+
+
+def replay() -> Parser:
+    """Return the parser of `syncrelay replay`."""
+    parser = Parser(
+        "syncrelay replay",
+        description="Runs the groups of a file on a recording, without ROS, and says what became of every message. "
+        "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic.",
+    )
+    parser.add_argument(
+        "bags",
+        metavar="BAG",
+        nargs="+",
+        help="a rosbag2 folder, or an MCAP, sqlite3 or ROS 1 bag file, compressed or not; several are read as one",
+    )
+    parser.add_argument(
+        "--config", metavar="FILE", action="append", required=True, help="the file with the groups; may be repeated"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
+    )
+    parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
+    parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
+    return parser
+
+
+def demo() -> Parser:
+    """Return the parser of `syncrelay demo`."""
+    parser = Parser(
+        "syncrelay demo",
+        description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it. "
+        "Exit code 1 if a group produced no set.",
+    )
+    parser.add_argument("--seconds", metavar="N", type=positive, help="end N seconds after the sensors are up")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
+    parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays, and exit")
+    parser.add_argument(
+        "--record",
+        metavar="OUT",
+        help="write what the sensors send in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT"
+        " as a rosbag2 folder",
+    )
+    return parser
+
+
+def doctor() -> Parser:
+    """Return the parser of `syncrelay doctor`."""
+    parser = Parser(
+        "syncrelay doctor",
+        description="Finds out why messages may not arrive: what is wrong, what follows from it, how to fix it. "
+        "Exit code 1 if something must be fixed.",
+    )
+    parser.add_argument(
+        "--config",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="check FILE too, and whether its types can be used here; may be repeated",
+    )
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="join the ROS graph and check the topics of FILE: publishers, types, QoS, stamps",
+    )
+    parser.add_argument("--seconds", metavar="N", type=positive, help="with --live: watch for N s (5)")
+    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+    parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
+    return parser
+
+
+def top() -> Parser:
+    """Return the parser of `syncrelay top`."""
+    parser = Parser(
+        "syncrelay top",
+        description="Shows a running relay live: its groups, their inputs, their last sets, and what is wrong. "
+        "Without --url it shows the relay of this machine, and asks which if there are several. "
+        "Exit code 1 if no relay answers.",
+    )
+    parser.add_argument(
+        "--url", metavar="URL", help="the relay's host, host:port or URL, such as robot or http://robot:9464"
+    )
+    parser.add_argument("--once", action="store_true", help="print the state once as text, and exit")
+    parser.add_argument("--json", action="store_true", help="with --once: print the state as JSON")
+    return parser
+
+
+def reload() -> Parser:
+    """Return the parser of `syncrelay reload`."""
+    parser = Parser(
+        "syncrelay reload",
+        description="Makes the relay on this machine read its file again. Groups that did not change keep running and "
+        "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
+    )
+    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host:port or URL")
+    return parser
+
+
+def healthcheck() -> Parser:
+    """Return the parser of `syncrelay healthcheck`."""
+    from syncrelay.cli.heartbeat import VARIABLE
+
+    return Parser(
+        "syncrelay healthcheck",
+        description=f"Checks that the relay is receiving: the relay writes a heartbeat into the file that {VARIABLE} "
+        "names. Exit code 1 if it is not receiving.",
+    )
+
+
+def schema() -> Parser:
+    """Return the parser of `syncrelay schema`."""
+    return Parser(
+        "syncrelay schema",
+        description="Prints the JSON Schema (draft 7) of the file: with it, editors complete and check what you write.",
+    )
+
+
+def completion() -> Parser:
+    """Return the parser of `syncrelay completion`."""
+    parser = Parser(
+        "syncrelay completion",
+        description="Prints a script that makes a shell complete syncrelay's commands, options and files, the groups "
+        "of a file and the topics of a recording.",
+        epilog="where to put it:\n"
+        "  bash  ~/.local/share/bash-completion/completions/syncrelay\n"
+        "  zsh   _syncrelay in a folder of $fpath, before compinit\n"
+        "  fish  ~/.config/fish/completions/syncrelay.fish",
+    )
+    parser.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
+    return parser
