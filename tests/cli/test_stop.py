@@ -91,7 +91,7 @@ def test_the_second_may_be_another_though_the_handlers_turn_never_comes(tmp_path
 def test_of_pid_1_which_the_kernel_protects_the_second_signal_is_the_end_too(tmp_path: Path):
     argv = ["unshare", "--pid", "--fork", "--kill-child", "--map-root-user", sys.executable, "-c", _SELF_SIGNALLED]
     environment = ros_environment(domain=0, folder=tmp_path, python_path=[ROOT])
-    done = subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=120)
     if "unshare" in done.stderr:
         pytest.skip(f"no process namespace can be made here: {done.stderr}")
     assert (done.returncode, done.stdout) == (128 + signal.SIGTERM, "1\n1 asked to end\n")
