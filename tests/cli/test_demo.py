@@ -88,7 +88,7 @@ def running(pid):
 
 def demo_for(stage, seconds):
     """A demo of so many seconds that came to its end, and how many: more where a busy machine left a group no set."""
-    for longer in (seconds, 3 * seconds, 9 * seconds):
+    for longer in (seconds, 3 * seconds, 6 * seconds):
         stage.environment["TWICE_AS_LONG_S"] = f"{2 * longer}"
         demo = stage.start("demo", [*_DEMO, "--seconds", f"{longer}"])
         if demo.wait(2 * longer + DEADLINE_S) == 0:
