@@ -134,7 +134,8 @@ def test_it_can_be_stopped_before_the_sensors_publish(stage):
     demo.send(signal.SIGINT)
     assert demo.wait() == 0
     assert demo.stdout == "Starting a simulated camera, lidar and IMU ...\n"
-    assert demo.said == ["syncrelay: stopped before it started"]
+    # Of sensors that take their time to end, it may warn.
+    assert [line for line in demo.said if not line.startswith("[WARN]")] == ["syncrelay: stopped before it started"]
     assert not any(map(running, sensors))
 
 

@@ -45,6 +45,11 @@ def ros_environment(*, domain: int, folder: Path, python_path: Sequence[Path]) -
     }
 
 
+def ours_of(stderr: str) -> list[str]:
+    """The lines of stderr but those of Fast DDS, which complains there of what others do to its shared memory."""
+    return [line for line in stderr.splitlines() if "RTPS_" not in line]
+
+
 def children_of(pid: int) -> list[int]:
     """The ids of the processes that a process has started; none if it is gone."""
     try:
@@ -90,8 +95,7 @@ class Process:
 
     @property
     def said(self) -> list[str]:
-        """The lines of stderr but those of Fast DDS, which complains there of what others do to its shared memory."""
-        return [line for line in self.stderr.splitlines() if "RTPS_" not in line]
+        return ours_of(self.stderr)
 
     def running(self) -> bool:
         return self._child.poll() is None
