@@ -33,7 +33,7 @@ _GROUP = {
 _TEXT = config({"front": _GROUP}, metrics=ANY_PORT)
 
 
-@pytest.mark.timeout(chosen(short=300, long=900))
+@pytest.mark.timeout(chosen(short=600, long=900))
 def test_every_pass_of_a_recording_that_is_looped_gives_the_same_sets(stage: Stage, figures):
     recording = merged(
         jittery("/camera", period_ms=20, jitter_ms=4, count=200, seed=1),
