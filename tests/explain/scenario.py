@@ -25,10 +25,11 @@ from syncrelay.explain import (
     GroupWatch,
     InputGraph,
     Judge,
+    Pause,
     Severity,
     Standstill,
 )
-from syncrelay.sync import Match, Message, Outcome
+from syncrelay.sync import DropReason, Match, Message, Outcome
 
 S = 1_000_000_000
 MS = 1_000_000
@@ -131,6 +132,7 @@ def run(
     options: dict[str, Any] | None = None,
     stops: Sequence[tuple[float, float]] = (),
     starved: Sequence[tuple[float, float]] = (),
+    paused: Sequence[tuple[float, float]] = (),
     publishers: Callable[[str, float], tuple[Endpoint, ...]] | None = None,
     facts: Callable[[float], dict[str, Any]] | None = None,
 ) -> Told:
@@ -138,7 +140,9 @@ def run(
 
     `stops` are when the whole process stands still, as by SIGSTOP, each from one second to another: what comes
     meanwhile is received at the end. `starved` is the same of the thread that takes messages: they are received in
-    time, and lie there. `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of
+    time, and lie there. `paused` is when the relay is paused.
+
+    `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of
     `GroupWatch.facts`.
     """
     config = group_of(sources, options or {})
@@ -146,7 +150,7 @@ def run(
     arrivals = merge(
         *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources))
     )
-    relay = _Relay(config)
+    relay = _Relay(config, paused)
     waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in arrivals)
     taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)
     place = 0
@@ -211,7 +215,8 @@ def _arrivals(
 class _Relay:
     """What the running relay does with a group, but for DDS."""
 
-    def __init__(self, config: GroupConfig) -> None:
+    def __init__(self, config: GroupConfig, paused: Sequence[tuple[float, float]]) -> None:
+        self._pauses = [(_ns(begin), _ns(end)) for begin, end in paused]
         self._n_inputs = len(config.topics)
         self._names = [(topic.topic, topic.output) for topic in config.topics]
         self._driver = EngineDriver(config, self._leave)
@@ -233,7 +238,16 @@ class _Relay:
             self._driver.reject(arrival.input, arrival.received, now=now)
             return
         self._arrived[arrival.input].append((arrival.stamp, arrival.received))
-        self._driver.add(Message(arrival.input, arrival.stamp, arrival.received, arrival.key), now=now)
+        message = Message(arrival.input, arrival.stamp, arrival.received, arrival.key)
+        if self._pause_at(now) is None:
+            self._driver.add(message, now=now)
+            return
+        self._driver.engine.let_go(DropReason.PAUSED)
+        self._driver.engine.reject(message, DropReason.PAUSED)
+
+    def _pause_at(self, now: int) -> Pause | None:
+        begins = (begin for begin, end in self._pauses if begin <= now < end)
+        return next((Pause(begin, "/syncrelay/resume") for begin in begins), None)
 
     def _leave(self, outcomes: Sequence[Outcome], now: int) -> None:
         for each in outcomes:
@@ -259,7 +273,9 @@ class _Relay:
         worst = max((each for each in self._standstills if each), key=lambda each: each.ns, default=None)
         waited = max(self._waits[-10:])
         self._waits.append(0)
-        self.facts = self._watch.facts(graph, now=now, **{"waited": waited, "standstill": worst, **more})
+        self.facts = self._watch.facts(
+            graph, now=now, **{"waited": waited, "standstill": worst, "pause": self._pause_at(now), **more}
+        )
         found = self._judge.judge(self.facts)
         self.found.append((second, found))
         for remark in self._log.remarks(self.facts, found, self._judge.explained(self.facts)):

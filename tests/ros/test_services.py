@@ -1,5 +1,7 @@
 """The services and parameters of the relay's node: called and read by a process of their own."""
 
+from importlib.metadata import version
+
 import pytest
 
 from tests.ros.cdr_messages import VECTOR
@@ -19,6 +21,12 @@ def test_a_reload_by_service_says_what_changed_or_what_is_wrong_with_the_file(st
     file, caller = ReloadedFile(stage, front=_FRONT), stage.caller()
     file.write(config({"front": _FRONT, "rear": _REAR}, metrics=ANY_PORT))
     assert caller.call("reload") == (True, "reloaded: 1 group unchanged; started rear")
+    assert caller.get("config", "version", "groups") == [[str(file.path)], version("syncrelay"), ["front", "rear"]]
+    for name, value in (("config", ["other.yaml"]), ("version", "0"), ("groups", ["front"])):
+        successful, why = caller.set(name, value)
+        assert not successful
+        assert name in why
+    assert caller.get("groups") == [["front", "rear"]]
     file.write(config({"front": {**_FRONT, "slop": "30ms"}}, metrics=ANY_PORT))
     assert caller.call("reload") == (True, "reloaded: 0 groups unchanged; rebuilt front; ended rear")
     file.write(config({"front": {**_FRONT, "slopp": "1ms"}}, metrics=ANY_PORT))
