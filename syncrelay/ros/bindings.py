@@ -145,6 +145,10 @@ class GroupBindings:
             topics[key] = TopicInput(
                 config, name=name, entities=self._entities, node=self._node, backend=self._backend, loop=self._loop
             )
+            # What was taken stays, also where another QoS is asked for.
+            for publisher in (each.type_from for each in self.topics if each.name == name):
+                if publisher is not None:
+                    topics[key].keep_type(publisher)
         return topics[key]
 
 
