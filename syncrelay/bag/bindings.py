@@ -1,12 +1,12 @@
 """A file's topics and a recording's channels, brought together; and what does not fit."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from syncrelay.bag.recording import Channel, Encoding, Recording
 from syncrelay.config import Config, GroupConfig, TopicConfig
 from syncrelay.config.names import expand
-from syncrelay.config.wording import nearest, quoted
+from syncrelay.config.wording import all_of, nearest, quoted
 
 _MOST_LISTED = 8
 
@@ -23,7 +23,10 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class GroupBinding:
-    """A group, its inputs in the file's order, and why an input has no channel, a sentence each."""
+    """A group, its inputs in the file's order, and why an input has no channel, a sentence each.
+
+    The group's topics have the recording's types where the file leaves them out and the recording has one.
+    """
 
     group: GroupConfig
     inputs: tuple[Input, ...]
@@ -46,16 +49,30 @@ def full_name(topic: str, config: Config) -> str:
 
 
 def _bind(group: GroupConfig, config: Config, channels: Sequence[Channel]) -> GroupBinding:
-    inputs, problems = [], []
-    for topic in group.topics:
-        name = full_name(topic.topic, config)
-        found = tuple(channel for channel in channels if channel.topic == name)
-        fitting = tuple(channel for channel in found if channel.type == topic.type and _is_ros(channel))
-        problems += [f"{group.name}: {_misfit(channel, topic)}" for channel in found if channel not in fitting]
-        if not found:
-            problems.append(f"{group.name}: {_missing(name, channels)}")
-        inputs.append(Input(topic, name, full_name(topic.output, config), fitting))
-    return GroupBinding(group, tuple(inputs), tuple(dict.fromkeys(problems)))
+    bound = [_bind_topic(topic, config, channels) for topic in group.topics]
+    inputs = tuple(each for each, _ in bound)
+    problems = dict.fromkeys(f"{group.name}: {problem}" for _, problems in bound for problem in problems)
+    return GroupBinding(replace(group, topics=tuple(each.config for each in inputs)), inputs, tuple(problems))
+
+
+def _bind_topic(topic: TopicConfig, config: Config, channels: Sequence[Channel]) -> tuple[Input, list[str]]:
+    """Return an input and why it has no channel, or not all of its topic."""
+    name, output = full_name(topic.topic, config), full_name(topic.output, config)
+    found = tuple(channel for channel in channels if channel.topic == name)
+    if not found:
+        return Input(topic, name, output, ()), [_missing(name, channels)]
+    if topic.type is None:
+        types = list(dict.fromkeys(channel.type for channel in found if channel.type and _is_ros(channel)))
+        if len(types) > 1:
+            return Input(topic, name, output, ()), [_ambiguous(name, types)]
+        topic = replace(topic, type=next(iter(types), None))
+    fitting = tuple(channel for channel in found if channel.type == topic.type and _is_ros(channel))
+    misfits = [_misfit(channel, topic) for channel in found if channel not in fitting]
+    return Input(topic, name, output, fitting), misfits
+
+
+def _ambiguous(name: str, types: Sequence[str]) -> str:
+    return f"{name} is recorded as {all_of(types)}, and the file has no type for it: write the one that is meant"
 
 
 def _is_ros(channel: Channel) -> bool:
@@ -65,7 +82,8 @@ def _is_ros(channel: Channel) -> bool:
 def _misfit(channel: Channel, topic: TopicConfig) -> str:
     if not _is_ros(channel):
         return f"{channel.topic} is recorded as {channel.encoding or 'bytes without a named encoding'}, expected cdr"
-    return f"{channel.topic} is recorded as {channel.type or 'a type without a name'}, the file says {topic.type}"
+    expected = "and the file has no type for it either" if topic.type is None else f"the file says {topic.type}"
+    return f"{channel.topic} is recorded as {channel.type or 'a type without a name'}, {expected}"
 
 
 def _missing(name: str, channels: Sequence[Channel]) -> str:

@@ -8,7 +8,7 @@ from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import GroupConfig
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
-from syncrelay.config.wording import quoted
+from syncrelay.config.wording import all_of, quoted
 
 # The longest of what every node offers below its name.
 _LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
@@ -29,6 +29,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
         yield from _unit(group, document)
+        yield from _unwritten_types(group, document)
 
 
 def check_node(node: NodeConfig, document: Document) -> Iterator[Problem]:
@@ -57,6 +58,21 @@ def _restamp(group: GroupConfig, document: Document) -> Iterator[Problem]:
         hint = document.did_you_mean(restamp, (*_RESTAMP_WORDS, *_inputs(group)))
         text = f"expected none, earliest, latest or an input of this group, found {quoted(restamp)}{hint}"
         yield document.problem((*group.path, "restamp"), text, code="bad_value")
+
+
+def _unwritten_types(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    """Yield, as one note, topics whose types nothing in the file tells."""
+    open_ones = [
+        (path, topic.topic)
+        for path, topic in group.paths()
+        if topic.type is None and topic.topic and (*path, "type") not in document.faulty
+    ]
+    if open_ones:
+        names = all_of(dict.fromkeys(quoted(name) for _, name in open_ones))
+        whose = f"the type of {names} comes" if len(open_ones) == 1 else f"the types of {names} come"
+        text = f"{whose} from the graph when the relay runs, or from the recording, and cannot be checked here"
+        path, _ = open_ones[0]
+        yield document.problem((*path, "topic"), text, code="type_from_graph", severity=Severity.NOTE)
 
 
 def _trigger(group: GroupConfig, document: Document) -> Iterator[Problem]:

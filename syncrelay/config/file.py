@@ -161,7 +161,7 @@ def _by_policy(groups: Mapping[str, type[Group]], any_group: type[Group]) -> Any
 
 
 # What a key holds that is needed, and is missing or faulty; any other None.
-_UNKNOWN: Final[Mapping[str, Any]] = {"topic": "", "type": ""}
+_UNKNOWN: Final[Mapping[str, Any]] = {"topic": ""}
 
 
 def _partial(model: type[AnyKeys], **fields: Any) -> type[AnyKeys]:

@@ -111,7 +111,14 @@ class Topic(Keys):
     """An input, and the output that its messages leave on."""
 
     topic: TopicName = Field(description="Name of the input topic.", examples=["/camera/image_raw"])
-    type: TypeName = Field(description="Message type in full, package/msg/Name.", examples=["sensor_msgs/msg/Image"])
+    type: Annotated[TypeName | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "Message type in full, package/msg/Name. Default: that of another group which names this topic with a type;"
+            " else that of the topic's publishers, or of the recording."
+        ),
+        examples=["sensor_msgs/msg/Image"],
+    )
     output: Annotated[TopicName | None, NOT_NULL] = Field(
         default=None,
         description="Name of the output topic. Default: the group's output_prefix followed by the input's name.",

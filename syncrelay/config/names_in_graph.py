@@ -138,18 +138,26 @@ def _repeated_inputs(topics: Sequence[_Topic], document: Document) -> Iterator[P
             yield document.problem(name.path, text, code="repeated_topic")
 
 
+def _shared_types(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
+    first: dict[str, tuple[Path, str]] = {}
+    for topic in topics:
+        path, type_name = (*topic.path, "type"), topic.config.type
+        if not topic.input.text or type_name is None or not document.has(path):
+            continue
+        other, others = first.setdefault(topic.input.text, (path, type_name))
+        if type_name != others:
+            line = document.line(other, beside=path)
+            text = f"{topic.input.said} is {quoted(others)} on {line}, but a topic has only one type"
+            yield document.problem(path, text, code="conflict")
+
+
 def _shared_topics(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
+    yield from _shared_types(topics, document)
     first: dict[str, _Topic] = {}
     for topic in topics:
         other = first.setdefault(topic.input.text, topic) if topic.input.text else topic
         if other is topic:
             continue
-        types = topic.config.type, other.config.type
-        if all(types) and types[0] != types[1]:
-            path = (*topic.path, "type")
-            line = document.line((*other.path, "type"), beside=path)
-            text = f"{topic.input.said} is {quoted(types[1])} on {line}, but a topic has only one type"
-            yield document.problem(path, text, code="conflict")
         qos, others = _qos(topic, document), _qos(other, document)
         if topic.config.qos != other.config.qos and not {qos, others} & document.faulty:
             text = (
@@ -229,7 +237,7 @@ def _meeting_own_topics(topics: Sequence[_Topic], own: dict[str, _OwnTopic], doc
             )
             yield document.problem(topic.output.path, text, code="own_topic")
         taken = own.get(topic.input.text)
-        if taken is not None and topic.config.type not in ("", taken.type):
+        if taken is not None and topic.config.type not in (None, taken.type):
             text = (
                 f"{topic.input.said} is a topic that the node itself uses for {taken.purpose}, with the type"
                 f" `{taken.type}`: a topic has only one type"

@@ -15,7 +15,7 @@ from syncrelay.config.translate import path_of
 def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Document, FileKeys]:
     """Return the tree of a file that pydantic refused, with its faulty keys marked, and a file without these.
 
-    In it a missing topic or type is empty, and another key that is needed None.
+    In it a missing topic is empty, and another key that is needed None.
     """
     # A group whose name is refused has its keys all the same.
     faulty = frozenset(_key(path_of(error["loc"])) for error in errors if error["loc"][2:] != ("[key]",))

@@ -1,6 +1,6 @@
 """What the relay is told: a file with every default filled in, be it in order or as much of it as could be read."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from syncrelay.config.file import FileKeys
@@ -24,12 +24,12 @@ from syncrelay.sync import Restamp, SyncGroup
 class TopicConfig:
     """An input and its output.
 
-    `stamp` is "header", "receive" or a StampField with the path of the field; `key` the path of the field to
-    match by, None where stamps are matched.
+    `type` is None where no group of the file says it: the graph or the recording does. `stamp` is "header", "receive"
+    or a StampField with the path of the field; `key` the path of the field to match by, None where stamps are matched.
     """
 
     topic: str
-    type: str
+    type: str | None
     output: str
     qos: QosPreset | QosOverrides
     offset_ns: int
@@ -79,7 +79,23 @@ class GroupConfig:
 
 def resolve_groups(file: FileKeys) -> tuple[GroupConfig, ...]:
     """Return the groups of a file with every default filled in."""
-    return tuple(_group(name, group, file.node) for name, group in file.groups.items())
+    groups = [_group(name, group, file.node) for name, group in file.groups.items()]
+    types = {
+        name: topic.type for group in reversed(groups) for name, topic in _named(group) if topic.topic and topic.type
+    }
+    return tuple(_with_types(group, types) for group in groups)
+
+
+def _named(group: GroupConfig) -> Iterator[tuple[str, TopicConfig]]:
+    return zip(group.inputs.names, group.topics, strict=True)
+
+
+def _with_types(group: GroupConfig, types: Mapping[str, str]) -> GroupConfig:
+    """Return a group whose topics have a type where any group writes one: a topic has one subscription for all."""
+    topics = (
+        topic if topic.type is not None else replace(topic, type=types.get(name)) for name, topic in _named(group)
+    )
+    return replace(group, topics=tuple(topics))
 
 
 def resolve_listen(metrics: MetricsConfig | None) -> Listen | None:

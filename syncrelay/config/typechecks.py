@@ -15,33 +15,37 @@ def check_types(groups: Sequence[GroupConfig], document: Document, interfaces: I
     """Yield types that aren't installed and stamps that aren't in them, and as notes what could not be checked."""
     for group in groups:
         for path, topic in group.paths():
-            if topic.type:
-                yield from _check_topic(topic, path, document, interfaces)
+            if topic.type is not None and (*path, "type") not in document.faulty:
+                yield from _check_topic(topic, topic.type, path, document, interfaces)
         yield from _check_restamp(group, document, interfaces)
 
 
-def _check_topic(topic: TopicConfig, path: Path, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+def _check_topic(
+    topic: TopicConfig, type_name: str, path: Path, document: Document, interfaces: Interfaces
+) -> Iterator[Problem]:
     of_type = (*path, "type")
-    package = topic.type.partition("/")[0]
-    fault = _not_installed(topic.type, document, interfaces)
+    package = type_name.partition("/")[0]
+    fault = _not_installed(type_name, document, interfaces)
     asked = list(_asked_fields(topic, path, document))
     goes_by_header = topic.stamp == "header" and (*path, "stamp") not in document.faulty
     if fault is not None:
         text, code = fault
         # A package may be installed where the relay runs, and replay needs none.
         severity = Severity.NOTE if code == "package_missing" else Severity.ERROR
-        subject = package if code == "package_missing" else topic.type
-        yield document.problem(of_type, text, code=code, severity=severity, subject=subject)
+        subject = package if code == "package_missing" else type_name
+        # Of a type that another group writes it is said there.
+        if document.has(of_type):
+            yield document.problem(of_type, text, code=code, severity=severity, subject=subject)
     elif asked or goes_by_header:
-        fields = interfaces.fields(topic.type)
+        fields = interfaces.fields(type_name)
         if fields is None:
-            text = f"{quoted(topic.type)} is installed without its .msg file, so its fields were not checked"
-            yield document.problem(of_type, text, code="not_checked", severity=Severity.NOTE, subject=topic.type)
+            text = f"{quoted(type_name)} is installed without its .msg file, so its fields were not checked"
+            yield document.problem(of_type, text, code="not_checked", severity=Severity.NOTE, subject=type_name)
             return
         for each in asked:
-            yield from _check_field(topic, each, document, interfaces)
+            yield from _check_field(type_name, each, document, interfaces)
         if goes_by_header and not _begins_with_header(fields):
-            yield _no_header(topic, path, fields, document, interfaces)
+            yield _no_header(type_name, path, fields, document, interfaces)
 
 
 def _asked_fields(topic: TopicConfig, path: Path, document: Document) -> Iterator["_AskedField"]:
@@ -91,16 +95,16 @@ def _begins_with_header(fields: Sequence[Field]) -> bool:
 
 
 def _no_header(
-    topic: TopicConfig, path: Path, fields: Sequence[Field], document: Document, interfaces: Interfaces
+    type_name: str, path: Path, fields: Sequence[Field], document: Document, interfaces: Interfaces
 ) -> Problem:
     times = list(_time_paths(fields, interfaces))
     own = f", or `stamp: {{field: {times[0]}}}`" if times else ""
     text = (
-        f"{quoted(topic.type)} does not begin with a std_msgs/msg/Header, so it has no stamp there:"
+        f"{quoted(type_name)} does not begin with a std_msgs/msg/Header, so it has no stamp there:"
         f" write `stamp: receive` to use the time of arrival{own}"
     )
-    key = "stamp" if document.has((*path, "stamp")) else "type"
-    return document.problem((*path, key), text, code="no_header", subject=topic.type)
+    key = next((key for key in ("stamp", "type") if document.has((*path, key))), "topic")
+    return document.problem((*path, key), text, code="no_header", subject=type_name)
 
 
 def _time_paths(fields: Sequence[Field], interfaces: Interfaces, *, depth: int = 3) -> Iterator[str]:
@@ -131,12 +135,10 @@ _A_TIME: Final = _Wanted(frozenset([TIME]), TIME)
 _A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a string or a time")
 
 
-def _check_field(
-    topic: TopicConfig, field: _AskedField, document: Document, interfaces: Interfaces
-) -> Iterator[Problem]:
-    text = _field_fault(topic.type, (), field.steps.split("."), field.wanted, interfaces, document=document)
+def _check_field(type_name: str, field: _AskedField, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+    text = _field_fault(type_name, (), field.steps.split("."), field.wanted, interfaces, document=document)
     if text is not None:
-        yield document.problem(field.path, text, code="no_such_field", subject=topic.type)
+        yield document.problem(field.path, text, code="no_such_field", subject=type_name)
 
 
 def _field_fault(

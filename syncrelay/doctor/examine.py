@@ -131,7 +131,9 @@ def _plan(config: Config | None, request: Request) -> Plan:
         node=config.node.name,
         namespace=config.node.namespace,
         # What lacks its package is the file check's to say.
-        types=tuple(each for each in types if installed is None or each.partition("/")[0] in installed.packages),
+        types=tuple(
+            each for each in types if each and (installed is None or each.partition("/")[0] in installed.packages)
+        ),
         names=config.names.written,
         ros_args=request.ros_args,
         use_sim_time=config.node.use_sim_time,

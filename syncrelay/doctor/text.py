@@ -60,7 +60,7 @@ def _row(facts: GroupFacts, index: int) -> tuple[str, ...]:
     rate_hz = topic.figures.rate_hz
     came = f"{rate_hz:.1f} Hz" if rate_hz else f"{topic.counts.fed} received"
     stamps = "" if lag is None else _age(lag)
-    return topic.name, topic.type, came, stamps, "; ".join(_publishers(topic)) or "no publisher"
+    return topic.name, topic.type or "type not known yet", came, stamps, "; ".join(_publishers(topic)) or "no publisher"
 
 
 def _age(delay: int) -> str:

@@ -80,7 +80,8 @@ class InputGraph:
     `name` is the topic's in the graph, `output` that under which its messages leave, `not_importable` says why its type
     cannot be used here, `not_readable` why the stamp or key that the file names cannot be read from it, `refusal` what
     DDS does not make or publish for it, `alike` are topics of the graph that may have been meant, `lost` counts what
-    DDS lost on the way of late. `rivals` are others that publish its output, seen so without a break since
+    DDS lost on the way of late. `type_from` is the publisher, or one of several, whose type was taken because the file
+    has none, None as long as there is none. `rivals` are others that publish its output, seen so without a break since
     `rivals_since`. `largest` is the size of the largest message in bytes, 0 where nobody measures it.
     """
 
@@ -96,17 +97,19 @@ class InputGraph:
     rivals: tuple[Endpoint, ...] = ()
     rivals_since: int = 0
     largest: int = 0
+    type_from: Endpoint | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class InputFacts:
     """An input and its output.
 
-    `key` is the newest message's. `offset` is added to stamps for matching, in nanoseconds.
+    `type` is the file's, or else the graph's; None until it is known. `key` is the newest message's. `offset` is added
+    to stamps for matching, in nanoseconds.
     """
 
     graph: InputGraph
-    type: str
+    type: str | None
     required: bool
     counts: InputCounts
     figures: InputFigures

@@ -25,6 +25,7 @@ class Code(Enum):
     REFUSED_BY_DDS = "refused_by_dds"
     TYPE_NOT_IMPORTABLE = "type_not_importable"
     OTHER_TYPE = "other_type"
+    SEVERAL_TYPES = "several_types"
     ALONE = "alone"
     NO_PUBLISHER = "no_publisher"
     INCOMPATIBLE_QOS = "incompatible_qos"

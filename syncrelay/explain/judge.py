@@ -25,6 +25,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     of_each_input(rules_graph.refused_by_dds),
     of_each_input(rules_graph.type_not_importable),
     of_each_input(rules_graph.other_type),
+    of_each_input(rules_graph.several_types),
     rules_graph.alone,
     rules_graph.no_publisher,
     of_each_input(rules_graph.incompatible_qos),
@@ -58,7 +59,14 @@ _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
 _OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET})
 """What a drift brings about, and sooner than it can be proven."""
 _OF_GRAPH: Final = frozenset(
-    {Code.ALONE, Code.NO_PUBLISHER, Code.TYPE_NOT_IMPORTABLE, Code.NOBODY_LISTENS, Code.NO_CLOCK}
+    {
+        Code.ALONE,
+        Code.NO_PUBLISHER,
+        Code.TYPE_NOT_IMPORTABLE,
+        Code.SEVERAL_TYPES,
+        Code.NOBODY_LISTENS,
+        Code.NO_CLOCK,
+    }
 )
 _WAIT: Final = "wait some seconds: it is not known yet whether a clock drifts"
 
@@ -114,6 +122,7 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.ALONE: _Explained(_MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
     Code.NO_PUBLISHER: _Explained(_MATCHING),
     Code.TYPE_NOT_IMPORTABLE: _Explained(_MATCHING),
+    Code.SEVERAL_TYPES: _Explained(_MATCHING),
     Code.NOBODY_LISTENS: _Explained(_FLOW),
     Code.NO_CLOCK: _Explained(frozenset({Code.SILENT, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.CLOCK_STOPPED: _Explained(_MATCHING | {Code.SILENT, Code.SLOWED}),

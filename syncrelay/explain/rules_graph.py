@@ -5,7 +5,7 @@ from typing import Final
 
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
-from syncrelay.explain.facts import GraphSnapshot, GroupFacts, InputFacts
+from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks
 
 # Discovery takes this long.
@@ -51,36 +51,66 @@ def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Foun
 
 def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find a type that cannot be used here, or not as the file asks."""
+    severity = Severity.ERROR if an_input.required else Severity.WARN
     if an_input.graph.not_importable:
-        yield Finding(
-            Code.TYPE_NOT_IMPORTABLE,
-            Severity.ERROR if an_input.required else Severity.WARN,
-            f"{an_input.name}: {an_input.graph.not_importable.splitlines()[0]}",
-            "install the package where the relay runs, or source the workspace that has it",
-            index,
-        )
+        text = f"{an_input.name}: {an_input.graph.not_importable.splitlines()[0]}"
+        suggestion = "install the package where the relay runs, or source the workspace that has it"
+        if others := _of_another_type(an_input):
+            text += f"; {others[0].node} publishes it as {others[0].type}"
+            suggestion = f"write `type: {others[0].type}`, or leave `type` out"
+        yield Finding(Code.TYPE_NOT_IMPORTABLE, severity, text, suggestion, index)
     elif an_input.graph.not_readable:
         yield Finding(
             Code.TYPE_NOT_IMPORTABLE,
-            Severity.ERROR if an_input.required else Severity.WARN,
+            severity,
             f"{an_input.name}: {an_input.graph.not_readable.splitlines()[0]}",
-            "name another field at `stamp` or `key`, then `syncrelay reload`",
+            "name a field that it has at `stamp` or `key`, or write `stamp: receive`, then `syncrelay reload`",
             index,
         )
 
 
 def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
-    """Find publishers of another type than the file's."""
-    alone = all(each.type != an_input.type for each in an_input.graph.publishers)
-    for publisher in an_input.graph.publishers:
-        if publisher.type != an_input.type:
-            yield Finding(
-                Code.OTHER_TYPE,
-                blocks(facts, an_input) if alone else Severity.WARN,
-                f"{publisher.node} publishes {an_input.name} as {publisher.type}, the file says {an_input.type}",
-                f"write `type: {publisher.type}`" if alone else f"have {publisher.node} use another topic",
-                index,
-            )
+    """Find publishers of another type than the file's, or than the one that was taken from the graph."""
+    others = _of_another_type(an_input)
+    # Of a type that cannot be used at all, it says who publishes another.
+    if an_input.graph.not_importable:
+        return
+    alone = len(others) == len(an_input.graph.publishers)
+    origin = an_input.graph.type_from
+    expected = f"the relay took {an_input.type} from {origin.node}" if origin else f"the file says {an_input.type}"
+    for publisher in others:
+        yield Finding(
+            Code.OTHER_TYPE,
+            blocks(facts, an_input) if alone else Severity.WARN,
+            f"{publisher.node} publishes {an_input.name} as {publisher.type}, {expected}",
+            (f"write `type: {publisher.type}`" if origin is None else f"restart the relay, or {_write(publisher)}")
+            if alone
+            else f"have {publisher.node} use another topic",
+            index,
+        )
+
+
+def _of_another_type(an_input: InputFacts) -> list[Endpoint]:
+    """Return its publishers of another type than its own, none as long as it has none."""
+    return [each for each in an_input.graph.publishers if an_input.type not in (None, each.type)]
+
+
+def _write(publisher: Endpoint) -> str:
+    return f"write `type: {publisher.type}` and `syncrelay reload`"
+
+
+def several_types(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+    """Find a topic whose type the file leaves to its publishers, and these do not agree."""
+    by_type = {each.type: each for each in reversed(an_input.graph.publishers)}
+    if an_input.type is None and len(by_type) > 1:
+        types = all_of(f"{each.type} by {each.node}" for each in reversed(by_type.values()))
+        yield Finding(
+            Code.SEVERAL_TYPES,
+            blocks(facts, an_input),
+            f"{an_input.name} is published with {len(by_type)} types: {types}",
+            "write the `type` that is meant, or have only one of them publish it",
+            index,
+        )
 
 
 def alone(facts: GroupFacts) -> Found:
@@ -127,9 +157,10 @@ def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[
     meant = _meant(facts, missing)
     if len(missing) == 1:
         (only,) = missing
-        text = f"nobody publishes {only.name} ({only.type})"
+        text = f"nobody publishes {only.name}{_of_type(only)}"
         if meant:
-            return text, f"did you mean `topic: {meant[only.name]}`? It is published as {only.type}"
+            published = f" It is published as {only.type}" if only.type else ""
+            return text, f"did you mean `topic: {meant[only.name]}`?{published}"
         return text, f"start the node that publishes {only.name}, or correct the topic's name"
     text = f"nobody publishes {one_of(each.name for each in missing)}"
     if (moved := _in_another_namespace(missing)) is not None:
@@ -138,6 +169,10 @@ def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[
     pairs = [f"{there} for {name}" for name, there in meant.items()]
     hint = f"did you mean {all_of(pairs)}? Otherwise " if pairs else ""
     return text, f"{hint}start the nodes that publish them, or correct the topics' names"
+
+
+def _of_type(an_input: InputFacts) -> str:
+    return f" ({an_input.type})" if an_input.type else ""
 
 
 def _meant(facts: GroupFacts, missing: Sequence[InputFacts]) -> dict[str, str]:
@@ -176,7 +211,7 @@ def _no_longer_published(facts: GroupFacts, gone: Sequence[InputFacts]) -> tuple
     last = words.seconds(facts.figures.now - max(each.figures.last_received or 0 for each in gone))
     if len(gone) == 1:
         (only,) = gone
-        text = f"nobody publishes {only.name} ({only.type}) any more; its last message arrived {last} ago"
+        text = f"nobody publishes {only.name}{_of_type(only)} any more; its last message arrived {last} ago"
         return text, f"restart the node that published {only.name}"
     text = f"nobody publishes {one_of(each.name for each in gone)} any more; the last message arrived {last} ago"
     return text, "restart the nodes that published them"

@@ -86,7 +86,7 @@ class GroupWatch:
             inputs=tuple(
                 InputFacts(
                     graph=shown,
-                    type=topic.type,
+                    type=shown.type_from.type if topic.type is None and shown.type_from else topic.type,
                     required=topic.required,
                     counts=counts,
                     figures=seen,

@@ -16,7 +16,7 @@ from syncrelay.ros.listeners import Listeners
 from syncrelay.ros.outputs import InputBinding
 from syncrelay.sync import DropReason
 
-_Key: TypeAlias = tuple[str, str, str]
+_Key: TypeAlias = tuple[str, str | None, str]
 
 
 @dataclass(frozen=True, slots=True)

@@ -151,12 +151,12 @@ def _topics_by_node(node: Any) -> Iterator[tuple[str, Sequence[str]]]:
             yield from node.get_publisher_names_and_types_by_node(name, namespace)
 
 
-def topics_alike(name: str, type_name: str, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
-    """Return the topics of a type whose names are most like one that nobody publishes, the best first.
+def topics_alike(name: str, type_name: str | None, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:
+    """Return the topics of a type, None for any, whose names are most like one that nobody publishes, the best first.
 
     First come those of the same name in a namespace; where nothing is alike, the only one of that type.
     """
-    of_type = [topic for topic, types in topics if type_name in types and topic != name]
+    of_type = [topic for topic, types in topics if type_name in (None, *types) and topic != name]
     in_namespaces = [topic for topic in of_type if topic.endswith(name)]
     alike = [*in_namespaces, *get_close_matches(name, of_type, n=3, cutoff=_ALIKE)]
-    return tuple(dict.fromkeys(alike)) or tuple(of_type if len(of_type) == 1 else ())
+    return tuple(dict.fromkeys(alike)) or tuple(of_type if type_name and len(of_type) == 1 else ())

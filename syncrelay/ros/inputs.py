@@ -3,7 +3,7 @@
 import importlib
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -20,7 +20,7 @@ from syncrelay.ros.handlers import handler
 from syncrelay.ros.librcl.rcl import RclCallError
 from syncrelay.ros.outputs import InputBinding, Outputs
 from syncrelay.ros.qos import input_profile
-from syncrelay.ros.types import import_type
+from syncrelay.ros.types import SettlingType, import_type, name_of
 
 _LOG = logging.getLogger("syncrelay")
 
@@ -43,7 +43,9 @@ class TopicInput:
         self.type = config.type
         self.publishers: tuple[Endpoint, ...] = ()
         self.not_importable: str | None = None
-        self.missing: str | None = f"a publisher of {name} ({config.type})"
+        self.type_from: Endpoint | None = None
+        """The publisher whose type was taken, because the file has none; what was taken stays."""
+        self.missing: str | None = self._publisher_words
         self.outputs = Outputs(entities=entities, backend=backend)
         self.refusal: Refusal | None = None
         """Why DDS does not make the subscription."""
@@ -58,6 +60,7 @@ class TopicInput:
         self._backend = backend
         self._loop = loop
         self._message_type: Any = None
+        self._settling = SettlingType()
         self._lost: Any = None
         self._failure: Exception | None = None
         self._force_poll = True
@@ -88,6 +91,10 @@ class TopicInput:
     @property
     def _may_try(self) -> bool:
         return time.monotonic() >= self._try_again
+
+    @property
+    def _publisher_words(self) -> str:
+        return f"a publisher of {self.name}{f' ({self.type})' if self.type else ''}"
 
     def bind(self, group: GroupRelay, index: int) -> InputBinding:
         """Make ready to feed an input of a group; raises TypeImportError for a field that the type does not have."""
@@ -130,13 +137,15 @@ class TopicInput:
         self._force_poll = True
         if self._failure is not None:
             self._end_failed(self._failure)
-        self.missing = self._find_type() or self._find_publishers()
+        endpoints = self._node.get_publishers_info_by_topic(self.name)
+        self.publishers = graph.publishers(endpoints, self.profile)
+        self.missing = self._find_type() or self._find_publishers(endpoints)
         self._force_poll = False
 
     def _end_failed(self, error: Exception) -> None:
         self._failure = None
         self.close()
-        self._refused(Refusal("receive", self.name, self.type, why=str(error) or type(error).__name__))
+        self._refused(self._refusal(str(error) or type(error).__name__))
         if not isinstance(error, _OF_RCL):
             raise error
 
@@ -145,14 +154,8 @@ class TopicInput:
         if self._message_type is not None and not lacking:
             return None
         importlib.invalidate_caches()
-        if self._message_type is None:
-            try:
-                self._message_type = import_type(self.type)
-            except TypeImportError as error:
-                self.not_importable = str(error)
-                self._say_once(logging.ERROR, f"{self.name}: {error}")
-                return f"the type {self.type} of {self.name}"
-            self.not_importable = None
+        if self._message_type is None and (missing := self._import_type()):
+            return missing
         for binding in lacking:
             binding.find_handler(self._message_type)
             if binding.not_readable:
@@ -161,22 +164,40 @@ class TopicInput:
             self._loop.call(self.outputs.feed).result()
         return None
 
-    def _find_publishers(self) -> str | None:
-        endpoints = self._node.get_publishers_info_by_topic(self.name)
+    def _import_type(self) -> str | None:
+        """Import the file's type, or the one that the topic's publishers have; return what is missing."""
+        self.not_importable = None
+        publisher = self._settling.publisher(self.publishers, now=time.monotonic()) if self.type is None else None
+        type_name = publisher.type if publisher is not None else self.type
+        if type_name is None:
+            return f"the type of {self.name}" if self.publishers else self._publisher_words
+        try:
+            self._message_type = import_type(type_name)
+        except TypeImportError as error:
+            self.not_importable = str(error)
+            self._say_once(logging.ERROR, f"{self.name}: {error}")
+            return f"the type {type_name} of {self.name}"
+        if publisher is not None:
+            self.type, self.type_from = type_name, publisher
+            _LOG.info("%s: %s, as %s publishes it", self.name, type_name, publisher.node)
+        return None
+
+    def _find_publishers(self, endpoints: Sequence[Any]) -> str | None:
         fitting = [endpoint for endpoint in endpoints if endpoint.topic_type == self.type]
         profile = input_profile(self._qos, [endpoint.qos_profile for endpoint in fitting])
         if profile is not None and (self._may_try or not self._is_refused):
             self._follow(profile)
         self.publishers = graph.publishers(endpoints, self.profile)
+        expected = f"the relay took {self.type}" if self.type_from else f"the file says {self.type}"
         for stranger in self.publishers:
             if stranger.type != self.type:
                 self._say_once(
                     logging.WARNING,
-                    f"{self.name}: {stranger.node} publishes it as {stranger.type}, the file says {self.type}",
+                    f"{self.name}: {stranger.node} publishes it as {stranger.type}, {expected}",
                 )
         served = [each for each in self.publishers if each.type == self.type]
         if not served:
-            return f"a publisher of {self.name} ({self.type})"
+            return self._publisher_words
         if all(each.mismatch for each in served):
             return f"a publisher of {self.name} with compatible QoS"
         return None
@@ -212,6 +233,9 @@ class TopicInput:
         if any(binding.publisher is not None for binding in lacking):
             self._loop.call(lambda: self.outputs.connect(lacking)).result()
 
+    def _refusal(self, why: str) -> Refusal:
+        return Refusal("receive", self.name, name_of(self._message_type), why=why)
+
     def _refused(self, refusal: Refusal) -> None:
         self.refusal = refusal
         self._put_off(refusal)
@@ -243,7 +267,7 @@ class TopicInput:
             for entity in filter(None, (*publishers.values(), subscription)):
                 self._entities.end(entity)
             if isinstance(error, _OF_RCL):
-                raise RefusedError(Refusal("receive", self.name, self.type, why=str(error))) from error
+                raise RefusedError(self._refusal(str(error))) from error
             raise
         if self.entity is not None and subscription is not None:
             _LOG.info("%s: subscribed again, because the QoS of its publishers changed", self.name)

@@ -66,6 +66,7 @@ class Surroundings:
             refusal=binding.refusal or _unpublished(binding, around.output),
             lost=lost,
             largest=topic.outputs.largest,
+            type_from=topic.type_from,
         )
 
     def _poll(self, binding: InputBinding) -> _Around:
@@ -88,7 +89,7 @@ class Surroundings:
             alike=() if topic.publishers else self._alike(topic.name, topic.type),
         )
 
-    def _alike(self, name: str, type_name: str) -> tuple[str, ...]:
+    def _alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
         """Find what may have been meant: our own outputs are not it."""
         outputs = {self._node.resolve_topic_name(binding.output) for binding in self._bindings}
         published = graph.published_topics(self._node).items()
@@ -101,4 +102,4 @@ def _unpublished(binding: InputBinding, output: str) -> Refusal | None:
     if last is None:
         return None
     why = f"{last.why} ({counted(last.messages, 'message')} so far)"
-    return Refusal("publish", output, binding.topic.type, why=why)
+    return Refusal("publish", output, str(binding.topic.type), why=why)

@@ -1,23 +1,55 @@
 """Message types by name, and where in a payload the stamp of a type is found."""
 
 import importlib
-from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final, TypeAlias
 
 from syncrelay.cdr import read_stamp
 from syncrelay.cdr_fields import UnreadableFieldError, field_reader
 from syncrelay.config import StampField, StampSource
+from syncrelay.config.names import check_type_name
 from syncrelay.dataflow.backend import Content
 from syncrelay.errors import TypeImportError
+from syncrelay.explain import Endpoint
 
 StampReader: TypeAlias = Callable[[Content], int | None]
 """From a payload to its stamp in nanoseconds; None where none can be read."""
 
 
+# Nodes are found one after the other: within this time another may publish another type.
+_SETTLE_S: Final = 0.5
+
+
+class SettlingType:
+    """The type that the publishers of a topic agree on, once they did for long enough."""
+
+    def __init__(self) -> None:
+        self._types: frozenset[str] = frozenset()
+        self._since = 0.0
+
+    def publisher(self, publishers: Sequence[Endpoint], *, now: float) -> Endpoint | None:
+        """Return the publisher whose type is to be taken, None as long as there is none; `now` is in seconds."""
+        types = frozenset(each.type for each in publishers)
+        if types != self._types:
+            self._types, self._since = types, now
+        if len(types) != 1 or now - self._since < _SETTLE_S:
+            return None
+        return next((each for each in publishers if each.is_named), publishers[0])
+
+
 def import_type(name: str) -> Any:
-    """Import the class of a full type name, `pkg/msg/Name`; raises TypeImportError saying what failed."""
-    package, kind, message = name.split("/")
+    """Import the class of a full type name, `pkg/msg/Name`; raises TypeImportError saying what failed.
+
+    The graph may name any type: of a package without messages nothing is imported.
+    """
     try:
+        package, kind, message = check_type_name(name).split("/")
+    except ValueError as error:
+        raise TypeImportError(str(error)) from error
+    try:
+        _require_messages(package, kind)
         module = importlib.import_module(f"{package}.{kind}")
         message_type = getattr(module, message)
         # The C support library is loaded here, not at import: a broken package shows only now.
@@ -28,6 +60,14 @@ def import_type(name: str) -> Any:
             f"  Is the package {package} built for this Python and sourced in this shell?"
         ) from error
     return message_type
+
+
+def _require_messages(package: str, kind: str) -> None:
+    """Raise ImportError for a package that is there, and has no messages."""
+    spec = find_spec(package)
+    folders = spec.submodule_search_locations if spec is not None else None
+    if spec is not None and not any(Path(folder, kind).is_dir() for folder in folders or ()):
+        raise ImportError(f"the package {package} has no {kind}")
 
 
 def name_of(message_type: Any) -> str:
@@ -42,10 +82,17 @@ def begins_with_header(message_type: Any) -> bool:
 
 
 def stamp_reader(source: StampSource, message_type: Any) -> StampReader | None:
-    """How to read the stamp that the file asks for; None for the receive time, which no payload holds."""
+    """How to read the stamp that the file asks for; None for the receive time, which no payload holds.
+
+    Raises TypeImportError where the type has no such stamp.
+    """
     if isinstance(source, StampField):
         return value_reader(message_type, source.field)
-    return read_stamp if source == "header" else None
+    if source == "receive":
+        return None
+    if not begins_with_header(message_type):
+        raise TypeImportError(f"{name_of(message_type)} does not begin with a std_msgs/msg/Header, so it has no stamp")
+    return read_stamp
 
 
 def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:

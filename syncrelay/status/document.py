@@ -21,7 +21,10 @@ _NS_PER_MS: Final = 1_000_000
 
 
 def document(state: RelayState) -> dict[str, Any]:
-    """Return the state as what json.dumps takes. Durations in milliseconds, stamps in nanoseconds."""
+    """Return the state as what json.dumps takes. Durations in milliseconds, stamps in nanoseconds.
+
+    What is not known is null, as the type of an input for which the file has none and nobody publishes.
+    """
     return {
         "relay": {
             "node": state.node,

@@ -69,5 +69,5 @@ def _is_served(an_input: InputFacts) -> bool:
     return an_input.graph.refusal is None and any(_serves(each, an_input.type) for each in an_input.graph.publishers)
 
 
-def _serves(publisher: Endpoint, type_name: str) -> bool:
+def _serves(publisher: Endpoint, type_name: str | None) -> bool:
     return publisher.type == type_name and publisher.mismatch is None

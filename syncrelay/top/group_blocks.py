@@ -171,7 +171,9 @@ def connections(group: Group, width: int) -> Iterator[Text]:
     for each in group.inputs:
         offset = f", offset {phrases.duration(each.offset_ms)}" if each.offset_ms else ""
         required = "" if each.required else ", optional"
-        yield from wrapped(f"{each.topic} ({each.type}{required}{offset})", width, first=line(""), style="bold")
+        yield from wrapped(
+            f"{each.topic} ({each.type or 'type not known yet'}{required}{offset})", width, first=line(""), style="bold"
+        )
         yield from wrapped(_nodes(each.publishers) or "nobody", width, first=line("  from "))
         receivers = _nodes(each.subscribers) or "nobody"
         yield from wrapped(f"{each.output}, to {receivers}", width, first=line("  as   "))

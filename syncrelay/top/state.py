@@ -83,7 +83,7 @@ class Input:
     """An input and its output. `dropped_lately` counts the last ten seconds, `missing` is a share of the sets."""
 
     topic: Text
-    type: Text
+    type: Text | None
     output: Text
     required: bool
     rate_hz: float

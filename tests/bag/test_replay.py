@@ -90,6 +90,27 @@ def test_a_type_that_differs_from_the_files_is_named_and_not_fed(tmp_path):
     assert [each.counts.fed for each in result.inputs] == [0, 2]
 
 
+def test_types_that_the_file_leaves_out_are_the_recordings(tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig())
+    left, result = _replayed(path, _group([{"topic": "/camera"}, {"topic": "/lidar"}]))
+    with_types, _ = _replayed(path, _group(inputs(_PAIR)))
+    assert _sets(left) == _sets(with_types)
+    assert result.sets == 39
+
+
+def test_two_recorded_types_of_a_topic_are_named_where_the_file_has_none(tmp_path):
+    other = [Frame("/camera", TIME_REFERENCE, BEGIN, serialize(TIME_REFERENCE, header(BEGIN), time(0), ""))]
+    paths = [write_mcap(tmp_path / "a.mcap", rig(2)), write_mcap(tmp_path / "b.mcap", other)]
+    recording = open_recording([str(path) for path in paths])
+    (binding,) = bind(load_text(config({"front": _group([{"topic": "/camera"}, {"topic": "/lidar"}])})), recording)
+    recording.close()
+    (problem,) = binding.problems
+    assert problem.startswith("front: /camera is recorded as ")
+    assert VECTOR in problem
+    assert TIME_REFERENCE in problem
+    assert not binding.is_complete
+
+
 def test_names_are_resolved_as_the_node_would(tmp_path):
     frames = [frame._replace(topic=f"/robot{frame.topic}") for frame in rig(3)]
     topics = inputs({"camera": VECTOR, "/robot/lidar": VECTOR})

@@ -48,6 +48,18 @@ def test_it_prints_figures_curves_fates_findings_and_a_suggestion(folder):
     assert "over slop 1 ms; write `slop: 3ms`" in done.stdout
 
 
+def test_types_that_the_file_leaves_out_change_nothing(folder):
+    topics = [{"topic": topic} for topic in _TOPICS]
+    (folder / "untyped.yaml").write_text(
+        config({"front": {"policy": "approximate_time", "slop": "1ms", "topics": topics}})
+    )
+    typed, untyped = (
+        run("analyze", "rig.mcap", "--config", file, folder=folder) for file in ("f.yaml", "untyped.yaml")
+    )
+    assert (untyped.returncode, untyped.stderr) == (0, "")
+    assert untyped.stdout == typed.stdout.replace("f.yaml", "untyped.yaml")
+
+
 def test_the_json_holds_the_same_for_programs(folder):
     done = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
     found = json.loads(done.stdout)

@@ -52,6 +52,7 @@ BEYOND_A_SCHEMA = {
     "two_outputs_of_one_absolute_name",
     "two_outputs_of_one_name",
     "type_without_header",
+    "type_written_by_another_group",
     "variable_not_set",
     "variable_of_another_kind",
 }

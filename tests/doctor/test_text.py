@@ -85,6 +85,13 @@ def test_a_publisher_of_another_type_is_listed_with_it():
     assert shown(an_input(publishers=(Endpoint("/ouster", CLOUD),))).endswith("/ouster (sensor_msgs/msg/PointCloud2)")
 
 
+def test_a_type_that_is_not_known_yet_is_told_with_the_publishers_types():
+    publishers = (Endpoint("/ouster", CLOUD), Endpoint("/other", IMAGE))
+    said = shown(an_input(type=None, publishers=publishers))
+    assert "type not known yet" in said
+    assert said.endswith("/ouster (sensor_msgs/msg/PointCloud2); /other (sensor_msgs/msg/Image)")
+
+
 def test_a_healthy_group_is_told_with_its_figures():
     facts = a_group()
     lines = list(observed_lines(Observed(5.0, GraphSnapshot(0, "SUBNET"), (GroupReport(facts, ()),))))

@@ -28,6 +28,7 @@ from syncrelay.explain import (
     Severity,
     Standstill,
 )
+from syncrelay.ros.types import SettlingType
 from syncrelay.sync import DropReason, Match, Message, Outcome
 
 S = 1_000_000_000
@@ -174,7 +175,8 @@ def run(
 
 def group_of(sources: Sequence[Source], options: dict[str, Any]) -> GroupConfig:
     """Return the group of a file that has a topic for each source."""
-    topics = {each.topic: {"topic": each.topic, "type": IMU, **each.topic_options} for each in sources}
+    keys = {each.topic: {"topic": each.topic, "type": IMU, **each.topic_options} for each in sources}
+    topics = {name: {key: value for key, value in of.items() if value is not None} for name, of in keys.items()}
     for each in sources:
         if not each.required:
             topics[each.topic]["required"] = False
@@ -218,6 +220,8 @@ class _Relay:
     def __init__(self, config: GroupConfig) -> None:
         self._n_inputs = len(config.topics)
         self._names = [(topic.topic, topic.output) for topic in config.topics]
+        self._settling = [SettlingType() if topic.type is None else None for topic in config.topics]
+        self._taken: list[Endpoint | None] = [None] * len(config.topics)
         self._driver = EngineDriver(config, self._leave)
         self._watch = GroupWatch(config, began=BEGAN)
         self._judge = Judge()
@@ -263,7 +267,13 @@ class _Relay:
         engine = self._driver.engine
         self._watch.add(self._arrived, self._sent, engine.counts(), engine.sets, woke=self.woke, now=now)
         self._arrived, self._sent = tuple([] for _ in range(self._n_inputs)), []
-        graph = [InputGraph(*name, publishers=each) for name, each in zip(self._names, publishers, strict=True)]
+        for index, settling in enumerate(self._settling):
+            if settling is not None and self._taken[index] is None:
+                self._taken[index] = settling.publisher(publishers[index], now=float(second))
+        graph = [
+            InputGraph(*name, publishers=each, type_from=taken)
+            for name, each, taken in zip(self._names, publishers, self._taken, strict=True)
+        ]
         worst = max((each for each in self._standstills if each), key=lambda each: each.ns, default=None)
         waited = max(self._waits[-10:])
         self._waits.append(0)

@@ -292,6 +292,30 @@ def test_a_publisher_that_goes_and_returns_as_another_is_told_by_that(returns_as
     says_only(told, code, "/b")
 
 
+UNTYPED = {"topic_options": {"type": None}}
+
+
+def test_two_types_of_a_topic_without_one_are_told_until_one_goes():
+    def publishers(topic, second):
+        both = (Endpoint("/b_driver", IMU), Endpoint("/stranger", "sensor_msgs/msg/Image"))
+        return (Endpoint("/a_driver", IMU),) if topic == "/a" else both[: 2 if second < 30 else 1]
+
+    told = a_pair(sends=lambda second: second > 30, **UNTYPED, more={"publishers": publishers})
+    says_only(told, "several_types", "/b is published with 2 types", f"{IMU} by /b_driver", "by /stranger")
+    assert told.ever_found == {"several_types"}
+    assert told.facts.inputs[1].type == IMU
+    assert not told.facts.is_silent
+
+
+def test_a_publisher_that_returns_as_another_is_told_with_whose_type_was_taken():
+    def publishers(topic, second):
+        is_other = topic == "/b" and second > 20
+        return (Endpoint("/new", "sensor_msgs/msg/Image") if is_other else Endpoint(f"{topic}_driver", IMU),)
+
+    told = a_pair(sends=lambda second: second < 20, **UNTYPED, more={"publishers": publishers})
+    says_only(told, "other_type", f"the relay took {IMU} from /b_driver")
+
+
 def test_a_standstill_in_which_nothing_was_due_is_nobodys_fault():
     more = {"facts": lambda second: {"standstill": Standstill(1_700_000_000 * S + 20 * S, S)} if second < 30 else {}}
     assert a_pair(more=more).warnings == []

@@ -2,11 +2,14 @@
 
 import random
 import re
+import sys
 
 import pytest
 
 from syncrelay.cdr_fields import TIME
 from syncrelay.config.interfaces import Interfaces
+from syncrelay.errors import TypeImportError
+from syncrelay.explain import Endpoint
 
 serialization = pytest.importorskip("rclpy.serialization", reason="rclpy is not installed")
 types = pytest.importorskip("syncrelay.ros.types")
@@ -90,3 +93,32 @@ def _value_at(message, path):
     if type(message).__name__ == "Time":
         return message.sec * 10**9 + message.nanosec
     return message[0] if isinstance(message, bytes) else message
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("antigravity/msg/Joke", "the package antigravity has no msg"),
+        ("no_such_msgs/msg/Thing", "No module named 'no_such_msgs'"),
+        ("std_msgs/msg/Nothing", "Nothing"),
+        ("Chatter", "`Chatter` is not a message type"),
+        ("a/b/c/d", "`a/b/c/d` is not a message type"),
+    ],
+)
+def test_a_type_that_the_graph_names_and_nobody_has_is_an_error_and_imports_nothing(name, why):
+    with pytest.raises(TypeImportError, match=re.escape(why)):
+        import_type(name)
+    assert "antigravity" not in sys.modules
+
+
+def test_types_settle_when_all_publishers_agree_for_a_while():
+    image, other, unnamed = Endpoint("/a", "I"), Endpoint("/b", "J"), Endpoint("?", "I", is_named=False)
+    settling = types.SettlingType()
+    assert settling.publisher([], now=0.0) is None
+    assert settling.publisher([unnamed], now=1.0) is None
+    assert settling.publisher([unnamed, image], now=1.4) is None
+    assert settling.publisher([unnamed, image], now=1.5) == image
+    assert settling.publisher([unnamed, image, other], now=1.6) is None
+    assert settling.publisher([other], now=1.7) is None
+    assert settling.publisher([unnamed], now=2.3) is None
+    assert settling.publisher([unnamed], now=2.8) == unnamed

@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 
 import pytest
 from states import BEGAN, MS, relay, started, working
@@ -101,6 +102,14 @@ def test_what_did_not_happen_yet_is_null_or_empty():
     assert [group[key] for key in ("since_last_set_ms", "span_ms", "latency_ms", "nearest_ms")] == [None] * 4
     assert [group["inputs"][0][key] for key in ("age_ms", "lag_ms", "jitter_ms", "drift_ppm")] == [None] * 4
     assert group["last_sets"] == []
+
+
+def test_a_type_is_null_until_the_graph_tells_it():
+    unknown = started()
+    facts = replace(unknown.facts, inputs=tuple(replace(each, type=None) for each in unknown.facts.inputs))
+    said = relay(replace(unknown, facts=facts))
+    assert [each["type"] for each in document(said)["groups"][0]["inputs"]] == [None, None]
+    assert not document(said)["relay"]["ready"]
 
 
 def test_a_mismatch_says_what_is_offered_and_requested_and_a_finding_its_topic():

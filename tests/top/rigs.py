@@ -111,7 +111,7 @@ def _graph(config: GroupConfig, index: int, sensor: Sensor | None) -> InputGraph
         name=topic.topic,
         output=topic.output,
         publishers=tuple(
-            Endpoint(name, sensor.type or topic.type, sensor.mismatch) for name in nodes if sensor is not None
+            Endpoint(name, sensor.type or topic.type or "", sensor.mismatch) for name in nodes if sensor is not None
         ),
-        subscribers=(Endpoint("/fusion", topic.type),),
+        subscribers=(Endpoint("/fusion", topic.type or ""),),
     )

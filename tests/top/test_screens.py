@@ -107,6 +107,13 @@ def test_a_group_is_opened_with_figures_findings_inputs_the_strip_and_who_publis
     assert "  900 received, 300 in sets, 2 waiting, 598 dropped (598 too_far)" in lines
 
 
+def test_a_type_that_is_not_known_yet_is_said_to_be_none():
+    waiting = states.simulated(states.file(front=states.group({"/a": None, "/b": states.IMAGE})), {})
+    lines = at_terminal(waiting, "enter", size=(80, 45))
+    assert "/a (type not known yet)" in lines
+    assert "/b (sensor_msgs/msg/Image)" in lines
+
+
 def test_keys_lead_through_the_groups_and_back():
     async def look():
         with serving(states.rig()) as server:

@@ -22,7 +22,10 @@ UNREADABLE = -(2**63)
 
 @dataclass(slots=True)
 class Stream:
-    """One input's messages as they were received: stamps, times of receipt, places in the whole recording, keys."""
+    """One input's messages as they were received: stamps, times of receipt, places in the whole recording, keys.
+
+    `type` is empty where the file has none and nothing was recorded.
+    """
 
     topic: str
     type: str
@@ -59,7 +62,7 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
             needs_place = binding.group.restamp is not None and topic.stamp != "header"
             wanted = (each.topic, topic.stamp, topic.key, needs_place)
             if wanted not in streams:
-                streams[wanted] = Stream(each.topic, topic.type, keys=None if topic.key is None else [])
+                streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
                 for channel in each.channels:
                     read = message_reader(binding.group, index, channel)
                     takers.setdefault(channel, []).append(_taker(streams[wanted], read))

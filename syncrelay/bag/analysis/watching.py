@@ -6,7 +6,7 @@ from typing import Final
 
 from syncrelay.bag.analysis.evaluation import Outcomes
 from syncrelay.bag.analysis.streams import Stream, arrivals
-from syncrelay.config import GroupConfig
+from syncrelay.config import GroupConfig, TopicConfig
 from syncrelay.explain import Arrival, Code, Endpoint, EngineDriver, Finding, GroupWatch, InputGraph, Judge, Severity
 
 _SECOND: Final = 1_000_000_000
@@ -61,10 +61,7 @@ class _Watch:
         self._arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]
         self._keys: list[Hashable] = [None] * len(streams)
         self._found: dict[tuple[Code, int | None], LastingFinding] = {}
-        self._graph = [
-            InputGraph(topic.topic, topic.output, (Endpoint("its publisher", topic.type),) if stream.places else ())
-            for topic, stream in zip(group.topics, streams, strict=True)
-        ]
+        self._graph = [_graph(topic, stream) for topic, stream in zip(group.topics, streams, strict=True)]
 
     def judge_until(self, now: int) -> None:
         """Judge the seconds that end by `now`."""
@@ -101,3 +98,9 @@ class _Watch:
             key = (finding.code, finding.input)
             before = self._found[key].seconds if key in self._found else 0
             self._found[key] = LastingFinding(finding, before + lasting)
+
+
+def _graph(topic: TopicConfig, stream: Stream) -> InputGraph:
+    """Return what a recording shows around an input: that it was published."""
+    publisher = Endpoint("its publisher", stream.type) if stream.places else None
+    return InputGraph(topic.topic, topic.output, (publisher,) if publisher else (), type_from=publisher)

@@ -52,7 +52,7 @@ FOUND = {
         Severity.ERROR,
         a_group(camera(not_readable="sensor_msgs/msg/Image has no usable field trigger: no such field"), LIDAR),
         "/camera: sensor_msgs/msg/Image has no usable field trigger: no such field",
-        "name another field at `stamp` or `key`, then `syncrelay reload`",
+        "name a field that it has at `stamp` or `key`, or write `stamp: receive`, then `syncrelay reload`",
     ),
     "a publisher of another type": (
         Code.OTHER_TYPE,
@@ -67,6 +67,36 @@ FOUND = {
         a_silent_group(camera(publishers=(Endpoint("/driver", IMAGE), STRANGER)), LIDAR),
         f"/usb_cam publishes /camera as std_msgs/msg/Int64, the file says {IMAGE}",
         "have /usb_cam use another topic",
+    ),
+    "a type that is not installed where another is published": (
+        Code.TYPE_NOT_IMPORTABLE,
+        Severity.ERROR,
+        a_group(camera(not_importable="no package fancy_msgs", publishers=(STRANGER,)), LIDAR),
+        "/camera: no package fancy_msgs; /usb_cam publishes it as std_msgs/msg/Int64",
+        "write `type: std_msgs/msg/Int64`, or leave `type` out",
+    ),
+    "a publisher of another type than the one that was taken": (
+        Code.OTHER_TYPE,
+        Severity.ERROR,
+        a_silent_group(camera(publishers=(STRANGER,), type_from=Endpoint("/driver", IMAGE)), LIDAR),
+        f"/usb_cam publishes /camera as std_msgs/msg/Int64, the relay took {IMAGE} from /driver",
+        "restart the relay, or write `type: std_msgs/msg/Int64` and `syncrelay reload`",
+    ),
+    "publishers of two types of a topic without one": (
+        Code.SEVERAL_TYPES,
+        Severity.ERROR,
+        a_silent_group(camera(type=None, publishers=(Endpoint("/driver", IMAGE), STRANGER)), LIDAR),
+        f"/camera is published with 2 types: {IMAGE} by /driver and std_msgs/msg/Int64 by /usb_cam",
+        "write the `type` that is meant, or have only one of them publish it",
+    ),
+    "nobody publishes a topic without a type": (
+        Code.NO_PUBLISHER,
+        Severity.ERROR,
+        a_silent_group(
+            camera(type=None, publishers=(), figures={"last_received": None}, alike=("/front/camera",)), LIDAR
+        ),
+        "nobody publishes /camera",
+        "did you mean `topic: /front/camera`?",
     ),
     "nobody publishes": (
         Code.NO_PUBLISHER,
@@ -311,6 +341,18 @@ QUIETLY = {
         a_silent_group(
             *unpublished(camera={"last_received": NOW - 9 * S}, lidar={}), empty_graph=GraphSnapshot(0, "SUBNET")
         ),
+    ),
+    "a type that is not known yet is no other type": (
+        Code.OTHER_TYPE,
+        a_silent_group(camera(type=None, publishers=(Endpoint("/driver", IMAGE), STRANGER)), LIDAR),
+    ),
+    "one type of a topic without one is no two": (
+        Code.SEVERAL_TYPES,
+        a_silent_group(camera(type=None, publishers=(Endpoint("/a", IMAGE), Endpoint("/b", IMAGE))), LIDAR),
+    ),
+    "who publishes another type than one that cannot be used is told with that": (
+        Code.OTHER_TYPE,
+        a_silent_group(camera(not_importable="no package fancy_msgs", publishers=(STRANGER,)), LIDAR),
     ),
     "another type is no QoS": (Code.INCOMPATIBLE_QOS, a_silent_group(camera(publishers=(STRANGER,)), LIDAR)),
     "what nobody publishes is not silent": (Code.SILENT, a_silent_group(camera(publishers=(), figures=QUIET), LIDAR)),
