@@ -69,8 +69,8 @@ def test_a_second_signal_ends_it_at_once(stage: Stage, step: str, first: signal.
     assert relay.wait() == -second
 
 
-# `systemctl stop` sends SIGTERM to launch and to its nodes, and launch then SIGINT to them; from a launch that is told
-# to be non-interactive, Ctrl-C comes twice.
+# `systemctl stop` sends SIGTERM to launch and to its nodes, and launch then SIGINT to them; where launch has no
+# terminal, Ctrl-C comes twice.
 @pytest.mark.parametrize(
     ("first", "second"),
     [(signal.SIGTERM, signal.SIGINT), (signal.SIGINT, signal.SIGTERM), (signal.SIGINT, signal.SIGINT)],

@@ -4,6 +4,7 @@ Neither ros2cli nor launch can be installed here: what they look for is checked,
 """
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -79,7 +80,9 @@ def test_the_installed_executable_says_its_version(workspace: Workspace, tmp_pat
 
 
 def test_the_installed_executable_relays_the_demos_rig(workspace: Workspace, stage: Stage):
-    relay = _start(workspace, stage, "--ros-args", "-r", "__node:=syncrelay_demo")
+    config = stage.folder / "rig.yaml"
+    shutil.copy(workspace.packages / "syncrelay" / "cli" / "demo.yaml", config)
+    relay = _start(workspace, stage, "--config", str(config), "--ros-args", "-r", "__node:=syncrelay_demo")
     collector = stage.collector(_OUTPUTS, reliability="best_effort")
     _start_sensors(stage)
     _wait_for_sets(collector, 20)
@@ -93,10 +96,9 @@ def test_the_installed_executable_relays_the_demos_rig(workspace: Workspace, sta
 
 
 def _start(workspace: Workspace, stage: Stage, *arguments: str) -> Process:
-    """Start the installed executable on the demo's file, in a shell where the workspace is sourced."""
+    """Start the installed executable in a shell where the workspace is sourced."""
     variables = [f"{name}={value}" for name, value in workspace.sourced().items()]
-    config = workspace.packages / "syncrelay" / "cli" / "demo.yaml"
-    return stage.start("relay", ["env", *variables, str(workspace.executable), "--config", str(config), *arguments])
+    return stage.start("relay", ["env", *variables, str(workspace.executable), *arguments])
 
 
 def _start_sensors(stage: Stage) -> None:
