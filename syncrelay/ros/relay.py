@@ -179,7 +179,7 @@ class Relay:
             return "paused already"
         self._groups.pause()
         _LOG.warning("paused: nothing leaves until %s is called", self.node.resolve_service_name("~/resume"))
-        self.evaluate()
+        self._show_pauses()
         return "paused: nothing leaves until ~/resume is called"
 
     def resume(self) -> str:
@@ -188,8 +188,12 @@ class Relay:
             return "not paused"
         self._groups.resume()
         _LOG.info("resumed")
-        self.evaluate()
+        self._show_pauses()
         return "resumed"
+
+    def _show_pauses(self) -> None:
+        with self._bugs.contained("evaluating the groups"):
+            self.evaluate()
 
     def refuse_reload(self, reason: str) -> None:
         """Report in `state` that a reload failed, and why."""
