@@ -73,6 +73,11 @@ def test_it_is_found_where_the_workspace_is_sourced(workspace: Workspace, tmp_pa
     assert found.splitlines() == [f"{workspace.executable} True", "True", "True", str(package)]
 
 
+def test_what_a_build_with_links_would_link_to_can_be_executed(workspace: Workspace):
+    # That build itself takes a minute: CMake makes each link by a script.
+    assert os.access(workspace.folder / "build" / "syncrelay" / "bin" / "syncrelay", os.X_OK)
+
+
 def test_the_installed_executable_says_its_version(workspace: Workspace, tmp_path: Path):
     environment = os.environ | workspace.sourced()
     said = subprocess.check_output([workspace.executable, "--version"], env=environment, text=True, cwd=tmp_path)
