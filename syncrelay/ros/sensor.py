@@ -14,6 +14,9 @@ from syncrelay.rig.schedule import SENSORS, Shot, schedule
 from syncrelay.ros.environment import log_arguments
 from syncrelay.wakeup import Wakeup
 
+# Whoever started it waits as long, and nobody waits for a sensor that was left alone.
+_LEAVE_WITHIN_S = 60
+
 
 def main(arguments: Sequence[str]) -> int:
     """Publish until SIGINT, SIGTERM or, where asked, the end of stdin; return the exit code."""
@@ -42,6 +45,8 @@ def _stop_at_end_of_stdin(stop: Wakeup) -> None:
     # Not sys.stdin: a daemon thread that holds its lock would abort the interpreter's exit.
     while os.read(0, 4096):
         pass
+    # Where a process was killed, DDS may wait for ever for what that held. The kernel needs no turn of ours to end it.
+    signal.alarm(_LEAVE_WITHIN_S)
     stop.set()
 
 
