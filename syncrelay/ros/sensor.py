@@ -9,13 +9,10 @@ import time
 from collections.abc import Iterator, Sequence
 
 from syncrelay.cdr import patch_stamp
-from syncrelay.rig.processes import UP
+from syncrelay.rig.processes import LEAVE_WITHIN_S, UP
 from syncrelay.rig.schedule import SENSORS, Shot, schedule
 from syncrelay.ros.environment import log_arguments
 from syncrelay.wakeup import Wakeup
-
-# Whoever started it waits as long, and nobody waits for a sensor that was left alone.
-_LEAVE_WITHIN_S = 60
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -46,7 +43,7 @@ def _stop_at_end_of_stdin(stop: Wakeup) -> None:
     while os.read(0, 4096):
         pass
     # Where a process was killed, DDS may wait for ever for what that held. The kernel needs no turn of ours to end it.
-    signal.alarm(_LEAVE_WITHIN_S)
+    signal.alarm(LEAVE_WITHIN_S)
     stop.set()
 
 
