@@ -28,6 +28,7 @@ BEYOND_A_SCHEMA = {
     "slop_not_a_number",
     "slop_without_end",
     "message_misspelt",
+    "manifests_that_meet",
     "names_too_long_in_full",
     "output_prefix_empty",
     "node_name_too_long_in_full",
