@@ -16,7 +16,8 @@ class Parameters:
 
     def __init__(self, node: Any, *, paths: Sequence[str], version: str) -> None:
         self._node = node
-        self._groups: list[str] = []
+        # None until the parameter is declared: a managed node may have no groups for a while.
+        self._groups: list[str] | None = None
         for name, value, description in (
             ("config", [printable(path) for path in paths] or [""], "The files that the relay runs."),
             ("version", version, "The version of syncrelay."),
@@ -26,7 +27,7 @@ class Parameters:
 
     def name_groups(self, groups: Sequence[str]) -> None:
         """Tell that these groups run now."""
-        if not self._groups:
+        if self._groups is None:
             # rclpy lets nobody change what is read-only, the node itself neither: others are refused below.
             constraints = "Set by the relay alone, at the start and at each reload."
             descriptor = ParameterDescriptor(description="The groups that run.", additional_constraints=constraints)
