@@ -263,7 +263,7 @@ def _misnamed_manifest(
         text = f"its manifest {name.said} is a topic that the node itself uses for {taken.purpose}: {instead}"
         yield document.problem(name.path, text, code="own_topic", span=span)
     for topic in topics:
-        if topic.input.text == name.text and topic.config.type in ("", MANIFEST_TYPE):
+        if topic.input.text == name.text and topic.config.type in (None, MANIFEST_TYPE):
             text = f"{topic.input.said} is the manifest of a group of the same node, which makes a loop"
             yield document.problem(topic.input.path, text, code="loop")
 
