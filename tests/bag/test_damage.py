@@ -21,7 +21,7 @@ _YEAR_2116 = 2**62
 _MEMORY = 16_000_000
 
 
-@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.timeout(chosen(short=600, long=1200))
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_flipped_bit_and_no_missing_end_stops_the_reading(kind: str, tmp_path: Path):
     path = KINDS[kind](tmp_path)
@@ -33,7 +33,7 @@ def test_no_flipped_bit_and_no_missing_end_stops_the_reading(kind: str, tmp_path
     assert readable > _PLACES / 2
 
 
-@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.timeout(chosen(short=600, long=1200))
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_length_that_lies_does_not_cost_its_memory(kind: str, tmp_path: Path):
     path = KINDS[kind](tmp_path)

@@ -24,6 +24,13 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "fusion.yaml"
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have no busy machine make anything seem to hang."""
+    monkeypatch.setattr(config_files, "_PATIENCE_S", 600.0)
+    monkeypatch.setattr(config_files, "_PIPE_S", 600.0)
+
+
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have what hangs told soon, and a pipe still be waited for."""

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.faults
 _PLACES = chosen(short=2, long=100)
 
 
-@pytest.mark.timeout(chosen(short=300, long=3600))
+@pytest.mark.timeout(chosen(short=600, long=3600))
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_command_ends_in_words_whatever_is_damaged(kind: str, tmp_path: Path, capsys):
     topics = inputs({"/camera": VECTOR, "/lidar": VECTOR})

@@ -86,10 +86,20 @@ def running(pid):
         return False
 
 
+def demo_for(stage, seconds):
+    """A demo of so many seconds that came to its end, and how many: more where a busy machine left a group no set."""
+    for longer in (seconds, 3 * seconds, 6 * seconds):
+        stage.environment["TWICE_AS_LONG_S"] = f"{2 * longer}"
+        demo = stage.start("demo", [*_DEMO, "--seconds", f"{longer}"])
+        if demo.wait(2 * longer + DEADLINE_S) == 0:
+            break
+    assert demo.wait() == 0, demo.stdout + demo.stderr
+    return demo, longer
+
+
 @pytest.mark.ros
 def test_it_matches_a_simulated_rig_and_sums_up(stage):
-    demo = stage.start("demo", [*_DEMO, "--seconds", "10"])
-    assert demo.wait() == 0, demo.stderr
+    demo, seconds = demo_for(stage, 8)
     groups = summed_up(demo.stdout)
     assert set(groups) == {"camera_lidar", "lidar_imu"}
     for sets, _, p95, inputs in groups.values():
@@ -100,7 +110,7 @@ def test_it_matches_a_simulated_rig_and_sums_up(stage):
             assert received == matched + dropped
     assert groups["camera_lidar"][1] < 3  # the offset is in use: without it, 12
     assert re.search(r"offset: -12 ms on /demo/camera/image_raw: span .* 1[12](\.\d+)? ms without it", demo.stdout)
-    assert len(re.findall(r"^ +\d+\.\d s  camera_lidar", demo.stdout, re.MULTILINE)) in range(1, 12)
+    assert len(re.findall(r"^ +\d+\.\d s  camera_lidar", demo.stdout, re.MULTILINE)) in range(1, seconds + 2)
     assert "\x1b" not in demo.stdout
     # Of what a busy machine makes of a rig, the relay may warn.
     assert [line for line in demo.said if not line.startswith("[WARN]")] == []
@@ -109,9 +119,8 @@ def test_it_matches_a_simulated_rig_and_sums_up(stage):
 @pytest.mark.ros
 def test_its_time_and_its_relay_begin_when_all_sensors_publish(stage):
     # Longer than the demo runs, and than a relay waits for messages before it asks for them.
-    stage.before_each_sensor("import time; time.sleep(8)")
-    demo = stage.start("demo", [*_DEMO, "--seconds", "4"])
-    assert demo.wait() == 0, demo.stdout + demo.stderr
+    stage.before_each_sensor("import os, time; time.sleep(float(os.environ['TWICE_AS_LONG_S']))")
+    demo, _ = demo_for(stage, 4)
     assert set(summed_up(demo.stdout)) == {"camera_lidar", "lidar_imu"}
     assert "nobody publishes" not in demo.stderr
 
@@ -125,7 +134,8 @@ def test_it_can_be_stopped_before_the_sensors_publish(stage):
     demo.send(signal.SIGINT)
     assert demo.wait() == 0
     assert demo.stdout == "Starting a simulated camera, lidar and IMU ...\n"
-    assert demo.said == ["syncrelay: stopped before it started"]
+    # Of sensors that take their time to end, it may warn.
+    assert [line for line in demo.said if not line.startswith("[WARN]")] == ["syncrelay: stopped before it started"]
     assert not any(map(running, sensors))
 
 
@@ -164,12 +174,12 @@ def test_the_rig_does_not_outlive_it(stage):
     demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
     sensors = children(demo.pid)
     demo.send(signal.SIGKILL)
-    wait_until(lambda: not any(map(running, sensors)), "the end of the rig", deadline_s=20)
+    wait_until(lambda: not any(map(running, sensors)), "the end of the rig")
 
 
 @pytest.mark.ros
 def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
-    screen = on_terminal(stage, [*_DEMO, "--seconds", "5"], columns=80, lines=24)
+    screen = on_terminal(stage)
     drawn, _, after = screen.partition("\x1b[?1049l")
     assert "Starting a simulated camera" in drawn.partition("\x1b[?1049h")[2]
     assert re.search(r"camera -12 ms.*A", drawn)
@@ -181,28 +191,39 @@ def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
 @pytest.mark.ros
 @pytest.mark.parametrize("setting", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "latin-1"}])
 def test_a_terminal_that_cannot_draw_gets_plain_lines(stage, setting):
-    screen = on_terminal(stage, [*_DEMO, "--seconds", "5"], columns=80, lines=24, **setting)
+    screen = on_terminal(stage, **setting)
     assert "\x1b[?1049h" not in screen
     assert "s  camera_lidar: " in screen
 
 
-def on_terminal(stage, argv, *, columns, lines, **environ):
-    """Run to the end on a terminal of its own; everything that was written to it."""
+def on_terminal(stage, **environ):
+    """Run a demo to its end on a terminal of 80x24; everything that was written to it.
+
+    It runs for longer where a busy machine left a group without a set.
+    """
+    for seconds in (5, 15, 45):
+        code, written = run_on_terminal(stage, [*_DEMO, "--seconds", f"{seconds}"], seconds + DEADLINE_S, environ)
+        if code == 0:
+            break
+    assert code == 0, written
+    return written
+
+
+def run_on_terminal(stage, argv, within_s, environ):
     ours, theirs = pty.openpty()
-    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
+    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     environment = stage.environment | {"TERM": "xterm-256color"} | environ
     process = subprocess.Popen(
         argv, stdin=theirs, stdout=theirs, stderr=theirs, env=environment, cwd=stage.folder, start_new_session=True
     )
     os.close(theirs)
     try:
-        written = read_until_closed(ours, time.monotonic() + DEADLINE_S)
-        assert process.wait(DEADLINE_S) == 0, written
+        written = read_until_closed(ours, time.monotonic() + within_s)
+        return process.wait(DEADLINE_S), written
     finally:
         process.kill()
         process.wait()
         os.close(ours)
-    return written
 
 
 def read_until_closed(descriptor, deadline):

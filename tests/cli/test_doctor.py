@@ -311,7 +311,7 @@ def test_what_it_says_to_do_about_stale_files_removes_them_and_no_others(base):
     assert "2 Fast DDS files" in found["shm_stale"]["what"]
     clean = found["shm_stale"]["fix"].splitlines()[-1]
     command = unshared(["mount"], f"{made}; set +e\n{clean}\nls /dev/shm >&2", "--version")
-    done = subprocess.run(command, env=base, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, env=base, capture_output=True, text=True, timeout=120, check=False)
     assert done.stderr.split() == ["fastrtps_port7499", "fastrtps_port7499_el", "kept"]
 
 

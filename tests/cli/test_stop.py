@@ -169,7 +169,7 @@ def _run_as_pid_1(script: str, *words: str, folder: Path) -> subprocess.Complete
 
 def _run(argv: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     environment = ros_environment(domain=0, folder=folder, python_path=[ROOT])
-    return subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=120)
 
 
 _SELF_SIGNALLED = """

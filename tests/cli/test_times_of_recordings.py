@@ -62,7 +62,7 @@ def _files(draw: st.DrawFn) -> str:
     return config({"front": {**group, **slop, **draw(thinned), "topics": topics}})
 
 
-@pytest.mark.timeout(chosen(short=300, long=3600))
+@pytest.mark.timeout(chosen(short=600, long=3600))
 @settings(
     max_examples=chosen(short=30, long=600),
     derandomize=not IS_LONG,

@@ -24,7 +24,7 @@ _MADE_UP = chosen(short=150, long=5000)
 _PAIRS = chosen(short=80, long=2000)
 
 
-@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.timeout(chosen(short=600, long=1200))
 @pytest.mark.parametrize("batch", range(_BATCHES))
 def test_a_file_of_any_content_is_in_order_or_an_error_that_says_why(batch: int, tmp_path: Path, figures):
     path, became = tmp_path / "fusion.yaml", Counter()
@@ -36,7 +36,7 @@ def test_a_file_of_any_content_is_in_order_or_an_error_that_says_why(batch: int,
     figures(f"{sum(became.values())} fuzzed files (part {batch + 1} of {_BATCHES}): {dict(became)}, nothing else")
 
 
-@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.timeout(chosen(short=600, long=1200))
 def test_a_document_made_up_of_our_words_is_in_order_or_an_error_that_says_why(tmp_path: Path, figures):
     path, became = tmp_path / "fusion.yaml", Counter()
     for number in range(_MADE_UP):
@@ -46,7 +46,7 @@ def test_a_document_made_up_of_our_words_is_in_order_or_an_error_that_says_why(t
     figures(f"{sum(became.values())} documents made up of the file's own words: {dict(became)}, nothing else")
 
 
-@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.timeout(chosen(short=600, long=1200))
 def test_files_of_any_content_together_are_in_order_or_an_error_that_says_where(tmp_path: Path, figures):
     paths, became = [tmp_path / "one.yaml", tmp_path / "two.yaml"], Counter()
     for number in range(_PAIRS):

@@ -37,7 +37,7 @@ _GROUPS = {
 
 
 @both_backends
-@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.timeout(chosen(short=600, long=1200))
 def test_messages_that_are_none_are_counted_and_right_sets_leave_afterwards(stage: Stage, backend: str, figures):
     aligned = {f"/{group}{topic}": VECTOR for group in _GROUPS for topic in _PAIR}
     recording = merged(at("/camera", *range(0, 1000, 20)), at("/lidar", *range(2, 1000, 20)))

@@ -56,7 +56,7 @@ def _kill(process: Process) -> None:
     process.wait()
 
 
-@pytest.mark.timeout(chosen(short=300, long=3600))
+@pytest.mark.timeout(chosen(short=600, long=3600))
 def test_publishers_and_subscribers_that_are_killed_at_random_cost_no_wrong_set(stage: Stage, figures):
     without_shared_memory(stage)
     rig = Rig(stage)
@@ -91,7 +91,7 @@ def test_publishers_and_subscribers_that_are_killed_at_random_cost_no_wrong_set(
     )
 
 
-@pytest.mark.timeout(chosen(short=300, long=1200))
+@pytest.mark.timeout(chosen(short=600, long=1200))
 def test_a_relay_that_is_killed_and_started_again_makes_right_sets_again(stage: Stage, figures):
     without_shared_memory(stage)
     rig = Rig(stage)

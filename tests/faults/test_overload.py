@@ -23,7 +23,7 @@ _HUNG_SETS = 6000
 _EXPLANATIONS = {"messages_lost", "too_slow", "short_queue"}
 
 
-@pytest.mark.timeout(chosen(short=300, long=600))
+@pytest.mark.timeout(chosen(short=600, long=600))
 @pytest.mark.parametrize("way", WAYS)
 def test_what_is_too_much_is_lost_in_order_and_told_and_then_all_is_as_before(stage: Stage, way: str, figures):
     rig = Rig(stage, slop=MS // 100)

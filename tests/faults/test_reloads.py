@@ -32,7 +32,7 @@ _FRONT = {
 }
 
 
-@pytest.mark.timeout(chosen(short=300, long=3600))
+@pytest.mark.timeout(chosen(short=600, long=3600))
 @both_backends
 def test_a_group_that_stays_loses_and_doubles_nothing_whatever_files_come(stage: Stage, figures):
     file, witness, began = _begun(stage)
@@ -64,7 +64,7 @@ def test_a_group_that_stays_loses_and_doubles_nothing_whatever_files_come(stage:
     )
 
 
-@pytest.mark.timeout(chosen(short=300, long=900))
+@pytest.mark.timeout(chosen(short=600, long=900))
 def test_files_that_come_faster_than_they_are_read_cost_it_nothing_either(stage: Stage, figures):
     file, witness, began = _begun(stage)
     relay = file.relay

@@ -25,7 +25,7 @@ _WARM_S = chosen(short=5, long=60)
 _GROWTH_MB = 10
 
 
-@pytest.mark.timeout(chosen(short=300, long=2400))
+@pytest.mark.timeout(chosen(short=600, long=2400))
 def test_nothing_is_lost_and_nothing_grows(stage: Stage, figures):
     rig = Rig(stage, topics=_TOPICS, slop=MS // 4, pairing=Pairing.BY_PLACE)
     relay = rig.relay(qos=LOSSLESS, keys={"queue_size": _QUEUE})

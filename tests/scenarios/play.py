@@ -80,6 +80,8 @@ class Played(NamedTuple):
     """What /status showed at last, by group."""
     written: dict[str, dict[str, str]]
     """What was written into the file of a group, as the relay suggested it."""
+    disturbed: str
+    """What shows that the machine did not give the play its time; empty where nothing does."""
 
     @classmethod
     def from_json(cls, text: str) -> "Played":
@@ -187,7 +189,12 @@ class Watch:
         shown = {name: {act: sorted(codes) for act, codes in acts.items()} for name, acts in self.shown.items()}
         warnings = [line for level, line in self.lines if level not in ("info", "debug")]
         notes = [line for level, line in self.lines if level == "info"]
-        return Played(warnings, notes, shown, self.last, written or {})
+        return Played(warnings, notes, shown, self.last, written or {}, self._disturbed())
+
+    def _disturbed(self) -> str:
+        waited = [line.message for _, line in self.lines if line.finding == "too_slow"]
+        found = [name for name, acts in self.shown.items() if "too_slow" in set().union(*acts.values())]
+        return "; ".join([*self._source.stdout.splitlines(), *waited, *(f"{name}: too slow" for name in found)])
 
 
 def placed(name: str, streams: Sequence[Stream]) -> list[Stream]:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _LONGEST_SLEEP_S = 0.1
 # A driver that did not get the CPU for so long has lost the sample: it does not send it late.
 _LOST_S = 0.1
+# One that did not get it for so long says so.
+_STALLED_S = 0.25
 
 
 class _Sampler:
@@ -146,14 +148,18 @@ def main() -> None:
     source = _Source(from_json(Path(sys.argv[1]).read_text()))
     # Without a buffer, which would hold the next line where select sees nothing.
     stdin = os.fdopen(sys.stdin.fileno(), "rb", buffering=0, closefd=False)
-    pause = 0.0
+    pause, turned = 0.0, time.monotonic()
     while True:
-        if select.select([stdin], [], [], pause)[0]:
+        is_told = bool(select.select([stdin], [], [], pause)[0])
+        if (late := time.monotonic() - turned - pause) > _STALLED_S:
+            print(f"stalled for {late:.2f} s", flush=True)  # noqa: T201  whoever judges what came looks for it
+        if is_told:
             line = stdin.readline()
             if not line:
                 break
             source.begin(line.decode().strip())
         pause = source.send_what_is_due()
+        turned = time.monotonic()
     rclpy.shutdown()
 
 

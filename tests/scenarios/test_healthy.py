@@ -9,7 +9,7 @@ from tests.scenarios.play import Played, Scenario, Theatre
 from tests.scenarios.streams import Stream
 from tests.scenarios.told import false_warnings, told
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(1800)]
 
 RIGS = {
     "camera_and_lidar": Scenario(

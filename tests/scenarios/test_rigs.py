@@ -13,7 +13,7 @@ from tests.scenarios.play import Played
 from tests.scenarios.play import play as play_scenarios
 from tests.scenarios.told import false_warnings, told, was_busy
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(1800)]
 
 RIGS = {**rigs_flow.RIGS, **rigs_stamps.RIGS, **rigs_graph.RIGS}
 

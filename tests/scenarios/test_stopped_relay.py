@@ -11,7 +11,7 @@ from tests.scenarios.play import Played, Scenario, Theatre
 from tests.scenarios.streams import Stream
 from tests.scenarios.told import false_warnings, told
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(1800)]
 
 _CAMERA, _LIDAR = Stream("camera", 10, wobble_ms=1), Stream("lidar", 10, phase_ms=7, wobble_ms=1)
 RIGS = {

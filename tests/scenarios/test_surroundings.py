@@ -11,7 +11,7 @@ from tests.ros.cdr_messages import time as ros_time
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
-from tests.ros.sensors import APPROXIMATE, play
+from tests.ros.sensors import APPROXIMATE, OF_A_BUSY_MACHINE, play
 from tests.ros.stage import Stage
 from tests.ros.status import ANY_PORT, findings
 from tests.scenarios.play import Source
@@ -34,9 +34,11 @@ def test_a_relay_that_is_alone_says_so_and_nothing_of_each_topic(stage: Stage):
     }
     groups = {name: {**APPROXIMATE, "topics": inputs(dict.fromkeys(each, VECTOR))} for name, each in topics.items()}
     relay = stage.relay(config(groups, metrics=ANY_PORT), "--log-format", "json")
-    relay.wait_until(lambda: len(_warned(relay)) >= len(topics), "a warning of each group")
-    assert {code for code, _ in _warned(relay)} == {"alone"}
-    for _, message in _warned(relay):
+    relay.wait_until(
+        lambda: [code for code, _ in _warned(relay)].count("alone") >= len(topics), "a warning of each group"
+    )
+    assert {code for code, _ in _warned(relay)} - OF_A_BUSY_MACHINE == {"alone"}
+    for message in [message for code, message in _warned(relay) if code == "alone"]:
         assert re.search(rf"domain {stage.domain}\b", message, re.IGNORECASE), message
         assert "LOCALHOST" in message
         assert "syncrelay doctor" in message
@@ -45,7 +47,7 @@ def test_a_relay_that_is_alone_says_so_and_nothing_of_each_topic(stage: Stage):
     source.begin("1")
     for name in topics:
         wait_until(lambda name=name: "healthy" in findings(relay, name), f"sets of {name}")
-    assert {code for code, _ in _warned(relay)} <= {"alone", "too_slow"}
+    assert {code for code, _ in _warned(relay)} <= {"alone"} | OF_A_BUSY_MACHINE
 
 
 def test_a_clock_that_nobody_tells_is_said_and_nothing_that_hangs_on_it(stage: Stage):
@@ -54,16 +56,18 @@ def test_a_clock_that_nobody_tells_is_said_and_nothing_that_hangs_on_it(stage: S
     relay = stage.relay(config({"front": group}, metrics=ANY_PORT, node={"use_sim_time": True}), "--log-format", "json")
     radar = Stream("/radar", 10, late_ms=40)
     Source(stage, [Stream("/camera", 10), Stream("/lidar", 10), radar]).begin("1")
-    relay.wait_until(lambda: bool(_warned(relay)), "a warning")
+    relay.wait_until(lambda: "no_clock" in dict(_warned(relay)), "a warning")
     wait_until(lambda: "no_clock" in findings(relay), "the finding")
     shown = findings(relay)
     begin = time.time_ns()
     ticks = [begin + n * 50_000_000 for n in range(2400)]
     play(stage, [Frame("/clock", CLOCK, tick, serialize(CLOCK, ros_time(tick))) for tick in ticks])
     said = _warned(relay)
-    assert {code for code, _ in said} == {"no_clock"}, said
-    assert all(re.search(r"no /clock (message )?has been received", message) for _, message in said), said
-    told = [message for _, message in said] + [f"{each['text']} {each['suggestion']}" for each in shown.values()]
+    assert {code for code, _ in said} - OF_A_BUSY_MACHINE == {"no_clock"}, said
+    of_clock = [message for code, message in said if code == "no_clock"]
+    assert all(re.search(r"no /clock (message )?has been received", message) for message in of_clock), said
+    findings_shown = [each for code, each in shown.items() if code not in OF_A_BUSY_MACHINE]
+    told = of_clock + [f"{each['text']} {each['suggestion']}" for each in findings_shown]
     assert not [each for each in told if re.search(r"max_wait|stood still|year|\d{6,} s", each)]
     wait_until(lambda: "no_clock" not in findings(relay), "the finding to be over")
     wait_until(lambda: not {"no_clock", "clock_stopped", "starting"} & findings(relay).keys(), "sets")

@@ -3,18 +3,21 @@
 import json
 import re
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.ros.configs import config
-from tests.ros.processes import wait_until
+from tests.ros.processes import DEADLINE_S, wait_until
 from tests.ros.stage import Stage
 from tests.ros.status import findings
 from tests.scenarios import rigs_flow, rigs_graph, rigs_stamps
 from tests.scenarios.play import Scenario, Theatre, group_of
 from tests.scenarios.streams import Stream
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(600)]
 
 _WELL = {"well": rigs_flow.RIGS["well"], "well_with_map": rigs_flow.RIGS["well_with_map"]}
 _BROKEN = {
@@ -31,7 +34,8 @@ _BROKEN = {
 _RIGS = {**_WELL, **_BROKEN}
 # What else is truly so for a while on a machine that is busy, whoever looks; said alone, it hides what it explains.
 _BUSY = {"too_slow"}
-_SECONDS = "12"
+# Longer where a busy machine let one of them see too little.
+_SECONDS = (12, 36, 72)
 
 
 def test_all_views_come_to_the_same_verdict(stage: Stage):
@@ -40,26 +44,47 @@ def test_all_views_come_to_the_same_verdict(stage: Stage):
     # The relay's own outputs are none of what is looked at.
     looked_at = {name: {**group_of(name, rig), "output_prefix": f"/looked_at/{name}"} for name, rig in _RIGS.items()}
     path.write_text(config(looked_at, node={"name": "looker"}))
-    syncrelay = [sys.executable, "-m", "syncrelay"]
-    explain = stage.start("explain", [*syncrelay, "--config", str(path), "--explain", _SECONDS])
-    live = ["--live", "--seconds", _SECONDS, "--json"]
-    doctor = stage.start("doctor", [*syncrelay, "doctor", "--config", str(path), *live])
+    for seconds in _SECONDS:
+        explained, diagnoses = _looked(stage, path, seconds)
+        others = [*_verdicts_of_others(explained), *_diagnoses_of_others(diagnoses)]
+        if not others:
+            break
+    assert others == []
     for name, rig in _RIGS.items():
         code = rig.first or "healthy"
         wait_until(lambda name=name, code=code: code in findings(theatre.file.relay, name), f"{code} of {name}")
-    assert explain.wait() == 1
+
+
+def _looked(stage: Stage, path: Path, seconds: int) -> tuple[str, list[dict[str, Any]]]:
+    """What a run that explains prints, and the diagnoses of a doctor that looks at the same time."""
+    syncrelay = [sys.executable, "-m", "syncrelay"]
+    explain = stage.start("explain", [*syncrelay, "--config", str(path), "--explain", f"{seconds}"])
+    live = ["--live", "--seconds", f"{seconds}", "--json"]
+    doctor = stage.start("doctor", [*syncrelay, "doctor", "--config", str(path), *live])
+    assert explain.wait(seconds + DEADLINE_S) == 1
+    assert doctor.wait(seconds + DEADLINE_S) == 1
+    return explain.stdout, list(json.loads(doctor.stdout)["diagnoses"])
+
+
+def _verdicts_of_others(explained: str) -> Iterator[str]:
+    """What is said of a rig that is not what it is."""
     for name, rig in _RIGS.items():
-        said = set(re.findall(rf"^{name}: .* \[(\w+)\]$", explain.stdout, re.MULTILINE))
-        assert said == _BUSY or said - _BUSY == {rig.first or "healthy"}, explain.stdout
-    assert doctor.wait() == 1
-    diagnoses = json.loads(doctor.stdout)["diagnoses"]
+        said = set(re.findall(rf"^{name}: .* \[(\w+)\]$", explained, re.MULTILINE))
+        if said != _BUSY and said - _BUSY != {rig.first or "healthy"}:
+            yield f"{name}, explained: {explained}"
+
+
+def _diagnoses_of_others(diagnoses: list[dict[str, Any]]) -> Iterator[str]:
     for name, rig in _BROKEN.items():
         said = {each["code"] for each in diagnoses if _is_about(each, name)}
-        assert said == _BUSY or rig.first in said, diagnoses
+        if said != _BUSY and rig.first not in said:
+            yield f"{name}, diagnosed: {diagnoses}"
     for name in _WELL:
-        assert not [each for each in diagnoses if _is_about(each, name) and each["code"] not in _BUSY]
+        for each in diagnoses:
+            if _is_about(each, name) and each["code"] not in _BUSY:
+                yield f"{name}, diagnosed: {each}"
 
 
-def _is_about(diagnosis: dict[str, str], group: str) -> bool:
+def _is_about(diagnosis: dict[str, Any], group: str) -> bool:
     """Whether it names the group or one of its topics."""
     return re.search(rf"(?<!\w){group}(?!\w)", json.dumps(diagnosis)) is not None

@@ -177,8 +177,11 @@ def test_relays_are_found_among_fifty_that_hang_or_never_end():
     with ExitStack() as stack:
         urls = [stack.enter_context(speaking(speech)) for speech in speeches]
         relays = [stack.enter_context(serving(states.healthy())).url for _ in range(2)]
-        # Long enough for a relay on a machine that others use too.
-        found = search([*urls[:25], *relays, *urls[25:]], timeout_s=5, whole_s=5)
+        for patience_s in (3, 10, 40):
+            # At last long enough for a relay on a machine that others use too.
+            found = search([*urls[:25], *relays, *urls[25:]], timeout_s=patience_s, whole_s=patience_s)
+            if len(found.relays) == len(relays):
+                break
     assert [answer.url for answer in found.relays] == relays
     assert len(found.others) == 50
 

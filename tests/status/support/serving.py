@@ -8,7 +8,7 @@ from syncrelay.config.listen import Listen
 from syncrelay.status import RelayState, Server
 
 ANY = Listen("127.0.0.1", range(1))
-_PATIENCE_S = 20
+_PATIENCE_S = 60
 
 
 @contextmanager
