@@ -66,8 +66,12 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]  # LifecycleNode is unty
         """See Transitions."""
         return _carried_out("cleanup", self._carried_out_by.cleanup)
 
-    def on_shutdown(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """See Transitions."""
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """See Transitions; one that is active is deactivated first."""
+        if state.label == "active":
+            ended = self.on_deactivate(state)
+            if ended != TransitionCallbackReturn.SUCCESS:
+                return ended
         return _carried_out("shutdown", self._carried_out_by.shutdown)
 
     def on_error(self, _state: LifecycleState) -> TransitionCallbackReturn:

@@ -104,10 +104,10 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
     assert manager.change("activate")
     _play_until_out(player, collector, _pairs(1000))
     wait_until(lambda: status(relay)["relay"]["ready"] is True, "the ready relay")
-    player.play(at("/camera", 5000))
-    wait_until(lambda: status(relay)["groups"][0]["inputs"][0]["buffered"] == 1, "a message that waits")
+    player.play(at("/camera", *range(5000, 5005)))
+    wait_until(lambda: status(relay)["groups"][0]["inputs"][0]["buffered"] == 5, "the messages that wait")
     assert manager.change("deactivate")
-    assert read_summary(relay.stderr)["front"].inputs["/camera"].dropped == {"shutdown": 1}
+    assert read_summary(relay.stderr)["front"].inputs["/camera"].dropped["shutdown"] == 5
     wait_until(lambda: not _endpoints(collector), "the end of all that the relay had on topics")
     player.play(next(_pairs(6000)))
 
@@ -183,8 +183,14 @@ def test_whatever_is_asked_for_the_state_is_the_one_that_the_transitions_lead_to
         assert status(relay)["relay"]["phase"] in phases
     assert {"unconfigured", "inactive", "active", "finalized"} <= set(manager.ask("states"))
     assert set(_NUMBERS) <= set(manager.ask("graph"))
+    while state != "active":
+        ((asked, state),) = [(asked, goal) for (before, asked), goal in _LEADS_TO.items() if before == state][:1]
+        assert manager.change(asked)
+    summaries = relay.stderr.count("front: 0 sets")
     assert manager.change("shutdown")
     assert manager.state == "finalized"
+    # It was deactivated first.
+    assert relay.stderr.count("front: 0 sets") == summaries + 1
     assert not manager.change("configure")
     wait_until(lambda: status(relay)["relay"]["phase"] == "finalized", "the finalized relay")
     assert status(relay)["groups"] == []
