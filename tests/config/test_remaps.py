@@ -145,6 +145,39 @@ def test_a_name_that_a_remap_made_is_said_beside_the_one_in_the_file(rules, sent
     assert problem.text == sentence
 
 
+@pytest.mark.parametrize(
+    ("rules", "sentence"),
+    [
+        (
+            {"~/f/sets": "/diagnostics"},
+            (
+                "its manifest `/diagnostics`, remapped from `/syncrelay/f/sets`, is a topic that the node itself uses"
+                " for its diagnostics: remap it to another name, or set `manifest: false`"
+            ),
+        ),
+        (
+            {"~/g/sets": "/same", "~/f/sets": "/same"},
+            (
+                "its manifest `/same`, remapped from `/syncrelay/g/sets`, is a topic that the node itself uses for the"
+                " manifest of the group f: remap it to another name, or set `manifest: false`"
+            ),
+        ),
+        (
+            {"~/f/sets": "/f/b"},
+            (
+                "the output `/f/b` is a topic that the node itself uses for the manifest of the group f: choose"
+                " another `output`"
+            ),
+        ),
+    ],
+)
+def test_a_manifest_that_a_remap_gives_a_name_of_something_else_is_refused(rules, sentence):
+    groups = {name: [{"topic": f"/{name}1", "type": _IMAGE}, {"topic": "/b", "type": _IMAGE}] for name in "fg"}
+    config = load_text(_file(groups), environ={})
+    (problem,) = config.names.problems(lambda name: rules.get(name, config.node.absolute(name)), groups=["f", "g"])
+    assert (problem.code, problem.text) == ("own_topic", sentence)
+
+
 def test_what_another_process_runs_has_names_of_its_own():
     groups = {name: [{"topic": f"/{name}1", "type": _IMAGE}, {"topic": "/b", "type": _IMAGE}] for name in "fg"}
     config = load_text(_file(groups), environ={})
