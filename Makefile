@@ -1,10 +1,12 @@
 # Everything a fresh machine needs comes from here: `make demo` and `make test` install what they run.
 PYTHON ?= $(shell .ci/python)
 VENV ?= .venv
+# The extra that brings ROS.
+ROS ?= ros
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-container faults soak lint schema bench clean
+.PHONY: demo test test-kilted test-container faults soak lint schema bench clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -12,6 +14,12 @@ demo: $(VENV)/demo
 # Many tests wait on real processes, so one more runs at once than there are cores; who is done first takes from others.
 test: $(VENV)/test
 	$(BIN)/python -m pytest -n $(shell expr 1 + $$(nproc)) --dist worksteal $(ARGS)
+
+# The relay on ROS 2 Kilted: the path through librcl proves itself, and messages are relayed over DDS. ARGS=tests/ros runs
+# all of these tests.
+test-kilted:
+	$(MAKE) test VENV=.venv-kilted ROS=kilted \
+		ARGS="$(or $(ARGS),tests/ros/test_librcl.py tests/ros/test_policies.py tests/ros/test_node.py)"
 
 # Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
 test-container: $(VENV)/test
@@ -48,11 +56,11 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { apt-get update && apt-get install -y python3-venv && $(PYTHON) -m venv $(VENV); }
 
 $(VENV)/demo: $(BIN)/python pyproject.toml
-	$(BIN)/python -m pip install -q -e '.[ros]'
+	$(BIN)/python -m pip install -q -e '.[$(ROS)]'
 	touch $@
 
 $(VENV)/test: $(BIN)/python pyproject.toml
-	$(BIN)/python -m pip install -q -e '.[ros,test]'
+	$(BIN)/python -m pip install -q -e '.[$(ROS),test]'
 	touch $@
 
 $(VENV)/lint: $(BIN)/python pyproject.toml

@@ -148,11 +148,12 @@ def _middleware(found: Installation) -> Iterator[Diagnosis]:
             "else: apt-get install ros-jazzy-rmw-fastrtps-cpp, and source ROS again",
         )
     elif asked and asked not in there:
+        package = f"ros-{found.distribution or 'jazzy'}-{asked.replace('_', '-')}"
         yield error(
             "middleware_not_there",
             f"RMW_IMPLEMENTATION asks for {asked}, which is not installed here; installed: {', '.join(there)}",
             impact="ROS ends the whole process when rclpy is imported, without an exception",
-            fix=f"unset RMW_IMPLEMENTATION    or install {asked} (ros-jazzy-{asked.replace('_', '-')}).\n"
+            fix=f"unset RMW_IMPLEMENTATION    or install {asked} ({package}).\n"
             "All nodes of a robot should use one middleware",
         )
 

@@ -11,7 +11,7 @@ from syncrelay.doctor.discovery import ports_of
 _NEEDED: Final = 600_000
 _TIGHT: Final = 8_000_000
 # Removes only what no process holds a lock on, which is how `fastdds shm clean` decides too.
-_CLEAN: Final = """for f in /dev/shm/fastrtps_*_[es]l; do flock -n "$f" rm -f "$f" "${f%_?l}"; done"""
+_CLEAN: Final = """for f in /dev/shm/fast*s_*_[es]l; do flock -n "$f" rm -f "$f" "${f%_?l}"; done"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,9 +59,10 @@ def _require_middleware(asked: str | None) -> None:
     )
     installed = sorted(set(registered) - {"rmw_implementation"})
     if asked and installed and asked not in installed:
+        distribution = os.environ.get("ROS_DISTRO") or "jazzy"
         raise RosUnavailableError(
             f"RMW_IMPLEMENTATION asks for {asked}, which is not installed here; there is {', '.join(installed)}.\n"
-            f"  Install it (ros-jazzy-{asked.replace('_', '-')}), or `unset RMW_IMPLEMENTATION`."
+            f"  Install it (ros-{distribution}-{asked.replace('_', '-')}), or `unset RMW_IMPLEMENTATION`."
         )
 
 

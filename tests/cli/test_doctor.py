@@ -274,7 +274,11 @@ def test_too_few_processes_allowed_are_counted(base, tasks_allowed):
 
 
 SHM = "mount -t tmpfs -o mode=1777 shm /dev/shm; cd /dev/shm"
-STALE = "touch fastrtps_0123456789abcdef fastrtps_0123456789abcdef_el fastrtps_port7999 fastrtps_port7999_el"
+# As Fast DDS 2 writes them, and as Fast DDS 3 does.
+STALE = (
+    "touch fastrtps_0123456789abcdef fastrtps_0123456789abcdef_el fastrtps_port7999 fastrtps_port7999_el"
+    " fastdds_0123456789abcdef fastdds_0123456789abcdef_el"
+)
 # Of a port that no process here takes: Fast DDS would wait for whoever holds it.
 LIVE = "touch fastrtps_port7499 fastrtps_port7499_el; exec 9<fastrtps_port7499_el; flock 9"
 VETH = "ip link add {0} type veth peer name {0}b; ip link set {0} up; ip link set {0}b up"
@@ -308,7 +312,7 @@ def test_a_machine_that_is_set_up_wrong_is_recognised(code, base):
 def test_what_it_says_to_do_about_stale_files_removes_them_and_no_others(base):
     made = f"{SHM}; {STALE}; {LIVE}; touch kept"
     _, found = examine(base, command=unshared(["mount"], made, "doctor", "--json"))
-    assert "2 Fast DDS files" in found["shm_stale"]["what"]
+    assert "3 Fast DDS files" in found["shm_stale"]["what"]
     clean = found["shm_stale"]["fix"].splitlines()[-1]
     command = unshared(["mount"], f"{made}; set +e\n{clean}\nls /dev/shm >&2", "--version")
     done = subprocess.run(command, env=base, capture_output=True, text=True, timeout=120, check=False)

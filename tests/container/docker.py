@@ -11,6 +11,7 @@ from tests.ros.processes import wait_until
 
 IMAGE = "syncrelay"
 WITH_MESSAGES = "syncrelay-messages"
+ON_ROS = "syncrelay-ros"
 Network = NewType("Network", str)
 HOST = Network("host")
 

@@ -108,22 +108,3 @@ def test_both_dockerfiles_carry_the_same_labels_and_defaults():
 
     kinds = ("LABEL", "HEALTHCHECK", "CMD", "USER", "WORKDIR /config")
     assert instructions("Dockerfile", *kinds) == instructions("Dockerfile.ros", *kinds)
-
-
-def test_the_entry_script_of_the_ros_image_sources_ros_and_the_overlay(tmp_path):
-    ros, overlay = tmp_path / "ros", tmp_path / "overlay"
-    for folder, script in ((ros, "setup.bash"), (overlay, "local_setup.bash")):
-        folder.mkdir(mode=0o755)
-        (folder / script).write_text(f"export SOURCED=$SOURCED:{folder.name}\n")
-    tmp_path.chmod(0o755)
-    (tmp_path / "syncrelay").write_text('#!/bin/sh\necho "$SOURCED $*"\n')
-    (tmp_path / "syncrelay").chmod(0o755)
-    said = docker(
-        *("run", "--rm", "--network=none", "--entrypoint=bash"),
-        f"--volume={_ROOT}/docker/entry.sh:/entry.sh:ro",
-        f"--volume={tmp_path}/syncrelay:/opt/syncrelay/bin/syncrelay:ro",
-        f"--volume={ros}:/opt/ros/jazzy:ro",
-        f"--volume={overlay}:/overlay:ro",
-        *(IMAGE, "/entry.sh", "--config", "/config/fusion.yaml"),
-    )
-    assert said == ":ros:overlay --config /config/fusion.yaml"

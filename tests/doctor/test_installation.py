@@ -73,6 +73,12 @@ def test_what_belongs_together_is_passed_over(found):
             "RMW_IMPLEMENTATION asks for rmw_cyclonedds_cpp, which is not installed here; installed: rmw_fastrtps_cpp",
             "unset RMW_IMPLEMENTATION    or install rmw_cyclonedds_cpp (ros-jazzy-rmw-cyclonedds-cpp)",
         ),
+        (
+            replace(WHEELS, middleware_asked="rmw_zenoh_cpp", distribution="kilted"),
+            "middleware_not_there",
+            "RMW_IMPLEMENTATION asks for rmw_zenoh_cpp",
+            "install rmw_zenoh_cpp (ros-kilted-rmw-zenoh-cpp)",
+        ),
     ],
 )
 def test_what_does_not_belong_together_is_named_with_the_way_out(found, code, what, do):

@@ -12,6 +12,7 @@ from pathlib import Path
 from tests.ros.domain import ports_of
 
 _FOLDER = Path("/dev/shm")  # noqa: S108  where POSIX shared memory is on Linux
+_PREFIXES = ("fastrtps_", "fastdds_")  # of Fast DDS 2 (Jazzy) and 3 (Kilted)
 
 
 def segments_of(pid: int) -> set[Path]:
@@ -21,12 +22,12 @@ def segments_of(pid: int) -> set[Path]:
     except (FileNotFoundError, ProcessLookupError):
         return set()
     mapped = {Path(line.split(maxsplit=5)[5]) for line in maps.splitlines() if f"{_FOLDER}/" in line}
-    return {path for path in mapped if path.name.startswith("fastrtps_") and "port" not in path.name}
+    return {path for path in mapped if path.name.startswith(_PREFIXES) and "port" not in path.name}
 
 
 def left_of(domain: int, segments: Iterable[Path]) -> set[Path]:
     """What still exists of a domain's ports and of the segments that its processes had mapped."""
-    ports = [_FOLDER / f"fastrtps_port{port}" for port in ports_of(domain)]
+    ports = [_FOLDER / f"{prefix}port{port}" for prefix in _PREFIXES for port in ports_of(domain)]
     files = {file for path in (*ports, *segments) for file in (path, *_companions(path))}
     return {file for file in files if file.exists()}
 

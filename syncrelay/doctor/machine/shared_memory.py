@@ -12,7 +12,8 @@ from typing import Final
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile
 
 _FOLDER: Final = Path("/dev/shm")  # noqa: S108  where POSIX shared memory is on Linux
-_NAME: Final = re.compile(r"fastrtps_(?:[0-9a-z]{16}|port([0-9]{1,5}))")
+# Fast DDS 3 (Kilted) writes fastdds_ where Fast DDS 2 (Jazzy) writes fastrtps_.
+_NAME: Final = re.compile(r"fast(?:rtps|dds)_(?:[0-9a-z]{16}|port([0-9]{1,5}))")
 
 
 def look_at_shared_memory(folder: Path = _FOLDER) -> SharedMemory:
@@ -28,7 +29,7 @@ def look_at_shared_memory(folder: Path = _FOLDER) -> SharedMemory:
 
 
 def _files(folder: Path) -> Iterator[ShmFile]:
-    for path in sorted(folder.glob("fastrtps_*")):
+    for path in sorted(folder.glob("fast*_*")):
         found = _NAME.fullmatch(path.name)
         if found is None:
             continue
