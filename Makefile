@@ -6,7 +6,7 @@ ROS ?= ros
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container faults soak lint schema bench clean
+.PHONY: demo test test-kilted test-container test-workspace faults soak lint schema bench clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -24,6 +24,10 @@ test-kilted:
 # Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
 test-container: $(VENV)/test
 	tests/container/run $(BIN)/python $(ARGS)
+
+# Builds a colcon workspace with this clone in it, and runs what it installs.
+test-workspace: $(VENV)/test $(VENV)/colcon/done
+	SYNCRELAY_COLCON=$(VENV)/colcon $(BIN)/python -m pytest tests/workspace $(ARGS)
 
 # Breaks what a robot breaks, at length, and prints what was survived; `make test` has the short form of each.
 faults: $(VENV)/test
@@ -61,6 +65,14 @@ $(VENV)/demo: $(BIN)/python pyproject.toml
 
 $(VENV)/test: $(BIN)/python pyproject.toml
 	$(BIN)/python -m pip install -q -e '.[$(ROS),test]'
+	touch $@
+
+# What ros-dev-tools and a sourced ROS bring on a robot: colcon, CMake, and of ament_cmake what the wheels forget to ask for.
+# In a venv of its own, as colcon brings plugins for pytest.
+$(VENV)/colcon/done: $(BIN)/python
+	$(BIN)/python -m venv $(VENV)/colcon
+	$(VENV)/colcon/bin/python -m pip install -q colcon-common-extensions cmake 'setuptools<80' ros-jazzy-ament-package \
+		ros-jazzy-ament-cmake ros-jazzy-ament-cmake-include-directories ros-jazzy-ament-cmake-python
 	touch $@
 
 $(VENV)/lint: $(BIN)/python pyproject.toml

@@ -4,6 +4,7 @@ Each is a process of its own, so a group has a core for itself, and takes nobody
 `front` is called `syncrelay_front`. Everything else is an argument of relay.launch.py.
 """
 
+import re
 from pathlib import Path
 
 import yaml
@@ -26,11 +27,10 @@ def generate_launch_description() -> LaunchDescription:
 
 def _relays(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     config = LaunchConfiguration("config").perform(context)
+    given = [{"config": config, "group": group, "node_name": f"syncrelay_{group}"} for group in _groups(config)]
     return [
-        IncludeLaunchDescription(
-            PythonLaunchDescriptionSource(_RELAY), launch_arguments={"group": name, "name": f"syncrelay_{name}"}.items()
-        )
-        for name in _groups(config)
+        IncludeLaunchDescription(PythonLaunchDescriptionSource(_RELAY), launch_arguments=arguments.items())
+        for arguments in given
     ]
 
 
@@ -44,7 +44,8 @@ def _groups(config: str) -> list[str]:
     if not isinstance(groups, dict) or not groups:
         raise RuntimeError(f"{config}: no groups found, try `ros2 run syncrelay syncrelay validate {config}`")
     metrics = read.get("metrics")
-    if len(groups) > 1 and isinstance(metrics, dict) and "listen" in metrics:
+    listen = str(metrics.get("listen")) if isinstance(metrics, dict) else ""
+    if len(groups) > 1 and re.search(r":[1-9]\d*$", listen):
         raise RuntimeError(
             f"{config}: metrics.listen names one port for {len(groups)} processes; leave it out, so that each takes the"
             " first free one from 9464, or write `metrics: null`"

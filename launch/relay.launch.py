@@ -14,7 +14,7 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument("config", description="the YAML file that describes the groups"),
             DeclareLaunchArgument("group", default_value="", description="run this group only; default: all"),
-            DeclareLaunchArgument("name", default_value="", description="of the node; default: as the file says"),
+            DeclareLaunchArgument("node_name", default_value="", description="default: as the file says"),
             DeclareLaunchArgument("namespace", default_value="", description="default: as the file says"),
             DeclareLaunchArgument(
                 "log_level",
@@ -50,7 +50,7 @@ def _relay(context: LaunchContext) -> list[LaunchDescriptionEntity]:
             package="syncrelay",
             executable="syncrelay",
             # What is not given stays as the file says.
-            name=given("name") or None,
+            name=given("node_name") or None,
             namespace=given("namespace") or None,
             arguments=[*arguments, "--group", group] if group else arguments,
             parameters=[{"use_sim_time": sim_time == "true"}] if sim_time else None,

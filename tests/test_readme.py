@@ -13,6 +13,7 @@ from syncrelay.config.file import file_format
 from syncrelay.explain import Code
 from syncrelay.sync import DropReason
 from tests.sync.support.timeline import play_policy
+from tests.test_launch_files import declared
 
 _ROOT = Path(__file__).parents[1]
 _README = (_ROOT / "README.md").read_text()
@@ -23,12 +24,29 @@ _ALL_BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(pag
 _FILES = [text for kind, text in _ALL_BLOCKS if kind == "yaml" and text.startswith("version:")]
 _SHOWN = [line.removeprefix("$ ") for kind, text in _ALL_BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
+_WORKSPACE = _ROOT / "docs" / "workspace.md"
+_SHELL = [line.split("  #")[0] for kind, text in _ALL_BLOCKS if kind == "sh" for line in text.splitlines()]
+_SHOWN += [line.removeprefix("ros2 run syncrelay ") for line in _SHELL if line.startswith("ros2 run syncrelay ")]
+_LAUNCHED = [line.split(maxsplit=3)[3] for line in _SHELL if line.startswith("ros2 launch syncrelay ")]
 _COMMANDS = sorted({command for command in [*_SHOWN, *_INLINE] if command})
 
 
 @pytest.mark.parametrize("text", _FILES, ids=range(len(_FILES)))
 def test_every_file_that_a_page_shows_is_in_order(text):
     assert load_text(text).groups
+
+
+@pytest.mark.parametrize("command", _LAUNCHED)
+def test_every_launch_that_a_page_shows_has_its_arguments(command):
+    file, *arguments = command.split()
+    # A group's relay gets all but its group and name from whoever starts the groups.
+    takes = declared("relay.launch.py") - ({"group", "node_name"} if file == "groups.launch.py" else set())
+    assert (_ROOT / "launch" / file).is_file()
+    assert {argument.split(":=")[0] for argument in arguments} <= takes
+
+
+def test_every_argument_of_the_launch_file_is_explained():
+    assert [name for name in declared("relay.launch.py") if f"\n| `{name}` |" not in _PAGES[_WORKSPACE]] == []
 
 
 @pytest.mark.parametrize("command", _COMMANDS)

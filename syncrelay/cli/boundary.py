@@ -15,7 +15,8 @@ DONE: Final = 0
 AT_FAULT: Final = 1
 """The user's file or data is at fault, or a check found something."""
 USAGE: Final = 2
-ROS_UNAVAILABLE: Final = 69
+UNAVAILABLE: Final = 69
+"""ROS, or a Python package that syncrelay needs, cannot be used here."""
 OUR_BUG: Final = 70
 INTERRUPTED: Final = 130
 
@@ -51,7 +52,13 @@ def _guarded(command: Callable[[], int]) -> int:
         # Who read us has seen enough.
         _abandon(sys.stdout)
         return AT_FAULT
-    except Exception:  # noqa: BLE001  the boundary: everything else is our bug
+    except Exception as error:  # noqa: BLE001  the boundary: everything else is our bug
+        if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
+            remark(
+                f"{sys.executable} lacks a Python package that syncrelay needs, or has it too old: {error}; run"
+                " `python3 -m pip install FOLDER-OF-SYNCRELAY`, or see docs/workspace.md if that is in a workspace"
+            )
+            return UNAVAILABLE
         say(traceback.format_exc())
         remark("this is a bug in syncrelay, please report it with the lines above and your file")
         return OUR_BUG
@@ -116,6 +123,6 @@ def _code(error: SyncRelayError) -> int:
         case UsageError():
             return USAGE
         case RosUnavailableError():
-            return ROS_UNAVAILABLE
+            return UNAVAILABLE
         case _:
             return AT_FAULT

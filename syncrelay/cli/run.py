@@ -108,7 +108,7 @@ def run(
         listening(config.listen if explain_s is None else None) as server,
         Relay(
             config,
-            config_path=", ".join(config_paths),
+            config_paths=config_paths,
             groups=groups or None,
             ros_args=ros_args,
             on_turn=heartbeat.beat if heartbeat else None,

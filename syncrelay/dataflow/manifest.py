@@ -56,18 +56,21 @@ class ManifestWriter:
 
     def write(self, number: int, match: Match, members: Sequence[Member | None], latency: int) -> bytes:
         """Return the manifest of a set, which is the `number`-th of its group; `latency` in ns."""
-        stamps = [stamp for stamp in match.stamps if stamp is not None]
-        missing = len(members) - len(stamps)
-        unpublished = sum(1 for member in members if member is not None and member.why_not)
-        common = match.stamp
+        there = [message for message in match.messages if message is not None]
+        missing = len(members) - len(there)
+        unpublished = sum([1 for member in members if member is not None and member.why_not])
+        offsets, common = self._offsets, match.stamp
+        # With the offsets, as the span of `/status` and of `analyze`.
+        matched = [message.stamp + offsets[message.input] for message in there]
+        stamp = max([message.stamp for message in there]) if common is None else common
         parts = [
-            _BEGIN(0, 1, 0, 0, *divmod(max(stamps) if common is None else common, _NS_PER_SECOND)),
+            _BEGIN(0, 1, 0, 0, *divmod(stamp, _NS_PER_SECOND)),
             self._heads.get((missing, unpublished)) or self._head(missing, unpublished),
             _number(number),
             _MISSING,
             _number(missing),
             _SPAN,
-            _number(self._span(match)),
+            _number(max(matched) - min(matched)),
             _LATENCY,
             _number(latency),
             _COMMON_STAMP,
@@ -96,12 +99,6 @@ class ManifestWriter:
             )
             at = (len(digits) + 1) % 4
         return b"".join(parts)
-
-    def _span(self, match: Match) -> int:
-        """Return the span as matched: with the offsets of the inputs, as `analyze` and `/status` have it."""
-        pairs = zip(match.stamps, self._offsets, strict=True)
-        matched = [stamp + offset for stamp, offset in pairs if stamp is not None]
-        return max(matched) - min(matched)
 
     def _head(self, missing: int, unpublished: int) -> bytes:
         """Return what comes before the set's number: an empty frame_id, how many statuses, the first one's begin."""

@@ -6,9 +6,9 @@ from typing import Final
 
 from syncrelay.config.wording import did_you_mean
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
+from syncrelay.environment.transport import PROFILES
 
 _VARIABLE: Final = "FASTDDS_BUILTIN_TRANSPORTS"
-_PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _TRANSPORTS: Final = ("DEFAULT", "UDPv4", "SHM", "UDPv6", "DEFAULTv6", "LARGE_DATA", "LARGE_DATAv6")
 _WITH_SHARED_MEMORY: Final = ("DEFAULT", "SHM", "DEFAULTv6", "LARGE_DATA", "LARGE_DATAv6")
 _EXPECTED: Final = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    with containers or several users; otherwise unset it"
@@ -16,10 +16,10 @@ _EXPECTED: Final = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    with containers o
 
 @dataclass(frozen=True, slots=True)
 class Transport:
-    """The environment's variables, and why the profiles file that they name cannot be read."""
+    """The environment's variables, and by variable why the profiles file that it names cannot be read."""
 
     environ: Mapping[str, str]
-    profiles_fault: str | None = None
+    profiles_faults: tuple[tuple[str, str], ...] = ()
 
 
 def uses_shared_memory(environ: Mapping[str, str]) -> bool:
@@ -30,17 +30,17 @@ def uses_shared_memory(environ: Mapping[str, str]) -> bool:
 
 def uses_defaults(environ: Mapping[str, str]) -> bool:
     """Whether Fast DDS carries messages as it does where nothing is said: over 0.5 MB of shared memory."""
-    return environ.get(_VARIABLE, "DEFAULT") == "DEFAULT" and not environ.get(_PROFILES)
+    return environ.get(_VARIABLE, "DEFAULT") == "DEFAULT" and not any(map(environ.get, PROFILES))
 
 
 def check_transport(found: Transport) -> Iterator[Diagnosis]:
     """Yield values that Fast DDS refuses, and those that limit which nodes data reach."""
-    if found.profiles_fault:
+    for name, fault in found.profiles_faults:
         yield error(
             "profiles_file",
-            f"{_PROFILES}={found.environ[_PROFILES]}: {found.profiles_fault}",
+            f"{name}={found.environ[name]}: {fault}",
             impact="Fast DDS ignores it: QoS, transports and peers are not what the file says",
-            fix=f"fix the path (in a container: mount the file), or: unset {_PROFILES}",
+            fix=f"fix the path (in a container: mount the file), or: unset {name}",
         )
     asked = found.environ.get(_VARIABLE)
     word = (asked or "").partition("?")[0]

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from syncrelay.environment.transport import PROFILES
+
 # Fast DDS announces a participant for half a second and then every three: of two that start a second apart, the
 # one often has to wait for the other's next turn (seen: 1.6 to 1.9 s on this default, 0 to 0.1 s on this profile).
 _PROFILE = """\
@@ -18,7 +20,6 @@ _PROFILE = """\
   </participant>
 </profiles>
 """
-_CHOICES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 
 
 @contextmanager
@@ -27,14 +28,15 @@ def quick_discovery() -> Iterator[None]:
 
     Enter it before DDS is used. A profile that the user chose stays; another middleware passes this over.
     """
-    if any(os.environ.get(name) for name in _CHOICES):
+    if any(os.environ.get(name) for name in PROFILES):
         yield
         return
     with tempfile.TemporaryDirectory(prefix="syncrelay-") as folder:
         path = Path(folder) / "profile.xml"
         path.write_text(_PROFILE, encoding="utf-8")
-        os.environ[_CHOICES[0]] = str(path)
+        os.environ.update(dict.fromkeys(PROFILES, str(path)))
         try:
             yield
         finally:
-            del os.environ[_CHOICES[0]]
+            for name in PROFILES:
+                del os.environ[name]

@@ -10,9 +10,11 @@ from syncrelay.config import Transport
 LARGE_MESSAGES: Final = Path(__file__).with_name("large_messages.xml")
 """The profiles file for messages over the 0.5 MB of Fast DDS's default shared-memory segment."""
 
-_PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
+PROFILES: Final = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+"""The variables that name a profiles file: Fast DDS 2 (Jazzy) reads the first, Fast DDS 3 (Kilted) the second."""
+
 # With one of these the user has chosen already, as our image does: shared memory may not reach the others.
-_CHOICES: Final = (_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")
+_CHOICES: Final = (*PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")
 
 _LOG = logging.getLogger("syncrelay")
 
@@ -25,4 +27,4 @@ def apply_transport(transport: Transport, environ: MutableMapping[str, str]) -> 
     if chosen:
         _LOG.warning("`transport: %s` has no effect: the environment has %s", transport, " ".join(chosen))
         return
-    environ[_PROFILES] = str(LARGE_MESSAGES)
+    environ.update(dict.fromkeys(PROFILES, str(LARGE_MESSAGES)))

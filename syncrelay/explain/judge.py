@@ -61,7 +61,14 @@ _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
 _OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET})
 """What a drift brings about, and sooner than it can be proven."""
 _OF_GRAPH: Final = frozenset(
-    {Code.ALONE, Code.NO_PUBLISHER, Code.TYPE_NOT_IMPORTABLE, Code.SEVERAL_TYPES, Code.NOBODY_LISTENS, Code.NO_CLOCK}
+    {
+        Code.ALONE,
+        Code.NO_PUBLISHER,
+        Code.TYPE_NOT_IMPORTABLE,
+        Code.SEVERAL_TYPES,
+        Code.NOBODY_LISTENS,
+        Code.NO_CLOCK,
+    }
 )
 _WAIT: Final = "wait some seconds: it is not known yet whether a clock drifts"
 

@@ -198,6 +198,10 @@ class GroupBindings:
             )
             if self.is_held:
                 topics[key].hold()
+            # What was taken stays, also where another QoS is asked for.
+            for publisher in (each.type_from for each in self.topics if each.name == name):
+                if publisher is not None:
+                    topics[key].keep_type(publisher)
         return topics[key]
 
 

@@ -74,7 +74,7 @@ class TopicInput:
         return (
             self._force_poll
             or self._failure is not None
-            or self._message_type is None
+            or (self._message_type is None and (self.type is not None or bool(self.publishers)))
             or not all(each.is_named for each in self.publishers)
             or any(binding.not_readable for binding in self.outputs.bindings)
             or (self._is_refused and self._may_try)
@@ -103,6 +103,11 @@ class TopicInput:
         if self._message_type is not None:
             binding.handler = handler(group, index, self._message_type)
         return binding
+
+    def keep_type(self, publisher: Endpoint) -> None:
+        """Have the type that was taken from this publisher before, if the file has none."""
+        if self.type is None:
+            self.type, self.type_from = publisher.type, publisher
 
     def make_publisher(self, binding: InputBinding) -> None:
         """Make the publisher of one that is bound, if its QoS is known. Raises RefusedError."""

@@ -32,10 +32,11 @@ from syncrelay.ros.hidden_node import join_hidden
 from syncrelay.ros.lifecycle import ManagedNode, Transitions
 from syncrelay.ros.manifests import Manifests
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
+from syncrelay.ros.parameters import Parameters
 from syncrelay.ros.services import Offered, Services
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.status import Phase, RelayState, advice
+from syncrelay.status import Phase, RelayState, advice, own_version
 from syncrelay.sync import DropReason
 from syncrelay.wakeup import Wakeup
 
@@ -68,7 +69,7 @@ class Relay:
         self,
         config: Config,
         *,
-        config_path: str = "",
+        config_paths: Sequence[str] = (),
         groups: Collection[str] | None = None,
         ros_args: Sequence[str] = (),
         on_turn: Callable[[], None] | None = None,
@@ -80,9 +81,9 @@ class Relay:
         One that only observes is hidden from lists of nodes, and publishes nothing.
 
         Raises ConfigError where remaps give two topics one name, UsageError where ROS rejects `ros_args`.
-        `config_path` is what `state` calls the file. `on_turn` is called on the receive thread for as long as that
-        turns, once a second at least. `manage` gives what carries out the transitions of a managed node, which starts
-        without groups; without it the node is none, and all groups run.
+        `config_paths` are what `state` and a parameter call the files. `on_turn` is called on the receive thread for as
+        long as that turns, once a second at least. `manage` gives what carries out the transitions of a managed node,
+        which starts without groups; without it the node is none, and all groups run.
         """
         apply_transport(config.node.transport, os.environ)
         if purpose is Purpose.OBSERVE:
@@ -121,6 +122,9 @@ class Relay:
         entities = Entities(self.node, purpose)
         bindings = GroupBindings(entities=entities, node=self.node, backend=backend, loop=self._loop)
         self._reporters = Reporters(self.node, entities)
+        self._parameters = None
+        if purpose is Purpose.RELAY:
+            self._parameters = Parameters(self.node, paths=config_paths, version=own_version())
         self._surroundings = Surroundings(self.node, purpose, relay_name=relay_name)
         self.monitor = Monitor(
             node=self.node,
@@ -140,8 +144,8 @@ class Relay:
             clock=self._clock,
             changed=lambda config: self._report_on(bindings, config),
         )
-        self._config_path = config_path
         self._is_managed = manage is not None
+        self._config_paths = config_paths
         self._phase = Phase.STARTING
         self._asked = -_ASKED_S
         self._next_evaluation = time.monotonic() + EVALUATE_S
@@ -253,7 +257,10 @@ class Relay:
 
     def _report_on(self, bindings: GroupBindings, config: Config) -> None:
         self.monitor.watch(bindings.all)
-        self._reporters.configure(config, [group.config.name for group in bindings.groups])
+        names = [group.config.name for group in bindings.groups]
+        self._reporters.configure(config, names)
+        if self._parameters is not None:
+            self._parameters.name_groups(names)
 
     def wake(self) -> None:
         """Have `step` return at once. Safe in a signal handler."""
@@ -321,7 +328,7 @@ class Relay:
         self._asked = now = time.monotonic()
         return RelayState(
             node=self.node.get_fully_qualified_name(),
-            config=self._config_path,
+            config=", ".join(self._config_paths),
             phase=self._phase,
             uptime_s=now - self._started,
             turned_s=now - self._loop.turned,

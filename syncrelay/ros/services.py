@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import CancelledError, Future
+from threading import Event
 from typing import Any, Final, TypeAlias
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -20,6 +21,8 @@ A SyncRelayError is an answer too, of a call that did not succeed.
 # A client that never waits for its answers gets no more than so many: each takes a little of every turn.
 _MOST_WAITING: Final = 64
 _ENDING: Final = "the relay is ending"
+# How long an end may take to tell those who wait that it comes.
+_TELL_S: Final = 1.0
 
 
 class Services:
@@ -29,6 +32,8 @@ class Services:
         self._node = node
         self._bugs = bugs
         self._waiting = 0
+        self._nobody_waits = Event()
+        self._nobody_waits.set()
         self._ended = False
         # A call that waits for its answer keeps away no other, nor those for parameters.
         self._group = ReentrantCallbackGroup()
@@ -36,9 +41,10 @@ class Services:
             self._offer(name, function)
 
     def end(self) -> None:
-        """Tell all who wait, and who still call, that the relay is ending."""
+        """Tell all who wait, and who still call, that the relay is ending. On another thread than the executor's."""
         self._ended = True
         self._node.executor.wake()
+        self._nobody_waits.wait(_TELL_S)
 
     def _offer(self, name: str, function: Callable[[], "Future[str]"]) -> None:
         # rclpy waits only for what was made by `async def`.
@@ -53,6 +59,7 @@ class Services:
         if self._waiting >= _MOST_WAITING:
             return False, f"{_MOST_WAITING} calls wait for their answers already"
         self._waiting += 1
+        self._nobody_waits.clear()
         try:
             future = function()
             future.add_done_callback(lambda _: self._node.executor.wake())
@@ -66,6 +73,8 @@ class Services:
             return False, f"a bug in syncrelay while answering ~/{name}: {error!r}; its traceback is in the log"
         finally:
             self._waiting -= 1
+            if not self._waiting:
+                self._nobody_waits.set()
 
 
 class _Answered:

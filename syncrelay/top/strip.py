@@ -41,7 +41,7 @@ MARKS: Mapping[DropReason, str] = MappingProxyType(
         DropReason.UNSTAMPED: "0",
         DropReason.MALFORMED: "?",
         DropReason.THINNED: "-",
-        DropReason.PAUSED: "‖",
+        DropReason.PAUSED: ":",
         DropReason.SHUTDOWN: "|",
     }
 )

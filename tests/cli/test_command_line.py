@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.cli.command import BAD, GOOD, run, run_python
+from tests.cli.command import BAD, GOOD, ROOT, run, run_python
 
 
 def test_help_names_every_command_and_option_on_stdout(tmp_path):
@@ -134,6 +134,18 @@ sys.exit(guarded(lambda: {}))
 def test_every_error_has_its_exit_code(command, code, said, tmp_path):
     done = run_python("-c", IN_THE_BOUNDARY.format(command), folder=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (code, "", said)
+
+
+def test_a_package_that_is_too_old_is_no_bug_of_ours(tmp_path):
+    # As on Ubuntu 24.04, which has pydantic 1.
+    (tmp_path / "pydantic").mkdir()
+    (tmp_path / "pydantic" / "__init__.py").touch()
+    (tmp_path / "f.yaml").write_text(GOOD)
+    done = run("validate", "f.yaml", folder=tmp_path, environ={"PYTHONPATH": f"{tmp_path}:{ROOT}"})
+    assert (done.returncode, done.stdout) == (69, "")
+    assert "from 'pydantic'" in done.stderr
+    assert "pip install" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_bug_of_ours_shows_its_traceback_and_asks_for_a_report(tmp_path):

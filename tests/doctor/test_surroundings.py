@@ -10,8 +10,9 @@ from syncrelay.doctor.discovery import Discovery, check_discovery
 from syncrelay.doctor.folders import Written, check_folders
 from syncrelay.doctor.network import Interface, check_network
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile, check_shared_memory
-from syncrelay.doctor.transport import Transport, check_transport, uses_shared_memory
+from syncrelay.doctor.transport import Transport, check_transport, uses_defaults, uses_shared_memory
 from syncrelay.environment.domain import domain_of, range_of
+from syncrelay.environment.transport import PROFILES
 
 ERROR, INFO = Severity.ERROR, Severity.INFO
 
@@ -119,10 +120,12 @@ def test_transports(value, found, shared):
     assert uses_shared_memory(environ) == shared
 
 
-def test_a_profiles_file_that_cannot_be_read_is_named_with_the_cause():
-    environ = {"FASTRTPS_DEFAULT_PROFILES_FILE": "/dds.xml"}
-    (diagnosis,) = check_transport(Transport(environ, "No such file or directory"))
-    assert diagnosis.what == "FASTRTPS_DEFAULT_PROFILES_FILE=/dds.xml: No such file or directory"
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_profiles_file_that_cannot_be_read_is_named_with_the_cause(name):
+    found = Transport({name: "/dds.xml"}, ((name, "No such file or directory"),))
+    (diagnosis,) = check_transport(found)
+    assert diagnosis.what == f"{name}=/dds.xml: No such file or directory"
+    assert not uses_defaults(found.environ)
 
 
 LO = Interface("lo", is_up=True, is_loopback=True, multicast=False)

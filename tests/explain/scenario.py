@@ -25,6 +25,7 @@ from syncrelay.explain import (
     GroupWatch,
     InputGraph,
     Judge,
+    Pause,
     Severity,
     Standstill,
 )
@@ -133,6 +134,7 @@ def run(
     stops: Sequence[tuple[float, float]] = (),
     starved: Sequence[tuple[float, float]] = (),
     sleeps: Sequence[tuple[int, int]] = (),
+    paused: Sequence[tuple[float, float]] = (),
     publishers: Callable[[str, float], tuple[Endpoint, ...]] | None = None,
     facts: Callable[[float], dict[str, Any]] | None = None,
 ) -> Told:
@@ -140,15 +142,17 @@ def run(
 
     `stops` are when the whole process stands still, as by SIGSTOP, each from one second to another: what comes
     meanwhile is received at the end. `starved` is the same of the thread that takes messages: they are received in
-    time, and lie there. `sleeps` is when nobody listens to a lazy group: it receives nothing. `publishers` gives
-    what the graph shows of a topic at a second, `facts` more keywords of `GroupWatch.facts`.
+    time, and lie there. `sleeps` is when nobody listens to a lazy group: it receives nothing. `paused` is when the
+    relay is paused.
+
+    `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of `GroupWatch.facts`.
     """
     config = group_of(sources, options or {})
     names = [topic.topic for topic in config.topics]
     arrivals = merge(
         *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources))
     )
-    relay = _Relay(config)
+    relay = _Relay(config, paused)
     heard = (each for each in arrivals if _until(sleeps, each[0]) == each[0])
     waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in heard)
     taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)
@@ -217,7 +221,8 @@ def _arrivals(
 class _Relay:
     """What the running relay does with a group, but for DDS."""
 
-    def __init__(self, config: GroupConfig) -> None:
+    def __init__(self, config: GroupConfig, paused: Sequence[tuple[float, float]]) -> None:
+        self._pauses = [(_ns(begin), _ns(end)) for begin, end in paused]
         self._n_inputs = len(config.topics)
         self._names = [(topic.topic, topic.output) for topic in config.topics]
         self._settling = [SettlingType() if topic.type is None else None for topic in config.topics]
@@ -243,7 +248,16 @@ class _Relay:
             self._driver.reject(arrival.input, arrival.received, now=now)
             return
         self._arrived[arrival.input].append((arrival.stamp, arrival.received))
-        self._driver.add(Message(arrival.input, arrival.stamp, arrival.received, arrival.key), now=now)
+        message = Message(arrival.input, arrival.stamp, arrival.received, arrival.key)
+        if self._pause_at(now) is None:
+            self._driver.add(message, now=now)
+            return
+        self._driver.engine.let_go(DropReason.PAUSED)
+        self._driver.engine.reject(message, DropReason.PAUSED)
+
+    def _pause_at(self, now: int) -> Pause | None:
+        begins = (begin for begin, end in self._pauses if begin <= now < end)
+        return next((Pause(begin, "/syncrelay/resume") for begin in begins), None)
 
     def _leave(self, outcomes: Sequence[Outcome], now: int) -> None:
         for each in outcomes:
@@ -278,7 +292,15 @@ class _Relay:
         waited = max(self._waits[-10:])
         self._waits.append(0)
         self.facts = self._watch.facts(
-            graph, now=now, **{"waited": waited, "standstill": worst, "asleep": self.asleep, **more}
+            graph,
+            now=now,
+            **{
+                "waited": waited,
+                "standstill": worst,
+                "asleep": self.asleep,
+                "pause": self._pause_at(now),
+                **more,
+            },
         )
         found = self._judge.judge(self.facts)
         self.found.append((second, found))

@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from syncrelay.cdr import read_stamp
 from syncrelay.environment.quick_discovery import quick_discovery
+from syncrelay.environment.transport import PROFILES
 from syncrelay.rig.schedule import SENSORS, schedule
 from tests.ros.processes import children_of, wait_until
 from tests.ros.shared_memory import left_of, segments_of
@@ -253,16 +254,16 @@ def test_sensors_that_never_publish_are_named(stage):
 
 
 def test_quick_discovery_is_a_profile_for_as_long_as_it_lasts(monkeypatch):
-    monkeypatch.delenv("FASTRTPS_DEFAULT_PROFILES_FILE", raising=False)
-    monkeypatch.delenv("FASTDDS_DEFAULT_PROFILES_FILE", raising=False)
+    for name in PROFILES:
+        monkeypatch.delenv(name, raising=False)
     with quick_discovery():
-        profile = Path(os.environ["FASTRTPS_DEFAULT_PROFILES_FILE"])
+        (profile,) = {Path(os.environ[name]) for name in PROFILES}
         assert "initialAnnouncements" in profile.read_text()
-    assert "FASTRTPS_DEFAULT_PROFILES_FILE" not in os.environ
+    assert os.environ.keys().isdisjoint(PROFILES)
     assert not profile.exists()
 
 
-@pytest.mark.parametrize("name", ["FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"])
+@pytest.mark.parametrize("name", PROFILES)
 def test_a_profile_of_the_users_own_stays(monkeypatch, name):
     monkeypatch.delenv("FASTRTPS_DEFAULT_PROFILES_FILE", raising=False)
     monkeypatch.setenv(name, "/mine.xml")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from syncrelay.environment.transport import LARGE_MESSAGES, apply_transport
+from syncrelay.environment.transport import LARGE_MESSAGES, PROFILES, apply_transport
 from tests.ros import relaying
 from tests.ros.cdr_messages import IMAGE, header, serialize
 from tests.ros.configs import LOSSLESS, config, inputs, outputs
@@ -11,7 +11,6 @@ from tests.ros.frames import Frame
 from tests.ros.stage import Stage
 from tests.ros.streams import BEGIN, MS
 
-_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _SEGMENT_BYTES = 64 << 20
 _IMAGE_BYTES = 2_000_000
 
@@ -19,13 +18,13 @@ _IMAGE_BYTES = 2_000_000
 def test_the_file_can_ask_for_large_messages():
     environ: dict[str, str] = {}
     apply_transport("large_messages", environ)
-    assert environ == {_PROFILES: str(LARGE_MESSAGES)}
+    assert environ == dict.fromkeys(PROFILES, str(LARGE_MESSAGES))
     untouched: dict[str, str] = {}
     apply_transport("default", untouched)
     assert untouched == {}
 
 
-@pytest.mark.parametrize("variable", [_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS"])
+@pytest.mark.parametrize("variable", [*PROFILES, "FASTDDS_BUILTIN_TRANSPORTS"])
 def test_what_the_environment_names_stands(variable, caplog):
     environ = {variable: "mine"}
     apply_transport("large_messages", environ)
@@ -45,7 +44,7 @@ def test_large_images_pass_through_the_shared_memory_that_the_file_asks_for(stag
     group = {"policy": "exact_time", "topics": inputs(topics, qos=LOSSLESS)}
     relay = stage.relay(config({"stereo": group}, node={"transport": "large_messages"}))
     # The others have it from their environment, as any process may.
-    stage.environment[_PROFILES] = str(LARGE_MESSAGES)
+    stage.environment.update(dict.fromkeys(PROFILES, str(LARGE_MESSAGES)))
     collector = stage.collector(aligned)
     player = stage.player(topics)
     relaying.connect(player, collector, recording, aligned)

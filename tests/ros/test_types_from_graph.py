@@ -51,6 +51,9 @@ def test_a_type_is_its_publishers_and_stays_when_these_go(stage: Stage):
     # A group that begins shares what is there, and is fed by a publisher that returns.
     file.reload(front=_exact(*_PAIR), rear=_exact(*_PAIR))
     relaying.connect(stage.player(_PAIR, node="again"), collector, recording, _REAR)
+    # With another QoS too, where the stranger would keep it from being taken again.
+    file.reload(front={"policy": "exact_time", "topics": [{"topic": topic} for topic in _PAIR]})
+    wait_until(lambda: _types(file.relay, "front") == [VECTOR, VECTOR], "the types that were taken")
     for topic in _PAIR:
         assert file.relay.stderr.count(f"{topic}: {VECTOR}, as ") == 1
 

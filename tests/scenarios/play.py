@@ -82,6 +82,8 @@ class Played(NamedTuple):
     """What was written into the file of a group, as the relay suggested it."""
     disturbed: str
     """What shows that the machine did not give the play its time; empty where nothing does."""
+    starved: bool
+    """Whether it was for so long that the relay warned of it."""
 
     @classmethod
     def from_json(cls, text: str) -> "Played":
@@ -189,12 +191,15 @@ class Watch:
         shown = {name: {act: sorted(codes) for act, codes in acts.items()} for name, acts in self.shown.items()}
         warnings = [line for level, line in self.lines if level not in ("info", "debug")]
         notes = [line for level, line in self.lines if level == "info"]
-        return Played(warnings, notes, shown, self.last, written or {}, self._disturbed())
+        return Played(warnings, notes, shown, self.last, written or {}, self._source.stdout, starved=False)
 
-    def _disturbed(self) -> str:
-        waited = [line.message for _, line in self.lines if line.finding == "too_slow"]
-        found = [name for name, acts in self.shown.items() if "too_slow" in set().union(*acts.values())]
-        return "; ".join([*self._source.stdout.splitlines(), *waited, *(f"{name}: too slow" for name in found)])
+
+def _with_what_the_relay_says_of_the_machine(played: Played) -> Played:
+    """Where nothing that is played keeps the relay from running, what it says of that is so."""
+    warned = [line.message for line in played.warnings if line.finding == "too_slow"]
+    shown = [name for name, acts in played.shown.items() if "too_slow" in set().union(*acts.values())]
+    disturbed = "\n".join([played.disturbed, *warned, *(f"{name}: too slow" for name in shown)])
+    return played._replace(disturbed=disturbed.strip(), starved=bool(warned))
 
 
 def placed(name: str, streams: Sequence[Stream]) -> list[Stream]:
@@ -240,7 +245,7 @@ def play(stage: Stage, scenarios: Mapping[str, Scenario]) -> Played:
     # Its last words are of the groups, too.
     theatre.file.relay.send(signal.SIGTERM)
     theatre.file.relay.wait()
-    return watch.played(written)
+    return _with_what_the_relay_says_of_the_machine(watch.played(written))
 
 
 def _write(group: dict[str, Any], changes: Mapping[str, str]) -> None:

@@ -8,9 +8,9 @@ from xml.parsers import expat
 
 from syncrelay.doctor.discovery import Discovery, peers_of
 from syncrelay.doctor.transport import Transport
+from syncrelay.environment.transport import PROFILES
 
 _EPHEMERAL: Final = (32768, 60999)
-_PROFILES: Final = "FASTRTPS_DEFAULT_PROFILES_FILE"
 
 
 def look_at_discovery(environ: Mapping[str, str]) -> Discovery:
@@ -19,9 +19,9 @@ def look_at_discovery(environ: Mapping[str, str]) -> Discovery:
 
 
 def look_at_transport(environ: Mapping[str, str]) -> Transport:
-    """Return Fast DDS's variables, and what is wrong with the file that they name."""
-    named = environ.get(_PROFILES)
-    return Transport(environ, _xml_fault(Path(named)) if named else None)
+    """Return Fast DDS's variables, and what is wrong with the files that they name."""
+    named = ((name, Path(environ[name])) for name in PROFILES if environ.get(name))
+    return Transport(environ, tuple((name, fault) for name, path in named if (fault := _xml_fault(path))))
 
 
 def _ephemeral_ports() -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
 from groups import MS, NOW, S, a_group, a_silent_group, an_input
 
-from syncrelay.explain import Code, Distribution, Severity, Standstill
+from syncrelay.explain import Code, Distribution, Pause, Severity, Standstill
 from syncrelay.sync.messages import DropReason
 
 HELD_UP = {"bursts": 1, "held": 2 * S, "held_up": [(NOW - 4 * S, NOW - 2 * S)]}
@@ -15,6 +15,13 @@ def held_up(begin, end):
 
 # Code, severity, facts, sentence, suggestion.
 FOUND = {
+    "a group that somebody paused": (
+        Code.PAUSED,
+        Severity.WARN,
+        a_silent_group(camera(), LIDAR, pause=Pause(NOW - 12 * S, "/syncrelay/resume")),
+        "paused for 12 s: no set leaves",
+        "`ros2 service call /syncrelay/resume std_srvs/srv/Trigger` ends the pause",
+    ),
     "a queue that is too short": (
         Code.SHORT_QUEUE,
         Severity.ERROR,

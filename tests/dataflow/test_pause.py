@@ -1,0 +1,146 @@
+"""A paused group: nothing leaves, all that comes is counted, and the sets after it are newer than those before."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from syncrelay.config import load_text
+from syncrelay.dataflow.group import GroupRelay
+from syncrelay.sync import DropReason
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.streams import BEGIN, MS
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_WITH_RADAR = [*inputs(_PAIR), {"topic": "/radar", "type": VECTOR, "required": False}]
+_KINDS = {
+    "exact_time": {},
+    "approximate_time": {"slop": "30ms"},
+    "approximate_time_eager": {"slop": "30ms"},
+    "approximate_epsilon_time": {"slop": "30ms"},
+    "latest_time": {"trigger": "/camera", "max_age": "1s"},
+}
+
+
+class _Outlet:
+    def __init__(self) -> None:
+        self.sent: list[int] = []
+
+    def send(self, payload: int) -> None:
+        self.sent.append(payload)
+
+
+def _group(**keys) -> tuple[GroupRelay, list[_Outlet]]:
+    text = config({"front": {"policy": "exact_time", "topics": inputs(_PAIR), **keys}})
+    group = GroupRelay(load_text(text).groups[0], now=lambda: 0)
+    outlets = [_Outlet() for _ in group.config.topics]
+    for index, outlet in enumerate(outlets):
+        group.connect(index, outlet, restamped=False)
+    return group, outlets
+
+
+def _give(group: GroupRelay, index: int, ms: int) -> None:
+    stamp = BEGIN + ms * MS
+    group.receive(index, stamp, stamp, stamp)
+
+
+def _sent(outlets: list[_Outlet]) -> list[list[int]]:
+    return [[(stamp - BEGIN) // MS for stamp in outlet.sent] for outlet in outlets]
+
+
+def test_what_waits_and_what_comes_is_dropped_as_paused_and_what_comes_after_is_matched():
+    group, outlets = _group()
+    _give(group, 0, 0)
+    group.pause()
+    group.pause()
+    for ms in (0, 10):
+        for index in range(2):
+            _give(group, index, ms)
+    assert _sent(outlets) == [[], []]
+    assert group.next_deadline() is None
+    group.unpause()
+    group.unpause()
+    # The partner of what was dropped finds nobody.
+    _give(group, 1, 0)
+    for index in range(2):
+        _give(group, index, 20)
+    assert _sent(outlets) == [[20], [20]]
+    camera, lidar = group.counts()
+    assert (camera.fed, camera.matched, dict(camera.dropped)) == (4, 1, {DropReason.PAUSED: 3})
+    assert (lidar.fed, lidar.matched) == (4, 1)
+    assert lidar.dropped[DropReason.PAUSED] == 2
+
+
+def test_a_latest_message_outlives_a_pause_be_it_from_before_or_from_within():
+    group, outlets = _group(policy="latest_time", trigger="/camera")
+    _give(group, 1, 0)
+    group.pause()
+    _give(group, 0, 10)
+    group.unpause()
+    _give(group, 0, 20)
+    assert _sent(outlets) == [[20], [0]]
+    group.pause()
+    for ms in (30, 40):
+        _give(group, 1, ms)
+    group.unpause()
+    _give(group, 0, 50)
+    assert _sent(outlets) == [[20, 50], [0, 40]]
+    assert [dict(each.dropped) for each in group.counts()] == [{DropReason.PAUSED: 1}] * 2
+
+
+def test_a_group_that_is_suspended_while_paused_stays_paused():
+    group, outlets = _group()
+    group.pause()
+    group.suspend()
+    for index in range(2):
+        _give(group, index, 0)
+        group.connect(index, outlets[index], restamped=False)
+    group.resume()
+    assert _sent(outlets) == [[], []]
+    assert [dict(each.dropped) for each in group.counts()] == [{DropReason.PAUSED: 1}] * 2
+
+
+def test_a_group_that_failed_is_paused_and_goes_on_as_one_that_failed():
+    group, _ = _group()
+    group.fail(ZeroDivisionError("x"))
+    group.pause()
+    group.unpause()
+    _give(group, 0, 0)
+    assert group.failure == "ZeroDivisionError: x"
+
+
+_STEPS = st.lists(
+    st.one_of(
+        st.tuples(st.integers(0, 2), st.integers(-25, 10)), st.sampled_from(["pause", "unpause", "suspend", "expire"])
+    ),
+    max_size=80,
+)
+
+
+def _take(step: str | tuple[int, int], group: GroupRelay, outlets: list[_Outlet], at: int) -> None:
+    match step:
+        case "suspend":
+            group.suspend()
+            for index, outlet in enumerate(outlets):
+                group.connect(index, outlet, restamped=False)
+            group.resume()
+        case "expire":
+            group.expire(at * MS)
+        case str():
+            getattr(group, step)()
+        case index, ahead:
+            _give(group, index % len(outlets), 20 * (at + ahead) // 2)
+
+
+@given(policy=st.sampled_from(sorted(_KINDS)), steps=_STEPS, optional=st.booleans())
+def test_all_is_counted_nothing_leaves_while_paused_and_no_set_goes_back(policy, steps, optional):
+    keys = {"policy": policy, **_KINDS[policy], **({"max_wait": "5ms", "topics": _WITH_RADAR} if optional else {})}
+    group, outlets = _group(**keys)
+    for at, step in enumerate(steps):
+        before = _sent(outlets)
+        _take(step, group, outlets, at)
+        if group.paused_since is not None:
+            assert _sent(outlets) == before
+        for each in group.counts():
+            assert each.fed == each.matched + sum(each.dropped.values()) + each.buffered
+    for stamps in _sent(outlets):
+        assert stamps == sorted(stamps)

@@ -1,0 +1,61 @@
+"""A relay that is paused and goes on: that no set leaves has a reason, and nothing else is blamed, then or later."""
+
+import pytest
+
+from tests.explain.scenario import Source, run
+
+_CAMERA, _LIDAR = Source("/camera", hz=30, jitter_ms=2), Source("/lidar", hz=10, jitter_ms=2)
+_IMU = Source("/imu", hz=5, required=False)
+_SLOP = {"slop": "60ms"}
+_PAUSES = [(20.1, 20.4), (30.0, 33.0), (45.0, 75.0), (100.3, 109.5)]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        _SLOP,
+        {**_SLOP, "max_wait": "100ms", "queue_size": 20},
+        {"policy": "latest_time", "trigger": "/lidar", "max_age": "1s"},
+    ],
+    ids=["approximate_time", "with an optional input", "latest_time"],
+)
+def test_of_a_healthy_rig_nothing_is_found_but_the_pauses_and_none_of_them_is_a_line(options):
+    sources = (_CAMERA, _LIDAR, _IMU) if "max_wait" in options else (_CAMERA, _LIDAR)
+    told = run(*sources, seconds=140, options=options, paused=_PAUSES)
+    assert told.lines == []
+    assert told.ever_found == {"paused"}
+    assert [second for second, _ in told.findings("paused")] == [30, 31, 32, *range(45, 75), *range(101, 110)]
+    # Soon after, the rate is again that of now.
+    assert told.facts.figures.rate_hz == pytest.approx(10, rel=0.1)
+
+
+def test_what_is_said_of_a_pause_is_for_how_long_and_how_to_end_it():
+    told = run(_CAMERA, _LIDAR, seconds=30, options=_SLOP, paused=[(20, 60)])
+    (paused,) = told.found[-1][1]
+    assert paused.text == "paused for 10 s: no set leaves"
+    assert paused.suggestion == "`ros2 service call /syncrelay/resume std_srvs/srv/Trigger` ends the pause"
+
+
+def test_a_silence_that_begins_in_a_pause_is_told_after_it():
+    dead = Source("/lidar", hz=10, sends=lambda second: second < 40)
+    told = run(_CAMERA, dead, seconds=90, options=_SLOP, paused=[(20, 60)])
+    silent = told.findings("silent")
+    assert all(each.severity.name == ("WARN" if second < 65 else "ERROR") for second, each in silent)
+    assert {line.code for line in told.warnings} == {"silent"}
+    in_the_pause, *after = told.warnings
+    assert in_the_pause.second >= 45
+    assert all(line.second >= 65 and line.text.startswith("no more sets for ") for line in after)
+    assert not any("recovered" in line.text for line in told.lines)
+
+
+def test_a_pause_is_no_recovery_of_what_was_silent_before_it():
+    gone = Source("/lidar", hz=10, sends=lambda second: not 20 < second < 80)
+    told = run(_CAMERA, gone, seconds=120, options=_SLOP, paused=[(40, 60)])
+    assert [line.second for line in told.lines if "recovered" in line.text] == pytest.approx([81], abs=1)
+
+
+def test_stamps_that_were_unset_before_a_pause_are_not_said_to_be_mended_by_it():
+    unset = Source("/lidar", hz=10, stamp=lambda _: 0)
+    told = run(_CAMERA, unset, seconds=90, options=_SLOP, paused=[(30, 60)])
+    assert {line.code for line in told.lines} == {"unstamped"}
+    assert not any("resolved" in line.text or "recovered" in line.text for line in told.lines)

@@ -1,0 +1,15 @@
+"""Tests of a colcon workspace, run by `make test-workspace`, which installs a colcon; without, none is collected."""
+
+import os
+
+import pytest
+
+from tests.workspace.building import COLCON, Workspace, build
+
+collect_ignore_glob = [] if os.environ.get(COLCON) else ["test_*.py"]
+
+
+@pytest.fixture(scope="session")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """A fresh workspace with this repository in its src/, built by colcon."""
+    return build(tmp_path_factory.mktemp("workspace"))
