@@ -11,7 +11,7 @@ import pytest
 
 from syncrelay.sync import ApproximateTime
 from tests.ros import relaying
-from tests.ros.cdr_messages import VECTOR, stamps_of
+from tests.ros.cdr_messages import VECTOR, stamp_of, stamps_of
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.reloaded import ReloadedFile
@@ -106,6 +106,8 @@ def test_while_paused_nothing_leaves_and_all_is_counted_and_what_comes_after_is_
     n_sent += 1
     player.play(at("/camera", -50))
     play(before, len(before) // 2)
+    last = stamp_of(before[-1].payload)
+    wait_until(lambda: last in stamps_of(collector.payloads("/front/lidar")), "the last set before the pause")
     assert caller.call("pause") == (True, "paused: nothing leaves until ~/resume is called")
     assert caller.call("pause") == (True, "paused already")
     n_sets = collector.count("/front/lidar")
