@@ -45,7 +45,7 @@ COMPLETES: Final = "_ARGCOMPLETE"
 
 def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
     """Run what the command line asks for and return its exit code; raises UsageError where it makes no sense."""
-    if not words and COMPLETES in os.environ:
+    if not words and {COMPLETES, "COMP_LINE"} <= os.environ.keys():
         from syncrelay.cli.completion import complete
 
         return complete()

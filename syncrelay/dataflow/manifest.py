@@ -21,8 +21,8 @@ _OK, _WARN, _ERROR, _STALE = range(4)
 _COUNT: Final = Struct("<I").pack
 # The encapsulation header of little-endian CDR, then the stamp.
 _BEGIN: Final = Struct("<4BiI").pack
-# Whatever is a number here has no more digits, be it negative.
-_DIGITS: Final = 32
+# Of a group there are some dozens, by the lengths of its numbers.
+_MOST_TEMPLATES: Final = 500
 # Why a message could not be published is told in DDS's words, this far.
 _LONGEST: Final = 200
 
@@ -41,64 +41,66 @@ class Member(NamedTuple):
 
 
 class ManifestWriter:
-    """Serializes the manifests of a group."""
+    """Serializes the manifests of a group.
+
+    What sets have in common, down to the lengths of their numbers, is a template: code that runs once in some
+    milliseconds costs by its length, as nothing of it is in the processor's caches.
+    """
 
     def __init__(self, config: GroupConfig, *, node: str, topics: Sequence[tuple[str, str]]) -> None:
         """Take the node's full name, and each input with its output, as the graph names them."""
         self._name, self._node = _text(config.name), _text(node)
-        self._policy = _key("policy") + _last_text(config.options.policy)
-        self._behind_policy = len(self._policy) % 4
+        self._policy = _last_text(config.options.policy)
         self._offsets = tuple(topic.offset_ns for topic in config.topics)
         self._names = [(_text(output), _text(source)) for source, output in topics]
-        self._present = [[self._input(each, at, _OK, "") for at in range(4)] for each in range(len(topics))]
-        self._missing = [[self._input(each, at, _STALE, "missing") for at in range(4)] for each in range(len(topics))]
-        self._heads: dict[tuple[int, int], bytes] = {}
+        self._templates: dict[tuple[object, ...], bytes] = {}
 
     def write(self, number: int, match: Match, members: Sequence[Member | None], latency: int) -> bytes:
         """Return the manifest of a set, which is the `number`-th of its group; `latency` in ns."""
-        there = [message for message in match.messages if message is not None]
-        missing = len(members) - len(there)
-        unpublished = sum([1 for member in members if member is not None and member.why_not])
         offsets, common = self._offsets, match.stamp
+        there = [message for message in match.messages if message is not None]
         # With the offsets, as the span of `/status` and of `analyze`.
         matched = [message.stamp + offsets[message.input] for message in there]
         stamp = max([message.stamp for message in there]) if common is None else common
-        parts = [
-            _BEGIN(0, 1, 0, 0, *divmod(stamp, _NS_PER_SECOND)),
-            self._heads.get((missing, unpublished)) or self._head(missing, unpublished),
-            _number(number),
-            _MISSING,
-            _number(missing),
-            _SPAN,
-            _number(max(matched) - min(matched)),
-            _LATENCY,
-            _number(latency),
-            _COMMON_STAMP,
-            _NO_STAMP if common is None else _number(common),
-            self._policy,
-        ]
-        at = self._behind_policy
-        for index, member in enumerate(members):
-            if member is None:
-                parts.append(self._missing[index][at])
-                at = 0
-                continue
-            why_not = member.why_not
-            digits = b"%d" % member.received
-            parts += (
-                self._input(index, at, _ERROR, why_not) if why_not else self._present[index][at],
-                _number(member.sequence),
-                _STAMP,
-                _number(member.stamp),
-                _ORIGINAL_STAMP,
-                _number(member.original_stamp),
-                _RECEIVED,
-                _COUNT(len(digits) + 1),
-                digits,
-                b"\0",
-            )
-            at = (len(digits) + 1) % 4
-        return b"".join(parts)
+        numbers = [number, len(members) - len(there), max(matched) - min(matched), latency]
+        if common is not None:
+            numbers.append(common)
+        for member in members:
+            if member is not None:
+                numbers += member[:4]
+        digits = list(map(b"%d".__mod__, numbers))
+        kinds = tuple([None if member is None else member.why_not for member in members])
+        key = (common is None, kinds, *map(len, digits))
+        template = self._templates.get(key) or self._template(key, digits, kinds, has_common=common is not None)
+        return template % (_BEGIN(0, 1, 0, 0, *divmod(stamp, _NS_PER_SECOND)), *digits)
+
+    def _template(
+        self, key: tuple[object, ...], digits: Sequence[bytes], kinds: Sequence[str | None], *, has_common: bool
+    ) -> bytes:
+        """Return what the stamp and these digits, or others of their lengths, are filled into, and keep it."""
+        sizes = iter([len(each) for each in digits])
+        # None is the place of digits.
+        parts: list[bytes | None] = [None, self._head(kinds.count(None), sum(map(bool, kinds)))]
+        for name in ("set", "missing", "span_ns", "latency_ns"):
+            parts += (_key(name), *_number(next(sizes)))
+        parts += (_key("common_stamp_ns"), *(_number(next(sizes)) if has_common else (_text(""),)))
+        parts += (_key("policy"), self._policy)
+        at = len(self._policy) % 4
+        for index, why_not in enumerate(kinds):
+            parts.append(self._input(index, at, why_not))
+            at = 0
+            if why_not is not None:
+                for name in ("stamp_ns", "original_stamp_ns", "received_ns"):
+                    parts += (_key(name), *_number(next(sizes)))
+                last = next(sizes) + 1
+                parts += (_key("sequence"), _COUNT(last), None, b"\0")
+                at = last % 4
+        # A size may be that of a percent sign.
+        template = b"".join([b"%b" if part is None else part.replace(b"%", b"%%") for part in parts])
+        if len(self._templates) >= _MOST_TEMPLATES:
+            self._templates.clear()
+        self._templates[key] = template
+        return template
 
     def _head(self, missing: int, unpublished: int) -> bytes:
         """Return what comes before the set's number: an empty frame_id, how many statuses, the first one's begin."""
@@ -107,16 +109,19 @@ class ManifestWriter:
         faults += [f"{unpublished} of {of} not published"] if unpublished else []
         level = _ERROR if unpublished else _WARN if missing else _OK
         message = _text(", ".join(faults) or "complete")
-        version = _COUNT(7) + _key("version") + _text(str(_VERSION)) + _key("set")
-        head = _text("") + _COUNT(1 + of) + _level(level, 0) + self._name + message + self._node + version
-        self._heads[missing, unpublished] = head
-        return head
+        version = _COUNT(7) + _key("version") + _text(str(_VERSION))
+        return _text("") + _COUNT(1 + of) + _level(level, 0) + self._name + message + self._node + version
 
-    def _input(self, index: int, at: int, level: int, message: str) -> bytes:
-        """Return an input's status before the first of its values, to stand `at` bytes behind a multiple of four."""
+    def _input(self, index: int, at: int, why_not: str | None) -> bytes:
+        """Return an input's status before its values, to stand `at` bytes behind a multiple of four.
+
+        `why_not` is None of one that is missing, empty of one that was published.
+        """
         output, source = self._names[index]
-        values = _COUNT(0) if level == _STALE else _COUNT(4) + _key("sequence")
-        return _level(level, at) + output + _text(message[:_LONGEST]) + source + values
+        if why_not is None:
+            return _level(_STALE, at) + output + _text("missing") + source + _COUNT(0)
+        level = _ERROR if why_not else _OK
+        return _level(level, at) + output + _text(why_not[:_LONGEST]) + source + _COUNT(4)
 
 
 def _level(level: int, at: int) -> bytes:
@@ -139,14 +144,6 @@ def _text(text: str) -> bytes:
 _key = _text
 
 
-def _number(value: int) -> bytes:
-    """Return a number as a string, and what aligns the next."""
-    digits = b"%d" % value
-    return _BEFORE[len(digits)] + digits + _AFTER[len(digits)]
-
-
-_BEFORE: Final = tuple(_COUNT(length + 1) for length in range(_DIGITS))
-_AFTER: Final = tuple(bytes(1 + -(length + 1) % 4) for length in range(_DIGITS))
-_NO_STAMP: Final = _text("")
-_MISSING, _SPAN, _LATENCY, _COMMON_STAMP = map(_key, ("missing", "span_ns", "latency_ns", "common_stamp_ns"))
-_STAMP, _ORIGINAL_STAMP, _RECEIVED = map(_key, ("stamp_ns", "original_stamp_ns", "received_ns"))
+def _number(size: int) -> tuple[bytes, None, bytes]:
+    """Return the place of a number of so many digits, and what aligns the next string."""
+    return _COUNT(size + 1), None, bytes(1 + -(size + 1) % 4)

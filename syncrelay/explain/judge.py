@@ -121,7 +121,7 @@ _FLOW: Final = (
 
 # What can be mended before the node is activated.
 _SAID_OF_THE_INACTIVE: Final = frozenset(
-    {Code.INTERNAL_ERROR, Code.INACTIVE, Code.TYPE_NOT_IMPORTABLE, Code.OTHER_TYPE}
+    {Code.INTERNAL_ERROR, Code.INACTIVE, Code.TYPE_NOT_IMPORTABLE, Code.OTHER_TYPE, Code.SEVERAL_TYPES}
 )
 
 EXPLAINS: Final[Mapping[Code, _Explained]] = {

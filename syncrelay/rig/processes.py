@@ -17,6 +17,9 @@ from syncrelay.rig.schedule import SENSORS
 UP = "publishes"
 """What a sensor says as soon as its publisher is there."""
 
+LEAVE_WITHIN_S = 50
+"""How long a sensor may take to leave DDS when its stdin has ended; then the kernel ends it."""
+
 # A sensor is up in 3 s and leaves DDS in 0.2 s; on a busy machine both take long.
 _UP_WITHIN_S = 60.0
 _END_WITHIN_S = 60.0

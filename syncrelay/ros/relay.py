@@ -203,7 +203,7 @@ class Relay:
             return "paused already"
         self._groups.pause()
         _LOG.warning("paused: nothing leaves until %s is called", self.node.resolve_service_name("~/resume"))
-        self.evaluate()
+        self._show_pauses()
         return "paused: nothing leaves until ~/resume is called"
 
     def resume(self) -> str:
@@ -212,8 +212,12 @@ class Relay:
             return "not paused"
         self._groups.resume()
         _LOG.info("resumed")
-        self.evaluate()
+        self._show_pauses()
         return "resumed"
+
+    def _show_pauses(self) -> None:
+        with self._bugs.contained("evaluating the groups"):
+            self.evaluate()
 
     def configure(self, config: Config) -> None:
         """Prepare the groups of a file, of a managed node that has none. On the main thread; raises as `reload`."""

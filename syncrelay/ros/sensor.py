@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 
 from syncrelay.cdr import patch_stamp
-from syncrelay.rig.processes import UP
+from syncrelay.rig.processes import LEAVE_WITHIN_S, UP
 from syncrelay.rig.schedule import SENSORS, Shot, schedule
 from syncrelay.ros.environment import log_arguments
 from syncrelay.wakeup import Wakeup
@@ -42,6 +42,8 @@ def _stop_at_end_of_stdin(stop: Wakeup) -> None:
     # Not sys.stdin: a daemon thread that holds its lock would abort the interpreter's exit.
     while os.read(0, 4096):
         pass
+    # Where a process was killed, DDS may wait for ever for what that held. The kernel needs no turn of ours to end it.
+    signal.alarm(LEAVE_WITHIN_S)
     stop.set()
 
 

@@ -18,8 +18,8 @@ Offered: TypeAlias = Mapping[str, Callable[[], "Future[str]"]]
 A SyncRelayError is an answer too, of a call that did not succeed.
 """
 
-# A client that never waits for its answers gets no more than so many: each takes a little of every turn.
-_MOST_WAITING: Final = 64
+# As long is the queue of answers that ROS gives a service: of more that are sent at once, some would be lost.
+_MOST_WAITING: Final = 10
 _ENDING: Final = "the relay is ending"
 # How long an end may take to tell those who wait that it comes.
 _TELL_S: Final = 1.0

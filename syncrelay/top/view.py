@@ -9,7 +9,7 @@ from rich.text import Text
 from syncrelay.status import Level, advice
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
-from syncrelay.top.pieces import STYLES, line
+from syncrelay.top.pieces import STYLES, line, wrapped
 from syncrelay.top.state import Group
 
 _WORST_FIRST: Final = (Level.ERROR, Level.STALE, Level.WARN, Level.OK)
@@ -67,7 +67,7 @@ def title(view: View, width: int) -> list[Text]:
     name.truncate(max(0, width - len(fares) - 2), overflow="ellipsis", pad=True)
     lines = [line(name, "  ", (fares, "" if relay.ready else STYLES[Level.WARN]))]
     if (needed := advice(relay.phase, relay.node)) is not None:
-        lines.append(line((needed, STYLES[Level.WARN])))
+        lines += wrapped(needed, width, first=Text(""), style=STYLES[Level.WARN])
     if view.trouble is not None:
         lines.append(
             line((f" STALE: no answer for {phrases.seconds(view.quiet_s)}: {view.trouble}; still trying ", "reverse"))

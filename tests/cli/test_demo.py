@@ -178,6 +178,19 @@ def test_the_rig_does_not_outlive_it(stage):
 
 
 @pytest.mark.ros
+def test_not_even_a_sensor_that_hangs_outlives_it(stage):
+    stage.before_each_sensor(
+        "import time; from rclpy.node import Node; from syncrelay.rig import processes; processes.LEAVE_WITHIN_S = 1; "
+        "Node.destroy_node = lambda self: time.sleep(600)"
+    )
+    demo = stage.start("demo", _DEMO)
+    demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
+    sensors = children(demo.pid)
+    demo.send(signal.SIGKILL)
+    wait_until(lambda: not any(map(running, sensors)), "the end of the rig")
+
+
+@pytest.mark.ros
 def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
     screen = on_terminal(stage)
     drawn, _, after = screen.partition("\x1b[?1049l")

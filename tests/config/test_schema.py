@@ -27,6 +27,7 @@ BEYOND_A_SCHEMA = {
     "merge_key",
     "slop_not_a_number",
     "slop_without_end",
+    "manifests_that_meet",
     "message_misspelt",
     "names_too_long_in_full",
     "output_prefix_empty",

@@ -7,8 +7,7 @@ It takes commands on stdin, one a line, and answers each with a line on stdout, 
     end                     the answers to all that was begun and not ended yet, in the order of the calls
     get NODE NAME ...       the values of a node's parameters, null of one that it does not have
     set NODE NAME VALUE     set a parameter to a JSON value: [successful, reason]
-    describe NODE NAME      whether a parameter is read-only
-    services NODE           the names of a node's services
+    services                the names of all services in the graph
 
 It ends when stdin does.
 """
@@ -19,7 +18,7 @@ import time
 from typing import Any
 
 import rclpy
-from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
@@ -39,7 +38,6 @@ def main() -> None:
         "end": caller.end,
         "get": caller.get,
         "set": caller.set,
-        "describe": caller.describe,
         "services": caller.services,
     }
     for line in sys.stdin:
@@ -74,14 +72,8 @@ class _Caller:
         (result,) = self._result(self._asked(SetParameters, f"{node}/set_parameters", request)).results
         return [result.successful, result.reason]
 
-    def describe(self, node: str, name: str) -> object:
-        request = DescribeParameters.Request(names=[name])
-        (answer,) = self._result(self._asked(DescribeParameters, f"{node}/describe_parameters", request)).descriptors
-        return answer.read_only
-
-    def services(self, node: str) -> object:
-        namespace, _, name = node.rpartition("/")
-        return [each for each, _ in self._node.get_service_names_and_types_by_node(name, namespace or "/")]
+    def services(self) -> object:
+        return [name for name, _ in self._node.get_service_names_and_types()]
 
     def _asked(self, kind: Any, name: str, request: Any) -> Any:
         if name not in self._clients:

@@ -134,11 +134,9 @@ class Caller:
         successful, reason = json.loads(self.process.ask(f"set {self.node} {name} {words}"))
         return successful, reason
 
-    def is_read_only(self, name: str) -> bool:
-        return bool(json.loads(self.process.ask(f"describe {self.node} {name}")))
-
     def services(self) -> list[str]:
-        return list(json.loads(self.process.ask(f"services {self.node}")))
+        """The names of all services in the graph."""
+        return list(json.loads(self.process.ask("services")))
 
 
 class Stage:

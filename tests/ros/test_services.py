@@ -58,17 +58,18 @@ def test_a_reload_by_service_says_what_changed_and_parameters_tell_what_runs(sta
     assert text.startswith("/syncrelay: ")
     # What it says of it hangs on how long there was no set.
     assert re.search(r"front: [A-Z]+", text), text
-    assert [name for name in caller.services() if name in _OFFERED] == _OFFERED
+    wait_until(lambda: set(caller.services()) >= set(_OFFERED), "all services in the graph")
 
 
 def test_services_can_be_switched_off(stage: Stage):
     stage.relay(config({"front": _FRONT}, node={"services": False})).wait_for_log("front: waiting for")
     caller = stage.caller()
     assert caller.get("groups") == [["front"]]
-    assert set(caller.services()).isdisjoint(_OFFERED)
+    services = caller.services()
+    assert "/syncrelay/get_parameters" in services
+    assert set(services).isdisjoint(_OFFERED)
 
 
-@both_backends
 def test_an_unchanged_group_loses_nothing_in_a_reload_by_service(stage: Stage):
     camera = jittery("/camera", period_ms=5, jitter_ms=1, count=1200, seed=1)
     recording = merged(camera, jittery("/lidar", period_ms=10, jitter_ms=2, count=600, seed=2))

@@ -15,6 +15,7 @@ STATES = {
     "starting": relay(started(), phase=Phase.STARTING),
     "nobody publishes": relay(started(camera=(), lidar=())),
     "working": relay(working()),
+    "unconfigured": relay(phase=Phase.UNCONFIGURED),
     "draining, two groups": relay(working(), started(), phase=Phase.DRAINING, reloads=2),
 }
 

@@ -2,9 +2,11 @@
 
 import asyncio
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 
+from syncrelay.status import Phase
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
 from tests.top import states
@@ -50,6 +52,14 @@ def test_groups_are_listed_with_state_rates_and_reason_and_the_selected_one_belo
     assert "▁" in next(line for line in lines if line.startswith("latency  "))
     assert "Open" in lines[-1]
     assert "Quit" in lines[-1]
+
+
+def test_a_managed_node_without_groups_says_what_it_waits_for():
+    lines = at_terminal(replace(states.healthy(), phase=Phase.UNCONFIGURED, groups=()))
+    assert "unconfigured, not ready" in lines[0]
+    assert (
+        " ".join(lines[1:3]) == "the node is unconfigured: configure it with `ros2 lifecycle set /syncrelay configure`"
+    )
 
 
 @pytest.mark.parametrize("keys", [["j"], ["down"], ["end", "k", "up"]])

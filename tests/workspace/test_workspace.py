@@ -84,14 +84,21 @@ def test_the_installed_executable_says_its_version(workspace: Workspace, tmp_pat
     assert said == f"syncrelay {version('syncrelay')}\n"
 
 
-def test_the_installed_executable_relays_the_demos_rig(workspace: Workspace, stage: Stage):
+def test_the_installed_executable_relays_the_demos_rig_and_is_reloaded_by_a_service_meanwhile(
+    workspace: Workspace, stage: Stage
+):
     config = stage.folder / "rig.yaml"
     shutil.copy(workspace.packages / "syncrelay" / "cli" / "demo.yaml", config)
     relay = _start(workspace, stage, "--config", str(config), "--ros-args", "-r", "__node:=syncrelay_demo")
     collector = stage.collector(_OUTPUTS, reliability="best_effort")
     _start_sensors(stage)
     _wait_for_sets(collector, 20)
-    assert "/syncrelay_demo" in collector.nodes()
+    caller = stage.caller("/syncrelay_demo")
+    config.write_text(config.read_text().replace("slop: 8ms", "slop: 9ms"))
+    assert caller.call("reload") == (True, "reloaded: 1 group unchanged; rebuilt lidar_imu")
+    so_far = {output: collector.count(output) for output in _OUTPUTS}
+    for output, count in so_far.items():
+        collector.wait_for(output, count + 20)
     # As from launch, whose terminal may send one more.
     relay.send(signal.SIGINT)
     relay.send(signal.SIGINT)
