@@ -29,7 +29,6 @@ BEYOND_A_SCHEMA = {
     "slop_without_end",
     "manifests_that_meet",
     "message_misspelt",
-    "manifests_that_meet",
     "names_too_long_in_full",
     "output_prefix_empty",
     "node_name_too_long_in_full",
