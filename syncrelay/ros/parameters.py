@@ -16,22 +16,24 @@ class Parameters:
 
     def __init__(self, node: Any, *, paths: Sequence[str], version: str) -> None:
         self._node = node
+        # None until the parameter is declared: a managed node may have no groups for a while.
         self._groups: list[str] | None = None
         for name, value, description in (
             ("config", [printable(path) for path in paths] or [""], "The files that the relay runs."),
             ("version", version, "The version of syncrelay."),
         ):
             _declare(node, name, value, ParameterDescriptor(description=description, read_only=True))
-        # rclpy lets nobody change what is read-only, the node itself neither: others are refused below.
-        constraints = "Set by the relay alone, at the start and at each reload."
-        descriptor = ParameterDescriptor(description="The groups that run.", additional_constraints=constraints)
-        # By its type, which no group tells: a managed node may have none.
-        _declare(node, _GROUPS, Parameter.Type.STRING_ARRAY, descriptor)
         node.add_on_set_parameters_callback(self._judged)
 
     def name_groups(self, groups: Sequence[str]) -> None:
         """Tell that these groups run now."""
-        if list(groups) != self._groups:
+        if self._groups is None:
+            # rclpy lets nobody change what is read-only, the node itself neither: others are refused below.
+            constraints = "Set by the relay alone, at the start and at each reload."
+            descriptor = ParameterDescriptor(description="The groups that run.", additional_constraints=constraints)
+            self._groups = list(groups)
+            _declare(self._node, _GROUPS, self._groups, descriptor)
+        elif list(groups) != self._groups:
             self._groups = list(groups)
             self._node.set_parameters([Parameter(_GROUPS, Parameter.Type.STRING_ARRAY, self._groups)])
 
