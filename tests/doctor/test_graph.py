@@ -20,11 +20,11 @@ def report(facts):
 
 
 def unpublished(name, **facts):
-    return an_input(name, publishers=(), figures={"last_received": None}, **facts)
+    return an_input(name, publishers=(), figures={"last_received": None, "fed": 0}, **facts)
 
 
 def silent(**facts):
-    return an_input(counts=InputCounts(0, 0, {}, 0), figures={"last_received": None}, **facts)
+    return an_input(counts=InputCounts(0, 0, {}, 0), figures={"last_received": None, "fed": 0}, **facts)
 
 
 def brief(diagnoses):

@@ -15,7 +15,7 @@ from tests.ros.status import findings, status
 
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
 
-_OVERLOAD_S = chosen(short=5, long=60)
+_OVERLOAD_S = chosen(short=3, long=60)
 _HZ = 100
 # No Python publishes so much: each source sends as fast as it can.
 _MORE_THAN_ANYONE_CAN = 50_000

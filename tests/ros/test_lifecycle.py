@@ -16,7 +16,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
 from tests.ros.stage import Collector, Player, Stage, both_backends
-from tests.ros.status import ANY_PORT, findings, get, status
+from tests.ros.status import ANY_PORT, findings, page, status
 from tests.ros.streams import BEGIN, MS, at, merged
 from tests.ros.summary import read_summary
 
@@ -65,16 +65,20 @@ def _pairs(start_ms: int) -> Iterator[list[Frame]]:
     return (merged(at("/camera", offset), at("/lidar", offset)) for offset in itertools.count(start_ms))
 
 
-def _play_until_out(player: Player, collector: Collector, sets: Iterator[list[Frame]]) -> None:
-    before = {topic: collector.count(topic) for topic in _PAIR_OUT}
+def _play_until_out(player: Player, collector: Collector, sets: Iterator[list[Frame]]) -> int:
+    """Play one set after the other until one has come out of every output; how many were played."""
+    played, before = 0, {topic: collector.count(topic) for topic in _PAIR_OUT}
 
     def out() -> bool:
+        nonlocal played
         if all(collector.count(topic) > count for topic, count in before.items()):
             return True
         player.play(next(sets))
+        played += 1
         return False
 
     wait_until(out, "a set")
+    return played
 
 
 def _endpoints(collector: Collector) -> list[str]:
@@ -96,7 +100,7 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
     assert manager.change("configure")
     wait_until(lambda: status(relay)["relay"]["phase"] == "inactive", "the inactive relay")
     wait_until(lambda: list(findings(relay)) == ["inactive"], "the finding and no other")
-    assert get(relay, "/livez") == "receiving\n"
+    wait_until(lambda: page(relay, "/livez") == (200, "receiving\n"), "a relay that lives")
     for _ in range(2):
         player.play(next(_pairs(0)))
     assert _endpoints(collector) == []
@@ -112,14 +116,21 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
     player.play(next(_pairs(6000)))
 
     assert manager.change("activate")
-    _play_until_out(player, collector, _pairs(8000))
+    played = _play_until_out(player, collector, _pairs(8000))
     stamps = stamps_of(collector.payloads("/front/lidar"))
     assert {(stamp - BEGIN) // (1000 * MS) for stamp in stamps} == {1, 8}
     expected = ["configuring", "inactive", "activating", "active", "deactivating", "inactive", "activating", "active"]
-    wait_until(lambda: [goal for _, goal in manager.events[-8:]] == expected, "all events")
+
+    def are_told() -> bool:
+        """Whether these are the events; what was told while the manager was not heard of yet is lost to it."""
+        told = [goal for _, goal in manager.events]
+        return len(told) >= 6 and told == expected[-len(told) :]
+
+    wait_until(are_told, "all events")
     _end(relay)
-    # Each activation counts from nothing.
-    assert read_summary(relay.stderr)["front"].sets == sum(stamp >= BEGIN + 8000 * MS for stamp in stamps)
+    # Each activation counts from nothing. The first sets may have left before they were listened to.
+    came = sum(stamp >= BEGIN + 8000 * MS for stamp in stamps)
+    assert came <= read_summary(relay.stderr)["front"].sets <= played
 
 
 def test_a_faulty_file_fails_to_configure_and_a_mended_one_is_what_runs(stage: Stage):
@@ -230,9 +241,15 @@ def test_who_only_looks_is_not_managed_and_the_doctor_names_the_state(stage: Sta
     player = stage.player({**_PAIR, "/other": STRING})
     player.match(0)
     looking = stage.relay(_managed(), "--explain", "3")
-    argv = [sys.executable, "-m", "syncrelay", "doctor", "--json", "--live", "--seconds", "3", "--config", str(path)]
-    done = subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
-    told = {each["code"]: each for each in json.loads(done.stdout)["diagnoses"]}
+    told: dict[str, dict[str, Any]] = {}
+    # Longer where a busy machine lets the doctor hear too little.
+    for seconds in (3, 10, 40):
+        argv = [sys.executable, "-m", "syncrelay", "doctor", "--json", "--live", "--config", str(path)]
+        argv += ["--seconds", f"{seconds}"]
+        done = subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
+        told = {each["code"]: each for each in json.loads(done.stdout)["diagnoses"]}
+        if "inactive" in told:
+            break
     assert told["inactive"]["fix"] == "activate it with `ros2 lifecycle set /syncrelay activate`"
     assert looking.wait() == 1
     assert "front: " in looking.stdout
