@@ -63,7 +63,7 @@ class Outlet(Protocol):
         ...
 
     def is_heard(self) -> bool:
-        """Whether anyone subscribes."""
+        """Whether anyone subscribes; not where that cannot be told. Raises nothing."""
         ...
 
 

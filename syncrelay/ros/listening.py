@@ -1,6 +1,7 @@
 """The graph listened to for a while: of every topic that is stamped, when its messages were made and received."""
 
 import os
+import re
 import time
 from array import array
 from collections.abc import Mapping
@@ -15,6 +16,7 @@ from rclpy.qos import QoSReliabilityPolicy
 from syncrelay.cdr import read_stamp
 from syncrelay.config import QosOverrides
 from syncrelay.config.interfaces import Interfaces
+from syncrelay.config.names_in_graph import DIAGNOSTICS, MANIFEST_TYPE
 from syncrelay.dataflow.backend import Content, RclBackend, Source
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import RosUnavailableError, TypeImportError
@@ -51,8 +53,8 @@ class HeardTopic:
 class Heard:
     """What was heard.
 
-    `relayed` are outputs of relays that run already; `headerless` are topics without stamps, with their types;
-    `unusable` says of each topic whose type cannot be had why.
+    `relayed` are outputs and manifests of relays that run already; `headerless` are topics without stamps, with their
+    types; `unusable` says of each topic whose type cannot be had why.
     """
 
     topics: tuple[HeardTopic, ...]
@@ -136,7 +138,7 @@ class _Listener:
         if not begins_with_header(message_type):
             self._headerless[name] = type_name
             return
-        if any(_subscribes_original(self._node, each, name) for each in publishers):
+        if any(is_relayed(self._node, each, name) for each in publishers):
             self._relayed.add(name)
             return
         offered = [each.qos_profile for each in publishers if each.topic_type == type_name]
@@ -163,14 +165,24 @@ class _Listener:
         self._loop.add(source, _give_up)
 
 
-def _subscribes_original(node: Any, publisher: Any, name: str) -> bool:
-    """Tell whether a topic is a relay's output: its publisher subscribes what its name ends with, as that type."""
+def is_relayed(node: Any, publisher: Any, name: str) -> bool:
+    """Tell whether a topic is a relay's output: its publisher subscribes what its name ends with, as that type.
+
+    While a lazy group sleeps, nothing is subscribed: who publishes manifests is a relay too, and they are no input.
+    """
+    named = publisher.node_name, publisher.node_namespace
     try:
-        subscribed = node.get_subscriber_names_and_types_by_node(publisher.node_name, publisher.node_namespace)
-    except NodeNameNonExistentError:
+        subscribed = node.get_subscriber_names_and_types_by_node(*named)
+        published = node.get_publisher_names_and_types_by_node(*named)
+    except (NodeNameNonExistentError, UnicodeDecodeError):
         return False
+    tells_sets = re.compile(re.escape(f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}") + "/[^/]+/sets")
     return any(
         name != original and name.endswith(original) and publisher.topic_type in types for original, types in subscribed
+    ) or (
+        # Others publish that too.
+        name != DIAGNOSTICS
+        and any(MANIFEST_TYPE in types and tells_sets.fullmatch(topic) for topic, types in published)
     )
 
 

@@ -57,8 +57,11 @@ class RclpyOutlet:
         self.send(content)
 
     def is_heard(self) -> bool:
-        """Whether anyone subscribes."""
-        return bool(self._count_subscriptions())
+        """Whether anyone subscribes; not where rcl cannot tell, of which `send` says why."""
+        try:
+            return bool(self._count_subscriptions())
+        except _rclpy.RCLError:
+            return False
 
 
 class WaitSetWatch:

@@ -382,6 +382,9 @@ def test_a_message_that_rcl_does_not_publish_says_why(here, topic):
         outlet.send(payload)
     with pytest.raises(PublishError, match="context is invalid"):
         other.send(vector(BEGIN))
+    # Whether to tell the set is asked in its group, which goes on.
+    assert not outlet.is_heard()
+    assert not other.is_heard()
 
 
 def _published_and_taken(here, topic):

@@ -155,6 +155,8 @@ def test_a_faulty_file_fails_to_configure_and_a_mended_one_is_what_runs(stage: S
     relay.send(signal.SIGHUP)
     wait_until(lambda: status(relay)["relay"]["refused_reloads"] == refused + 1, "the reload to be refused")
     assert "the node is unconfigured" in status(relay)["relay"]["reload_error"]
+    assert "reload failed:\n" in relay.stderr
+    assert "keeping the running configuration" not in relay.stderr
 
     assert manager.change("configure")
     wait_until(lambda: [each["name"] for each in status(relay)["groups"]] == ["rear"], "the new group")

@@ -3,6 +3,8 @@
 from ctypes import byref
 from typing import Any, Final
 
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+
 from syncrelay.cdr import STAMP_BYTES, write_stamp
 from syncrelay.dataflow.backend import Deliver, PublishError, Taken
 from syncrelay.ros.librcl.buffers import OwnMessage, Payload, Pool
@@ -92,8 +94,11 @@ class LibrclOutlet:
         self.sent += 1
 
     def is_heard(self) -> bool:
-        """Whether anyone subscribes."""
-        return bool(self._count_subscriptions())
+        """Whether anyone subscribes; not where rcl cannot tell, of which `send` says why."""
+        try:
+            return bool(self._count_subscriptions())
+        except _rclpy.RCLError:
+            return False
 
     def _fail(self, code: int) -> None:
         try:
