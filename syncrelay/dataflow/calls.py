@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import Any, TypeVar
 
 _Result = TypeVar("_Result")
@@ -52,5 +53,7 @@ class Calls:
     def end(self) -> None:
         """Cancel what is due, and all that comes."""
         self._ended = True
-        while self._due:
-            self._due.popleft()[0].cancel()
+        # Who asks after the end cancels too, maybe at the same moment.
+        with suppress(IndexError):
+            while True:
+                self._due.popleft()[0].cancel()

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from syncrelay.doctor.diagnosis import Diagnosis, Severity, error, info
 from syncrelay.doctor.discovery import ports_of
 from syncrelay.explain import GraphSnapshot, no_other_node
-from syncrelay.status import Phase, advice
 
 
 def check_graph(graph: GraphSnapshot) -> Iterator[Diagnosis]:
@@ -53,6 +52,9 @@ def check_own_name(graph: GraphSnapshot, node: str) -> Iterator[Diagnosis]:
 
 def check_state(state: str | None, node: str) -> Iterator[Diagnosis]:
     """Yield that a managed node of the relay's name is not active; `state` is what it says, None where it is none."""
+    # It brings what serves HTTP, which an installation that is examined may lack.
+    from syncrelay.status import Phase, advice  # noqa: PLC0415
+
     phase = next((each for each in Phase if each.value == state), None)
     if phase is not None and (what := advice(phase, node)) is not None:
         text, _, fix = what.partition(": ")
