@@ -17,8 +17,7 @@ from syncrelay.config.wording import quoted
 DIAGNOSTICS: Final = "/diagnostics"
 SCALARS: Final = ("sets_hz", "span_ms", "latency_ms")
 """Figures of a group, each on a topic `~/GROUP/FIGURE`."""
-
-
+_TRANSITIONS: Final = "~/transition_event"
 MANIFEST_TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
 
 
@@ -65,6 +64,8 @@ class NamesInFile:
         yield from _outputs(topics, self.document)
         yield from _too_long(topics, self.document)
         own = _own_topics(self.diagnostics, [group.name for group in chosen], resolve)
+        if self.node.lifecycle:
+            own[resolve(_TRANSITIONS)] = _OwnTopic("lifecycle_msgs/msg/TransitionEvent", "its transitions")
         for group in chosen:
             if group.options.manifest:
                 manifest = _manifest(group, self.document, self.node.absolute, resolve)

@@ -11,6 +11,7 @@ from syncrelay.dataflow.backend import RclBackend
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
+from syncrelay.explain import Endpoint
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.ros.inputs import TopicInput
 from syncrelay.ros.listeners import Listeners, PublishersOf
@@ -56,6 +57,8 @@ class GroupBindings:
         self._backend = backend
         self._loop = loop
         self._topics: dict[_Key, TopicInput] = {}
+        # The publishers that types were taken from, by the topics' names, for those that take the place of the held.
+        self._taken: dict[str, Endpoint] = {}
         self._listeners = Listeners(loop)
 
     @property
@@ -97,6 +100,7 @@ class GroupBindings:
         # From here on these run, whatever becomes of the end of the others.
         self._topics = {key: topic for key, topic in topics.items() if topic in used}
         self.all = bindings
+        self._taken = {}
         for topic in used:
             topic.try_again()
         self._end_publishers(_inputs_of(ended))
@@ -115,8 +119,9 @@ class GroupBindings:
 
     def release(self) -> None:
         """End the groups that were held; those that are run from now on receive and publish."""
+        taken = _taken(self.topics)
         self.run(())
-        self.is_held = False
+        self.is_held, self._taken = False, taken
 
     def wait_until_acknowledged(self, deadline: int) -> None:
         """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
@@ -199,10 +204,14 @@ class GroupBindings:
             if self.is_held:
                 topics[key].hold()
             # What was taken stays, also where another QoS is asked for.
-            for publisher in (each.type_from for each in self.topics if each.name == name):
-                if publisher is not None:
-                    topics[key].keep_type(publisher)
+            publisher = (self._taken | _taken(self.topics)).get(name)
+            if publisher is not None:
+                topics[key].keep_type(publisher)
         return topics[key]
+
+
+def _taken(topics: Sequence[TopicInput]) -> dict[str, Endpoint]:
+    return {each.name: each.type_from for each in topics if each.type_from is not None}
 
 
 def _inputs_of(bindings: Sequence[GroupBinding]) -> list[InputBinding]:

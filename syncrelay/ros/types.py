@@ -4,10 +4,10 @@ import importlib
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 from syncrelay.cdr import read_stamp
-from syncrelay.cdr_fields import UnreadableFieldError, field_reader
+from syncrelay.cdr_fields import FieldsOf, UnreadableFieldError, field_reader, time_reader
 from syncrelay.config import StampField, StampSource
 from syncrelay.config.names import check_type_name
 from syncrelay.dataflow.backend import Content
@@ -16,7 +16,7 @@ from syncrelay.explain import Endpoint
 
 StampReader: TypeAlias = Callable[[Content], int | None]
 """From a payload to its stamp in nanoseconds; None where none can be read."""
-
+_ReaderOf = TypeVar("_ReaderOf", bound=Callable[[Content], Any])
 
 # Nodes are found one after the other: within this time another may publish another type.
 _SETTLE_S: Final = 0.5
@@ -87,7 +87,7 @@ def stamp_reader(source: StampSource, message_type: Any) -> StampReader | None:
     Raises TypeImportError where the type has no such stamp.
     """
     if isinstance(source, StampField):
-        return value_reader(message_type, source.field)
+        return _reader(time_reader, message_type, source.field)
     if source == "receive":
         return None
     if not begins_with_header(message_type):
@@ -100,9 +100,13 @@ def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:
 
     Raises TypeImportError where the type has no such field.
     """
+    return _reader(field_reader, message_type, path)
+
+
+def _reader(make: Callable[[FieldsOf, str, str], _ReaderOf], message_type: Any, path: str) -> _ReaderOf:
     name = name_of(message_type)
     try:
-        return field_reader(_fields_of, name.replace("/msg/", "/"), path)
+        return make(_fields_of, name.replace("/msg/", "/"), path)
     except UnreadableFieldError as error:
         raise TypeImportError(f"{name} has no usable field {path}: {error}") from error
 

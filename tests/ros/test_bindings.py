@@ -11,7 +11,7 @@ import pytest
 
 from syncrelay.config import StampField, load_text
 from syncrelay.errors import ReloadError
-from syncrelay.explain import Refusal
+from syncrelay.explain import Endpoint, Refusal
 from tests.ros.configs import config
 from tests.ros.processes import wait_until
 
@@ -269,3 +269,24 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
         assert not any(each.missing and "DDS" in each.missing for each in here.bindings.topics)
         assert kept <= {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
     assert refused
+
+
+def test_a_type_that_was_taken_stays_when_the_node_is_activated(here):
+    untyped = {"policy": "exact_time", "topics": [{"topic": name} for name in ("/x", "/y")]}
+
+    def run() -> None:
+        here.bindings.run([GroupRelay(each, now=lambda: 0) for each in load_text(config({"f": untyped})).groups])
+
+    publisher = Endpoint("/driver", _IMU)
+    here.bindings.is_held = True
+    run()
+    here.bindings.topics[0].keep_type(publisher)
+    for _ in range(2):
+        here.bindings.release()
+        run()
+        assert [each.type_from for each in here.bindings.topics] == [publisher, None]
+        here.bindings.hold()
+    # What is forgotten is found anew.
+    here.bindings.run(())
+    run()
+    assert [each.type_from for each in here.bindings.topics] == [None, None]

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from syncrelay.cdr_fields import TIME
+from syncrelay.config import StampField
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint
@@ -109,6 +110,14 @@ def test_a_type_that_the_graph_names_and_nobody_has_is_an_error_and_imports_noth
     with pytest.raises(TypeImportError, match=re.escape(why)):
         import_type(name)
     assert "antigravity" not in sys.modules
+
+
+@pytest.mark.parametrize("path", ["header.frame_id", "height"])
+def test_a_stamp_is_a_time_also_where_the_file_left_the_type_to_the_graph(path):
+    image = import_type("sensor_msgs/msg/Image")
+    with pytest.raises(TypeImportError, match=rf"no usable field {re.escape(path)}: {re.escape(path)} is .*Time"):
+        types.stamp_reader(StampField(field=path), image)
+    assert types.stamp_reader(StampField(field="header.stamp"), image) is not None
 
 
 def test_types_settle_when_all_publishers_agree_for_a_while():
