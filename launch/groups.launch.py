@@ -1,7 +1,7 @@
 """Start a relay for each group of a file: `ros2 launch syncrelay groups.launch.py config:=fusion.yaml`.
 
-Each is a process of its own, so a group has a core for itself, and takes nobody with it when it ends. The node of group
-`front` is called `syncrelay_front`. Everything else is an argument of relay.launch.py.
+Each is a process of its own, so it can use a core of its own, and takes no other group with it when it ends. The node
+of group `front` is called `syncrelay_front`. Everything else is an argument of relay.launch.py.
 """
 
 import re
@@ -36,8 +36,8 @@ def _relays(context: LaunchContext) -> list[LaunchDescriptionEntity]:
 
 def _groups(config: str) -> list[str]:
     """Return the names of a file's groups. Raises RuntimeError if it has none, or one HTTP port for several."""
-    # The relays check the file. Their own reader of it is not asked: `ros2 launch` runs on the system's Python, which
-    # has not what a venv brought. The base loader takes keys as they are written, as it does.
+    # The relays check the file. Their own reader cannot be used: `ros2 launch` runs on the system's Python, which lacks
+    # what a venv brought. The base loader takes keys as they are written, as that reader does.
     with Path(config).open(encoding="utf-8") as file:
         read = yaml.load(file, Loader=yaml.BaseLoader)  # noqa: S506  it makes texts, lists and dictionaries only
     groups = read.get("groups") if isinstance(read, dict) else None
@@ -47,7 +47,7 @@ def _groups(config: str) -> list[str]:
     listen = str(metrics.get("listen")) if isinstance(metrics, dict) else ""
     if len(groups) > 1 and re.search(r":[1-9]\d*$", listen):
         raise RuntimeError(
-            f"{config}: metrics.listen names one port for {len(groups)} processes; leave it out, so that each takes the"
+            f"{config}: metrics.listen names one port for {len(groups)} processes: leave it out, so that each takes the"
             " first free one from 9464, or write `metrics: null`"
         )
     return list(groups)

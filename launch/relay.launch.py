@@ -5,7 +5,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-# Time to read why it ended, and for others to forget the old node. Launch asks for no reason, nor for the exit code.
+# Time to read why it ended, and for others to forget the old node. Launch respawns whatever the exit code.
 _RESPAWN_AFTER_S = 2.0
 
 
@@ -14,13 +14,13 @@ def generate_launch_description() -> LaunchDescription:
         [
             DeclareLaunchArgument("config", description="the YAML file that describes the groups"),
             DeclareLaunchArgument("group", default_value="", description="run this group only; default: all"),
-            DeclareLaunchArgument("node_name", default_value="", description="default: as the file says"),
-            DeclareLaunchArgument("namespace", default_value="", description="default: as the file says"),
+            DeclareLaunchArgument("node_name", default_value="", description="its name; default: as the file says"),
+            DeclareLaunchArgument("namespace", default_value="", description="of the node; default: as the file says"),
             DeclareLaunchArgument(
                 "log_level",
                 default_value="info",
                 choices=["debug", "info", "warning", "error"],
-                description="of the log",
+                description="the least severe messages that the log shows",
             ),
             DeclareLaunchArgument(
                 "use_sim_time",
@@ -32,7 +32,7 @@ def generate_launch_description() -> LaunchDescription:
                 "respawn",
                 default_value="false",
                 choices=["true", "false"],
-                description=f"start it again {_RESPAWN_AFTER_S:g} s after it ended by itself",
+                description=f"start it again {_RESPAWN_AFTER_S:g} s after it ends by itself",
             ),
             OpaqueFunction(function=_relay),
         ]

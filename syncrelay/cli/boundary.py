@@ -55,8 +55,8 @@ def _guarded(command: Callable[[], int]) -> int:
     except Exception as error:  # noqa: BLE001  the boundary: everything else is our bug
         if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
             remark(
-                f"{sys.executable} lacks a Python package that syncrelay needs, or has it too old: {error}; run"
-                " `python3 -m pip install FOLDER-OF-SYNCRELAY`, or see docs/workspace.md if that is in a workspace"
+                f"{sys.executable} lacks a Python package that syncrelay needs, or has too old a version: {error}; run"
+                " `python3 -m pip install FOLDER-OF-SYNCRELAY`, or see docs/workspace.md for a ROS workspace"
             )
             return UNAVAILABLE
         say(traceback.format_exc())

@@ -53,7 +53,7 @@ class Managed:
     def activate(self) -> None:
         """Receive and publish."""
         self._relay.call(self._relay.activate).result()
-        LOGGER.info("active")
+        LOGGER.info("active: receiving and publishing")
 
     def deactivate(self) -> None:
         """Receive and publish no more, and say what became of all messages."""

@@ -1,4 +1,4 @@
-"""What each command is called with. Imports nothing slow: completion reads it at every press of TAB.
+"""The words that each command takes. Imports nothing slow: completion reads it at every press of TAB.
 
 A metavar says what kind of word is expected, and so what completes it (syncrelay.cli.completion).
 """
@@ -12,7 +12,8 @@ syncrelay --config FILE [option ...] [--ros-args ...]
        syncrelay COMMAND ..."""
 _EXIT_CODES: Final = """\
 exit codes: 0 done, 1 the file or data has a problem, 2 wrong usage,
-  69 ROS cannot be used here, 70 a bug in syncrelay, 130 interrupted"""
+  69 ROS or a needed package cannot be used here, 70 a bug in syncrelay,
+  130 interrupted"""
 
 
 def relay() -> Parser:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from syncrelay.status import Server
 
 _FAILED: Final = "reload failed; keeping the running configuration:"
-_NONE_TO_KEEP: Final = "reload failed:"
+_FAILED_WITHOUT_GROUPS: Final = "reload failed; no groups are running:"
 _BUG: Final = (
     "reload failed because of a bug in syncrelay; keeping the running configuration;"
     " please report it with these lines and the file:"
@@ -152,7 +152,7 @@ def _reload(relay: "Relay", read: Reading, config_paths: Sequence[str], groups: 
         _require_groups(groups, config, config_paths)
         changed = relay.reload(config)
     except SyncRelayError as error:
-        refusal = f"{_FAILED if relay.groups else _NONE_TO_KEEP}\n{error}"
+        refusal = f"{_FAILED if relay.groups else _FAILED_WITHOUT_GROUPS}\n{error}"
         LOGGER.error("%s", refusal)
         relay.refuse_reload(str(error))
     except Exception as error:  # noqa: BLE001  a file that finds a bug of ours is no reason to end what runs

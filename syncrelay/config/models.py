@@ -62,7 +62,6 @@ class NodeConfig(Keys):
             " lifecycle manager configures and activates it. Default: false, it starts active."
         ),
     )
-
     services: bool = Field(
         default=True,
         description=(
@@ -129,8 +128,8 @@ class Topic(Keys):
     type: Annotated[TypeName | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "Message type in full, package/msg/Name. Default: that of another group which names this topic with a type;"
-            " else that of the topic's publishers, or of the recording."
+            "Message type in full, package/msg/Name. Default: the one that another group gives this topic; if none"
+            " does, that of the topic's publishers, or of the recording."
         ),
         examples=["sensor_msgs/msg/Image"],
     )
@@ -306,15 +305,15 @@ class Group(Keys):
     lazy: bool = Field(
         default=False,
         description=(
-            "Subscribe to the inputs only while somebody subscribes to one of the outputs; what waits when the last"
-            " one has gone is dropped. Default: false."
+            "Subscribe to the inputs only while somebody subscribes to one of the outputs or to the manifest; messages"
+            " that wait when the last subscriber has gone are dropped. Default: false."
         ),
     )
     manifest: bool = Field(
         default=True,
         description=(
-            "Publish a small message for each set on ~/GROUP/sets, behind the set's own: which messages belong"
-            " together, which are missing, span and latency; see docs/manifest.md. Default: true."
+            "Publish a small message for each set on ~/GROUP/sets, after the set's own: which messages belong together,"
+            " which inputs are missing, span and latency; see docs/manifest.md. Default: true."
         ),
     )
     output_prefix: Annotated[OutputPrefix | None, NOT_NULL] = Field(

@@ -1,4 +1,4 @@
-"""What is told of each set on a topic of its own: a diagnostic_msgs/msg/DiagnosticArray, written as CDR by hand.
+"""The manifest of each set: a diagnostic_msgs/msg/DiagnosticArray, written as CDR by hand.
 
 docs/manifest.md is its contract. Whatever is the same in every set of a group is serialized once.
 """
@@ -11,7 +11,7 @@ from syncrelay.config import GroupConfig
 from syncrelay.sync import Match
 
 MANIFEST_DEPTH: Final = 500
-"""How many DDS keeps of a group: who joins sets needs each one, and a hiccup of some seconds must cost none."""
+"""How many DDS keeps of a group: whoever joins sets needs each one, and a stall of some seconds must cost none."""
 
 _VERSION: Final = 1
 

@@ -81,7 +81,7 @@ class InputGraph:
     cannot be used here, `not_readable` why the stamp or key that the file names cannot be read from it, `refusal` what
     DDS does not make or publish for it, `alike` are topics of the graph that may have been meant, `lost` counts what
     DDS lost on the way of late. `type_from` is the publisher, or one of several, whose type was taken because the file
-    has none, None as long as there is none. `rivals` are others that publish its output, seen so without a break since
+    has none, None while there is none. `rivals` are others that publish its output, seen so without a break since
     `rivals_since`. `largest` is the size of the largest message in bytes, 0 where nobody measures it.
     """
 
@@ -135,7 +135,7 @@ class Standstill(NamedTuple):
 
 
 class Pause(NamedTuple):
-    """Nothing leaves since a time, because somebody asked for that; `ended_by` is the service that ends it."""
+    """Since when nothing leaves, because somebody asked for that; `ended_by` is the service that ends it."""
 
     since: int
     ended_by: str

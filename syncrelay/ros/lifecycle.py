@@ -4,14 +4,26 @@ import logging
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from threading import Event
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
+from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import GetState
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from syncrelay.errors import SyncRelayError
 
 _LOG = logging.getLogger("syncrelay")
+
+# What managers ask for by number.
+_NAMES: Final = {
+    Transition.TRANSITION_CONFIGURE: "configure",
+    Transition.TRANSITION_CLEANUP: "cleanup",
+    Transition.TRANSITION_ACTIVATE: "activate",
+    Transition.TRANSITION_DEACTIVATE: "deactivate",
+    Transition.TRANSITION_UNCONFIGURED_SHUTDOWN: "shutdown of an unconfigured node",
+    Transition.TRANSITION_INACTIVE_SHUTDOWN: "shutdown of an inactive node",
+    Transition.TRANSITION_ACTIVE_SHUTDOWN: "shutdown of an active node",
+}
 
 
 class Transitions(Protocol):
@@ -79,10 +91,11 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]  # LifecycleNode is unty
         return _carried_out("recover", self._carried_out_by.recover)
 
     def _answer(self, request: Any, response: Any) -> Any:
-        # Of what the state machine refuses rclpy raises some: whoever asked would wait for ever.
+        # For some of what the state machine refuses rclpy raises an error: whoever asked would wait for ever.
         asked = request.transition.label or request.transition.id
         if not any(asked in (each[0], each[1]) for each in self._state_machine.available_transitions):
-            _LOG.warning("refused the transition %s: the node is %s", asked, self._state_machine.current_state[1])
+            state = self._state_machine.current_state[1]
+            _LOG.warning("refused the transition %s: the node is %s", _NAMES.get(asked, asked), state)
             response.success = False
             return response
         return self._change_state(request, response)

@@ -1,4 +1,4 @@
-"""Whether anyone takes what lazy groups give: while nobody does, they sleep."""
+"""Whether anyone subscribes to what lazy groups publish: while nobody does, they sleep."""
 
 import time
 from collections.abc import Callable, Sequence

@@ -27,7 +27,7 @@ _PROFILE: Final = QoSProfile(
 
 
 class Manifests:
-    """Has groups tell their sets. On the main thread."""
+    """Has groups publish the manifests of their sets. On the main thread."""
 
     def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop) -> None:
         self._entities = entities
@@ -38,7 +38,7 @@ class Manifests:
         self._said: set[str] = set()
 
     def begin(self, groups: Iterable[GroupRelay]) -> None:
-        """Have these groups tell their sets, from their first on where they don't run yet; who does so goes on.
+        """Have these groups publish manifests, from their first set on where they don't run yet; those that do go on.
 
         What DDS refuses is logged once: those groups run without.
         """

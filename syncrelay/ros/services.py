@@ -57,7 +57,7 @@ class Services:
 
     async def _answer(self, name: str, function: Callable[[], "Future[str]"]) -> tuple[bool, str]:
         if self._waiting >= _MOST_WAITING:
-            return False, f"{_MOST_WAITING} calls wait for their answers already"
+            return False, f"{_MOST_WAITING} calls are already waiting for their answers; call again later"
         self._waiting += 1
         self._nobody_waits.clear()
         try:

@@ -155,7 +155,7 @@ def test_a_faulty_file_fails_to_configure_and_a_mended_one_is_what_runs(stage: S
     relay.send(signal.SIGHUP)
     wait_until(lambda: status(relay)["relay"]["refused_reloads"] == refused + 1, "the reload to be refused")
     assert "the node is unconfigured" in status(relay)["relay"]["reload_error"]
-    assert "reload failed:\n" in relay.stderr
+    assert "reload failed; no groups are running:\n" in relay.stderr
     assert "keeping the running configuration" not in relay.stderr
 
     assert manager.change("configure")

@@ -14,7 +14,7 @@ def test_the_groups_of_a_managed_node_come_and_go(ros_domain: int):
     node = rclpy.create_node("here", context=context)
     try:
         parameters = Parameters(node, paths=["fusion.yaml"], version="1")
-        for groups in (["front"], [], ["front", "rear"], [], ["rear"]):
+        for groups in ([], ["front"], [], ["front", "rear"], [], ["rear"]):
             parameters.name_groups(groups)
             assert node.get_parameter("groups").value == groups
     finally:

@@ -47,6 +47,6 @@ def test_what_fails_and_what_never_ends_is_answered_and_more_calls_than_can_wait
             caller.begin("never")
             assert caller.get("groups") == [["front"]]
         assert all_wait.wait(60)
-        assert caller.call("never") == (False, "10 calls wait for their answers already")
+        assert caller.call("never") == (False, "10 calls are already waiting for their answers; call again later")
         relay.drain()
         assert caller.end() == [(False, "the relay is ending")] * _MOST
