@@ -37,8 +37,8 @@ def _received(relay: Process, group: str) -> int:
 
 
 def _said_of_groups(relay: Process) -> list[str]:
-    """What the log says of how groups run, without times and levels."""
-    return re.findall(r"(?:front|rear): (?:waiting|running).*", relay.stderr)
+    """What the log says of how groups run, without times and levels; but for publishers that were found late."""
+    return re.findall(r"(?:front|rear): (?:waiting for a subscriber|running).*", relay.stderr)
 
 
 @both_backends
