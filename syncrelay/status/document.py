@@ -1,7 +1,7 @@
 """The state of a relay as JSON: what /status gives and `syncrelay top` reads."""
 
 import os
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution
 from typing import Any, Final
 
 from syncrelay.explain import (
@@ -46,9 +46,13 @@ def document(state: RelayState) -> dict[str, Any]:
 def own_version() -> str:
     """Return the installed version of syncrelay."""
     try:
-        return version("syncrelay")
+        metadata = distribution("syncrelay").metadata
     except PackageNotFoundError:
         return "unknown"
+    # Of an installation that was removed by hand a folder may be left, which says nothing.
+    if "Version" not in metadata:
+        return "unknown"
+    return metadata["Version"]
 
 
 def group_document(report: GroupReport) -> dict[str, Any]:

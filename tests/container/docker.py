@@ -86,7 +86,8 @@ class Container:
         assert text in self.logs()
 
     def wait_for_health(self, health: str) -> None:
-        wait_until(lambda: self.health() == health, f"the container to be {health}")
+        wait_until(lambda: self.health() == health or not self.running(), f"the container to be {health}, or to end")
+        assert self.health() == health, self.logs()
 
 
 def _shared_memory_of(pid: int) -> set[str]:

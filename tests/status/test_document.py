@@ -8,7 +8,7 @@ import pytest
 from states import BEGAN, MS, relay, started, working
 
 from syncrelay.explain import Endpoint, Mismatch
-from syncrelay.status import Level, Phase, document, level
+from syncrelay.status import Level, Phase, document, level, own_version
 
 STATES = {
     "no group": relay(),
@@ -135,3 +135,9 @@ def test_a_level_is_the_worst_finding(report, expected):
 
 def test_durations_are_milliseconds():
     assert document(relay(working()))["groups"][0]["tolerance"]["ms"] * MS == 20_000_000
+
+
+def test_what_is_left_of_an_installation_has_no_version(tmp_path, monkeypatch):
+    (tmp_path / "syncrelay-9.9.9.dist-info").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    assert own_version() == "unknown"
