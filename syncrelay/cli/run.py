@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from syncrelay import own_version
 from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.config_files import ConfigFiles, Reading
@@ -32,7 +33,7 @@ def command(words: Sequence[str], stop: StopRequest) -> int:
     parser = parsers.relay()
     arguments = parser.read(words)
     if arguments.version:
-        put(_version())
+        put(f"syncrelay {own_version()}")
         return DONE
     if not arguments.config:
         parser.error("--config FILE is missing")
@@ -47,15 +48,6 @@ def command(words: Sequence[str], stop: StopRequest) -> int:
         watch=arguments.watch,
         stop=stop,
     )
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return f"syncrelay {version('syncrelay')}"
-    except PackageNotFoundError:
-        return "syncrelay (not installed)"
 
 
 def run(

@@ -14,6 +14,7 @@ from typing import Self, TypeVar
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
+from syncrelay import own_version
 from syncrelay.config import Config
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.calls import Calls
@@ -36,7 +37,7 @@ from syncrelay.ros.parameters import Parameters
 from syncrelay.ros.services import Offered, Services
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.status import Phase, RelayState, advice, own_version
+from syncrelay.status import Phase, RelayState, advice
 from syncrelay.sync import DropReason
 from syncrelay.wakeup import Wakeup
 

@@ -1,6 +1,6 @@
 """The state of a running relay for programs: as JSON and as metrics, over HTTP."""
 
-from syncrelay.status.document import document, group_document, own_version
+from syncrelay.status.document import document, group_document
 from syncrelay.status.server import Server
 from syncrelay.status.state import Level, Phase, RelayState, advice, is_ready, level
 
@@ -14,5 +14,4 @@ __all__ = [
     "group_document",
     "is_ready",
     "level",
-    "own_version",
 ]

@@ -1,9 +1,9 @@
 """The state of a relay as JSON: what /status gives and `syncrelay top` reads."""
 
 import os
-from importlib.metadata import PackageNotFoundError, distribution
 from typing import Any, Final
 
+from syncrelay import own_version
 from syncrelay.explain import (
     Distribution,
     Endpoint,
@@ -41,18 +41,6 @@ def document(state: RelayState) -> dict[str, Any]:
         },
         "groups": [group_document(report) for report in state.groups],
     }
-
-
-def own_version() -> str:
-    """Return the installed version of syncrelay."""
-    try:
-        metadata = distribution("syncrelay").metadata
-    except PackageNotFoundError:
-        return "unknown"
-    # Of an installation that was removed by hand a folder may be left, which says nothing.
-    if "Version" not in metadata:
-        return "unknown"
-    return metadata["Version"]
 
 
 def group_document(report: GroupReport) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
+from syncrelay import own_version
 from syncrelay.explain import BOUNDS_NS, Histogram
-from syncrelay.status.document import own_version
 from syncrelay.status.state import RelayState, is_ready
 
 _NS_PER_SECOND = 1e9

@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 from states import BEGAN, MS, relay, started, working
 
+from syncrelay import own_version
 from syncrelay.explain import Endpoint, Mismatch
-from syncrelay.status import Level, Phase, document, level, own_version
+from syncrelay.status import Level, Phase, document, level
 
 STATES = {
     "no group": relay(),
