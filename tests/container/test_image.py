@@ -1,5 +1,7 @@
 """The image by itself: what is in it, what is left out, and what it does without a relay."""
 
+import hashlib
+import json
 import tomllib
 from pathlib import Path
 
@@ -21,6 +23,14 @@ for name in names:
     module, _, message = name.replace("/", ".").rpartition(".")
     getattr(import_module(module), message).__class__.__import_type_support__()
 print(len(names))
+"""
+_ALL_FILES = """
+import hashlib, json
+from pathlib import Path
+import syncrelay
+root = Path(syncrelay.__file__).parent
+files = {str(file.relative_to(root)): file.read_bytes() for file in root.rglob("*.py")}
+print(json.dumps({name: hashlib.sha256(content).hexdigest() for name, content in files.items()}))
 """
 _FAULTY = """\
 version: 1
@@ -58,6 +68,16 @@ def test_a_faulty_file_is_explained_in_the_container_with_the_types_that_it_has(
     assert run.returncode == 1
     assert "fusion.yaml:5:5: groups.front.slopp" in run.stderr
     assert "did you mean `sensor_msgs/msg/Image`?" in run.stderr
+
+
+def test_what_is_installed_is_the_code_that_was_copied(in_image):
+    run = in_image("-c", _ALL_FILES, options=("--entrypoint=python3",))
+    assert run.returncode == 0, run.stderr
+    package = _ROOT / "syncrelay"
+    files = {str(file.relative_to(package)): file.read_bytes() for file in package.rglob("*.py")}
+    assert json.loads(run.stdout) == {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+    (version,) = in_image("--version").stdout.split()[1:]
+    assert version == tomllib.loads((_ROOT / "pyproject.toml").read_text())["project"]["version"]
 
 
 def test_a_relay_without_its_file_says_so(in_image):
