@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.ros.domain import claimed_domain
-from tests.ros.stage import Stage, running_stage
+from tests.ros.stage import BACKEND, Stage, running_stage
 
 _REAL_DATA = "SYNCRELAY_REAL_DATA"
 _FIGURES = "figures"
@@ -64,7 +64,7 @@ def ros_domain() -> Iterator[int]:
 @pytest.fixture
 def backend() -> str:
     """The backend that the relay's messages pass through; tests marked `both_backends` run on each."""
-    return "direct"
+    return BACKEND
 
 
 @pytest.fixture

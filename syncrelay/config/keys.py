@@ -57,7 +57,7 @@ _UNIT: Final = "(ns|us|µs|μs|ms|s|min)"
 _TOKENS: Final = "[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
 
 
-def duration_schema(*, sign: str, **limits: int) -> dict[str, Any]:
+def duration_schema(*, sign: str, **limits: float) -> dict[str, Any]:
     """Return the JSON Schema of a duration with a pattern for the sign that it may have."""
     return {
         "anyOf": [
@@ -73,6 +73,21 @@ def _text(pattern: str, **limits: int) -> WithJsonSchema:
 
 Duration = Annotated[int, BeforeValidator(_not_negative), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0))]
 """A duration of 0 or more, in nanoseconds."""
+
+_LONGEST_PAUSE_NS: Final = 100_000_000
+
+
+def _short(value: object) -> int:
+    pause = _not_negative(value)
+    if pause > _LONGEST_PAUSE_NS:
+        raise ValueError("at most 100ms: all messages of the relay wait for so long")
+    return pause
+
+
+ShortDuration = Annotated[
+    int, BeforeValidator(_short), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=0.1))
+]
+"""A duration of 0 to 0.1 s, in nanoseconds."""
 
 SignedDuration = Annotated[int, BeforeValidator(parse_duration), WithJsonSchema(duration_schema(sign="[+-]?"))]
 """A duration of either sign, in nanoseconds."""

@@ -18,6 +18,7 @@ from syncrelay.config.keys import (
     NodeName,
     OutputPrefix,
     Rate,
+    ShortDuration,
     SignedDuration,
     TopicName,
     TypeName,
@@ -68,6 +69,16 @@ class NodeConfig(Keys):
             "Offer the services ~/reload, ~/status, ~/pause and ~/resume, which anyone on the ROS graph can call."
             " Default: true."
         ),
+    )
+
+    coalesce: ShortDuration = Field(
+        default=0,
+        description=(
+            "How long the relay waits, when a message comes, for those that come with it, to take them all in one go:"
+            " less CPU for many inputs that are stamped together, and so much more latency. At most 100ms. A number is"
+            " seconds, a string has a unit (ns, us, ms, s, min). Default: 0, not at all."
+        ),
+        examples=["300us"],
     )
 
     def absolute(self, name: str) -> str:

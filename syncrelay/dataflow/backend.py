@@ -1,22 +1,40 @@
 """How serialized messages come out of rcl and go back into it: what each backend offers to the receive loop."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 
 Content: TypeAlias = bytes | memoryview
 """A message's bytes, to read fields from at once; they are not kept."""
-Deliver: TypeAlias = Callable[[Any, Content, int], None]
-"""Takes a payload, its content, and the time DDS received it, in nanoseconds of the system clock."""
-Taken: TypeAlias = tuple[int, Any, Content]
-"""The time of receipt, the payload as the engine carries it, and its content."""
+
+
+class Payload(Protocol):
+    """A message as the engine carries it. Its memory is free again when nobody refers to it."""
+
+    @property
+    def received(self) -> int:
+        """When DDS received it, in nanoseconds of the system clock."""
+        ...
+
+    def content(self) -> Content:
+        """The message's bytes."""
+        ...
+
+
+Deliver: TypeAlias = Callable[[Any], None]
+"""Takes a payload."""
 
 
 class BackendName(Enum):
     """The backends, by the names that users give them."""
 
+    COMPILED = "compiled"
     LIBRCL = "direct"
     RCLPY = "rclpy"
+
+
+ALL: Final = 2**62
+"""More messages than any history holds."""
 
 
 class Source(Protocol):
@@ -25,13 +43,11 @@ class Source(Protocol):
     deliver: Deliver
     waited: int
     """The longest that a message waited from its receipt to the poll that found it, in ns; the reader resets it."""
+    pending: int
+    """How many messages it has at most: what was reported, or `ALL` until `take` finds that there is no more."""
 
-    def take(self) -> Taken | None:
-        """Take its oldest message; None if none is pending."""
-        ...
-
-    def force_poll(self) -> None:
-        """Have `take` ask DDS until it has no more messages, whatever was reported as pending."""
+    def take(self) -> Payload | None:
+        """Take its oldest message, one less then being pending; None if there is none after all."""
         ...
 
 
@@ -67,8 +83,8 @@ class Outlet(Protocol):
         ...
 
 
-Ready: TypeAlias = tuple[Sequence[Source], int]
-"""Sources that may have got messages since they were drained, and the time of the poll.
+Ready: TypeAlias = tuple[Sequence[Source], int, bool]
+"""Sources that may have got messages since they were drained, the time of the poll, and whether there was a wake.
 
 Whatever was received up to that time, in nanoseconds of the system clock, is in one of them, or in one that was not
 drained, but for what DDS was just about to report. A source is drained when `take` gave None.
@@ -99,6 +115,45 @@ class Watch(Protocol):
         ...
 
 
+class Inbox(Protocol):
+    """Waits for messages and delivers them in the order of their receipt, whatever the topic."""
+
+    failed: Mapping[Source, Exception]
+    """The sources that could not be drained, and why, until they are removed."""
+
+    def add(self, source: Any) -> None:
+        """Drain one more source, of the same backend."""
+        ...
+
+    def remove(self, source: Any) -> None:
+        """Deliver what is held of a source, and drain it no longer."""
+        ...
+
+    def receive(self, longest_ns: int) -> None:
+        """Deliver what comes for so long, or until a wake or a failure."""
+        ...
+
+    def receive_once(self, longest_ns: int) -> None:
+        """Wait for messages, for so long at most or until a wake, and deliver them."""
+        ...
+
+    def deliver_all(self) -> None:
+        """Deliver what was received until now, however much it is."""
+        ...
+
+    def deliver_held(self) -> None:
+        """Deliver what was taken and held, at the end: nothing more is taken."""
+        ...
+
+    def wake(self) -> None:
+        """Have `receive` return. Any thread."""
+        ...
+
+    def close(self) -> None:
+        """Free what it holds."""
+        ...
+
+
 class GraphChanges(Protocol):
     """Tells when the graph is worth another poll. Used on one thread."""
 
@@ -111,6 +166,8 @@ class RclBackend(Protocol):
     """One way through rcl. Its outlets take what its sources give."""
 
     name: BackendName
+    flow: Any
+    """What takes its payloads through a group and out on its outlets: a Flow."""
 
     def source(self, subscription: Any, deliver: Deliver) -> Any:
         """Drain a raw rclpy subscription from now on."""
@@ -120,8 +177,8 @@ class RclBackend(Protocol):
         """Publish through an rclpy publisher."""
         ...
 
-    def watch(self) -> Watch:
-        """Make a watch, with no sources yet."""
+    def inbox(self, *, coalesce_ns: int = 0) -> Inbox:
+        """Make an inbox, with no sources yet, that waits so long for more after the first message."""
         ...
 
     def graph_changes(self, node: Any) -> GraphChanges:

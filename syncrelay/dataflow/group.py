@@ -5,12 +5,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeVar
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
+from syncrelay.dataflow.flow import Engine, Flow, Stamps
 from syncrelay.dataflow.manifest import ManifestWriter, Member
 from syncrelay.explain import Code, RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
@@ -18,12 +19,7 @@ from syncrelay.sync.counts import InputCounts
 
 _LOG = logging.getLogger("syncrelay")
 _Result = TypeVar("_Result")
-_Engine: TypeAlias = SyncGroup | PausedEngine | StoppedEngine
 
-# Enough for the widest terminal's strip of recent sets.
-_RECENT = 256
-# What is kept between two evaluations: at 1 kHz they may be 10 s apart.
-_WATCHED = 10_000
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
 
@@ -37,11 +33,11 @@ class Batch(NamedTuple):
     """
 
     arrivals: tuple[deque[tuple[int, int]], ...]
-    sets: deque[tuple[tuple[int | None, ...], int]]
+    sets: deque[tuple[Stamps, int]]
     keys: tuple[Hashable, ...]
     counts: tuple[InputCounts, ...]
     n_sets: int
-    last: tuple[tuple[int | None, ...] | RecentDrop, ...]
+    last: tuple[Stamps | RecentDrop, ...]
 
 
 class Unpublished(NamedTuple):
@@ -52,20 +48,19 @@ class Unpublished(NamedTuple):
 
 
 class GroupRelay:
-    """Feeds a group's engine and publishes the sets that it gives.
+    """Feeds a group's engine and publishes the sets that it gives, by its flow.
 
-    An exception stops this group and no other: the caller of `receive` calls `fail`, all else does so itself.
+    An exception stops this group and no other: who feeds the flow calls `fail`, all else does so itself.
     """
 
-    def __init__(self, config: GroupConfig, *, now: Callable[[], int]) -> None:
+    def __init__(self, config: GroupConfig, *, now: Callable[[], int], flow: type[Flow] = Flow) -> None:
         self.config = config
-        self.engine: _Engine = config.engine()
+        self._n_inputs = len(config.topics)
+        self.flow = flow(config.engine(), n_inputs=self._n_inputs, now=now, told=self)
         self.failure: str | None = None
         """What stopped it; None of one that works."""
         self.paused_since: int | None = None
         """Since when it is paused, in nanoseconds of the system clock; None of one that is not."""
-        self.last: deque[tuple[int | None, ...] | RecentDrop] = deque(maxlen=_RECENT)
-        """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
         self.sleeps = False
         """Whether nothing is fed, because nobody listens."""
         self.woke: int | None = None
@@ -73,32 +68,34 @@ class GroupRelay:
         self.unpublished: dict[int, Unpublished] = {}
         """The inputs of which the last message could not be published."""
         self._now = now
-        self._n_inputs = len(config.topics)
-        self._keys: list[Hashable] = [None] * self._n_inputs
-        self._watch()
-        self._restamped = [False] * len(config.topics)
-        self._outlets: list[Outlet | None] = [None] * len(config.topics)
-        self._suspended: _Engine = self.engine
+        self._suspended = self.engine
         self._held_by = StoppedEngine(0, ())
         self._was_connected: list[bool] = []
-        self._left = 0
-        self._manifest: tuple[ManifestWriter, Outlet] | None = None
         self._manifest_failed = False
+
+    @property
+    def engine(self) -> Engine:
+        """What its messages are fed to."""
+        return self.flow.engine
+
+    @engine.setter
+    def engine(self, engine: Engine) -> None:
+        self.flow.engine = engine
 
     def connect(self, index: int, outlet: Outlet, *, restamped: bool) -> None:
         """Publish one input's messages through an outlet from now on.
 
         `restamped` says that its payloads begin with a Header, whose stamp the set's common stamp replaces.
         """
-        self._outlets[index] = outlet
-        self._restamped[index] = restamped
+        self.flow.outlets[index] = outlet
+        self.flow.restamped[index] = restamped
 
     def pause(self) -> None:
         """Let nothing leave until `unpause`; what is buffered, and what comes meanwhile, is dropped as `paused`."""
         if self.paused_since is not None:
             return
         self.paused_since = time.time_ns()
-        self._guarded(lambda: self._conclude(self.engine.let_go(DropReason.PAUSED)))
+        self._guarded(lambda: self.flow.conclude(self.engine.let_go(DropReason.PAUSED)))
         if isinstance(self.engine, SyncGroup):
             self.engine = PausedEngine(self.engine, trigger=self.config.trigger)
 
@@ -111,18 +108,24 @@ class GroupRelay:
     @property
     def tells_sets(self) -> bool:
         """Whether it has where to publish its manifests. Any thread."""
-        return self._manifest is not None
+        return self.flow.tell is not None
 
     def tell_sets(self, writer: ManifestWriter, outlet: Outlet) -> None:
         """Publish a manifest behind each set from now on, while anyone subscribes to it."""
-        self._manifest = writer, outlet
+
+        def tell(match: Match, latency: int) -> None:
+            if outlet.is_heard():
+                self._tell(match, latency, writer, outlet)
+
+        self.flow.tell = tell
 
     def suspend(self) -> None:
         """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
         counts = self.counts()
         self._suspended = self.engine
         self.engine = self._held_by = StoppedEngine(self.engine.sets, counts, most=_HELD)
-        self._outlets, self._was_connected = [None] * self._n_inputs, [outlet is not None for outlet in self._outlets]
+        self._was_connected = [outlet is not None for outlet in self.flow.outlets]
+        self.flow.outlets = [None] * self._n_inputs
 
     def resume(self) -> None:
         """Go on with all that was held. Where an outlet is missing now, all is dropped: sets would lack a message."""
@@ -131,13 +134,13 @@ class GroupRelay:
         self.engine = self._suspended
         lacks = any(
             was_connected and outlet is None
-            for was_connected, outlet in zip(self._was_connected, self._outlets, strict=True)
+            for was_connected, outlet in zip(self._was_connected, self.flow.outlets, strict=True)
         )
         if lacks:
             self.flush(DropReason.SHUTDOWN)
         try:
             for message, reason in self._held_by.held:
-                self._conclude(self._resumed(message, DropReason.SHUTDOWN if lacks else reason))
+                self.flow.conclude(self._resumed(message, DropReason.SHUTDOWN if lacks else reason))
         except Exception as error:  # noqa: BLE001  it is this group's alone
             self.fail(error)
 
@@ -155,32 +158,19 @@ class GroupRelay:
             return (self.engine.reject(message, reason),)
         return self.engine.add(message, now=self._now())
 
-    def receive(self, index: int, payload: Any, received: int, stamp: int | None, key: Hashable = None) -> None:
-        """Take in a message of one input, whose stamp is None where it, or the key, cannot be read; times in ns."""
-        if stamp is None:
-            self._conclude([self.engine.reject(Message(index, 0, (payload, received)), DropReason.MALFORMED)])
-            return
-        self._arrivals[index].append((stamp, received))
-        self._keys[index] = key
-        self._conclude(self.engine.add(Message(index, stamp, (payload, received), key), now=self._now()))
-
     def watched(self) -> Batch:
         """Give what came and left since this was last asked for, and all counts."""
-        arrivals, sets = self._arrivals, self._sets
-        self._watch()
-        return Batch(arrivals, sets, tuple(self._keys), self.counts(), self.engine.sets, tuple(self.last))
-
-    def _watch(self) -> None:
-        self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
-        self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
+        flow = self.flow
+        arrivals, sets = flow.watched()
+        return Batch(arrivals, sets, tuple(flow.keys), self.counts(), self.engine.sets, tuple(flow.last))
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""
-        self._guarded(lambda: self._conclude(self.engine.expire(now=now)))
+        self._guarded(lambda: self.flow.conclude(self.engine.expire(now=now)))
 
     def flush(self, reason: DropReason) -> None:
         """Drop all that is buffered."""
-        self._guarded(lambda: self._conclude(self.engine.flush(reason)))
+        self._guarded(lambda: self.flow.conclude(self.engine.flush(reason)))
 
     def next_deadline(self) -> int | None:
         """When `expire` wants to be called next."""
@@ -220,49 +210,11 @@ class GroupRelay:
             return self.engine.counts()
         return self.config.engine().counts()
 
-    def _conclude(self, outcomes: Sequence[Match | Drop]) -> None:
-        for outcome in outcomes:
-            if isinstance(outcome, Match):
-                newest = self._send(outcome)
-                stamps, latency = outcome.stamps, time.time_ns() - newest
-                self._sets.append((stamps, latency))
-                self.last.append(stamps)
-                self._left += 1
-                if self._manifest is not None and self._manifest[1].is_heard():
-                    self._tell(outcome, latency, *self._manifest)
-            else:
-                message = outcome.message
-                self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
-
-    def _send(self, match: Match) -> int:
-        """Publish a set; when its newest message was received."""
-        newest = 0
-        for message in match.messages:
-            if message is None:
-                continue
-            # As it was fed: what DDS received, and when, in nanoseconds of the system clock.
-            payload, received = message.payload
-            newest = max(newest, received)
-            outlet = self._outlets[message.input]
-            if outlet is None:
-                continue
-            try:
-                if match.stamp is not None and self._restamped[message.input]:
-                    outlet.send_stamped(payload, match.stamp)
-                else:
-                    outlet.send(payload)
-            except PublishError as error:
-                self._not_published(message.input, outlet, str(error))
-            else:
-                if self.unpublished:
-                    self._published(message.input, outlet)
-        return newest
-
     def _tell(self, match: Match, latency: int, writer: ManifestWriter, outlet: Outlet) -> None:
         """Publish the manifest of the set that was just sent."""
         members = [None if message is None else self._member(message, match.stamp) for message in match.messages]
         try:
-            outlet.send_content(writer.write(self._left, match, members, latency))
+            outlet.send_content(writer.write(self.flow.n_sets, match, members, latency))
         except PublishError as error:
             if not self._manifest_failed:
                 _LOG.error("%s: a manifest could not be published: %s", self.config.name, error)
@@ -271,16 +223,18 @@ class GroupRelay:
             self._manifest_failed = False
 
     def _member(self, message: Message, common_stamp: int | None) -> Member:
-        index, stamp, (_, received) = message.input, message.stamp, message.payload
-        leaves_as = common_stamp if common_stamp is not None and self._restamped[index] else stamp
-        outlet = self._outlets[index]
+        index, stamp, received = message.input, message.stamp, message.payload.received
+        leaves_as = common_stamp if common_stamp is not None and self.flow.restamped[index] else stamp
+        outlet = self.flow.outlets[index]
         if self.unpublished and index in self.unpublished:
             return Member(leaves_as, stamp, received, 0, self.unpublished[index].why)
         return Member(leaves_as, stamp, received, 0 if outlet is None else outlet.sent)
 
-    def _not_published(self, index: int, outlet: Outlet, why: str) -> None:
+    def refused(self, index: int, outlet: Outlet, why: str) -> None:
+        """Note that an outlet did not publish a message of this input."""
         before = self.unpublished.get(index)
         self.unpublished[index] = Unpublished(1 + (before.messages if before else 0), why)
+        self.flow.all_accepted = False
         if before is None:
             _LOG.error(
                 "%s: a message could not be published on %s: %s; trying again with the next one",
@@ -290,8 +244,10 @@ class GroupRelay:
                 extra={"group": self.config.name, "finding": Code.REFUSED_BY_DDS.value},
             )
 
-    def _published(self, index: int, outlet: Outlet) -> None:
+    def accepted(self, index: int, outlet: Outlet) -> None:
+        """Note that an outlet published a message of this input."""
         recovered = self.unpublished.pop(index, None)
+        self.flow.all_accepted = not self.unpublished
         if recovered is not None:
             _LOG.info(
                 "%s: publishing on %s again; %s not published",

@@ -8,8 +8,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from syncrelay.dataflow.backend import Source, Watch
-from syncrelay.dataflow.backlog import Backlog
+from syncrelay.dataflow.backend import Inbox, Source
 from syncrelay.dataflow.calls import Calls
 
 if TYPE_CHECKING:
@@ -24,16 +23,16 @@ _AFTER_FAILURE_S = 0.01
 
 
 class ReceiveLoop:
-    """Drains sources of one backend on the thread that calls `run`.
+    """Has an inbox deliver its messages on the thread that calls `run`.
 
     Only `call`, `wake`, `stop` and the attributes may be used from other threads. `expire` is called with the time of
-    `now`, in nanoseconds, when that is due, and `on_turn` at every turn, at least once a second. `contain` takes an
+    `now`, in nanoseconds, when that is due, and `on_turn` at least once a second. `contain` takes an
     exception that nobody else did, and the loop goes on; without it, the loop ends and `run` raises it.
     """
 
     def __init__(
         self,
-        watch: Watch,
+        inbox: Inbox,
         *,
         now: Callable[[], int],
         expire: Callable[[int], None],
@@ -41,21 +40,20 @@ class ReceiveLoop:
         on_turn: Callable[[], None] | None = None,
         contain: Callable[[Exception], None] | None = None,
     ) -> None:
-        self._watch = watch
+        self._inbox = inbox
         self._now = now
         self.deadline = deadline
         """Says when `expire` wants to be called next, by the clock of `now`; None while it never does.
 
-        Asked at every turn; wake the loop after replacing it.
+        Asked after every delivery; wake the loop after replacing it.
         """
         self.turned = time.monotonic()
-        """When the loop last turned."""
+        """When the loop last showed that it works: once a second at least."""
         self._expire = expire
         self._on_turn = on_turn
         self._contain = contain
         self._sources: dict[Source, Callable[[Exception], None]] = {}
-        self._backlog = Backlog()
-        self._calls = Calls(watch.wake)
+        self._calls = Calls(inbox.wake)
         self._stopping = False
 
     def call(self, function: Callable[[], _Result]) -> "Future[_Result]":
@@ -67,7 +65,7 @@ class ReceiveLoop:
 
     def wake(self) -> None:
         """Have the loop check its calls and deadlines now."""
-        self._watch.wake()
+        self._inbox.wake()
 
     def stop(self) -> None:
         """Have `run` take what has arrived, carry out the calls still due, and return."""
@@ -79,18 +77,17 @@ class ReceiveLoop:
 
         `failed` hears on the loop's thread what kept it from giving its messages; by then it is removed.
         """
-        self._watch.add(source)
+        self._inbox.add(source)
         self._sources[source] = failed
 
     def remove(self, source: Source) -> None:
         """Take what a source has, then stop draining it: it may be destroyed. On the loop's thread."""
-        self._backlog.deliver_until(time.time_ns(), self._sources)
+        self._inbox.deliver_all()
         self._leave(source)
 
     def _leave(self, source: Source) -> None:
-        self._backlog.forget(source)
-        if self._sources.pop(source, None) is not None:
-            self._watch.remove(source)
+        self._sources.pop(source, None)
+        self._inbox.remove(source)
 
     def run(self) -> None:
         """Receive until `stop` is called."""
@@ -99,7 +96,7 @@ class ReceiveLoop:
                 self._guarded(self._receive)
                 if not self._stopping:
                     time.sleep(_AFTER_FAILURE_S)
-            for last in (self._take_what_came, self._backlog.deliver_held, self._calls.carry_out):
+            for last in (self._inbox.deliver_all, self._inbox.deliver_held, self._calls.carry_out):
                 self._guarded(last)
         finally:
             self._calls.end()
@@ -117,32 +114,30 @@ class ReceiveLoop:
             if self._calls:
                 self._calls.carry_out()
             deadline = self.deadline
-            longest = _LONGEST_REST_NS if deadline is None else self._expire_due(deadline)
-            self._backlog.deliver(self._watch.wait(0 if self._backlog.held else longest))
-            if self._backlog.failed:
+            if deadline is None:
+                self._inbox.receive(_LONGEST_REST_NS)
+            else:
+                self._inbox.receive_once(self._expire_due(deadline))
+            if self._inbox.failed:
                 self._end_failed()
             self.turned = time.monotonic()
             if self._on_turn is not None:
                 self._on_turn()
 
-    def _take_what_came(self) -> None:
-        self._backlog.deliver_until(time.time_ns(), self._sources)
-
     def _end_failed(self) -> None:
         """Stop draining what failed, and pass the error to who added it."""
-        failed, self._backlog.failed = self._backlog.failed, {}
-        for source, error in failed.items():
+        for source, error in dict(self._inbox.failed).items():
             failed_of = self._sources.get(source)
+            self._leave(source)
             if failed_of is not None:
-                self._leave(source)
                 failed_of(error)
 
     def close(self) -> None:
         """Free what the loop holds of rcl. After `run` has returned."""
-        self._watch.close()
+        self._inbox.close()
 
     def _expire_due(self, deadline: Callable[[], int | None]) -> int:
-        """Let go what is due; give the nanoseconds until the next deadline, a on_turn at most."""
+        """Let go what is due; give the nanoseconds until the next deadline, a second at most."""
         due, now = deadline(), self._now()
         if due is not None and now >= due:
             self._expire(now)

@@ -23,7 +23,7 @@ def check_start(started: StartResult, *, before: Sequence[Diagnosis]) -> Iterato
     if started.path_fault:
         yield info(
             "receive_path",
-            f"messages pass through rclpy: librcl is not as expected here ({started.path_fault})",
+            f"messages take the path `{started.path}`: {started.path_fault}",
             impact="the relay works, but each message costs more CPU",
             fix="please report it, with the first line of this output",
         )

@@ -1,42 +1,73 @@
-"""Which backend messages pass through: librcl where it proves itself, rclpy elsewhere or when asked for."""
+"""Which backend messages pass through: the cheapest that proves itself here, or the one that is asked for."""
 
 import logging
+from importlib.util import find_spec
 from typing import Any, Final
 
 from syncrelay.dataflow.backend import BackendName, RclBackend
 from syncrelay.errors import RosUnavailableError, UsageError
+from syncrelay.ros.librcl.backend import LibrclBackend
 from syncrelay.ros.librcl.check import LibrclUnusableError, checked_backend
 from syncrelay.ros.rclpy_backend import RclpyBackend
 
 VARIABLE: Final = "SYNCRELAY_RECEIVE"
-"""The environment variable that names the backend, a BackendName; without it librcl is tried first."""
+"""The environment variable that names the backend, a BackendName; without it the cheapest is taken."""
 
 _LOG = logging.getLogger("syncrelay")
+_WORDS: Final = {
+    BackendName.COMPILED: "messages pass through librcl, in compiled code",
+    BackendName.LIBRCL: "messages pass through librcl, without a copy in Python",
+    BackendName.RCLPY: "messages pass through rclpy",
+}
 
 
 def choose_backend(asked: str | None, *, node: Any, context: Any) -> RclBackend:
     """Return the backend that messages pass through in this process, and log which it is.
 
-    Raises UsageError for an unknown name, RosUnavailableError where librcl is asked for by name and cannot be used.
+    Raises UsageError for an unknown name, RosUnavailableError where one is asked for by name and cannot be used.
     """
     name = _name(asked) if asked else None
-    if name is BackendName.RCLPY:
-        _LOG.info("messages pass through rclpy, as %s asks", VARIABLE)
-        return RclpyBackend(context)
-    try:
-        backend = checked_backend(node)
-    except LibrclUnusableError as error:
-        if name is BackendName.LIBRCL:
-            raise RosUnavailableError(f"{VARIABLE}={asked}: librcl is not as expected here ({error})") from error
-        _LOG.warning("messages pass through rclpy, at a higher cost: librcl is not as expected here (%s)", error)
-        return RclpyBackend(context)
-    _LOG.info("messages pass through librcl, without a copy in Python")
+    backend, fault = (RclpyBackend(context), "") if name is BackendName.RCLPY else _found(node, context, name)
+    words = _WORDS[backend.name]
+    if name is not None and name is not backend.name:
+        raise RosUnavailableError(f"{VARIABLE}={asked}: {fault or 'the compiled path was not built here'}")
+    if name is not None:
+        _LOG.info("%s, as %s asks", words, VARIABLE)
+    elif fault:
+        _LOG.warning("%s, at a higher cost: %s", words, fault)
+    else:
+        _LOG.info("%s", words)
     return backend
+
+
+def find_backend(*, node: Any, context: Any) -> tuple[RclBackend, str]:
+    """Return the cheapest backend that proves itself here, and what is wrong with one that would be cheaper."""
+    return _found(node, context, None)
+
+
+def _found(node: Any, context: Any, name: BackendName | None) -> tuple[RclBackend, str]:
+    try:
+        librcl = checked_backend(node)
+    except LibrclUnusableError as error:
+        return RclpyBackend(context), f"librcl is not as expected here ({error})"
+    # It needs a compiler where syncrelay is installed, and nothing is wrong without it.
+    if name is BackendName.LIBRCL or find_spec("syncrelay.ros.compiled.path") is None:
+        return librcl, ""
+    try:
+        return _compiled(librcl, node), ""
+    except (LibrclUnusableError, ImportError) as error:
+        return librcl, f"the compiled path is not as expected here ({error})"
+
+
+def _compiled(librcl: LibrclBackend, node: Any) -> RclBackend:
+    from syncrelay.ros.compiled.check import compiled_backend  # noqa: PLC0415  it may not be there
+
+    return compiled_backend(librcl.rcl, node)
 
 
 def _name(asked: str) -> BackendName:
     try:
         return BackendName(asked)
     except ValueError as error:
-        names = " or ".join(name.value for name in BackendName)
-        raise UsageError(f"{VARIABLE}={asked}: expected {names}") from error
+        *others, last = [name.value for name in BackendName]
+        raise UsageError(f"{VARIABLE}={asked}: expected {', '.join(others)} or {last}") from error

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from syncrelay.config import Config, ConfigError, GroupConfig
 from syncrelay.config.wording import counted
+from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
@@ -35,6 +36,7 @@ class Groups:
         manifests: Manifests,
         loop: ReceiveLoop,
         clock: WaitingClock,
+        flow: type[Flow],
         changed: Callable[[Config], None],
     ) -> None:
         """Run the groups with the names `chosen`, None for all.
@@ -53,6 +55,7 @@ class Groups:
         self._resolve = resolve
         self._loop = loop
         self._clock = clock
+        self._flow = flow
         self._changed = changed
         # What each group was last said to wait for; None of one that runs.
         self._announced: dict[str, str | None] = {}
@@ -161,7 +164,7 @@ class Groups:
         self.manifests.begin(groups)
 
     def _begun(self, config: GroupConfig) -> GroupRelay:
-        group = GroupRelay(config, now=self._clock.now)
+        group = GroupRelay(config, now=self._clock.now, flow=self._flow)
         if self.is_paused:
             group.pause()
         return group

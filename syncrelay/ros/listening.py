@@ -17,7 +17,7 @@ from syncrelay.cdr import read_stamp
 from syncrelay.config import QosOverrides
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.names_in_graph import DIAGNOSTICS, MANIFEST_TYPE
-from syncrelay.dataflow.backend import Content, RclBackend, Source
+from syncrelay.dataflow.backend import Payload, RclBackend, Source
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import RosUnavailableError, TypeImportError
 from syncrelay.printable import printable
@@ -92,7 +92,7 @@ class _Listener:
         now = time.monotonic_ns()
         self._due, self._end = now, now + round(seconds * _SECOND)
         self._loop = ReceiveLoop(
-            backend.watch(), now=time.monotonic_ns, deadline=lambda: min(self._due, self._end), expire=self._turn
+            backend.inbox(), now=time.monotonic_ns, deadline=lambda: min(self._due, self._end), expire=self._turn
         )
         self._topics: dict[str, HeardTopic] = {}
         self._relayed: set[str] = set()
@@ -153,9 +153,9 @@ class _Listener:
         return import_type(type_name)
 
     def _subscribe(self, topic: HeardTopic, message_type: Any, profile: Any) -> None:
-        def take(_payload: Any, content: Content, received: int) -> None:
-            topic.stamps.append(read_stamp(content))
-            topic.received.append(received)
+        def take(payload: Payload) -> None:
+            topic.stamps.append(read_stamp(payload.content()))
+            topic.received.append(payload.received)
             topic.places.append(self._count)
             self._count += 1
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rclpy.duration import Duration
 
-from syncrelay.dataflow.backend import Content, Deliver, Outlet, RclBackend, Source
+from syncrelay.dataflow.backend import Deliver, Outlet, Payload, RclBackend, Source
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Refusal
@@ -157,11 +157,11 @@ class Outputs:
         else:
             self.source.deliver = self._measure
 
-    def _measure(self, payload: Any, content: Content, received: int) -> None:
-        self.largest = max(self.largest, len(content))
-        self.deliver(payload, content, received)
+    def _measure(self, payload: Payload) -> None:
+        self.largest = max(self.largest, len(payload.content()))
+        self.deliver(payload)
 
-    def deliver(self, payload: Any, content: Content, received: int) -> None:
+    def deliver(self, payload: Payload) -> None:
         """Feed all of them a message."""
         for handle in self._handlers:
-            handle(payload, content, received)
+            handle(payload)

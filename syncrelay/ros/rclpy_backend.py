@@ -7,7 +7,23 @@ from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.cdr import patch_stamp
-from syncrelay.dataflow.backend import BackendName, Deliver, PublishError, Ready, Taken
+from syncrelay.dataflow.backend import ALL, BackendName, Deliver, Inbox, PublishError, Ready
+from syncrelay.dataflow.flow import Flow
+from syncrelay.dataflow.inbox import PolledInbox
+
+
+class RclpyPayload:
+    """One message, in bytes of Python's."""
+
+    __slots__ = ("_content", "received")
+
+    def __init__(self, content: bytes, received: int) -> None:
+        self.received = received
+        self._content = content
+
+    def content(self) -> bytes:
+        """The message's bytes."""
+        return self._content
 
 
 class RclpySource:
@@ -15,20 +31,18 @@ class RclpySource:
 
     def __init__(self, subscription: Any, deliver: Deliver) -> None:
         self.deliver = deliver
-        self.waited = 0
+        self.waited = self.pending = 0
         self.handle = subscription.handle
         self._type = subscription.msg_type
 
-    def take(self) -> Taken | None:
+    def take(self) -> RclpyPayload | None:
         """Take its oldest message; None if there is none."""
         taken = self.handle.take_message(self._type, True)  # noqa: FBT003  rclpy's signature
         if taken is None:
+            self.pending = 0
             return None
-        payload, meta = taken
-        return meta["received_timestamp"], payload, payload
-
-    def force_poll(self) -> None:
-        """Change nothing: it always polls."""
+        content, info = taken
+        return RclpyPayload(content, info["received_timestamp"])
 
 
 class RclpyOutlet:
@@ -40,21 +54,21 @@ class RclpyOutlet:
         self._publish = publisher.handle.publish_raw
         self._count_subscriptions = publisher.handle.get_subscription_count
 
-    def send(self, payload: bytes) -> None:
+    def send(self, payload: RclpyPayload) -> None:
         """Publish a payload unchanged. Raises PublishError."""
-        try:
-            self._publish(payload)
-        except _rclpy.RCLError as error:
-            raise PublishError(str(error)) from error
-        self.sent += 1
+        self.send_content(payload.content())
 
-    def send_stamped(self, payload: bytes, stamp: int) -> None:
+    def send_stamped(self, payload: RclpyPayload, stamp: int) -> None:
         """Publish a copy of the payload with this stamp."""
-        self.send(patch_stamp(payload, stamp))
+        self.send_content(patch_stamp(payload.content(), stamp))
 
     def send_content(self, content: bytes) -> None:
         """Publish a message that was serialized here. Raises PublishError."""
-        self.send(content)
+        try:
+            self._publish(content)
+        except _rclpy.RCLError as error:
+            raise PublishError(str(error)) from error
+        self.sent += 1
 
     def is_heard(self) -> bool:
         """Whether anyone subscribes; not where rcl cannot tell, of which `send` says why."""
@@ -97,7 +111,9 @@ class WaitSetWatch:
         seen_until = time.time_ns()
         wait_set.wait(timeout_ns)
         ready = [source for index, source in enumerate(self._sources) if wait_set.is_ready("subscription", index)]
-        return ready, seen_until
+        for source in ready:
+            source.pending = ALL
+        return ready, seen_until, wait_set.is_ready("guard_condition", 0)
 
     def wake(self) -> None:
         """Have `wait` return. Any thread."""
@@ -121,6 +137,7 @@ class RclpyBackend:
     """Takes and publishes bytes through rclpy: what works wherever rclpy does."""
 
     name = BackendName.RCLPY
+    flow = Flow
 
     def __init__(self, context: Any) -> None:
         self._context = context
@@ -133,9 +150,9 @@ class RclpyBackend:
         """Publish through an rclpy publisher."""
         return RclpyOutlet(publisher)
 
-    def watch(self) -> WaitSetWatch:
-        """Make a watch, with no sources yet."""
-        return WaitSetWatch(self._context)
+    def inbox(self, *, coalesce_ns: int = 0) -> Inbox:
+        """Make an inbox, with no sources yet."""
+        return PolledInbox(WaitSetWatch(self._context), coalesce_ns=coalesce_ns)
 
     def graph_changes(self, node: Any) -> NoGraphEvents:  # noqa: ARG002  the protocol's signature
         """Follow the graph as a node sees it."""

@@ -113,7 +113,7 @@ class Relay:
         self.backend = backend.name
         self._bugs = Bugs()
         self._loop = ReceiveLoop(
-            backend.watch(),
+            backend.inbox(coalesce_ns=config.node.coalesce),
             now=self._clock.now,
             expire=lambda now: self._groups.expire(now),  # noqa: PLW0108  the groups come after the loop
             on_turn=on_turn,
@@ -143,6 +143,7 @@ class Relay:
             manifests=Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop),
             loop=self._loop,
             clock=self._clock,
+            flow=backend.flow,
             changed=lambda config: self._report_on(bindings, config),
         )
         self._is_managed = manage is not None

@@ -132,6 +132,7 @@ OPTIONS = {
     "namespace": (file(), file(node={"namespace": "/z"}), lambda config: config.node.namespace),
     "transport": (file(), file(node={"transport": "large_messages"}), lambda config: config.node.transport),
     "services": (file(), file(node={"services": False}), lambda config: config.node.services),
+    "coalesce": (file(), file(node={"coalesce": "1ms"}), lambda config: config.node.coalesce),
     "lifecycle": (file(), file(node={"lifecycle": True}), lambda config: config.node.lifecycle),
     "use_sim_time": (file(), file(node={"use_sim_time": True}), lambda config: config.node.use_sim_time),
     "node": (file(), file(node={"name": "z"}), lambda config: config.node),

@@ -5,7 +5,9 @@ from collections import deque
 
 import pytest
 
+from syncrelay.dataflow.backend import ALL
 from syncrelay.dataflow.backlog import Backlog
+from tests.dataflow.payloads import Named
 
 
 class _Source:
@@ -14,22 +16,28 @@ class _Source:
     def __init__(self, delivered: list, *messages: tuple[int, str]):
         self.messages = deque(messages)
         self.waited = 0
-        self.deliver = lambda payload, _content, _received: delivered.append(payload)
+        self.pending = ALL
+        self.deliver = lambda payload: delivered.append(payload.name)
 
     def take(self):
         if not self.messages:
             return None
-        received, payload = self.messages.popleft()
-        return received, payload, b""
+        received, name = self.messages.popleft()
+        return Named(name, received)
 
-    def force_poll(self):
-        pass
+
+def _deliver(backlog: Backlog, sources: list[_Source], until: int) -> None:
+    """As the inbox has it."""
+    if len(sources) == 1 and not backlog.held:
+        backlog.deliver_alone(sources[0], until)
+    else:
+        backlog.deliver(sources, until)
 
 
 def test_messages_of_all_sources_leave_by_their_time_of_receipt():
     delivered: list[str] = []
     sources = [_Source(delivered, (1, "a"), (4, "b")), _Source(delivered, (2, "A"), (3, "B"), (5, "C"))]
-    Backlog().deliver((sources, 10))
+    Backlog().deliver(sources, 10)
     assert delivered == ["a", "A", "B", "b", "C"]
 
 
@@ -37,11 +45,11 @@ def test_what_came_after_the_look_waits_for_the_next_one():
     delivered: list[str] = []
     backlog = Backlog()
     slow, fast = _Source(delivered), _Source(delivered, (1, "a"), (6, "b"))
-    backlog.deliver(([fast], 5))
+    _deliver(backlog, [fast], 5)
     assert delivered == ["a"]
     assert backlog.held == {fast}
     slow.messages.append((5, "A"))
-    backlog.deliver(([slow], 10))
+    _deliver(backlog, [slow], 10)
     assert delivered == ["a", "A", "b"]
     assert not backlog.held
 
@@ -50,10 +58,10 @@ def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
     delivered: list[str] = []
     backlog = Backlog()
     flood = _Source(delivered, *((n, f"{n}") for n in range(1000)))
-    backlog.deliver(([flood], 1000))
+    _deliver(backlog, [flood], 1000)
     assert 0 < len(delivered) < 1000
     while backlog.held:
-        backlog.deliver(([], 1000))
+        _deliver(backlog, [], 1000)
     assert delivered == [f"{n}" for n in range(1000)]
 
 
@@ -61,7 +69,7 @@ def test_a_slow_topic_gets_its_turn_in_a_flood():
     delivered: list[str] = []
     imu = _Source(delivered, *((2 * n, "imu") for n in range(10_000)))
     camera = _Source(delivered, (99, "camera"))
-    Backlog().deliver(([imu, camera], 20_000))
+    Backlog().deliver([imu, camera], 20_000)
     assert delivered.index("camera") == 50
 
 
@@ -69,10 +77,10 @@ def test_a_source_that_ends_gives_what_is_held_of_it():
     delivered: list[str] = []
     backlog = Backlog()
     ending, staying = _Source(delivered, (6, "a")), _Source(delivered, (7, "A"))
-    backlog.deliver(([ending, staying], 5))
+    _deliver(backlog, [ending, staying], 5)
     backlog.forget(ending)
     assert delivered == ["a"]
-    backlog.deliver(([], 10))
+    _deliver(backlog, [], 10)
     assert delivered == ["a", "A"]
 
 
@@ -98,7 +106,7 @@ def test_each_source_tells_how_long_its_own_messages_waited_whenever_it_was_look
         for source in sources:
             came = sorted(chance.randint(looked, now + 5) for _ in range(chance.choice([0, 0, 1, 3])))
             source.messages.extend((at, (source, at)) for at in came)
-        backlog.deliver(([each for each in sources if each.messages or each in backlog.held], now))
+        _deliver(backlog, [each for each in sources if each.messages or each in backlog.held], now)
         for source, at in delivered:
             waits[source] = max(waits.get(source, 0), now - at)
         delivered.clear()

@@ -8,10 +8,12 @@ from threading import Thread
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.backend import ALL, PublishError
 from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.sync import DropReason
+from tests.dataflow.payloads import FLOWS, Named
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
@@ -21,17 +23,18 @@ _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 _STEPS = ("add", "reject", "expire", "flush", "counts", "next_deadline")
 
 
-def _group(name: str = "front", **keys) -> GroupRelay:
-    text = config({name: {"policy": "exact_time", "max_wait": "10ms", "topics": inputs(_PAIR), **keys}})
-    return GroupRelay(load_text(text).groups[0], now=lambda: 0)
+@pytest.fixture(params=FLOWS)
+def group(request) -> GroupRelay:
+    text = config({"front": {"policy": "exact_time", "max_wait": "10ms", "topics": inputs(_PAIR)}})
+    return GroupRelay(load_text(text).groups[0], now=lambda: 0, flow=request.param)
 
 
 class _Outlet:
     def __init__(self) -> None:
         self.sent: list[object] = []
 
-    def send(self, payload: object) -> None:
-        self.sent.append(payload)
+    def send(self, payload: Named) -> None:
+        self.sent.append(payload.name)
 
 
 class _Failing:
@@ -52,7 +55,7 @@ def _drive(group: GroupRelay, step: str) -> None:
         case "add" | "reject":
             stamp = BEGIN if step == "add" else None
             try:
-                group.receive(0, b"late", 0, stamp)
+                group.flow.receive(0, Named(b"late"), stamp)
             except ZeroDivisionError as error:
                 group.fail(error)
         case "expire":
@@ -66,11 +69,13 @@ def _drive(group: GroupRelay, step: str) -> None:
 
 
 @pytest.mark.parametrize("failing", _STEPS)
-def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then_on(failing: str, caplog):
-    group, outlets = _group(), [_Outlet(), _Outlet()]
+def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then_on(
+    failing: str, group: GroupRelay, caplog
+):
+    outlets = [_Outlet(), _Outlet()]
     for index, outlet in enumerate(outlets):
         group.connect(index, outlet, restamped=False)
-        group.receive(index, b"set", 0, BEGIN)
+        group.flow.receive(index, Named(b"set"), BEGIN)
     assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
     group.engine = _Failing(group.engine, failing)
     _drive(group, failing)
@@ -78,7 +83,7 @@ def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then
     for step in _STEPS:
         _drive(group, step)
     for index in range(2):
-        group.receive(index, b"more", 0, BEGIN + MS)
+        group.flow.receive(index, Named(b"more"), BEGIN + MS)
     assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
     assert group.engine.sets == 1
     if failing != "counts":
@@ -89,18 +94,18 @@ def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then
     ]
 
 
-def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_came():
-    group, outlets = _group(), [_Outlet(), _Outlet()]
+def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_came(group: GroupRelay):
+    outlets = [_Outlet(), _Outlet()]
 
     def connect() -> None:
         for index, outlet in enumerate(outlets):
             group.connect(index, outlet, restamped=False)
 
     connect()
-    group.receive(0, b"before", 0, BEGIN)
+    group.flow.receive(0, Named(b"before"), BEGIN)
     group.suspend()
-    group.receive(1, b"meanwhile", 0, BEGIN)
-    group.receive(1, b"no stamp", 0, None)
+    group.flow.receive(1, Named(b"meanwhile"), BEGIN)
+    group.flow.receive(1, Named(b"no stamp"), None)
     group.expire(BEGIN)
     assert group.next_deadline() is None
     assert [outlet.sent for outlet in outlets] == [[], []]
@@ -110,13 +115,13 @@ def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_
     assert [(each.fed, each.matched, sum(each.dropped.values())) for each in group.counts()] == [(1, 1, 0), (2, 1, 1)]
 
 
-def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in_part():
-    group, outlets = _group(), [_Outlet(), _Outlet()]
+def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in_part(group: GroupRelay):
+    outlets = [_Outlet(), _Outlet()]
     for index, outlet in enumerate(outlets):
         group.connect(index, outlet, restamped=False)
-    group.receive(0, b"before", 0, BEGIN)
+    group.flow.receive(0, Named(b"before"), BEGIN)
     group.suspend()
-    group.receive(1, b"meanwhile", 0, BEGIN)
+    group.flow.receive(1, Named(b"meanwhile"), BEGIN)
     group.connect(1, outlets[1], restamped=False)
     group.resume()
     assert [outlet.sent for outlet in outlets] == [[], []]
@@ -132,21 +137,21 @@ class _FailingOutlet(_Outlet):
         super().__init__()
         self._refused = payload
 
-    def send(self, payload: object) -> None:
-        if payload == self._refused:
+    def send(self, payload: Named) -> None:
+        if payload.name == self._refused:
             raise PublishError("no memory")
         super().send(payload)
 
 
-def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_goes_on(caplog):
+def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_goes_on(group: GroupRelay, caplog):
     caplog.set_level("INFO")
-    group, outlets = _group(), [_Outlet(), _FailingOutlet(b"2")]
+    outlets = [_Outlet(), _FailingOutlet(b"2")]
     for index, outlet in enumerate(outlets):
         group.connect(index, outlet, restamped=False)
     told = []
     for n in range(4):
         for index in range(2):
-            group.receive(index, b"%d" % n, 0, BEGIN + n * MS)
+            group.flow.receive(index, Named(b"%d" % n), BEGIN + n * MS)
         told.append(dict(group.unpublished))
     assert told == [{}, {}, {1: (1, "no memory")}, {}]
     assert [outlet.sent for outlet in outlets] == [[b"0", b"1", b"2", b"3"], [b"0", b"1", b"3"]]
@@ -164,6 +169,7 @@ class _Source:
         self.messages = deque(messages)
         self.deliver = lambda *_: None
         self.waited = 0
+        self.pending = ALL
 
     def take(self):
         if not self.messages:
@@ -171,10 +177,7 @@ class _Source:
         message = self.messages.popleft()
         if isinstance(message, Exception):
             raise message
-        return 0, message, message
-
-    def force_poll(self) -> None:
-        pass
+        return Named(message)
 
 
 class _Watch:
@@ -192,7 +195,7 @@ class _Watch:
 
     def wait(self, _: int):
         _fail_at_times(self._chance)
-        return list(self.sources), time.time_ns()
+        return list(self.sources), time.time_ns(), True
 
     def wake(self) -> None:
         pass
@@ -212,7 +215,7 @@ def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
     chance = random.Random(seed)
     told: list[Exception] = []
     loop = ReceiveLoop(
-        _Watch(chance),
+        PolledInbox(_Watch(chance)),
         now=lambda: 0,
         expire=lambda _: _fail_at_times(chance),
         deadline=lambda: _fail_at_times(chance) or chance.choice([None, 0]),
@@ -222,7 +225,7 @@ def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
     sound = [_Source(*(b"%d" % n for n in range(200))) for _ in range(3)]
     delivered: dict[_Source, list[bytes]] = {source: [] for source in sound}
     for source in sound:
-        source.deliver = lambda payload, *_, source=source: delivered[source].append(payload)
+        source.deliver = lambda payload, source=source: delivered[source].append(payload.name)
         loop.add(source, told.append)
     ailing, lost = _Source(b"a", OSError("gone"), b"b"), []
     loop.add(ailing, lost.append)
@@ -243,6 +246,27 @@ def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
 
 def test_without_somebody_to_tell_the_loop_raises_what_failed():
     chance = random.Random(1)
-    loop = ReceiveLoop(_Watch(chance), now=lambda: 0, expire=lambda _: None)
+    loop = ReceiveLoop(PolledInbox(_Watch(chance)), now=lambda: 0, expire=lambda _: None)
     with pytest.raises((ZeroDivisionError, OSError, MemoryError, RecursionError)):
         loop.run()
+
+
+class _Trickle(_Watch):
+    """Names one source at each wait, and wakes nobody."""
+
+    def wait(self, timeout_ns: int):
+        self.timeouts.append(timeout_ns)
+        return ([self.sources.pop(0)] if self.sources else []), time.time_ns(), False
+
+
+@pytest.mark.parametrize(("coalesce_ns", "delivered"), [(0, [b"a"]), (1, [b"a", b"b"])])
+def test_what_comes_with_the_first_message_is_taken_with_it_where_the_file_says_so(coalesce_ns: int, delivered):
+    watch, came = _Trickle(random.Random(0)), []
+    watch.timeouts = []
+    inbox = PolledInbox(watch, coalesce_ns=coalesce_ns)
+    for source in (_Source(b"a"), _Source(b"b")):
+        source.deliver = lambda payload: came.append(payload.name)
+        inbox.add(source)
+    inbox.receive_once(7)
+    assert came == delivered
+    assert watch.timeouts == [7, 0][: len(delivered)]

@@ -9,6 +9,7 @@ from syncrelay.dataflow.backend import PublishError
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import ManifestWriter, Member
 from syncrelay.sync import Match, Message
+from tests.dataflow.payloads import Named
 from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.manifests import ERROR, MANIFEST_TYPE, OK, STALE, WARN, Told, ToldInput, read
@@ -120,7 +121,7 @@ def told():
 
 def _feed_set(group: GroupRelay, number: int) -> None:
     for index in range(2):
-        group.receive(index, b"", BEGIN, BEGIN + number)
+        group.flow.receive(index, Named(b"", BEGIN), BEGIN + number)
 
 
 def test_what_could_not_be_published_is_told(told):

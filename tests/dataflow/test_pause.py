@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.sync import DropReason
+from tests.dataflow.payloads import Named
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.streams import BEGIN, MS
@@ -25,8 +26,8 @@ class _Outlet:
     def __init__(self) -> None:
         self.sent: list[int] = []
 
-    def send(self, payload: int) -> None:
-        self.sent.append(payload)
+    def send(self, payload: Named) -> None:
+        self.sent.append(payload.name)
 
 
 def _group(**keys) -> tuple[GroupRelay, list[_Outlet]]:
@@ -40,7 +41,7 @@ def _group(**keys) -> tuple[GroupRelay, list[_Outlet]]:
 
 def _give(group: GroupRelay, index: int, ms: int) -> None:
     stamp = BEGIN + ms * MS
-    group.receive(index, stamp, stamp, stamp)
+    group.flow.receive(index, Named(stamp, stamp), stamp)
 
 
 def _sent(outlets: list[_Outlet]) -> list[list[int]]:

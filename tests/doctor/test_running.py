@@ -10,9 +10,11 @@ from syncrelay.doctor.start_check import StartResult
 
 
 def test_a_path_that_costs_more_is_an_info_with_its_reason():
-    (found,) = check_start(StartResult(path="rclpy", path_fault="other fields"), before=())
+    (found,) = check_start(
+        StartResult(path="rclpy", path_fault="librcl is not as expected here (other fields)"), before=()
+    )
     assert (found.code, found.severity) == ("receive_path", Severity.INFO)
-    assert found.what == "messages pass through rclpy: librcl is not as expected here (other fields)"
+    assert found.what == "messages take the path `rclpy`: librcl is not as expected here (other fields)"
     assert list(check_start(StartResult(path="direct"), before=())) == []
     assert list(check_start(StartResult(path="rclpy"), before=())) == []
 

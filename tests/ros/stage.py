@@ -1,10 +1,12 @@
 """A test's stage: player, relay and collector, each a process, on a ROS domain of their own."""
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -18,7 +20,16 @@ from tests.ros.shared_memory import left_of
 _CHECKOUT = Path(__file__).parents[2]
 _PACKAGE = Path(syncrelay.__file__).parents[1]
 
-both_backends = pytest.mark.parametrize("backend", ["direct", "rclpy"])
+
+def _usual_backend() -> str:
+    """The compiled path on Python 3.12, where it was built, and librcl from Python elsewhere: CI runs both."""
+    is_built = find_spec("syncrelay.ros.compiled.path") is not None
+    return "compiled" if is_built and sys.version_info >= (3, 12) else "direct"
+
+
+BACKEND = os.environ.get("SYNCRELAY_RECEIVE") or _usual_backend()
+"""What messages pass through where a test does not say."""
+both_backends = pytest.mark.parametrize("backend", list(dict.fromkeys([BACKEND, "rclpy"])))
 """For what must be so whichever backend messages pass through."""
 
 
@@ -142,7 +153,7 @@ class Caller:
 class Stage:
     """Starts the processes of one test on one domain."""
 
-    def __init__(self, folder: Path, domain: int, backend: str = "direct") -> None:
+    def __init__(self, folder: Path, domain: int, backend: str = BACKEND) -> None:
         self.folder, self.domain = folder, domain
         self.environment = ros_environment(domain=domain, folder=folder, python_path=[_PACKAGE, _CHECKOUT])
         self.environment["SYNCRELAY_RECEIVE"] = backend
@@ -237,7 +248,7 @@ class Stage:
 
 
 @contextmanager
-def running_stage(folder: Path, domain: int, backend: str = "direct") -> Iterator[Stage]:
+def running_stage(folder: Path, domain: int, backend: str = BACKEND) -> Iterator[Stage]:
     stage = Stage(folder, domain, backend)
     try:
         yield stage

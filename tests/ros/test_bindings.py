@@ -14,6 +14,7 @@ from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint, Refusal
 from tests.ros.configs import config
 from tests.ros.processes import wait_until
+from tests.ros.stage import BACKEND
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 entities = pytest.importorskip("syncrelay.ros.entities")
@@ -43,14 +44,14 @@ class _Refusing(entities.Entities):
         return super().publisher(message_type, topic, profile)
 
 
-@pytest.fixture(params=["direct", "rclpy"])
+@pytest.fixture(params=list(dict.fromkeys([BACKEND, "rclpy"])))
 def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
     """GroupBindings of a node of this process, with a loop that runs."""
     context = rclpy.context.Context()
     rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
     node = rclpy.create_node("here", context=context)
     backend = choose_backend(request.param, node=node, context=context)
-    loop = ReceiveLoop(backend.watch(), now=lambda: 0, expire=lambda _: None)
+    loop = ReceiveLoop(backend.inbox(), now=lambda: 0, expire=lambda _: None)
     refusing = _Refusing(node)
     thread = Thread(target=loop.run)
     thread.start()
@@ -180,7 +181,7 @@ def test_a_topic_that_gives_no_messages_any_more_is_subscribed_anew_and_told(her
     binding = here.bindings.all[0]
     failing = binding.inputs[0].topic
     publisher = here.node.create_publisher(import_type(_IMU), "/x", 10)
-    sources[0].take = lambda: {}["no such"]
+    sources[0].deliver = lambda _: {}["no such"]
     wait_until(lambda: publisher.publish(import_type(_IMU)()) or failing.is_due, "the source to fail")
     # No refusal of rcl's: it is a bug, which whoever looks tells with its traceback.
     with pytest.raises(KeyError):

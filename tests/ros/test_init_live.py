@@ -13,7 +13,7 @@ from syncrelay.config import load
 from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
 from tests.ros.frames import Frame
 from tests.ros.processes import ours_of
-from tests.ros.stage import Stage
+from tests.ros.stage import Stage, both_backends
 from tests.ros.streams import merged
 
 pytestmark = pytest.mark.ros
@@ -45,7 +45,7 @@ def _init_of_all(stage: Stage, written: Path, *topics: str) -> subprocess.Comple
     return done
 
 
-@pytest.mark.parametrize("backend", ["direct", "rclpy"])
+@both_backends
 def test_what_it_writes_is_in_order_and_gives_sets_of_that_graph(stage: Stage):
     reliable = stage.player({"/camera": VECTOR, "/lidar": VECTOR})
     lossy = stage.player({"/imu": VECTOR, "/log": STRING}, reliability="best_effort")

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from syncrelay.config import load
-from syncrelay.dataflow.backend import BackendName, PublishError
+from syncrelay.dataflow.backend import ALL, BackendName, PublishError
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import RosUnavailableError, UsageError
 from syncrelay.sync import DropReason
@@ -73,74 +73,59 @@ def _group(tmp_path, **keys):
     return GroupRelay(load(str(path)).groups[0], now=lambda: 0)
 
 
-class _CountingPool(buffers.Pool):
-    """Refuses to lend what is out, and to take back what is not."""
-
-    def __init__(self, functions):
-        super().__init__(functions)
-        self.out = set()
-        self.lendings = self.most = 0
-
-    def lend(self):
-        memory = super().lend()
-        assert memory not in self.out
-        self.out.add(memory)
-        self.lendings += 1
-        self.most = max(self.most, len(self.out))
-        return memory
-
-    def give_back(self, memory):
-        self.out.remove(memory)
-        super().give_back(memory)
-
-
 def _source(here, topic, deliver, pool=None):
     return messages.LibrclSource(here.rcl, pool or buffers.Pool(here.rcl), topic.subscription, deliver)
 
 
 def _take(source):
     """Its oldest message, whether anybody told it or not."""
-    source.force_poll()
+    source.pending = ALL
     return source.take()
+
+
+def _told(source):
+    """Its oldest message, of those that it was told of."""
+    return source.take() if source.pending else None
 
 
 def test_a_message_comes_out_as_it_went_in(here, topic):
     source = here.backend.source(topic.subscription, print)
     payload = vector(BEGIN, frame_id="a frame")
     topic.publisher.publish(payload)
-    received, _, content = _take(source)
-    assert bytes(content) == padded(payload)
-    assert received > BEGIN
+    taken = _take(source)
+    assert bytes(taken.content()) == padded(payload)
+    assert taken.received > BEGIN
     assert _take(source) is None
 
 
 def test_every_memory_comes_back_once_whatever_became_of_its_message(here, topic, tmp_path):
     # One topic feeds both inputs of two groups: each message has up to four owners at a time.
-    pool = _CountingPool(here.rcl)
+    pool, most = buffers.Pool(here.rcl), 0
     groups = [_group(tmp_path, queue_size=5), _group(tmp_path, queue_size=20)]
     for group in groups:
         for index in range(2):
             group.connect(index, here.backend.outlet(topic.publisher), restamped=True)
 
-    def deliver(payload, content, received):
-        stamp = stamp_of(bytes(content))
+    def deliver(payload):
+        stamp = stamp_of(bytes(payload.content()))
         for group in groups:
-            group.receive(stamp // MS % 2, payload, received, stamp)
+            group.flow.receive(stamp // MS % 2, payload, stamp)
 
     source = _source(here, topic, deliver, pool)
     for n in range(2000):
         # Even and odd stamps never match, so the queues are always full and most overflow.
         topic.publisher.publish(vector(BEGIN + n * MS))
-        received, payload, content = _take(source)
-        source.deliver(payload, content, received)
-    assert pool.lendings == 2001
+        payload = _take(source)
+        source.deliver(payload)
+        most = max(most, pool.lent)
     # Both groups keep twenty of each input at most; one is being delivered and one is for the next message.
-    assert pool.most <= 2 * 20 + 2
-    del payload, content
+    assert most <= 2 * 20 + 2
+    del payload
     for group in groups:
         group.flush(DropReason.SHUTDOWN)
     gc.collect()
-    assert pool.lent == len(pool.out) == 1
+    assert pool.lent == 1
+    assert len({id(memory) for memory in pool.spare}) == len(pool.spare)
 
 
 def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, topic):
@@ -148,31 +133,30 @@ def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, topic):
     outlet = here.backend.outlet(topic.publisher)
     original = padded(vector(BEGIN))
     topic.publisher.publish(original)
-    _, payload, content = _take(source)
+    payload = _take(source)
     outlet.send_stamped(payload, BEGIN + 5)
-    assert bytes(content) == original
+    assert bytes(payload.content()) == original
     outlet.send(payload)
-    _, stamped, stamped_content = _take(source)
-    _, unchanged, unchanged_content = _take(source)
-    assert bytes(stamped_content) == with_stamp(original, BEGIN + 5)
-    assert bytes(unchanged_content) == original
+    stamped, unchanged = _take(source), _take(source)
+    assert bytes(stamped.content()) == with_stamp(original, BEGIN + 5)
+    assert bytes(unchanged.content()) == original
     assert len({payload.memory, stamped.memory, unchanged.memory}) == 3
 
 
 def test_a_burst_takes_no_more_memory_than_the_queues_and_gives_it_back(here, topic, tmp_path):
-    pool = _CountingPool(here.rcl)
+    pool, most = buffers.Pool(here.rcl), 0
     group = _group(tmp_path, queue_size=30)
     source = _source(here, topic, lambda *_: None, pool)
     for n in range(500):
         topic.publisher.publish(vector(BEGIN + n * MS))
-    while (taken := _take(source)) is not None:
-        received, payload, content = taken
-        group.receive(0, payload, received, stamp_of(bytes(content)))
+    while (payload := _take(source)) is not None:
+        group.flow.receive(0, payload, stamp_of(bytes(payload.content())))
+        most = max(most, pool.lent)
     counts = group.engine.counts()[0]
     assert counts.fed == 500
     assert counts.dropped == {DropReason.OVERFLOW: 470}
-    assert pool.most <= 30 + 2
-    del taken, payload, content
+    assert most <= 30 + 2
+    del payload
     group.flush(DropReason.SHUTDOWN)
     assert pool.made - pool.freed <= 10
 
@@ -190,13 +174,12 @@ def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):
         topic.publisher.publish(with_stamp(payload, stamp))
     tracemalloc.start()
     for n in range(2 * len(stamps)):
-        received, message, content = _take(kept)
-        handlers[n % 2](message, content, received)
+        handlers[n % 2](_take(kept))
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert group.engine.sets == len(stamps)
     assert peak < _IMAGE_BYTES / 10
-    sent = [bytes(_take(kept)[2]) for _ in range(2 * len(stamps))]
+    sent = [bytes(_take(kept).content()) for _ in range(2 * len(stamps))]
     assert sent == [with_stamp(payload, stamp) for stamp in stamps for _ in range(2)]
 
 
@@ -209,16 +192,16 @@ def test_a_watch_sees_what_came_before_it_what_comes_later_and_a_wake(here, topi
     topic.publisher.publish(vector(BEGIN))
     watch.add(source)
     assert watch.wait(_LONG_NS)[0] == [source]
-    source.take()
+    _told(source)
     topic.publisher.publish(vector(BEGIN + MS))
-    ready, seen_until = watch.wait(_LONG_NS)
+    ready, seen_until, _ = watch.wait(_LONG_NS)
     assert ready == [source]
-    assert source.take()[0] <= seen_until
+    assert _told(source).received <= seen_until
     while watch.wait(0)[0]:
-        assert source.take() is None
+        assert _told(source) is None
     threading.Timer(0, watch.wake).start()
     # Once a second it looks into all, whatever it was told.
-    assert not [each for each in watch.wait(_LONG_NS)[0] if each.take()]
+    assert not [each for each in watch.wait(_LONG_NS)[0] if _told(each)]
     watch.remove(source)
     topic.publisher.publish(vector(BEGIN + 2 * MS))
     assert watch.wait(0)[0] == []
@@ -232,7 +215,7 @@ def test_a_look_knows_of_all_that_came_before_it(here, topic, monkeypatch):
     watch = here.backend.watch()
     for source in sources:
         watch.add(source)
-    while any(source.take() for source in watch.wait(0)[0]):
+    while any(_told(source) for source in watch.wait(0)[0]):
         pass
     for n in range(2):
         topic.publisher.publish(vector(BEGIN + n * MS))
@@ -244,9 +227,9 @@ def test_a_look_knows_of_all_that_came_before_it(here, topic, monkeypatch):
         return time.time_ns()
 
     monkeypatch.setattr(time, "time_ns", now)
-    ready, seen_until = watch.wait(_LONG_NS)
+    ready, seen_until, _ = watch.wait(_LONG_NS)
     assert ready == sources
-    assert all(source.take()[0] <= seen_until for source in ready)
+    assert all(_told(source).received <= seen_until for source in ready)
     watch.close()
     here.node.destroy_subscription(other)
     here.node.destroy_publisher(publisher)
@@ -256,15 +239,15 @@ def test_a_message_that_dds_never_told_of_is_found_within_a_second(here, topic, 
     source, watch = here.backend.source(topic.subscription, print), here.backend.watch()
     watch.add(source)
     while watch.wait(0)[0]:
-        assert source.take() is None
+        assert _told(source) is None
     here.rcl.set_on_new_message(source.address, None, None)
     topic.publisher.publish(vector(BEGIN))
-    assert source.take() is None
+    assert _told(source) is None
     later = time.time_ns() + 1_000_000_000
     monkeypatch.setattr(time, "time_ns", lambda: later)
     assert watch.wait(0)[0] == [source]
-    assert source.take() is not None
-    assert source.take() is None
+    assert _told(source) is not None
+    assert _told(source) is None
     assert watch.wait(0)[0] == []
     watch.close()
 
@@ -279,13 +262,13 @@ def test_what_is_pending_is_taken_without_asking_once_more(here, topic, monkeypa
     source, watch = _source(here, topic, print), here.backend.watch()
     watch.add(source)
     while watch.wait(0)[0]:
-        assert source.take() is None
+        assert _told(source) is None
     asked.clear()
     for n in range(3):
         topic.publisher.publish(vector(BEGIN + n * MS))
     while source.pending < 3:
         watch.wait(_LONG_NS)
-    assert [source.take() is None for _ in range(5)] == [False] * 3 + [True] * 2
+    assert [_told(source) is None for _ in range(5)] == [False] * 3 + [True] * 2
     assert len(asked) == 3
     watch.close()
 
@@ -355,7 +338,7 @@ def test_structures_that_are_not_as_expected_are_found_out(here, monkeypatch, st
 
 
 def test_where_librcl_is_not_as_expected_rclpy_is_used_and_the_log_says_so(here, monkeypatch, caplog):
-    assert choose_backend(None, node=here.node, context=here.context).name is BackendName.LIBRCL
+    assert choose_backend("direct", node=here.node, context=here.context).name is BackendName.LIBRCL
     empty = _structure(("info", _structure()), ("margin", ctypes.c_uint8 * 256))
     monkeypatch.setattr(check, "_RoomyInfo", empty)
     assert choose_backend(None, node=here.node, context=here.context).name is BackendName.RCLPY
@@ -368,20 +351,20 @@ def test_the_backend_can_be_chosen(here, caplog):
     caplog.set_level("INFO")
     assert choose_backend("rclpy", node=here.node, context=here.context).name is BackendName.RCLPY
     assert "as SYNCRELAY_RECEIVE asks" in caplog.text
-    with pytest.raises(UsageError, match="SYNCRELAY_RECEIVE=dds: expected direct or rclpy"):
+    with pytest.raises(UsageError, match="SYNCRELAY_RECEIVE=dds: expected compiled, direct or rclpy"):
         choose_backend("dds", node=here.node, context=here.context)
 
 
 def test_a_message_that_rcl_does_not_publish_says_why(here, topic):
     outlet, other = here.backend.outlet(topic.publisher), RclpyBackend(here.context).outlet(topic.publisher)
-    _, payload, _ = _published_and_taken(here, topic)
+    payload = _published_and_taken(here, topic)
     # rcl's own: rclpy's would destroy the node too, since Kilted.
     with here.context.handle:
         here.context.handle.shutdown()
     with pytest.raises(PublishError, match="rcl_publish_serialized_message failed with"):
         outlet.send(payload)
     with pytest.raises(PublishError, match="context is invalid"):
-        other.send(vector(BEGIN))
+        other.send_content(vector(BEGIN))
     # Whether to tell the set is asked in its group, which goes on.
     assert not outlet.is_heard()
     assert not other.is_heard()

@@ -45,7 +45,7 @@ class StartResult:
     """How it went. `failed` is the step that failed, None if all went well, and `fault` says why.
 
     `unusable` has the fault of every type that cannot be imported. `names` are the topics after all remaps. `path` is
-    how messages pass, direct or rclpy, and `path_fault` why not directly.
+    how messages pass, a BackendName, and `path_fault` what is wrong with a way that costs less.
     """
 
     failed: Step | None = None

@@ -5,7 +5,6 @@ import os
 import sys
 from typing import Any
 
-from syncrelay.dataflow.backend import BackendName
 from syncrelay.doctor.start_check import Step
 from syncrelay.errors import RosUnavailableError, TypeImportError, UsageError
 from syncrelay.ros.environment import require_rclpy
@@ -63,24 +62,20 @@ def _start(plan: dict[str, Any]) -> None:
         full_name=node.get_fully_qualified_name(),
         names=names,
         use_sim_time=bool(node.get_parameter("use_sim_time").value),
-        **_path(node),
+        **_path(node, context),
     )
     node.destroy_node()
     context.try_shutdown()
 
 
-def _path(node: Any) -> dict[str, str]:
-    """Find how messages would pass, and why not directly."""
-    from syncrelay.ros.backend_choice import VARIABLE  # noqa: PLC0415  after require_rclpy
-    from syncrelay.ros.librcl.check import LibrclUnusableError, checked_backend  # noqa: PLC0415  after require_rclpy
+def _path(node: Any, context: Any) -> dict[str, str]:
+    """Find how messages would pass, and what is wrong with a way that costs less."""
+    from syncrelay.ros.backend_choice import VARIABLE, find_backend  # noqa: PLC0415  after require_rclpy
 
-    if os.environ.get(VARIABLE) == BackendName.RCLPY.value:
-        return {"path": BackendName.RCLPY.value, "path_fault": ""}
-    try:
-        checked_backend(node)
-    except LibrclUnusableError as error:
-        return {"path": BackendName.RCLPY.value, "path_fault": str(error)}
-    return {"path": BackendName.LIBRCL.value, "path_fault": ""}
+    if asked := os.environ.get(VARIABLE):
+        return {"path": asked, "path_fault": ""}
+    backend, fault = find_backend(node=node, context=context)
+    return {"path": backend.name.value, "path_fault": fault}
 
 
 def _say(step: Step, **facts: Any) -> None:

@@ -2,7 +2,9 @@
 
 from typing import Any
 
-from syncrelay.dataflow.backend import BackendName, Deliver
+from syncrelay.dataflow.backend import BackendName, Deliver, Inbox
+from syncrelay.dataflow.flow import Flow
+from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.ros.librcl.buffers import Pool
 from syncrelay.ros.librcl.events import EventWatch
 from syncrelay.ros.librcl.graph_changes import GraphChanges
@@ -14,22 +16,27 @@ class LibrclBackend:
     """Takes and publishes in librcl: payloads are memory of ours that Python never copies."""
 
     name = BackendName.LIBRCL
+    flow = Flow
 
     def __init__(self, rcl: Rcl) -> None:
-        self._rcl = rcl
+        self.rcl = rcl
 
     def source(self, subscription: Any, deliver: Deliver) -> LibrclSource:
         """Drain a raw rclpy subscription from now on."""
-        return LibrclSource(self._rcl, Pool(self._rcl), subscription, deliver)
+        return LibrclSource(self.rcl, Pool(self.rcl), subscription, deliver)
 
     def outlet(self, publisher: Any) -> LibrclOutlet:
         """Publish through an rclpy publisher."""
-        return LibrclOutlet(self._rcl, publisher)
+        return LibrclOutlet(self.rcl, publisher)
 
     def watch(self) -> EventWatch:
         """Make a watch, with no sources yet."""
-        return EventWatch(self._rcl)
+        return EventWatch(self.rcl)
+
+    def inbox(self, *, coalesce_ns: int = 0) -> Inbox:
+        """Make an inbox, with no sources yet."""
+        return PolledInbox(self.watch(), coalesce_ns=coalesce_ns)
 
     def graph_changes(self, node: Any) -> GraphChanges:
         """Follow the graph as a node sees it."""
-        return GraphChanges(self._rcl, node)
+        return GraphChanges(self.rcl, node)

@@ -71,28 +71,20 @@ class Pool:
 
     def __init__(self, rcl: Rcl) -> None:
         self._rcl = rcl
-        self._spare: list[Memory] = []
+        self.spare: list[Memory] = []
+        """Those that nobody has; the last is the one to take, or `make` one."""
         self.made = 0
         self.freed = 0
 
     @property
     def lent(self) -> int:
         """How many memories are out."""
-        return self.made - self.freed - len(self._spare)
+        return self.made - self.freed - len(self.spare)
 
-    def lend(self) -> Memory:
-        """Return a memory that nobody else has; it is to be given back once."""
-        if self._spare:
-            return self._spare.pop()
+    def make(self) -> Memory:
+        """Return a memory more; its payload gives it back."""
         self.made += 1
         return Memory(self._rcl)
-
-    def give_back(self, memory: Memory) -> None:
-        """Keep the memory for the next, or free it."""
-        if len(self._spare) < _SPARE:
-            self._spare.append(memory)
-        else:
-            self.freed += 1
 
 
 class Payload:
@@ -101,11 +93,18 @@ class Payload:
     So it may serve several groups and several sets, and none of them has to say when it is done.
     """
 
-    __slots__ = ("_pool", "memory")
+    __slots__ = ("_pool", "content", "memory", "received")
 
-    def __init__(self, memory: Memory, pool: Pool) -> None:
+    def __init__(self, memory: Memory, pool: Pool, received: int) -> None:
         self.memory = memory
+        self.received = received
+        self.content = memory.content
         self._pool = pool
 
     def __del__(self) -> None:
-        self._pool.give_back(self.memory)
+        # Done for each message, as is taking a spare one: a call more would cost more than what it does.
+        pool = self._pool
+        if len(pool.spare) < _SPARE:
+            pool.spare.append(self.memory)
+        else:
+            pool.freed += 1

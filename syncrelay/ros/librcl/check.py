@@ -18,10 +18,10 @@ from syncrelay.ros.librcl.rcl import Allocator, MessageInfo, Rcl, RclCallError, 
 
 _MARGIN: Final = 256
 _UNTOUCHED: Final = 0xA5
-_PATIENCE_NS: Final = 10_000_000_000
+PATIENCE_NS: Final = 10_000_000_000
 _ROOM: Final = 17
 # A Time of 1 s and 2 ns, little-endian.
-_PAYLOAD: Final = bytes([0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0])
+PAYLOAD: Final = bytes([0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0])
 
 
 class LibrclUnusableError(Exception):
@@ -79,23 +79,23 @@ def _check_there_and_back(rcl: Rcl, node: Any) -> None:
     backend = LibrclBackend(rcl)
     changes = backend.graph_changes(node)
     changes.seen()
-    with _endpoints(node) as (subscription, publisher):
+    with endpoints(node) as (subscription, publisher):
         _require(changes.seen(), "librcl does not report changes in the graph")
         source, watch = backend.source(subscription, _never_called), backend.watch()
         try:
             watch.add(source)
             watch.wait(0)
-            publisher.handle.publish_raw(_PAYLOAD)
-            _require(source in watch.wait(_PATIENCE_NS)[0], "DDS does not report messages that arrive")
+            publisher.handle.publish_raw(PAYLOAD)
+            _require(source in watch.wait(PATIENCE_NS)[0], "DDS does not report messages that arrive")
             pool = Pool(rcl)
-            memory = pool.lend()
+            memory = pool.make()
             ours = _take_with_margin(rcl, source.address, memory)
-            backend.outlet(publisher).send(Payload(memory, pool))
-            _require(source in watch.wait(_PATIENCE_NS)[0], "DDS does not get what is published in librcl")
+            backend.outlet(publisher).send(Payload(memory, pool, 0))
+            _require(source in watch.wait(PATIENCE_NS)[0], "DDS does not get what is published in librcl")
             theirs = subscription.handle.take_message(Time, True)  # noqa: FBT003  rclpy's signature
         finally:
             watch.close()
-    _require(theirs is not None and theirs[0] == _PAYLOAD, "a message published in librcl comes back changed")
+    _require(theirs is not None and theirs[0] == PAYLOAD, "a message published in librcl comes back changed")
     _compare(ours, theirs[1])
 
 
@@ -105,7 +105,7 @@ def _take_with_margin(rcl: Rcl, subscription: int, memory: Memory) -> MessageInf
     code = rcl.take(pointer(subscription), memory.pointer, byref(roomy), None)
     rcl.require(code, "rcl_take_serialized_message")
     _require_margin(roomy, "rmw_message_info_t")
-    _require(memory.content() == _PAYLOAD, "a message taken in librcl differs from the one published")
+    _require(memory.content() == PAYLOAD, "a message taken in librcl differs from the one published")
     info: MessageInfo = roomy.info
     return info
 
@@ -113,11 +113,11 @@ def _take_with_margin(rcl: Rcl, subscription: int, memory: Memory) -> MessageInf
 def _compare(ours: MessageInfo, theirs: Mapping[str, int]) -> None:
     """Compare what librcl says of the first message with what rclpy says of the second, sent within a moment."""
     for name in ("source_timestamp", "received_timestamp"):
-        _require(0 <= theirs[name] - getattr(ours, name) <= _PATIENCE_NS, f"{name} is not what rclpy says")
+        _require(0 <= theirs[name] - getattr(ours, name) <= PATIENCE_NS, f"{name} is not what rclpy says")
 
 
 @contextmanager
-def _endpoints(node: Any) -> Iterator[tuple[Any, Any]]:
+def endpoints(node: Any) -> Iterator[tuple[Any, Any]]:
     """A raw subscription and a publisher, on a topic that nobody else has and `ros2 topic list` hides."""
     # Of no namespace: one that is long would make the name longer than DDS takes.
     topic = f"/_syncrelay_check_{uuid.uuid4().hex}"

@@ -12,7 +12,7 @@ from contextlib import suppress
 from ctypes import c_void_p, cast
 from typing import Final
 
-from syncrelay.dataflow.backend import Ready
+from syncrelay.dataflow.backend import ALL, Ready
 from syncrelay.ros.librcl.messages import LibrclSource
 from syncrelay.ros.librcl.rcl import Rcl, RclCallError
 
@@ -32,6 +32,7 @@ class EventWatch:
         self._wake = os.eventfd(0, _FLAGS)
         self._epoll.register(self._wake, _EDGE)
         self._forced_at = time.time_ns()
+        self._woken = False
 
     def add(self, source: LibrclSource) -> None:
         """Watch one more source; what it has already is found by the next wait. Raises RclCallError."""
@@ -44,7 +45,7 @@ class EventWatch:
         except RclCallError:
             self._forget(event)
             raise
-        source.force_poll()
+        source.pending = ALL
         os.eventfd_write(event, 1)
 
     def remove(self, source: LibrclSource) -> None:
@@ -64,6 +65,7 @@ class EventWatch:
 
     def wait(self, timeout_ns: int) -> Ready:
         """Wait until a source gets messages, for the timeout at most, or until a wake."""
+        self._woken = False
         ready = self._heard(self._epoll.poll(timeout_ns / _NS_PER_SECOND))
         seen_until = time.time_ns()
         if seen_until - self._forced_at >= _NS_PER_SECOND or seen_until < self._forced_at:
@@ -72,7 +74,7 @@ class EventWatch:
         # a single message, as nearly always: DDS has reported what came before, or is about to.
         if len(ready) > 1 or (ready and ready[0].pending > 1):
             ready += [source for source in self._heard(self._epoll.poll(0)) if source not in ready]
-        return ready, seen_until
+        return ready, seen_until, self._woken
 
     def _heard(self, events: Sequence[tuple[int, int]]) -> list[LibrclSource]:
         """Add to each source the messages that DDS reported."""
@@ -81,14 +83,16 @@ class EventWatch:
             if (source := self._sources.get(event)) is not None:
                 source.pending += os.eventfd_read(event)
                 ready.append(source)
+            else:
+                self._woken = True
         return ready
 
     def _poll_all(self, now: int) -> Ready:
         """Poll all sources, once a second: an event that was never written must not silence a topic."""
         self._forced_at = now
         for source in self._sources.values():
-            source.force_poll()
-        return list(self._sources.values()), now
+            source.pending = ALL
+        return list(self._sources.values()), now, self._woken
 
     def wake(self) -> None:
         """Have `wait` return. Any thread."""

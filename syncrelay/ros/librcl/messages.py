@@ -6,12 +6,9 @@ from typing import Any, Final
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.cdr import STAMP_BYTES, write_stamp
-from syncrelay.dataflow.backend import Deliver, PublishError, Taken
+from syncrelay.dataflow.backend import Deliver, PublishError
 from syncrelay.ros.librcl.buffers import OwnMessage, Payload, Pool
 from syncrelay.ros.librcl.rcl import NOTHING_TAKEN, MessageInfo, Rcl, RclCallError, pointer
-
-# More than any history holds.
-_ALL: Final = 2**62
 
 
 class LibrclSource:
@@ -31,12 +28,11 @@ class LibrclSource:
         self._call = rcl.take
         self._info = MessageInfo()
         self._info_pointer = byref(self._info)
-        self._next = self._pool.lend()
+        self._spare = pool.spare
+        self._next = pool.make()
 
-    def take(self) -> Taken | None:
-        """Take its oldest message; None if none is pending. Raises RclCallError."""
-        if not self.pending:
-            return None
+    def take(self) -> Payload | None:
+        """Take its oldest message; None if there is none after all. Raises RclCallError."""
         memory = self._next
         code = self._call(self._pointer, memory.pointer, self._info_pointer, None)
         if code:
@@ -46,12 +42,8 @@ class LibrclSource:
             self.pending = 0
             return None
         self.pending -= 1
-        self._next = self._pool.lend()
-        return self._info.received_timestamp, Payload(memory, self._pool), memory.content()
-
-    def force_poll(self) -> None:
-        """Have `take` ask librcl until there are no more."""
-        self.pending = _ALL
+        self._next = self._spare.pop() if self._spare else self._pool.make()
+        return Payload(memory, self._pool, self._info.received_timestamp)
 
 
 class LibrclOutlet:
@@ -77,7 +69,7 @@ class LibrclOutlet:
 
     def send_stamped(self, payload: Payload, stamp: int) -> None:
         """Publish a payload with this stamp, and put its own back: another set may hold it too."""
-        content = payload.memory.content()
+        content = payload.content()
         own = bytes(content[STAMP_BYTES])
         write_stamp(content, stamp)
         try:

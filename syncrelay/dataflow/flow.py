@@ -1,0 +1,135 @@
+"""The way of a message through its group: its stamp is read, the engine matches it, its set leaves on the outlets."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Hashable, Sequence
+from typing import Final, NamedTuple, Protocol, Self, TypeAlias
+
+from syncrelay.cdr import read_stamp
+from syncrelay.dataflow.backend import Deliver, Outlet, Payload, PublishError
+from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
+from syncrelay.explain import RecentDrop
+from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
+
+Engine: TypeAlias = SyncGroup | PausedEngine | StoppedEngine
+Stamps: TypeAlias = tuple[int | None, ...]
+"""Stamps of a set in input order, in nanoseconds; None where a message was missing."""
+
+# Enough for the widest terminal's strip of recent sets.
+RECENT: Final = 256
+# What is kept between two evaluations: at 1 kHz they may be 10 s apart.
+_WATCHED: Final = 10_000
+
+
+class Watched(NamedTuple):
+    """Stamps and times of receipt of each input's messages, and stamps and latency of each set; in nanoseconds."""
+
+    arrivals: tuple[deque[tuple[int, int]], ...]
+    sets: deque[tuple[Stamps, int]]
+
+    @classmethod
+    def none_of(cls, n_inputs: int) -> Self:
+        """Return what is filled next."""
+        return cls(tuple([deque(maxlen=_WATCHED) for _ in range(n_inputs)]), deque(maxlen=_WATCHED))
+
+
+class Told(Protocol):
+    """Hears what becomes of what leaves."""
+
+    def refused(self, index: int, outlet: Outlet, why: str) -> None:
+        """An outlet did not publish a message of this input."""
+        ...
+
+    def accepted(self, index: int, outlet: Outlet) -> None:
+        """An outlet published a message; told while one of the last was refused."""
+        ...
+
+
+class Flow:
+    """Feeds an engine on the receive thread and publishes the sets that it gives. What it raises stops its group."""
+
+    def __init__(self, engine: Engine, *, n_inputs: int, now: Callable[[], int], told: Told) -> None:
+        self.engine = engine
+        self.outlets: list[Outlet | None] = [None] * n_inputs
+        self.restamped = [False] * n_inputs
+        """Which inputs' payloads begin with a Header, whose stamp the set's common stamp replaces."""
+        self.keys: list[Hashable] = [None] * n_inputs
+        """What the newest messages are matched by."""
+        self.last: deque[Stamps | RecentDrop] = deque(maxlen=RECENT)
+        """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
+        self.n_sets = 0
+        """How many sets left: what manifests number them by."""
+        self.all_accepted = True
+        """Whether the last message of each input was published."""
+        self.tell: Callable[[Match, int], None] | None = None
+        """Hears of each set that left, and of its latency in nanoseconds."""
+        self._now = now
+        self._told = told
+        self._watched = Watched.none_of(n_inputs)
+
+    def watched(self) -> Watched:
+        """Give what came and left since this was last asked for."""
+        watched, self._watched = self._watched, Watched.none_of(len(self.outlets))
+        return watched
+
+    def by_header(self, index: int, fail: Callable[[Exception], None]) -> Deliver:
+        """What takes an input's payloads that begin with a Header. It raises nothing: an exception goes to `fail`."""
+
+        # A `try` costs nothing where nothing is raised; one more call for each message would.
+        def deliver(payload: Payload) -> None:
+            try:
+                self.receive(index, payload, read_stamp(payload.content()))
+            except Exception as error:  # noqa: BLE001  nobody else on the topic is to suffer
+                fail(error)
+
+        return deliver
+
+    def receive(self, index: int, payload: Payload, stamp: int | None, key: Hashable = None) -> None:
+        """Take in a message of one input, whose stamp, in nanoseconds, is None where it or the key cannot be read."""
+        if stamp is None:
+            self.conclude([self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED)])
+            return
+        self._watched.arrivals[index].append((stamp, payload.received))
+        if key is not None:
+            self.keys[index] = key
+        outcomes = self.engine.add(Message(index, stamp, payload, key), now=self._now())
+        if outcomes:
+            self.conclude(outcomes)
+
+    def conclude(self, outcomes: Sequence[Match | Drop]) -> None:
+        """Publish the sets among these, and note what left."""
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                newest = self._send(outcome)
+                stamps, latency = outcome.stamps, time.time_ns() - newest
+                self._watched.sets.append((stamps, latency))
+                self.last.append(stamps)
+                self.n_sets += 1
+                if self.tell is not None:
+                    self.tell(outcome, latency)
+            else:
+                message = outcome.message
+                self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
+
+    def _send(self, match: Match) -> int:
+        """Publish a set; when its newest message was received."""
+        newest = 0
+        for message in match.messages:
+            if message is None:
+                continue
+            index, payload = message.input, message.payload
+            newest = max(newest, payload.received)
+            outlet = self.outlets[index]
+            if outlet is None:
+                continue
+            try:
+                if match.stamp is not None and self.restamped[index]:
+                    outlet.send_stamped(payload, match.stamp)
+                else:
+                    outlet.send(payload)
+            except PublishError as error:
+                self._told.refused(index, outlet, str(error))
+            else:
+                if not self.all_accepted:
+                    self._told.accepted(index, outlet)
+        return newest

@@ -1,0 +1,1 @@
+"""The path through librcl in machine code, where it was built."""

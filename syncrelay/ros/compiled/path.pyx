@@ -1,0 +1,735 @@
+# cython: language_level=3, boundscheck=False, wraparound=False
+"""The way of a message in machine code: the inbox, payloads, outlets and flow that the Python modules of these names
+describe, for librcl. dataflow/inbox.py, backlog.py and flow.py, and ros/librcl/ are what to read; this does the same.
+
+It is built without ROS: whoever uses it hands over the addresses of librcl's functions, and proves at the start that
+they do what is expected (check.py).
+"""
+
+import time
+from collections import deque
+
+from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.flow import RECENT, Watched
+from syncrelay.explain import RecentDrop
+from syncrelay.ros.librcl.rcl import RclCallError
+from syncrelay.sync import DropReason, Match, Message
+
+cimport cython
+from cpython.memoryview cimport PyMemoryView_FromMemory
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t, uintptr_t
+from libc.stdlib cimport calloc, free
+from libc.string cimport memcpy
+
+
+cdef extern from *:
+    """
+    #include <errno.h>
+    #include <limits.h>
+    #include <linux/futex.h>
+    #include <stdint.h>
+    #include <sys/syscall.h>
+    #include <time.h>
+    #include <unistd.h>
+
+    /* Where the loop sleeps. What comes rings; only who rings while it sleeps pays for a system call. */
+    enum { AWAKE = 0, RUNG = 1, ASLEEP = 2 };
+    typedef struct { uint32_t state; uint32_t woken; } sr_bell;
+    /* What DDS reports of one subscription. */
+    typedef struct { sr_bell * bell; uint64_t reported; } sr_signal;
+
+    static void sr_ring(sr_bell * bell)
+    {
+      if (__atomic_exchange_n(&bell->state, RUNG, __ATOMIC_SEQ_CST) == ASLEEP) {
+        syscall(SYS_futex, &bell->state, FUTEX_WAKE | FUTEX_PRIVATE_FLAG, 1, NULL, NULL, 0);
+      }
+    }
+
+    /* rcl_event_callback_t, called on DDS's threads. */
+    static void sr_on_new_message(const void * user, size_t count)
+    {
+      sr_signal * signal = (sr_signal *)user;
+      __atomic_fetch_add(&signal->reported, count, __ATOMIC_SEQ_CST);
+      sr_ring(signal->bell);
+    }
+
+    static void sr_wake(sr_bell * bell)
+    {
+      __atomic_store_n(&bell->woken, 1, __ATOMIC_SEQ_CST);
+      sr_ring(bell);
+    }
+
+    /* Whether it has rung since it was last heard. */
+    static int sr_heard(sr_bell * bell)
+    {
+      return __atomic_exchange_n(&bell->state, AWAKE, __ATOMIC_SEQ_CST) == RUNG;
+    }
+
+    static void sr_sleep(sr_bell * bell, int64_t longest_ns)
+    {
+      uint32_t awake = AWAKE;
+      if (__atomic_compare_exchange_n(&bell->state, &awake, ASLEEP, 0, __ATOMIC_SEQ_CST, __ATOMIC_SEQ_CST)) {
+        struct timespec longest = { longest_ns / 1000000000, longest_ns % 1000000000 };
+        syscall(SYS_futex, &bell->state, FUTEX_WAIT | FUTEX_PRIVATE_FLAG, ASLEEP, &longest, NULL, 0);
+      }
+    }
+
+    static int sr_was_woken(sr_bell * bell)
+    {
+      return (int)__atomic_exchange_n(&bell->woken, 0, __ATOMIC_SEQ_CST);
+    }
+
+    static uint64_t sr_reported(sr_signal * signal)
+    {
+      return __atomic_load_n(&signal->reported, __ATOMIC_SEQ_CST)
+        ? __atomic_exchange_n(&signal->reported, 0, __ATOMIC_SEQ_CST) : 0;
+    }
+
+    static int64_t sr_clock(clockid_t clock)
+    {
+      struct timespec now;
+      clock_gettime(clock, &now);
+      return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+    }
+
+    static void sr_rest(int64_t ns)
+    {
+      struct timespec rest = { ns / 1000000000, ns % 1000000000 };
+      nanosleep(&rest, NULL);
+    }
+    """
+    ctypedef struct sr_bell:
+        pass
+    ctypedef struct sr_signal:
+        sr_bell * bell
+    void sr_on_new_message(const void * user, size_t count) noexcept nogil
+    void sr_wake(sr_bell *) noexcept nogil
+    bint sr_heard(sr_bell *) noexcept nogil
+    void sr_sleep(sr_bell *, int64_t) noexcept nogil
+    bint sr_was_woken(sr_bell *) noexcept nogil
+    uint64_t sr_reported(sr_signal *) noexcept nogil
+    int64_t sr_clock(int) noexcept nogil
+    void sr_rest(int64_t) noexcept nogil
+    int CLOCK_REALTIME
+    int CLOCK_MONOTONIC
+
+
+# As in ros/librcl/rcl.py.
+ctypedef struct Allocator:
+    void * allocate
+    void * deallocate
+    void * reallocate
+    void * zero_allocate
+    void * state
+
+ctypedef struct SerializedMessage:
+    uint8_t * buffer
+    size_t length
+    size_t capacity
+    Allocator allocator
+
+ctypedef struct Gid:
+    void * implementation_identifier
+    uint8_t data[16]
+
+ctypedef struct MessageInfo:
+    int64_t source_timestamp
+    int64_t received_timestamp
+    uint64_t publication_sequence_number
+    uint64_t reception_sequence_number
+    Gid publisher_gid
+    uint8_t from_intra_process
+
+SIZES = (sizeof(Allocator), sizeof(SerializedMessage), sizeof(MessageInfo))
+
+cdef enum:
+    NOTHING_TAKEN = 401
+    SPARE = 8
+    BATCH = 256
+
+cdef int64_t SECOND = 1_000_000_000
+# More than any history holds.
+cdef uint64_t ALL = <uint64_t>1 << 62
+
+
+# Without the collector's part: no cycle goes through these three, and a memory that ends needs the others.
+@cython.final
+@cython.no_gc
+cdef class Functions:
+    """librcl's functions by their addresses; `require` raises what a code of theirs says."""
+
+    cdef int (*take)(const void *, SerializedMessage *, MessageInfo *, void *) noexcept nogil
+    cdef int (*publish)(const void *, const SerializedMessage *, void *) noexcept nogil
+    cdef int (*array_init)(SerializedMessage *, size_t, const Allocator *) noexcept nogil
+    cdef int (*array_fini)(SerializedMessage *) noexcept nogil
+    cdef int (*set_on_new_message)(const void *, void (*)(const void *, size_t) noexcept nogil, const void *) noexcept nogil
+    cdef Allocator allocator
+    cdef object require
+
+    def __init__(self, *, take, publish, array_init, array_fini, set_on_new_message, allocator, require):
+        self.take = <int (*)(const void *, SerializedMessage *, MessageInfo *, void *) noexcept nogil><uintptr_t>take
+        self.publish = <int (*)(const void *, const SerializedMessage *, void *) noexcept nogil><uintptr_t>publish
+        self.array_init = <int (*)(SerializedMessage *, size_t, const Allocator *) noexcept nogil><uintptr_t>array_init
+        self.array_fini = <int (*)(SerializedMessage *) noexcept nogil><uintptr_t>array_fini
+        self.set_on_new_message = <int (*)(const void *, void (*)(const void *, size_t) noexcept nogil, const void *) noexcept nogil><uintptr_t>set_on_new_message
+        cdef const uint8_t[::1] content = allocator
+        memcpy(&self.allocator, &content[0], sizeof(Allocator))
+        self.require = require
+
+
+@cython.final
+@cython.no_gc
+cdef class Pool:
+    """Memories of one subscription, whose messages are of like size."""
+
+    cdef Functions functions
+    cdef SerializedMessage * spare[SPARE]
+    cdef int n_spare
+    cdef readonly int made, freed
+
+    def __init__(self, Functions functions):
+        self.functions = functions
+
+    @property
+    def lent(self):
+        """How many memories are out."""
+        return self.made - self.freed - self.n_spare
+
+    cdef SerializedMessage * lend(self) except NULL:
+        if self.n_spare:
+            self.n_spare -= 1
+            return self.spare[self.n_spare]
+        cdef SerializedMessage * message = <SerializedMessage *>calloc(1, sizeof(SerializedMessage))
+        if message == NULL:
+            raise MemoryError
+        if self.functions.array_init(message, 0, &self.functions.allocator):
+            free(message)
+            raise MemoryError
+        self.made += 1
+        return message
+
+    cdef void give_back(self, SerializedMessage * message) noexcept:
+        if self.n_spare < SPARE:
+            self.spare[self.n_spare] = message
+            self.n_spare += 1
+        else:
+            self.freed += 1
+            self._free(message)
+
+    cdef void _free(self, SerializedMessage * message) noexcept:
+        self.functions.array_fini(message)
+        free(message)
+
+    def __dealloc__(self):
+        while self.n_spare:
+            self.n_spare -= 1
+            self._free(self.spare[self.n_spare])
+
+
+@cython.final
+@cython.no_gc
+@cython.freelist(64)
+cdef class Payload:
+    """One message; when nobody refers to it, its memory goes back."""
+
+    cdef Pool pool
+    cdef SerializedMessage * message
+    cdef readonly int64_t received
+
+    def content(self):
+        """The message's bytes where they lie: writable, and valid as long as the payload."""
+        return PyMemoryView_FromMemory(<char *>self.message.buffer, self.message.length, 0x200)
+
+    def __dealloc__(self):
+        if self.message != NULL:
+            self.pool.give_back(self.message)
+
+
+@cython.final
+@cython.no_gc_clear
+cdef class Source:
+    """A subscription drained by librcl."""
+
+    cdef public int64_t waited
+    cdef public uint64_t pending
+    cdef readonly Pool pool
+    cdef readonly object address
+    cdef Functions functions
+    cdef const void * subscription
+    cdef object owner
+    cdef sr_signal * signal
+    cdef SerializedMessage * next
+    cdef Payload held
+    cdef object _deliver
+    cdef Deliver _by_header
+
+    def __init__(self, Functions functions, subscription, deliver):
+        self.functions, self.owner, self.pool = functions, subscription, Pool(functions)
+        self.address = subscription.handle.pointer
+        self.subscription = <const void *><uintptr_t>self.address
+        self.next = self.pool.lend()
+        self.deliver = deliver
+
+    @property
+    def deliver(self):
+        return self._deliver
+
+    @deliver.setter
+    def deliver(self, deliver):
+        self._deliver = deliver
+        self._by_header = deliver if isinstance(deliver, Deliver) else None
+
+    def take(self):
+        """Take its oldest message; None if there is none after all. Raises RclCallError."""
+        return self._take()
+
+    cdef Payload _take(self):
+        cdef MessageInfo info
+        cdef SerializedMessage * message = self.next
+        cdef int code
+        with nogil:
+            code = self.functions.take(self.subscription, message, &info, NULL)
+        if code:
+            if code != NOTHING_TAKEN:
+                self.functions.require(code, "rcl_take_serialized_message")
+            # A full history has replaced some of those that were pending.
+            self.pending = 0
+            return None
+        self.pending -= 1
+        self.next = self.pool.lend()
+        cdef Payload payload = Payload.__new__(Payload)
+        payload.pool, payload.message, payload.received = self.pool, message, info.received_timestamp
+        return payload
+
+    cdef int _give(self, Payload payload, int64_t until) except -1:
+        if until - payload.received > self.waited:
+            self.waited = until - payload.received
+        if self._by_header is not None:
+            self._by_header.give(payload)
+        else:
+            self._deliver(payload)
+        return 0
+
+    cdef int _listen(self, sr_bell * bell) except -1:
+        """Have the bell rung when messages come; what is there already is found by the next poll."""
+        self.signal = <sr_signal *>calloc(1, sizeof(sr_signal))
+        if self.signal == NULL:
+            raise MemoryError
+        self.signal.bell = bell
+        cdef int code = self.functions.set_on_new_message(self.subscription, sr_on_new_message, self.signal)
+        if code:
+            free(self.signal)
+            self.signal = NULL
+            self.functions.require(code, "rcl_subscription_set_on_new_message_callback")
+        self.pending = ALL
+        return 0
+
+    cdef bint _leave(self) noexcept:
+        """Have no bell rung; whether that is certain. Else what DDS would write to stays."""
+        cdef int code = self.functions.set_on_new_message(self.subscription, NULL, NULL)
+        if not code:
+            free(self.signal)
+        self.signal = NULL
+        return not code
+
+    def __dealloc__(self):
+        if self.next != NULL:
+            self.pool.give_back(self.next)
+
+
+@cython.final
+cdef class Inbox:
+    """Waits for what DDS reports and delivers it by the time of receipt; as PolledInbox on an EventWatch."""
+
+    cdef readonly dict failed
+    cdef list sources
+    cdef Py_ssize_t n_held
+    cdef sr_bell * bell
+    cdef bint is_left
+    cdef int64_t coalesce, force_every, forced_at
+
+    def __cinit__(self):
+        self.bell = <sr_bell *>calloc(1, sizeof(sr_bell))
+        if self.bell == NULL:
+            raise MemoryError
+
+    def __init__(self, *, coalesce_ns=0, force_ns=SECOND):
+        self.failed, self.sources, self.coalesce, self.force_every = {}, [], coalesce_ns, force_ns
+        self.is_left = True
+        self.forced_at = sr_clock(CLOCK_REALTIME)
+
+    def __dealloc__(self):
+        # What DDS might still write to is left.
+        if self.is_left:
+            free(self.bell)
+
+    def add(self, Source source):
+        """Drain one more source; raises RclCallError."""
+        source._listen(self.bell)
+        self.sources.append(source)
+        sr_wake(self.bell)
+
+    def remove(self, Source source):
+        """Deliver what is held of a source, and drain it no longer."""
+        cdef Payload payload
+        if source.held is not None:
+            payload = self._release(source)
+            self._hand_on(source, payload, payload.received)
+        self.failed.pop(source, None)
+        if source in self.sources:
+            self.sources.remove(source)
+            if not source._leave():
+                self.is_left = False
+
+    def receive(self, int64_t longest_ns):
+        """Deliver what comes for so long, or until a wake or a failure."""
+        cdef int64_t end = sr_clock(CLOCK_MONOTONIC) + longest_ns
+        cdef int64_t rest = longest_ns
+        while rest > 0 and not (self._turn(rest) or self.failed):
+            rest = end - sr_clock(CLOCK_MONOTONIC)
+
+    def receive_once(self, int64_t longest_ns):
+        """Wait for messages, for so long at most or until a wake, and deliver them."""
+        self._turn(longest_ns)
+
+    cdef int _turn(self, int64_t longest_ns) except -1:
+        """Receive once; whether there was a wake."""
+        cdef Source source, only = None
+        cdef Py_ssize_t n_ready = 0
+        cdef int64_t now
+        if not self.n_held:
+            if not sr_heard(self.bell):
+                with nogil:
+                    sr_sleep(self.bell, longest_ns)
+                    if sr_heard(self.bell) and self.coalesce:
+                        sr_rest(self.coalesce)
+            elif self.coalesce:
+                with nogil:
+                    sr_rest(self.coalesce)
+        else:
+            sr_heard(self.bell)
+        cdef int woken = sr_was_woken(self.bell)
+        now = sr_clock(CLOCK_REALTIME)
+        # Now and then all are polled: a report that was never made must not silence a topic.
+        cdef bint force = now - self.forced_at >= self.force_every or now < self.forced_at
+        if force:
+            self.forced_at = now
+        for source in self.sources:
+            source.pending = ALL if force else source.pending + sr_reported(source.signal)
+            if source.pending:
+                n_ready += 1
+                only = source
+        if n_ready == 1 and not self.n_held:
+            self._deliver_alone(only, now)
+        elif n_ready or self.n_held:
+            self._fill()
+            self._deliver(now, BATCH)
+        return woken
+
+    def deliver_all(self):
+        """Deliver what was received until now, however much it is."""
+        cdef Source source
+        for source in self.sources:
+            source.pending = ALL
+        self._fill()
+        self._deliver(sr_clock(CLOCK_REALTIME), -1)
+
+    def deliver_held(self):
+        """Deliver what was taken and held, at the end: nothing more is taken."""
+        cdef Source source = self._first()
+        cdef Payload payload
+        while source is not None:
+            payload = self._release(source)
+            self._hand_on(source, payload, payload.received)
+            source = self._first()
+
+    cdef int _deliver_alone(self, Source source, int64_t until) except -1:
+        """Deliver what one source has, a batch at most: nearly always, and without any sorting."""
+        cdef Payload payload
+        cdef int n
+        try:
+            for n in range(BATCH + 1):
+                if not source.pending:
+                    return 0
+                payload = source._take()
+                if payload is None:
+                    return 0
+                if n == BATCH or payload.received > until:
+                    source.held = payload
+                    self.n_held += 1
+                    return 0
+                source._give(payload, until)
+        except Exception as error:
+            self.failed[source] = error
+        return 0
+
+    cdef int _fill(self) except -1:
+        """Take one message of each source of which none is held."""
+        cdef Source source
+        for source in list(self.sources):
+            if source.held is None:
+                self._hold(source)
+        return 0
+
+    cdef int _deliver(self, int64_t until, int most) except -1:
+        """Deliver the oldest first, up to a time; so many at most, or without end if that is negative."""
+        cdef Source source
+        while most:
+            source = self._first()
+            if source is None or source.held.received > until:
+                return 0
+            self._hand_on(source, self._release(source), until)
+            self._hold(source)
+            most -= 1
+        return 0
+
+    cdef Source _first(self):
+        """The source of which the oldest message is held."""
+        cdef Source source, first = None
+        if self.n_held:
+            for source in self.sources:
+                if source.held is not None and (first is None or source.held.received < first.held.received):
+                    first = source
+        return first
+
+    cdef Payload _release(self, Source source):
+        cdef Payload payload = source.held
+        source.held = None
+        self.n_held -= 1
+        return payload
+
+    cdef int _hold(self, Source source) except -1:
+        if not source.pending:
+            return 0
+        try:
+            source.held = source._take()
+        except Exception as error:
+            self.failed[source] = error
+            return 0
+        if source.held is not None:
+            self.n_held += 1
+        return 0
+
+    cdef int _hand_on(self, Source source, Payload payload, int64_t until) except -1:
+        try:
+            source._give(payload, until)
+        except Exception as error:
+            self.failed[source] = error
+        return 0
+
+    def wake(self):
+        """Have `receive` return. Any thread."""
+        sr_wake(self.bell)
+
+    def close(self):
+        """Leave the sources that are left."""
+        for source in list(self.sources):
+            self.remove(source)
+
+
+cdef class Outlet:
+    """A publisher that librcl sends through."""
+
+    cdef readonly object topic
+    cdef public uint64_t sent
+    cdef Functions functions
+    cdef object owner
+    cdef const void * publisher
+
+    def __init__(self, Functions functions, publisher):
+        self.functions, self.owner, self.topic = functions, publisher, publisher.topic_name
+        self.publisher = <const void *><uintptr_t>publisher.handle.pointer
+
+    cdef int _send(self, Payload payload) except -1:
+        cdef int code
+        with nogil:
+            code = self.functions.publish(self.publisher, payload.message, NULL)
+        if code:
+            self._fail(code)
+        self.sent += 1
+        return 0
+
+    cdef int _send_stamped(self, Payload payload, object stamp) except -1:
+        cdef uint8_t * place = payload.message.buffer
+        cdef uint8_t own[8]
+        if payload.message.length < 12 or place[0] or place[1] not in (0, 1, 6, 7):
+            raise ValueError("the payload has no stamp to patch")
+        seconds, nanoseconds = divmod(stamp, SECOND)
+        if not -(2**31) <= seconds < 2**31:
+            raise ValueError(f"a stamp of {stamp} ns does not fit builtin_interfaces/Time")
+        memcpy(own, place + 4, 8)
+        _write(place + 4, <uint32_t><int32_t>seconds, <uint32_t>nanoseconds, place[1] & 1)
+        try:
+            self._send(payload)
+        finally:
+            memcpy(place + 4, own, 8)
+        return 0
+
+    def send(self, Payload payload):
+        """Publish a payload unchanged. Raises PublishError."""
+        self._send(payload)
+
+    def send_stamped(self, Payload payload, stamp):
+        """Publish a payload with this stamp, and put its own back: another set may hold it too."""
+        self._send_stamped(payload, stamp)
+
+    def _fail(self, code):
+        try:
+            self.functions.require(code, "rcl_publish_serialized_message")
+        except RclCallError as error:
+            raise PublishError(str(error)) from error
+
+
+cdef void _write(uint8_t * place, uint32_t seconds, uint32_t nanoseconds, bint is_little) noexcept nogil:
+    cdef int n, shift
+    for n in range(4):
+        shift = 8 * n if is_little else 24 - 8 * n
+        place[n] = <uint8_t>(seconds >> shift)
+        place[4 + n] = <uint8_t>(nanoseconds >> shift)
+
+
+cdef uint32_t _number(const uint8_t * place, bint is_little) noexcept nogil:
+    if is_little:
+        return place[0] | <uint32_t>place[1] << 8 | <uint32_t>place[2] << 16 | <uint32_t>place[3] << 24
+    return place[3] | <uint32_t>place[2] << 8 | <uint32_t>place[1] << 16 | <uint32_t>place[0] << 24
+
+
+cdef bint read_stamp(const uint8_t * content, size_t length, int64_t * stamp) noexcept nogil:
+    """As cdr.read_stamp; whether there is one."""
+    if length < 12 or content[0] or content[1] not in (0, 1, 6, 7):
+        return False
+    cdef int32_t seconds = <int32_t>_number(content + 4, content[1] & 1)
+    cdef uint32_t nanoseconds = _number(content + 8, content[1] & 1)
+    stamp[0] = seconds * SECOND + nanoseconds
+    return nanoseconds < SECOND
+
+
+def stamp_of(bytes content):
+    """Return the stamp of a payload, or None; for tests."""
+    cdef int64_t stamp
+    return stamp if read_stamp(content, len(content), &stamp) else None
+
+
+@cython.final
+cdef class Deliver:
+    """What takes an input's payloads that begin with a Header; what it raises goes to `fail`."""
+
+    cdef Flow flow
+    cdef Py_ssize_t index
+    cdef object fail
+
+    def __call__(self, Payload payload):
+        self.give(payload)
+
+    cdef int give(self, Payload payload) except -1:
+        cdef int64_t stamp
+        try:
+            if read_stamp(payload.message.buffer, payload.message.length, &stamp):
+                self.flow.feed(self.index, payload, stamp, None)
+            else:
+                self.flow.reject(self.index, payload)
+        except Exception as error:
+            self.fail(error)
+        return 0
+
+
+cdef class Flow:
+    """As dataflow.flow.Flow."""
+
+    cdef public object engine, tell
+    cdef public list outlets, restamped, keys
+    cdef readonly object last
+    cdef readonly int64_t n_sets
+    cdef public bint all_accepted
+    cdef object _now, _told, _watched, _note_left, _note_set
+    cdef list _note_arrival
+
+    def __init__(self, engine, *, n_inputs, now, told):
+        self.engine, self.tell, self._told, self.n_sets = engine, None, told, 0
+        self.outlets, self.restamped, self.keys = [None] * n_inputs, [False] * n_inputs, [None] * n_inputs
+        self.last = deque(maxlen=RECENT)
+        self._note_left = self.last.append
+        self.all_accepted = True
+        self._now = None if now is time.monotonic_ns else now
+        self._watch()
+
+    def watched(self):
+        """Give what came and left since this was last asked for."""
+        watched = self._watched
+        self._watch()
+        return watched
+
+    def _watch(self):
+        self._watched = Watched.none_of(len(self.outlets))
+        self._note_arrival = [arrivals.append for arrivals in self._watched.arrivals]
+        self._note_set = self._watched.sets.append
+
+    def by_header(self, index, fail):
+        """What takes an input's payloads that begin with a Header."""
+        cdef Deliver deliver = Deliver.__new__(Deliver)
+        deliver.flow, deliver.index, deliver.fail = self, index, fail
+        return deliver
+
+    def receive(self, Py_ssize_t index, payload, stamp, key=None):
+        """Take in a message of one input, whose stamp, in nanoseconds, is None where it or the key cannot be read."""
+        if stamp is None:
+            self.reject(index, payload)
+        else:
+            self.feed(index, payload, stamp, key)
+
+    cdef int reject(self, Py_ssize_t index, object payload) except -1:
+        self.conclude((self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED),))
+        return 0
+
+    cdef int feed(self, Py_ssize_t index, object payload, object stamp, object key) except -1:
+        cdef object now = sr_clock(CLOCK_MONOTONIC) if self._now is None else self._now()
+        self._note_arrival[index]((stamp, payload.received))
+        if key is not None:
+            self.keys[index] = key
+        outcomes = self.engine.add(Message(index, stamp, payload, key), now=now)
+        if outcomes:
+            self.conclude(outcomes)
+        return 0
+
+    cpdef conclude(self, outcomes):
+        """Publish the sets among these, and note what left."""
+        cdef object latency
+        for outcome in outcomes:
+            if isinstance(outcome, Match):
+                newest = self._send(outcome)
+                stamps = tuple([None if message is None else message.stamp for message in outcome.messages])
+                latency = sr_clock(CLOCK_REALTIME) - newest
+                self._note_set((stamps, latency))
+                self._note_left(stamps)
+                self.n_sets += 1
+                if self.tell is not None:
+                    self.tell(outcome, latency)
+            else:
+                message = outcome.message
+                self._note_left(RecentDrop(message.input, message.stamp, outcome.reason))
+
+    cdef object _send(self, match):
+        """Publish a set; when its newest message was received."""
+        newest = 0
+        common = match.stamp
+        for message in match.messages:
+            if message is None:
+                continue
+            index, payload = message.input, message.payload
+            newest = max(newest, payload.received)
+            outlet = self.outlets[index]
+            if outlet is None:
+                continue
+            try:
+                if common is not None and self.restamped[index]:
+                    outlet.send_stamped(payload, common)
+                elif isinstance(outlet, Outlet):
+                    (<Outlet>outlet)._send(payload)
+                else:
+                    outlet.send(payload)
+            except PublishError as error:
+                self._told.refused(index, outlet, str(error))
+            else:
+                if not self.all_accepted:
+                    self._told.accepted(index, outlet)
+        return newest
