@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from syncrelay.ros.compiled import source_fingerprint
 from tests.container.docker import IMAGE, docker, run_docker
 from tests.ros.configs import config, inputs
 
@@ -78,6 +79,20 @@ def test_what_is_installed_is_the_code_that_was_copied(in_image):
     assert json.loads(run.stdout) == {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     (version,) = in_image("--version").stdout.split()[1:]
     assert version == tomllib.loads((_ROOT / "pyproject.toml").read_text())["project"]["version"]
+
+
+def test_the_compiled_path_is_in_the_image_without_what_it_was_made_of(in_image):
+    run = in_image(
+        "-c", "import syncrelay.ros.compiled.path as path; print(path.SOURCE)", options=("--entrypoint=python3",)
+    )
+    assert (run.returncode, run.stdout) == (0, f"{source_fingerprint()}\n"), run.stderr
+    left = in_image(
+        "/opt/syncrelay",
+        *("-path", "*/syncrelay/*", "(", "-name", "*.pyx", "-o", "-name", "*.c", ")"),
+        options=("--entrypoint=find",),
+    )
+    assert (left.returncode, left.stdout) == (0, "")
+    assert in_image("-c", "command -v gcc || true", options=("--entrypoint=sh",)).stdout == ""
 
 
 def test_a_relay_without_its_file_says_so(in_image):

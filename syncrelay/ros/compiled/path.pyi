@@ -1,0 +1,3 @@
+SOURCE: str
+
+def answer() -> int: ...
