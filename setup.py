@@ -9,6 +9,7 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import BaseError, CCompilerError
 
 _SOURCE = Path("syncrelay/ros/compiled/path.pyx")
+_FINGERPRINT = hashlib.sha256(_SOURCE.read_bytes()).hexdigest()
 
 
 class _BuildWherePossible(build_ext):
@@ -18,11 +19,16 @@ class _BuildWherePossible(build_ext):
         self.force = True
 
     def build_extension(self, ext: Extension) -> None:
-        # What an earlier build left would be taken for this one's if this one fails.
         built = Path(self.get_ext_fullpath(ext.name))
+        in_clone = _SOURCE.with_name(built.name)
+        # Every venv of this Python that is installed from the clone uses the one that is there.
+        if in_clone.exists() and _FINGERPRINT.encode() in in_clone.read_bytes():
+            if in_clone.absolute() != built.absolute():
+                self.copy_file(in_clone, built)
+            return
+        # An earlier build's would be installed for this one's if this one fails.
+        in_clone.unlink(missing_ok=True)
         built.unlink(missing_ok=True)
-        if self.editable_mode:
-            _SOURCE.with_name(built.name).unlink(missing_ok=True)
         try:
             super().build_extension(ext)
         except (BaseError, CCompilerError) as error:
@@ -31,8 +37,6 @@ class _BuildWherePossible(build_ext):
                 logging.WARNING,
             )
 
-
-_FINGERPRINT = hashlib.sha256(_SOURCE.read_bytes()).hexdigest()
 
 setup(
     ext_modules=[

@@ -1,3 +1,1 @@
 SOURCE: str
-
-def answer() -> int: ...
