@@ -4,9 +4,11 @@ VENV ?= .venv
 # The extra that brings ROS.
 ROS ?= ros
 BIN := $(VENV)/bin
+# A change of these takes a new installation: the compiled path is built by it.
+BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container test-workspace faults soak lint schema bench clean
+.PHONY: demo test test-kilted test-container test-workspace faults soak lint schema bench wheel clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -52,18 +54,22 @@ bench: $(VENV)/test
 	$(BIN)/python bench/engine.py
 	$(BIN)/python bench/relay.py
 
+# What a release hands out, built and tried: an sdist, and a wheel for this machine and this Python.
+wheel: $(BIN)/python
+	.ci/wheel $(BIN)/python
+
 clean:
-	rm -rf .venv* build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv* build dist *.egg-info syncrelay/ros/compiled/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or 3.12 is needed: apt-get install python3 python3-venv" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV) || { apt-get update && apt-get install -y python3-venv && $(PYTHON) -m venv $(VENV); }
 
-$(VENV)/demo: $(BIN)/python pyproject.toml
+$(VENV)/demo: $(BIN)/python $(BUILT_OF)
 	$(BIN)/python -m pip install -q -e '.[$(ROS)]'
 	touch $@
 
-$(VENV)/test: $(BIN)/python pyproject.toml
+$(VENV)/test: $(BIN)/python $(BUILT_OF)
 	$(BIN)/python -m pip install -q -e '.[$(ROS),test]'
 	touch $@
 

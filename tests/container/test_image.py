@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from syncrelay.ros.compiled import source_fingerprint
 from tests.container.docker import IMAGE, docker, run_docker
 from tests.ros.configs import config, inputs
 
@@ -31,6 +32,13 @@ import syncrelay
 root = Path(syncrelay.__file__).parent
 files = {str(file.relative_to(root)): file.read_bytes() for file in root.rglob("*.py")}
 print(json.dumps({name: hashlib.sha256(content).hexdigest() for name, content in files.items()}))
+"""
+_COMPILED = """
+import json
+from pathlib import Path
+from syncrelay.ros.compiled import path
+files = Path(path.__file__).parent.iterdir()
+print(json.dumps([path.SOURCE, sorted({file.suffix for file in files})]))
 """
 _FAULTY = """\
 version: 1
@@ -78,6 +86,13 @@ def test_what_is_installed_is_the_code_that_was_copied(in_image):
     assert json.loads(run.stdout) == {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     (version,) = in_image("--version").stdout.split()[1:]
     assert version == tomllib.loads((_ROOT / "pyproject.toml").read_text())["project"]["version"]
+
+
+def test_the_compiled_path_is_in_the_image_without_what_it_was_made_of(in_image):
+    run = in_image("-c", _COMPILED, options=("--entrypoint=python3",))
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout) == [source_fingerprint(), ["", ".py", ".so"]]
+    assert in_image("-c", "command -v gcc || true", options=("--entrypoint=sh",)).stdout == ""
 
 
 def test_a_relay_without_its_file_says_so(in_image):

@@ -2,6 +2,7 @@
 
 import pytest
 
+from syncrelay.ros.compiled import source_fingerprint
 from tests.container.docker import HARDENED, ON_ROS, PROBED_EVERY_SECOND, docker
 from tests.container.sets import CONFIG, assert_relayed
 
@@ -42,6 +43,14 @@ def test_ros_comes_from_its_base_what_syncrelay_needs_from_the_image_and_an_over
         ON_ROS,
     )
     assert said.splitlines() == ["/opt/ros/jazzy True overlay", "True"]
+
+
+def test_the_compiled_path_is_in_the_ros_image_and_its_compiler_is_not():
+    said = docker(
+        *("run", "--rm", "--network=none", "--entrypoint=sh", ON_ROS, "-c"),
+        "python3 -c 'import syncrelay.ros.compiled.path as path; print(path.SOURCE)'; command -v gcc || true",
+    )
+    assert said == source_fingerprint()
 
 
 def test_the_user_of_the_ros_image_is_not_root():

@@ -66,7 +66,9 @@ def build(folder: Path) -> Workspace:
     """Clone what is tracked into a new workspace, and build it."""
     workspace = Workspace(folder)
     tracked = subprocess.check_output(["git", "ls-files", "-z"], cwd=ROOT, text=True)  # noqa: S607  the user's
-    for name in filter(None, tracked.split("\0")):
+    # The compiled path is what `pip install -e` leaves in the clone.
+    built = [str(path.relative_to(ROOT)) for path in ROOT.glob("syncrelay/ros/compiled/*.so")]
+    for name in filter(None, [*tracked.split("\0"), *built]):
         (workspace.sources / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / name, workspace.sources / name)
     workspace.colcon("build")

@@ -3,6 +3,7 @@
 import time
 from typing import Any
 
+from syncrelay.ros.compiled import path, source_fingerprint
 from syncrelay.ros.compiled.backend import CompiledBackend
 from syncrelay.ros.librcl.check import PATIENCE_NS, PAYLOAD, LibrclUnusableError, endpoints
 from syncrelay.ros.librcl.rcl import Rcl, RclCallError
@@ -13,6 +14,8 @@ def compiled_backend(rcl: Rcl, node: Any) -> CompiledBackend:
 
     The functions of librcl must have proven themselves.
     """
+    if source_fingerprint() not in (None, path.SOURCE):
+        raise LibrclUnusableError("it was built of another path.pyx: install syncrelay again")
     try:
         backend = CompiledBackend(rcl)
         with endpoints(node) as (subscription, publisher):

@@ -4,6 +4,7 @@ from typing import Any
 from syncrelay.dataflow.backend import Deliver as AnyDeliver
 from syncrelay.dataflow.flow import Flow as _Flow
 
+SOURCE: str
 SIZES: tuple[int, int, int]
 
 def stamp_of(content: bytes) -> int | None: ...

@@ -140,6 +140,11 @@ ctypedef struct MessageInfo:
     Gid publisher_gid
     uint8_t from_intra_process
 
+cdef extern from *:
+    const char * SYNCRELAY_SOURCE
+
+# setup.py's fingerprint of this file.
+SOURCE = SYNCRELAY_SOURCE.decode()
 SIZES = (sizeof(Allocator), sizeof(SerializedMessage), sizeof(MessageInfo))
 
 cdef enum:

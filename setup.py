@@ -1,0 +1,52 @@
+"""What pyproject.toml cannot say: the compiled path is built where a C compiler and Python's headers are."""
+
+import hashlib
+import logging
+from pathlib import Path
+
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import BaseError, CCompilerError
+
+_SOURCE = Path("syncrelay/ros/compiled/path.pyx")
+_FINGERPRINT = hashlib.sha256(_SOURCE.read_bytes()).hexdigest()
+
+
+class _BuildWherePossible(build_ext):
+    def initialize_options(self) -> None:
+        super().initialize_options()
+        self.cython_c_in_temp = True
+        self.force = True
+
+    def build_extension(self, ext: Extension) -> None:
+        built = Path(self.get_ext_fullpath(ext.name))
+        in_clone = _SOURCE.with_name(built.name)
+        # Every venv of this Python that is installed from the clone uses the one that is there.
+        if in_clone.exists() and _FINGERPRINT.encode() in in_clone.read_bytes():
+            if in_clone.absolute() != built.absolute():
+                self.copy_file(in_clone, built)
+            return
+        # An earlier build's would be installed for this one's if this one fails.
+        in_clone.unlink(missing_ok=True)
+        built.unlink(missing_ok=True)
+        try:
+            super().build_extension(ext)
+        except (BaseError, CCompilerError) as error:
+            self.announce(
+                f"syncrelay is installed without its compiled path: it does the same, at a higher cost ({error})",
+                logging.WARNING,
+            )
+
+
+setup(
+    ext_modules=[
+        Extension(
+            "syncrelay.ros.compiled.path",
+            [str(_SOURCE)],
+            define_macros=[("SYNCRELAY_SOURCE", f'"{_FINGERPRINT}"')],
+            extra_compile_args=["-g0"],
+            optional=True,
+        )
+    ],
+    cmdclass={"build_ext": _BuildWherePossible},
+)
