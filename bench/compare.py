@@ -28,7 +28,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--load", action="append", choices=LOADS, help="may be repeated (default: the first)")
     parser.add_argument("--seconds", type=float, default=ROUND_S, help="of each turn (default: %(default)s)")
-    parser.add_argument("--rounds", type=int, default=60, help="at most (default: %(default)s)")
+    parser.add_argument("--rounds", type=int, default=100, help="at most (default: %(default)s)")
     parser.add_argument("--width", type=float, default=0.05, help="of the interval (default: %(default)s)")
     parser.add_argument("candidates", nargs="+", metavar="CANDIDATE")
     asked = parser.parse_args()

@@ -19,10 +19,10 @@ from spent import Instructions, by_purpose, threads_ns
 
 # Fifty processes may have to start on two cores.
 PATIENCE_S = 90.0
-# Whole seconds, as the relay looks at its groups once a second.
-ROUND_S = 2.0
-# Before what counts, so that what a relay leaves for later weighs at both ends.
-LEAD_S = 0.5
+# The relay looks at its groups once a second. What counts has as many looks as seconds, and the lead gives the first
+# one a whole second of messages to look at: what is left to a look is no cheaper than it is.
+ROUND_S = 1.0
+LEAD_S = 1.0
 # By then each of fifty groups has been looked at since the last publisher or subscriber came.
 WARM_UP_S = 5.0
 MIN_ROUNDS = 10
@@ -150,7 +150,7 @@ def free_domains():
     return iter(free)
 
 
-def in_turns(candidates, *, seconds=ROUND_S, most=60, width=0.05):
+def in_turns(candidates, *, seconds=ROUND_S, most=100, width=0.05):
     """Load the candidates in turns, until each ratio to the first is known narrowly enough, or for so many rounds.
 
     Returns the rounds that nothing disturbed, each a Turn per candidate, and how many there were.
