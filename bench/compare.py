@@ -5,10 +5,10 @@ A candidate is a checkout of syncrelay (`.`, `/path/to/another`), `c` (bench/flo
 and of a checkout `heard` (its manifest is subscribed), `scalars` (on /diagnostics) and `untold` (nothing is observed
 or told).
 
-Each is started once, between processes that publish and receive, and loaded in turns of seconds while the others are
-idle. CPU is what all threads of its process ran, by the scheduler's count, per message that came out. Rounds in which
-neighbours took over 5 % of the machine are dropped for all. It ends when the 95 % confidence interval of each ratio is
-narrow enough, or after so many rounds.
+Each is started once, between processes that publish and receive, and loaded in turns, for a second in each round, while
+the others are idle. CPU is what all threads of its process ran, by the scheduler's count, per message that came out.
+Rounds in which neighbours took over 5 % of the machine are dropped. It ends when the 95 % confidence interval of each
+ratio is narrow enough, or after so many rounds.
 """
 
 import argparse
@@ -20,14 +20,19 @@ from pathlib import Path
 
 from candidates import LOADS, Workshop
 from intervals import Interval
-from rounds import ROUND_S, in_turns, medians, ratios
+from rounds import in_turns, medians, ratios
 from spent import PURPOSES
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--load", action="append", choices=LOADS, help="may be repeated (default: the first)")
-    parser.add_argument("--seconds", type=float, default=ROUND_S, help="of each turn (default: %(default)s)")
+    parser.add_argument(
+        "--load",
+        action="append",
+        choices=LOADS,
+        metavar="LOAD",
+        help=f"of {', '.join(LOADS)}; may be repeated (default: the first)",
+    )
     parser.add_argument("--rounds", type=int, default=100, help="at most (default: %(default)s)")
     parser.add_argument("--width", type=float, default=0.05, help="of the interval (default: %(default)s)")
     parser.add_argument("candidates", nargs="+", metavar="CANDIDATE")
@@ -40,7 +45,7 @@ def main():
             except ValueError as error:
                 parser.error(str(error))
             print(f"{name}:", flush=True)
-            show(candidates, *in_turns(candidates, seconds=asked.seconds, most=asked.rounds, width=asked.width))
+            show(candidates, *in_turns(candidates, most=asked.rounds, width=asked.width))
     return 0
 
 
@@ -53,7 +58,7 @@ def show(candidates, kept, n_rounds):
     print("|---" * (len(PURPOSES) + 6) + "|")
     threads = [
         [statistics.median(turn.threads_us[purpose] for turn in column) for purpose in PURPOSES]
-        for column in zip(*kept, strict=True)
+        for column in zip(*(turns for turns, _ in kept), strict=True)
     ]
     lines = zip(
         candidates,

@@ -42,8 +42,8 @@ def median_interval(values):
 
 
 def undisturbed(rounds):
-    """Return the rounds in none of whose turns too much was stolen: what disturbs one turn disturbs a ratio."""
-    return [turns for turns in rounds if all(turn.stolen <= MOST_STOLEN for turn in turns)]
+    """Return the rounds in which not too much was stolen, be it from one candidate or from all."""
+    return [each for each in rounds if each.stolen <= MOST_STOLEN]
 
 
 def stolen_share(before, after):

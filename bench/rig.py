@@ -9,7 +9,6 @@ system clock, so that the age of a set's last message, when it comes back, is it
 
 import argparse
 import json
-import select
 import statistics
 import sys
 import time
@@ -31,7 +30,7 @@ SILENCE_S = 1.0
 
 
 def publish(node, asked):
-    """In each turn publish until a time, and say how many messages have stamps from another time on.
+    """In each turn publish as many sets of each group as stdin says.
 
     Topics that go `together` follow each other `apart` seconds; the next ones come later, spread evenly over a period.
     """
@@ -42,21 +41,18 @@ def publish(node, asked):
     groups = [publishers[at : at + asked.together] for at in range(0, len(publishers), asked.together)]
     payload = payload_of(asked.type, asked.size)
     for line in sys.stdin:
-        counted_from, end = json.loads(line)
-        began, counted, number = time.time(), 0, 0
-        while began + number / (asked.rate * len(groups)) < end / 1e9:
+        began = time.monotonic()
+        for number in range(int(line) * len(groups)):
+            due = began + number / (asked.rate * len(groups))
+            time.sleep(max(0.0, due - time.monotonic()))
             group = groups[number % len(groups)]
-            time.sleep(max(0.0, began + number / (asked.rate * len(groups)) - time.time()))
             # One stamp, when the last of them is due: however busy the machine is, they are a set.
-            stamp = time.time_ns() + int((len(group) - 1) * asked.apart * 1e9)
-            write_stamp(payload, stamp)
+            write_stamp(payload, time.time_ns() + int((len(group) - 1) * asked.apart * 1e9))
             for publisher in group:
                 publisher.publish(bytes(payload))
                 if asked.apart:
                     time.sleep(asked.apart)
-            counted += len(group) * (stamp >= counted_from)
-            number += 1
-        say(counted)
+        say("done")
 
 
 def payload_of(type_name, size):
@@ -66,7 +62,7 @@ def payload_of(type_name, size):
 
 
 def receive(node, asked):
-    """In each turn take what has stamps from a time on, until stdin gives its number and all is there.
+    """In each turn take as many messages as stdin says, with stamps from a time on, until all came or is lost.
 
     Says how much came, and the median age of sets.
     """
@@ -79,10 +75,8 @@ def receive(node, asked):
     say("ready")
     wait_set = _rclpy.WaitSet(len(topics), 0, 0, 0, 0, 0, rclpy.get_default_context().handle)
     for line in sys.stdin:
-        counted_from, due, came, ages, last = int(line), None, 0, [], time.monotonic()
-        while came != due and (due is None or time.monotonic() < last + SILENCE_S):
-            if due is None and select.select([sys.stdin], [], [], 0)[0]:
-                due, last = int(sys.stdin.readline()), time.monotonic()
+        (since, due), ages, came, last = json.loads(line), [], 0, time.monotonic()
+        while came < due and time.monotonic() < last + SILENCE_S:
             wait_set.clear_entities()
             for subscription in subscriptions:
                 wait_set.add_subscription(subscription.handle)
@@ -90,9 +84,9 @@ def receive(node, asked):
             for index, subscription in enumerate(subscriptions):
                 while wait_set.is_ready("subscription", index) and (taken := take(subscription.handle, kind)):
                     stamp, last = read_stamp(taken[0]), time.monotonic()
-                    came += stamp >= counted_from
+                    came += stamp >= since
                     # The last topic of a set completes it: the others wait for it, whatever the relay.
-                    if stamp >= counted_from and (index + 1) % asked.together == 0:
+                    if stamp >= since and (index + 1) % asked.together == 0:
                         ages.append(time.time_ns() - stamp)
         say([came, statistics.median(ages) if ages else 0])
 

@@ -9,7 +9,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,10 +20,12 @@ from spent import Instructions, by_purpose, threads_ns
 
 # Fifty processes may have to start on two cores.
 PATIENCE_S = 90.0
-# The relay looks at its groups once a second. What counts has as many looks as seconds, and the lead gives the first
-# one a whole second of messages to look at: what is left to a look is no cheaper than it is.
-ROUND_S = 1.0
-LEAD_S = 1.0
+# In a round each candidate is loaded so often for so long: what else runs here changes by the second, so what is
+# compared has to lie closer together.
+SLICES = 4
+SLICE_S = 0.25
+# What a relay runs without a load is seen once, for so long.
+IDLE_S = 3.0
 # By then each of fifty groups has been looked at since the last publisher or subscriber came.
 WARM_UP_S = 5.0
 MIN_ROUNDS = 10
@@ -35,8 +38,14 @@ class Turn(NamedTuple):
     cpu_us: float
     latency_ms: float
     lost: float
-    stolen: float
     instructions: float
+
+
+class Round(NamedTuple):
+    """A turn of each candidate, and the share of the machine that its neighbours took meanwhile."""
+
+    turns: Sequence[Turn]
+    stolen: float
 
 
 class Child:
@@ -89,29 +98,53 @@ class Station:
         for child in (self._publisher, self._receiver):
             child.read(PATIENCE_S)
 
-    def turn(self, seconds):
-        """Load the relay, and return what a message cost it; raises RuntimeError where a process fails."""
-        if self._instructions is None:
-            self._instructions = Instructions(self.relay.process.pid)
-        counted_from = time.time_ns() + int(LEAD_S * 1e9)
-        self._receiver.tell(counted_from)
-        self._publisher.tell(json.dumps([counted_from, counted_from + int(seconds * 1e9)]))
-        time.sleep(max(0.0, counted_from / 1e9 - time.time()))
-        before, instructions, machine = threads_ns(self.relay.process.pid), self._instructions.read(), machine_time()
-        due = int(self._publisher.read(seconds + PATIENCE_S)) * len(self._load.outputs) / len(self._load.inputs)
-        self._receiver.tell(int(due))
+        self._idle_share, self._loaded_ns, self._slices = Counter(), 0, []
+
+    def note_idle(self):
+        """Note what the threads run by themselves, and count instructions from now on."""
+        self._instructions = Instructions(self.relay.process.pid)
+        before = self._ran()
+        time.sleep(IDLE_S)
+        self._idle_share = {thread: ns / IDLE_S / 1e9 for thread, ns in (self._ran() - before).items()}
+
+    def begin(self):
+        self._before = time.monotonic_ns(), self._ran(), self._instructions.read()
+        self._loaded_ns, self._slices = 0, []
+
+    def load_for(self, seconds):
+        """Load the relay until all that it was sent came out, or is lost; raises RuntimeError where a process fails."""
+        began = time.monotonic_ns()
+        n_sets = max(1, round(self._load.rate * seconds))
+        due = n_sets * len(self._load.outputs)
+        self._receiver.tell(json.dumps([time.time_ns(), due]))
+        self._publisher.tell(n_sets)
+        self._publisher.read(PATIENCE_S)
         came, latency_ns = json.loads(self._receiver.read(PATIENCE_S))
+        self._loaded_ns += time.monotonic_ns() - began
+        self._slices.append((due, came, latency_ns))
+
+    def end(self):
+        """Return what a message cost since the beginning, less what the relay runs by itself while others are loaded.
+
+        All the time is looked at, as a relay may do later, once a second, what a message has asked for.
+        """
+        began, before, instructions = self._before
+        ran, rested_ns = self._ran() - before, time.monotonic_ns() - began - self._loaded_ns
+        due, came, _ = map(sum, zip(*self._slices, strict=True))
         if came == 0:
             raise RuntimeError(f"{self.relay.process.args} relayed nothing")
-        ran = {thread: ns - before.get(thread, 0) for thread, ns in threads_ns(self.relay.process.pid).items()}
+        for thread, share in self._idle_share.items():
+            ran[thread] -= share * rested_ns
         return Turn(
             {purpose: ns / came / 1e3 for purpose, ns in by_purpose(ran, self.relay.process.pid).items()},
-            sum(ran.values()) / came / 1e3,
-            latency_ns / 1e6,
+            ran.total() / came / 1e3,
+            statistics.median(latency_ns for *_, latency_ns in self._slices) / 1e6,
             1 - came / due,
-            stolen_share(machine, machine_time()),
             (self._instructions.read() - instructions) / came,
         )
+
+    def _ran(self):
+        return Counter(threads_ns(self.relay.process.pid))
 
 
 def machine_time():
@@ -150,37 +183,47 @@ def free_domains():
     return iter(free)
 
 
-def in_turns(candidates, *, seconds=ROUND_S, most=100, width=0.05):
+def in_turns(candidates, *, most=100, width=0.05):
     """Load the candidates in turns, until each ratio to the first is known narrowly enough, or for so many rounds.
 
-    Returns the rounds that nothing disturbed, each a Turn per candidate, and how many there were.
+    Returns the rounds that nothing disturbed, and how many there were; Ctrl-C ends it early.
     """
     rounds = []
-    with processes() as start:
+    with contextlib.suppress(KeyboardInterrupt), processes() as start:
         domains = free_domains()
         started = [Station(candidate, next(domains), start) for candidate in candidates]
         for station in started:
             station.wait_ready()
         time.sleep(WARM_UP_S)
-        for number in range(-1, most):
-            # There and back, so that none is always behind the same one.
-            order = started if number % 2 else started[::-1]
-            turns = {station: station.turn(seconds) for station in order}
-            # The first round is for what happens once.
-            if number >= 0:
-                rounds.append([turns[station] for station in started])
+        for station in started:
+            station.load_for(2 * SLICE_S)
+            station.note_idle()
+        while len(rounds) < most:
+            rounds.append(one_round(started))
             kept = undisturbed(rounds)
             if len(kept) >= MIN_ROUNDS and all(ratio.width < width for ratio in ratios(kept, "cpu_us")):
                 break
     return undisturbed(rounds), len(rounds)
 
 
+def one_round(started):
+    machine = machine_time()
+    for station in started:
+        station.begin()
+    for number in range(SLICES):
+        # There and back, so that none is always behind the same one.
+        for station in started[:: -1 if number % 2 else 1]:
+            station.load_for(SLICE_S)
+    return Round([station.end() for station in started], stolen_share(machine, machine_time()))
+
+
 def ratios(rounds, what):
     """Return for each candidate the median of its figures to the first one's, round by round, and its interval."""
-    shares = [[getattr(turn, what) / getattr(turns[0], what) for turn in turns] for turns in rounds]
+    shares = [[getattr(turn, what) / getattr(turns[0], what) for turn in turns] for turns, _ in rounds]
     return [median_interval(column) for column in zip(*shares, strict=True)]
 
 
 def medians(rounds, what):
     """Return for each candidate the median of its figures."""
-    return [statistics.median(getattr(turn, what) for turn in column) for column in zip(*rounds, strict=True)]
+    columns = zip(*(turns for turns, _ in rounds), strict=True)
+    return [statistics.median(getattr(turn, what) for turn in column) for column in columns]

@@ -3,10 +3,11 @@
 import math
 import random
 from statistics import median
+from typing import NamedTuple
 
 import pytest
 
-from bench.intervals import MOST_STOLEN, median_interval, stolen_share, undisturbed
+from bench.intervals import median_interval, stolen_share, undisturbed
 from bench.spent import Thread, by_purpose
 
 
@@ -30,14 +31,12 @@ def test_the_interval_holds_the_true_median_in_95_of_100_series_of_rounds_with_o
     assert held / len(series) >= 0.95
 
 
-class Turn:
-    def __init__(self, stolen):
-        self.stolen = stolen
+class Round(NamedTuple):
+    stolen: float
 
 
-def test_a_round_is_dropped_for_all_where_one_turn_was_stolen():
-    quiet, busy = Turn(MOST_STOLEN), Turn(MOST_STOLEN + 0.001)
-    assert undisturbed([[quiet, quiet], [quiet, busy], [busy, quiet]]) == [[quiet, quiet]]
+def test_a_round_of_which_more_than_a_twentieth_was_stolen_is_dropped():
+    assert undisturbed([Round(0), Round(0.051), Round(0.05), Round(1)]) == [Round(0), Round(0.05)]
 
 
 def test_stolen_is_a_share_of_all_time_that_passed():
