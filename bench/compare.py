@@ -33,7 +33,7 @@ def main():
         metavar="LOAD",
         help=f"of {', '.join(LOADS)}; may be repeated (default: the first)",
     )
-    parser.add_argument("--rounds", type=int, default=100, help="at most (default: %(default)s)")
+    parser.add_argument("--rounds", type=int, default=200, help="at most (default: %(default)s)")
     parser.add_argument("--width", type=float, default=0.05, help="of the interval (default: %(default)s)")
     parser.add_argument("candidates", nargs="+", metavar="CANDIDATE")
     asked = parser.parse_args()
@@ -80,7 +80,10 @@ def show(candidates, kept, n_rounds):
 
 
 def shown(ratio: Interval):
-    return "1" if ratio.low == ratio.high else f"{ratio.median:.3f} ({ratio.low:.3f} to {ratio.high:.3f})"
+    if ratio.low == ratio.high:
+        return "1"
+    between = f"{ratio.low:.3f} to {ratio.high:.3f}" if math.isfinite(ratio.width) else "too few rounds for an interval"
+    return f"{ratio.median:.3f} ({between})"
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """What a relayed message costs: `python bench/relay.py`, printed as tables, ratios taken in this one run.
 
-Measured as compare.py does: candidates between processes of their own, loaded in turns.
+Measured as compare.py does. The relay in C++ on rclcpp is not among them: neither PyPI nor Debian has rclcpp.
 """
 
 import argparse
@@ -81,11 +81,8 @@ class Tables:
         print(f"{title}:", flush=True)
         show(
             [replace(each, name=each.name.replace(CHECKOUT, "syncrelay")) for each in candidates],
-            *self._run(candidates),
+            *in_turns(candidates, most=self._rounds),
         )
-
-    def _run(self, candidates):
-        return in_turns(candidates, most=self._rounds)
 
     def _start_and_idle(self, load, seconds):
         """Start a relay whose publishers are there, and leave it alone.

@@ -93,12 +93,12 @@ class Station:
         told = [*rig, "receive", load.type_name, f"--together={load.topics}", *hear, *load.outputs]
         self._receiver = start(told, rig_environ)
         self._instructions = None
+        self._before = None
+        self._idle_share, self._loaded_ns, self._loaded_ran, self._slices = Counter(), 0, Counter(), []
 
     def wait_ready(self):
         for child in (self._publisher, self._receiver):
             child.read(PATIENCE_S)
-
-        self._idle_share, self._loaded_ns, self._slices = Counter(), 0, []
 
     def note_idle(self):
         """Note what the threads run by themselves, and count instructions from now on."""
@@ -109,11 +109,11 @@ class Station:
 
     def begin(self):
         self._before = time.monotonic_ns(), self._ran(), self._instructions.read()
-        self._loaded_ns, self._slices = 0, []
+        self._loaded_ns, self._loaded_ran, self._slices = 0, Counter(), []
 
     def load_for(self, seconds):
         """Load the relay until all that it was sent came out, or is lost; raises RuntimeError where a process fails."""
-        began = time.monotonic_ns()
+        began, before = time.monotonic_ns(), self._ran()
         n_sets = max(1, round(self._load.rate * seconds))
         due = n_sets * len(self._load.outputs)
         self._receiver.tell(json.dumps([time.time_ns(), due]))
@@ -121,20 +121,22 @@ class Station:
         self._publisher.read(PATIENCE_S)
         came, latency_ns = json.loads(self._receiver.read(PATIENCE_S))
         self._loaded_ns += time.monotonic_ns() - began
+        self._loaded_ran += self._ran() - before
         self._slices.append((due, came, latency_ns))
 
     def end(self):
-        """Return what a message cost since the beginning, less what the relay runs by itself while others are loaded.
+        """Return what a message cost since the beginning.
 
-        All the time is looked at, as a relay may do later, once a second, what a message has asked for.
+        What the relay ran while others were loaded counts where it is more than it runs by itself: a relay may do
+        later, once a second, what a message has asked for.
         """
         began, before, instructions = self._before
         ran, rested_ns = self._ran() - before, time.monotonic_ns() - began - self._loaded_ns
         due, came, _ = map(sum, zip(*self._slices, strict=True))
         if came == 0:
             raise RuntimeError(f"{self.relay.process.args} relayed nothing")
-        for thread, share in self._idle_share.items():
-            ran[thread] -= share * rested_ns
+        idle = Counter({thread: int(share * rested_ns) for thread, share in self._idle_share.items()})
+        ran = self._loaded_ran + (ran - self._loaded_ran - idle)
         return Turn(
             {purpose: ns / came / 1e3 for purpose, ns in by_purpose(ran, self.relay.process.pid).items()},
             ran.total() / came / 1e3,
@@ -183,7 +185,7 @@ def free_domains():
     return iter(free)
 
 
-def in_turns(candidates, *, most=100, width=0.05):
+def in_turns(candidates, *, most=200, width=0.05):
     """Load the candidates in turns, until each ratio to the first is known narrowly enough, or for so many rounds.
 
     Returns the rounds that nothing disturbed, and how many there were; Ctrl-C ends it early.
