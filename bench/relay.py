@@ -1,39 +1,26 @@
 """What a relayed message costs: `python bench/relay.py`, printed as tables, ratios taken in this one run.
 
-Publishers and receivers are processes of their own over DDS. CPU is user and system time of the relay's process, all
-threads, divided by the messages that it had to relay; runs are interleaved and medians given, so that what else runs
-matters less. The floor is bench/floor.c, where a compiler and the wheels' headers are.
+Measured as compare.py does. The relay in C++ on rclcpp is not among them: neither PyPI nor Debian has rclcpp.
 """
 
 import argparse
 import os
 import sys
 import tempfile
+import time
+from dataclasses import replace
 from pathlib import Path
 
-from relay_runs import (
-    Load,
-    floor,
-    in_turns,
-    interleaved,
-    ours,
-    ours_telling_all,
-    ours_telling_nothing,
-    ours_through_rclpy,
-    start_and_idle,
-    typed,
-)
+from candidates import HERE, LOADS, Load, Workshop
+from compare import show
+from rounds import PATIENCE_S, free_domains, in_turns, processes
+from spent import threads_ns
 
-LARGE = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).parents[1] / "configs/large_messages.xml")}
-COSTS = {
-    "2 x 200 Hz x 1 kB": Load("Image", 1_000, 200),
-    "4 x 100 Hz Imu": Load("Imu", 0, 100, topics=4),
-    "2 x 20 Hz x 1 MB": Load("Image", 1_000_000, 20, seconds=8, environ=LARGE),
-}
+SMALL = "2 x 200 Hz x 1 kB"
 LARGE_LOADS = {
+    "2 x 20 Hz x 1 MB, large_messages": LOADS["2 x 20 Hz x 1 MB"],
     "2 x 20 Hz x 1 MB, default transport": Load("Image", 1_000_000, 20),
-    "2 x 20 Hz x 1 MB, large_messages": Load("Image", 1_000_000, 20, environ=LARGE),
-    "2 x 20 Hz x 6 MB, large_messages": Load("Image", 6_000_000, 20, environ=LARGE),
+    "2 x 20 Hz x 6 MB, large_messages": LOADS["2 x 20 Hz x 6 MB"],
 }
 # All of 400 messages a second, but for the last two.
 SCALES = {
@@ -46,75 +33,95 @@ SCALES = {
     "2 topics of 1 kHz": Load("Image", 1_000, 1_000),
     "2 topics, each in 10 groups": Load("Image", 1_000, 20, groups=10, shared=True),
 }
+CHECKOUT = str(HERE.parent)
 
 
-def cost(runs, relays):
-    print("| load | relay | CPU a message | to typed | to C | p50 latency | to typed | lost |")
-    print("|---|---|---|---|---|---|---|---|")
-    for name, load in COSTS.items():
-        figures = interleaved(relays, load, runs)
-        plain, bare = figures["typed rclpy"], figures.get("C on rcl")
-        for relay, each in figures.items():
-            to_c = f"{each.cpu_us / bare.cpu_us:.2f}" if bare else "-"
-            print(
-                f"| {name} | {relay} | {each.cpu_us:.0f} us | {each.cpu_us / plain.cpu_us:.2f} | {to_c} "
-                f"| {each.latency_ms:.2f} ms | {each.latency_ms / plain.latency_ms:.2f} | {each.lost:.1%} |",
-                flush=True,
-            )
+class Tables:
+    """The parts of what is printed, by their names."""
+
+    def __init__(self, workshop, rounds):
+        self._workshop, self._rounds = workshop, rounds
+
+    def cost(self):
+        words = [CHECKOUT, f"{CHECKOUT}@SYNCRELAY_RECEIVE=rclpy", "typed"]
+        try:
+            self._workshop.candidate("c", LOADS[SMALL])
+            words.insert(0, "c")
+        except ValueError as error:
+            print(error)
+        for load in LOADS:
+            # What is taught takes no 2,000 messages a second.
+            self._compare(load, [word for word in words if (word, load) != ("typed", "2 x 1 kHz x 1 kB")])
+
+    def telling(self):
+        for load in (SMALL, "4 x 100 Hz Imu"):
+            self._compare(load, [f"{CHECKOUT}@untold", CHECKOUT, f"{CHECKOUT}@scalars", f"{CHECKOUT}@heard"])
+
+    def large(self):
+        self._loads("large messages", LARGE_LOADS)
+
+    def scale(self):
+        self._loads("scale", SCALES)
+
+    def rest(self):
+        took_s, cpu_s, _ = self._start_and_idle(Load("Image", 1_000, 1), seconds=1)
+        print(f"from the command to both subscriptions: {took_s:.2f} s, of them {cpu_s:.2f} s of CPU")
+        _, _, idle_share = self._start_and_idle(Load("Image", 1_000, 1, groups=20), seconds=10)
+        print(f"20 groups of 2 topics, subscribed and silent: {idle_share:.1%} of a core")
+
+    def _compare(self, load, words):
+        self._show(load, [self._workshop.candidate(word, LOADS[load]) for word in words])
+
+    def _loads(self, title, loads):
+        self._show(
+            title, [replace(self._workshop.candidate(CHECKOUT, load), name=name) for name, load in loads.items()]
+        )
+
+    def _show(self, title, candidates):
+        print(f"{title}:", flush=True)
+        show(
+            [replace(each, name=each.name.replace(CHECKOUT, "syncrelay")) for each in candidates],
+            *in_turns(candidates, most=self._rounds),
+        )
+
+    def _start_and_idle(self, load, seconds):
+        """Start a relay whose publishers are there, and leave it alone.
+
+        Returns the time and the CPU time until all is subscribed, and the share of a core that it uses then, in s.
+        """
+        relay = self._workshop.candidate(CHECKOUT, load)
+        rig = [sys.executable, str(HERE / "rig.py"), "publish", load.type_name, "--size=0", "--together=1"]
+        with processes() as start:
+            domain = {"ROS_DOMAIN_ID": str(next(free_domains()))}
+            publisher = start([*rig, *load.inputs], {**domain, "PYTHONPATH": CHECKOUT})
+            time.sleep(3)
+            began = time.monotonic()
+            process = start(relay.argv, {**domain, **relay.environ}, relay.folder).process
+            publisher.read(PATIENCE_S)
+            took_s, cpu_s = time.monotonic() - began, cpu_s_of(process)
+            time.sleep(5)
+            before = cpu_s_of(process)
+            time.sleep(seconds)
+            return took_s, cpu_s, (cpu_s_of(process) - before) / seconds
 
 
-def large(runs):
-    print("\n| large messages | CPU a message | p50 latency | lost |\n|---|---|---|---|")
-    for name, load in LARGE_LOADS.items():
-        each = interleaved({"ours": ours}, load, runs)["ours"]
-        print(f"| {name} | {each.cpu_us:.0f} us | {each.latency_ms:.1f} ms | {each.lost:.1%} |", flush=True)
-
-
-def telling(runs):
-    print("\n| what it tells | CPU a message | to nothing |\n|---|---|---|")
-    load = COSTS["2 x 200 Hz x 1 kB"]
-    figures = interleaved({"nothing": ours_telling_nothing, "all, as scalars too": ours_telling_all}, load, runs)
-    for name, each in figures.items():
-        print(f"| {name} | {each.cpu_us:.0f} us | {each.cpu_us / figures['nothing'].cpu_us:.2f} |", flush=True)
-
-
-def scale(runs):
-    print("\n| scale | CPU a message | to the first | p50 latency | lost |\n|---|---|---|---|---|")
-    figures = in_turns({name: (ours, load) for name, load in SCALES.items()}, runs)
-    first = next(iter(figures.values()))
-    for name, each in figures.items():
-        ratio = each.cpu_us / first.cpu_us
-        print(f"| {name} | {each.cpu_us:.0f} us | {ratio:.2f} | {each.latency_ms:.2f} ms | {each.lost:.1%} |")
-
-
-def rest():
-    started = start_and_idle(Load("Image", 1_000, 1), seconds=1)
-    print(f"\nfrom the command to both subscriptions: {started.took_s:.2f} s, of them {started.cpu_s:.2f} s of CPU")
-    idle = start_and_idle(Load("Image", 1_000, 1, groups=20), seconds=10)
-    print(f"20 groups of 2 topics, subscribed and silent: {idle.idle_share:.1%} of a core")
+def cpu_s_of(process):
+    return sum(threads_ns(process.pid).values()) / 1e9
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5, help="runs of each relay and load (default: %(default)s)")
+    parser.add_argument("--rounds", type=int, default=30, help="of a table, at most (default: %(default)s)")
     parser.add_argument("parts", nargs="*", metavar="PART", help="of cost, telling, large, scale, rest (default: all)")
-    options = parser.parse_args()
-    parts = options.parts or ["cost", "telling", "large", "scale", "rest"]
+    asked = parser.parse_args()
     print(f"Python {sys.version.split()[0]}, {os.cpu_count()} cores\n")
     with tempfile.TemporaryDirectory() as folder:
-        relays = {"typed rclpy": typed, "syncrelay through rclpy": ours_through_rclpy, "syncrelay": ours}
-        if bare := floor(Path(folder)):
-            relays["C on rcl"] = bare
-        if "cost" in parts:
-            cost(options.runs, relays)
-    if "telling" in parts:
-        telling(options.runs)
-    if "large" in parts:
-        large(options.runs)
-    if "scale" in parts:
-        scale(options.runs)
-    if "rest" in parts:
-        rest()
+        tables = Tables(Workshop(Path(folder)), asked.rounds)
+        parts = {each.__name__: each for each in (tables.cost, tables.telling, tables.large, tables.scale, tables.rest)}
+        if unknown := set(asked.parts) - set(parts):
+            parser.error(f"no part is called {', '.join(sorted(unknown))}")
+        for part in asked.parts or parts:
+            parts[part]()
     return 0
 
 

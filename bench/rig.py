@@ -1,20 +1,20 @@
-"""What stands around a relay under test: a process that publishes, and one that receives. Started by relay_runs.py.
+"""What stands around a relay under test: a process that publishes, and one that receives. Started by rounds.py.
 
-    rig.py publish TYPE --size BYTES --rate HZ --warm-up N --counted N --together N TOPIC...
-    rig.py receive TYPE --together N TOPIC...
+    rig.py publish TYPE --size BYTES --rate HZ --together N --apart SECONDS TOPIC...
+    rig.py receive TYPE --together N [--hear MANIFEST] TOPIC...
 
-Stamps are times of publishing by the system clock, so that the age of a set's last message, when it comes back, is its
-latency. Both say `ready` when DDS has matched them.
+Both say `ready` when DDS has matched them, and then wait for turns on stdin. Stamps are times of publishing by the
+system clock, so that the age of a set's last message, when it comes back, is its latency.
 """
 
 import argparse
 import json
-import select
 import statistics
 import sys
 import time
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
@@ -25,39 +25,34 @@ from syncrelay.cdr import read_stamp, write_stamp
 TYPES = {"Image": Image, "Imu": Imu}
 PROFILE = QoSProfile(depth=100)
 POLL_S = 0.02
-# Between two topics of a set, as sensors do not speak in one breath: each message wakes the relay.
-APART_S = 0.0002
+# What has not come after so long a silence is lost.
+SILENCE_S = 1.0
 
 
 def publish(node, asked):
-    """Publish on all topics; say `warm` before the messages that count, and the span of their stamps after them.
+    """In each turn publish as many sets of each group as stdin says.
 
-    Topics that go `together` follow each other closely; the next ones come later, spread evenly over the period.
+    Topics that go `together` follow each other `apart` seconds; the next ones come later, spread evenly over a period.
     """
     publishers = [node.create_publisher(TYPES[asked.type], topic, PROFILE) for topic in asked.topics]
     while any(publisher.get_subscription_count() < 1 for publisher in publishers):
         time.sleep(POLL_S)
     say("ready")
-    sys.stdin.readline()
     groups = [publishers[at : at + asked.together] for at in range(0, len(publishers), asked.together)]
     payload = payload_of(asked.type, asked.size)
-    began = time.monotonic()
-    first = last = 0
-    for number in range(asked.warm_up + asked.counted):
-        if number == asked.warm_up:
-            first = time.time_ns()
-            say("warm")
-        for place, group in enumerate(groups):
-            due = began + (number + place / len(groups)) / asked.rate
+    for line in sys.stdin:
+        began = time.monotonic()
+        for number in range(int(line) * len(groups)):
+            due = began + number / (asked.rate * len(groups))
             time.sleep(max(0.0, due - time.monotonic()))
+            group = groups[number % len(groups)]
             # One stamp, when the last of them is due: however busy the machine is, they are a set.
-            last = time.time_ns() + int((len(group) - 1) * APART_S * 1e9)
-            write_stamp(payload, last)
+            write_stamp(payload, time.time_ns() + int((len(group) - 1) * asked.apart * 1e9))
             for publisher in group:
                 publisher.publish(bytes(payload))
-                time.sleep(APART_S)
-    say([first, last])
-    sys.stdin.readline()
+                if asked.apart:
+                    time.sleep(asked.apart)
+        say("done")
 
 
 def payload_of(type_name, size):
@@ -67,28 +62,33 @@ def payload_of(type_name, size):
 
 
 def receive(node, asked):
-    """Take what comes until stdin gives a span of stamps; say how much came of it, and the median age of sets."""
+    """In each turn take as many messages as stdin says, with stamps from a time on, until all came or is lost.
+
+    Says how much came, and the median age of sets.
+    """
     kind, topics = TYPES[asked.type], asked.topics
     subscriptions = [node.create_subscription(kind, topic, print, PROFILE, raw=True) for topic in topics]
-    while any(node.count_publishers(topic) < 1 for topic in topics):
+    # DDS receives and acknowledges manifests, whether anyone takes them or not.
+    heard = [node.create_subscription(DiagnosticArray, topic, print, 500, raw=True) for topic in asked.hear]
+    while any(node.count_publishers(each.topic_name) < 1 for each in [*subscriptions, *heard]):
         time.sleep(POLL_S)
     say("ready")
-    ages = []
     wait_set = _rclpy.WaitSet(len(topics), 0, 0, 0, 0, 0, rclpy.get_default_context().handle)
-    while not select.select([sys.stdin], [], [], 0)[0]:
-        wait_set.clear_entities()
-        for subscription in subscriptions:
-            wait_set.add_subscription(subscription.handle)
-        wait_set.wait(int(POLL_S * 1e9))
-        for index, subscription in enumerate(subscriptions):
-            while wait_set.is_ready("subscription", index) and (taken := take(subscription.handle, kind)):
-                stamp = read_stamp(taken[0])
-                ages.append((stamp, index, time.time_ns() - stamp))
-    first, last = json.loads(sys.stdin.readline())
-    counted = [(index, age) for stamp, index, age in ages if first <= stamp <= last]
-    # The last topic of a set completes it: the others wait for it, whatever the relay.
-    completing = [age for index, age in counted if (index + 1) % asked.together == 0]
-    say([len(counted), statistics.median(completing) if completing else 0])
+    for line in sys.stdin:
+        (since, due), ages, came, last = json.loads(line), [], 0, time.monotonic()
+        while came < due and time.monotonic() < last + SILENCE_S:
+            wait_set.clear_entities()
+            for subscription in subscriptions:
+                wait_set.add_subscription(subscription.handle)
+            wait_set.wait(int(POLL_S * 1e9))
+            for index, subscription in enumerate(subscriptions):
+                while wait_set.is_ready("subscription", index) and (taken := take(subscription.handle, kind)):
+                    stamp, last = read_stamp(taken[0]), time.monotonic()
+                    came += stamp >= since
+                    # The last topic of a set completes it: the others wait for it, whatever the relay.
+                    if stamp >= since and (index + 1) % asked.together == 0:
+                        ages.append(time.time_ns() - stamp)
+        say([came, statistics.median(ages) if ages else 0])
 
 
 def take(handle, kind):
@@ -106,9 +106,9 @@ def main():
     parser.add_argument("topics", nargs="+", metavar="TOPIC")
     parser.add_argument("--size", type=int)
     parser.add_argument("--rate", type=float)
-    parser.add_argument("--warm-up", type=int)
-    parser.add_argument("--counted", type=int)
     parser.add_argument("--together", type=int)
+    parser.add_argument("--apart", type=float)
+    parser.add_argument("--hear", action="append", default=[])
     asked = parser.parse_args()
     rclpy.init()
     node = rclpy.create_node(f"bench_{asked.command}")

@@ -1,0 +1,166 @@
+"""What can be measured: loads, and the relays that bear them."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+HERE = Path(__file__).parent
+LARGE = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(HERE.parent / "configs/large_messages.xml")}
+
+
+@dataclass(frozen=True)
+class Load:
+    """So many topics of a type, published at a rate, in groups that use them all.
+
+    The topics of a set share a stamp and follow each other `apart_s`: by itself so that each message wakes the relay,
+    as sensors do not speak in one breath.
+    """
+
+    type_name: str
+    size: int
+    rate: float
+    topics: int = 2
+    groups: int = 1
+    shared: bool = False
+    apart_s: float = 0.0002
+    environ: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def inputs(self):
+        n_sources = 1 if self.shared else self.groups
+        return [f"/in{number}" for number in range(self.topics * n_sources)]
+
+    @property
+    def outputs(self):
+        return [f"/g{group}/out{index}" for group in range(self.groups) for index in range(self.topics)]
+
+    @property
+    def routes(self):
+        """Input and output of each topic of each group."""
+        inputs = self.inputs * (self.groups if self.shared else 1)
+        return list(zip(inputs, self.outputs, strict=True))
+
+
+LOADS = {
+    "2 x 200 Hz x 1 kB": Load("Image", 1_000, 200),
+    "4 x 100 Hz Imu": Load("Imu", 0, 100, topics=4),
+    "9 x 50 Hz Imu": Load("Imu", 0, 50, topics=9, apart_s=0),
+    "2 x 1 kHz x 1 kB": Load("Image", 1_000, 1_000),
+    "2 x 20 Hz x 1 MB": Load("Image", 1_000_000, 20, environ=LARGE),
+    "2 x 20 Hz x 6 MB": Load("Image", 6_000_000, 20, environ=LARGE),
+}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A relay's command under a load, and where it is started; its environment; which of its manifests are heard."""
+
+    name: str
+    load: Load
+    argv: Sequence[str]
+    environ: Mapping[str, str] = field(default_factory=dict)
+    folder: Path | None = None
+    hear: Sequence[str] = ()
+
+
+# Scalars on /diagnostics; manifests that someone hears; neither watching nor telling.
+SWITCHES = {"scalars", "heard", "untold"}
+
+
+class Workshop:
+    """Makes candidates, from a folder for their files; what they are called is in the help of compare.py."""
+
+    def __init__(self, folder):
+        self._folder, self._files, self._floor = folder, 0, None
+
+    def candidate(self, word, load):
+        """Return what a word names; raises ValueError where it names nothing, or nothing that can be had here."""
+        kind, _, settings = word.partition("@")
+        asked = dict(setting.partition("=")[::2] for setting in settings.split(",") if setting)
+        python = asked.pop("PYTHON", sys.executable)
+        if kind == "c":
+            return Candidate(word, load, [python, "-c", CALL_MAIN, str(self._built_floor()), *_words(load)], asked)
+        if kind == "typed":
+            here = {"PYTHONPATH": str(HERE.parent)}
+            return Candidate(word, load, [python, str(HERE / "typed_relay.py"), *_words(load)], {**here, **asked})
+        checkout = Path(kind).resolve()
+        if not (checkout / "syncrelay/cli").is_dir():
+            raise ValueError(f"{kind}: neither `c` nor `typed` nor a checkout of syncrelay")
+        switches = {name for name, value in asked.items() if not value}
+        if wrong := switches - SWITCHES:
+            raise ValueError(f"{word}: no setting is called {', '.join(sorted(wrong))}")
+        environ = {"PYTHONPATH": str(checkout), **{name: value for name, value in asked.items() if value}}
+        command = [python, *self._entry(load, switches)]
+        hear = [f"/syncrelay/g{group}/sets" for group in range(load.groups)] if "heard" in switches else []
+        # `-m` looks where it is started first.
+        return Candidate(word, load, command, environ, checkout, hear)
+
+    def _entry(self, load, switches):
+        keys = {"diagnostics": {"scalars": True}} if "scalars" in switches else {}
+        if "untold" in switches:
+            keys = {"metrics": None, "diagnostics": None}
+        self._files += 1
+        path = self._folder / f"relay{self._files}.yaml"
+        path.write_text(json.dumps({"version": 1, **keys, "groups": _groups(load)}))
+        return (
+            [str(HERE / "untold.py"), str(path)] if "untold" in switches else ["-m", "syncrelay", "--config", str(path)]
+        )
+
+    def _built_floor(self):
+        """The relay in C, compiled; raises ValueError where there is no compiler, or no headers."""
+        if self._floor is None:
+            self._floor = _compiled(self._folder / "floor.so")
+        return self._floor
+
+
+def _groups(load):
+    return {
+        f"g{group}": {
+            "policy": "approximate_time_eager",
+            "slop": "5ms",
+            "topics": [
+                {"topic": topic, "type": f"sensor_msgs/msg/{load.type_name}", "output": output}
+                for topic, output in load.routes[group * load.topics : (group + 1) * load.topics]
+            ],
+        }
+        for group in range(load.groups)
+    }
+
+
+def _words(load):
+    return [word for route in load.routes for word in (load.type_name, *route)]
+
+
+# The wheels' libraries want symbols of the interpreter, so it calls the C program: one call, which ends with it.
+CALL_MAIN = """
+import ctypes, sys
+words = [word.encode() for word in sys.argv[1:]]
+sys.exit(ctypes.CDLL(sys.argv[1]).main(len(words), (ctypes.c_char_p * len(words))(*words)))
+"""
+
+
+def _compiled(library):
+    prefix = Path(sys.prefix)
+    compiler = shutil.which("cc")
+    if compiler is None or not (prefix / "include/rcl").is_dir():
+        raise ValueError("c: there is no compiler, or no headers of rcl")
+    includes = [f"-I{path}" for path in (prefix / "include").iterdir()]
+    needed = ["rcl", "rmw", "rcutils", "rosidl_runtime_c", "sensor_msgs__rosidl_typesupport_c"]
+    subprocess.run(
+        [
+            *(compiler, "-O2", "-Wall", "-shared", "-fPIC", "-o", str(library), str(HERE / "floor.c"), *includes),
+            *(f"-L{prefix / 'lib'}", *(f"-l{name}" for name in needed)),
+        ],
+        check=True,
+    )
+    return library
+
+
+def clean_environment():
+    """What the bench was started with, less what would tell Fast DDS otherwise."""
+    return {name: value for name, value in os.environ.items() if not name.startswith(("FASTDDS_", "FASTRTPS_"))}

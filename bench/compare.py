@@ -1,0 +1,90 @@
+"""Compare what a relayed message costs: `python bench/compare.py [--load NAME] A B [C ...]`, in ratios to A.
+
+A candidate is a checkout of syncrelay (`.`, `/path/to/another`), `c` (bench/floor.c, bare C on rcl) or `typed`
+(bench/typed_relay.py), with settings behind an @: `.@SYNCRELAY_RECEIVE=rclpy`, `.@PYTHON=/path/to/python,NAME=VALUE`,
+and of a checkout `heard` (its manifest is subscribed), `scalars` (on /diagnostics) and `untold` (nothing is observed
+or told).
+
+Each is started once, between processes that publish and receive, and loaded in turns, for a second in each round, while
+the others are idle. CPU is what all threads of its process ran, by the scheduler's count, per message that came out.
+Rounds in which neighbours took over 5 % of the machine are dropped. It ends when the 95 % confidence interval of each
+ratio is narrow enough, or after so many rounds.
+"""
+
+import argparse
+import math
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+from candidates import LOADS, Workshop
+from intervals import Interval
+from rounds import in_turns, medians, ratios
+from spent import PURPOSES
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument(
+        "--load",
+        action="append",
+        choices=LOADS,
+        metavar="LOAD",
+        help=f"of {', '.join(LOADS)}; may be repeated (default: the first)",
+    )
+    parser.add_argument("--rounds", type=int, default=200, help="at most (default: %(default)s)")
+    parser.add_argument("--width", type=float, default=0.05, help="of the interval (default: %(default)s)")
+    parser.add_argument("candidates", nargs="+", metavar="CANDIDATE")
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        workshop = Workshop(Path(folder))
+        for name in asked.load or [next(iter(LOADS))]:
+            try:
+                candidates = [workshop.candidate(word, LOADS[name]) for word in asked.candidates]
+            except ValueError as error:
+                parser.error(str(error))
+            print(f"{name}:", flush=True)
+            show(candidates, *in_turns(candidates, most=asked.rounds, width=asked.width))
+    return 0
+
+
+def show(candidates, kept, n_rounds):
+    """Print a table of the candidates' figures, and how many rounds they are of."""
+    if not kept:
+        print(f"none of {n_rounds} rounds was undisturbed\n", flush=True)
+        return
+    print(f"| candidate | CPU a message | {' | '.join(PURPOSES)} | to the first | p50 latency | to the first | lost |")
+    print("|---" * (len(PURPOSES) + 6) + "|")
+    threads = [
+        [statistics.median(turn.threads_us[purpose] for turn in column) for purpose in PURPOSES]
+        for column in zip(*(turns for turns, _ in kept), strict=True)
+    ]
+    lines = zip(
+        candidates,
+        *(medians(kept, "cpu_us"), threads, ratios(kept, "cpu_us")),
+        *(medians(kept, "latency_ms"), ratios(kept, "latency_ms"), medians(kept, "lost")),
+        strict=True,
+    )
+    for candidate, cpu_us, threads_us, cost, latency_ms, lateness, lost in lines:
+        print(
+            f"| {candidate.name} | {cpu_us:.1f} us | {' | '.join(f'{us:.1f}' for us in threads_us)} | {shown(cost)} "
+            f"| {latency_ms:.2f} ms | {shown(lateness)} | {lost:.1%} |"
+        )
+    counted = medians(kept, "instructions")
+    if any(map(math.isnan, counted)):
+        print("the kernel counts no instructions here")
+    else:
+        print("instructions a message:", ", ".join(f"{each:,.0f}" for each in counted))
+    print(f"{len(kept)} of {n_rounds} rounds kept\n", flush=True)
+
+
+def shown(ratio: Interval):
+    if ratio.low == ratio.high:
+        return "1"
+    between = f"{ratio.low:.3f} to {ratio.high:.3f}" if math.isfinite(ratio.width) else "too few rounds for an interval"
+    return f"{ratio.median:.3f} ({between})"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

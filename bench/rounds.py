@@ -1,0 +1,231 @@
+"""Candidates that are started once and loaded in turns, and what a message cost each of them in each round."""
+
+import contextlib
+import json
+import random
+import select
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from candidates import HERE, clean_environment
+from intervals import median_interval, stolen_share, undisturbed
+from spent import Instructions, by_purpose, threads_ns
+
+# Fifty processes may have to start on two cores.
+PATIENCE_S = 90.0
+# In a round each candidate is loaded so often for so long: what else runs here changes by the second, so what is
+# compared has to lie closer together.
+SLICES = 4
+SLICE_S = 0.25
+# What a relay runs without a load is seen once, for so long.
+IDLE_S = 3.0
+# By then each of fifty groups has been looked at since the last publisher or subscriber came.
+WARM_UP_S = 5.0
+MIN_ROUNDS = 10
+
+
+class Turn(NamedTuple):
+    """What a candidate did in a round: CPU of its process a message by thread, and in all; median age of sets."""
+
+    threads_us: Mapping[str, float]
+    cpu_us: float
+    latency_ms: float
+    lost: float
+    instructions: float
+
+
+class Round(NamedTuple):
+    """A turn of each candidate, and the share of the machine that its neighbours took meanwhile."""
+
+    turns: Sequence[Turn]
+    stolen: float
+
+
+class Child:
+    """A process that is talked to line by line, and ended."""
+
+    def __init__(self, argv, environ, log, cwd=None):
+        self.process = subprocess.Popen(
+            argv, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, env=environ, cwd=cwd, text=True
+        )
+
+    def read(self, patience_s):
+        ready, _, _ = select.select([self.process.stdout], [], [], patience_s)
+        line = self.process.stdout.readline() if ready else ""
+        if not line:
+            raise RuntimeError(f"{self.process.args} said nothing")
+        return line.rstrip("\n")
+
+    def tell(self, line):
+        self.process.stdin.write(f"{line}\n")
+        self.process.stdin.flush()
+
+    def end(self):
+        """End it by the end of its stdin; if that does not help, by signals."""
+        self.process.stdin.close()
+        for insist in (self.process.terminate, self.process.kill):
+            try:
+                self.process.wait(2)
+            except subprocess.TimeoutExpired:
+                insist()
+        self.process.wait()
+
+
+class Station:
+    """A candidate's relay between a publisher and a receiver of its own, on a ROS domain of its own."""
+
+    def __init__(self, candidate, domain, start):
+        load = self._load = candidate.load
+        environ = {**load.environ, "ROS_DOMAIN_ID": str(domain)}
+        rig = [sys.executable, str(HERE / "rig.py")]
+        pace = [f"--size={load.size}", f"--rate={load.rate}", f"--apart={load.apart_s}", f"--together={load.topics}"]
+        hear = [f"--hear={topic}" for topic in candidate.hear]
+        self.relay = start(candidate.argv, {**environ, **candidate.environ}, candidate.folder)
+        rig_environ = {**environ, "PYTHONPATH": str(HERE.parent)}
+        self._publisher = start([*rig, "publish", load.type_name, *pace, *load.inputs], rig_environ)
+        told = [*rig, "receive", load.type_name, f"--together={load.topics}", *hear, *load.outputs]
+        self._receiver = start(told, rig_environ)
+        self._instructions = None
+        self._before = None
+        self._idle_share, self._loaded_ns, self._loaded_ran, self._slices = Counter(), 0, Counter(), []
+
+    def wait_ready(self):
+        for child in (self._publisher, self._receiver):
+            child.read(PATIENCE_S)
+
+    def note_idle(self):
+        """Note what the threads run by themselves, and count instructions from now on."""
+        self._instructions = Instructions(self.relay.process.pid)
+        before = self._ran()
+        time.sleep(IDLE_S)
+        self._idle_share = {thread: ns / IDLE_S / 1e9 for thread, ns in (self._ran() - before).items()}
+
+    def begin(self):
+        self._before = time.monotonic_ns(), self._ran(), self._instructions.read()
+        self._loaded_ns, self._loaded_ran, self._slices = 0, Counter(), []
+
+    def load_for(self, seconds):
+        """Load the relay until all that it was sent came out, or is lost; raises RuntimeError where a process fails."""
+        began, before = time.monotonic_ns(), self._ran()
+        n_sets = max(1, round(self._load.rate * seconds))
+        due = n_sets * len(self._load.outputs)
+        self._receiver.tell(json.dumps([time.time_ns(), due]))
+        self._publisher.tell(n_sets)
+        self._publisher.read(PATIENCE_S)
+        came, latency_ns = json.loads(self._receiver.read(PATIENCE_S))
+        self._loaded_ns += time.monotonic_ns() - began
+        self._loaded_ran += self._ran() - before
+        self._slices.append((due, came, latency_ns))
+
+    def end(self):
+        """Return what a message cost since the beginning.
+
+        What the relay ran while others were loaded counts where it is more than it runs by itself: a relay may do
+        later, once a second, what a message has asked for.
+        """
+        began, before, instructions = self._before
+        ran, rested_ns = self._ran() - before, time.monotonic_ns() - began - self._loaded_ns
+        due, came, _ = map(sum, zip(*self._slices, strict=True))
+        if came == 0:
+            raise RuntimeError(f"{self.relay.process.args} relayed nothing")
+        idle = Counter({thread: int(share * rested_ns) for thread, share in self._idle_share.items()})
+        ran = self._loaded_ran + (ran - self._loaded_ran - idle)
+        return Turn(
+            {purpose: ns / came / 1e3 for purpose, ns in by_purpose(ran, self.relay.process.pid).items()},
+            ran.total() / came / 1e3,
+            statistics.median(latency_ns for *_, latency_ns in self._slices) / 1e6,
+            1 - came / due,
+            (self._instructions.read() - instructions) / came,
+        )
+
+    def _ran(self):
+        return Counter(threads_ns(self.relay.process.pid))
+
+
+def machine_time():
+    with Path("/proc/stat").open() as file:
+        return file.readline()
+
+
+@contextlib.contextmanager
+def processes():
+    """Yield what starts a process, and end all in the end; what they said is shown where one failed."""
+    children = []
+    with tempfile.TemporaryDirectory() as name, (Path(name) / "log").open("w+") as log:
+        kept = clean_environment() | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_LOG_DIR": name}
+
+        def start(argv, environ, folder=None):
+            children.append(Child(argv, kept | environ, log, folder))
+            return children[-1]
+
+        try:
+            yield start
+        except RuntimeError:
+            sys.stderr.write((Path(name) / "log").read_text())
+            raise
+        finally:
+            for child in children:
+                child.process.terminate()
+            for child in children:
+                child.end()
+
+
+def free_domains():
+    """Return domains that nobody uses: the first participant of a domain has a port of its own."""
+    taken = {int(line.split()[1].rpartition(":")[2], 16) for line in Path("/proc/net/udp").read_text().splitlines()[1:]}
+    free = [domain for domain in range(1, 102) if 7410 + 250 * domain not in taken]
+    random.shuffle(free)
+    return iter(free)
+
+
+def in_turns(candidates, *, most=200, width=0.05):
+    """Load the candidates in turns, until each ratio to the first is known narrowly enough, or for so many rounds.
+
+    Returns the rounds that nothing disturbed, and how many there were; Ctrl-C ends it early.
+    """
+    rounds = []
+    with contextlib.suppress(KeyboardInterrupt), processes() as start:
+        domains = free_domains()
+        started = [Station(candidate, next(domains), start) for candidate in candidates]
+        for station in started:
+            station.wait_ready()
+        time.sleep(WARM_UP_S)
+        for station in started:
+            station.load_for(2 * SLICE_S)
+            station.note_idle()
+        while len(rounds) < most:
+            rounds.append(one_round(started))
+            kept = undisturbed(rounds)
+            if len(kept) >= MIN_ROUNDS and all(ratio.width < width for ratio in ratios(kept, "cpu_us")):
+                break
+    return undisturbed(rounds), len(rounds)
+
+
+def one_round(started):
+    machine = machine_time()
+    for station in started:
+        station.begin()
+    for number in range(SLICES):
+        # There and back, so that none is always behind the same one.
+        for station in started[:: -1 if number % 2 else 1]:
+            station.load_for(SLICE_S)
+    return Round([station.end() for station in started], stolen_share(machine, machine_time()))
+
+
+def ratios(rounds, what):
+    """Return for each candidate the median of its figures to the first one's, round by round, and its interval."""
+    shares = [[getattr(turn, what) / getattr(turns[0], what) for turn in turns] for turns, _ in rounds]
+    return [median_interval(column) for column in zip(*shares, strict=True)]
+
+
+def medians(rounds, what):
+    """Return for each candidate the median of its figures."""
+    columns = zip(*(turns for turns, _ in rounds), strict=True)
+    return [statistics.median(getattr(turn, what) for turn in column) for column in columns]
