@@ -92,18 +92,21 @@ class Workshop:
         if not (checkout / "syncrelay/cli").is_dir():
             raise ValueError(f"{kind}: neither `c` nor `typed` nor a checkout of syncrelay")
         switches = {name for name, value in asked.items() if not value}
+        coalesce = asked.pop("coalesce", None)
         if wrong := switches - SWITCHES:
             raise ValueError(f"{word}: no setting is called {', '.join(sorted(wrong))}")
         environ = {"PYTHONPATH": str(checkout), **{name: value for name, value in asked.items() if value}}
-        command = [python, *self._entry(load, switches)]
+        command = [python, *self._entry(load, switches, coalesce)]
         hear = [f"/syncrelay/g{group}/sets" for group in range(load.groups)] if "heard" in switches else []
         # `-m` looks where it is started first.
         return Candidate(word, load, command, environ, checkout, hear)
 
-    def _entry(self, load, switches):
+    def _entry(self, load, switches, coalesce):
         keys = {"diagnostics": {"scalars": True}} if "scalars" in switches else {}
         if "untold" in switches:
             keys = {"metrics": None, "diagnostics": None}
+        if coalesce:
+            keys["node"] = {"coalesce": coalesce}
         self._files += 1
         path = self._folder / f"relay{self._files}.yaml"
         path.write_text(json.dumps({"version": 1, **keys, "groups": _groups(load)}))

@@ -1,21 +1,18 @@
 """A relay that neither watches itself nor tells of it: `untold.py FILE`. What saying why costs is the difference."""
 
-# ruff: noqa: SLF001  a switch that the relay itself has no use for
-
 import sys
 from collections import deque
 
-from syncrelay.cli import main
-from syncrelay.dataflow.group import GroupRelay
-from syncrelay.ros.monitor import Monitor
+from syncrelay.dataflow import flow
 
+# Before the compiled flow takes it over.
+flow.RECENT = 0
 
-def _note_nothing(group):
-    nothing = deque(maxlen=0)
-    group._arrivals = (nothing,) * group._n_inputs
-    group._sets = group.last = nothing
+from syncrelay.cli import main  # noqa: E402
+from syncrelay.ros.monitor import Monitor  # noqa: E402
 
+_NOTHING = deque(maxlen=0)
 
-GroupRelay._watch = _note_nothing
+flow.Watched.none_of = lambda n_inputs: flow.Watched((_NOTHING,) * n_inputs, _NOTHING)
 Monitor.evaluate = Monitor.evaluate_in_turn = lambda _: None
 sys.exit(main(["--config", sys.argv[1]]))
