@@ -51,10 +51,10 @@ def here(ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNam
         yield own
 
 
-def _topic(node, name):
-    """A topic with a subscription and a publisher that keep all."""
-    subscription = node.create_subscription(Vector3Stamped, name, print, _KEEP_ALL, raw=True)
-    return SimpleNamespace(subscription=subscription, publisher=node.create_publisher(Vector3Stamped, name, _KEEP_ALL))
+def _topic(node, name, profile=_KEEP_ALL):
+    """A topic with a subscription and a publisher that keep all, or what else a test says."""
+    subscription = node.create_subscription(Vector3Stamped, name, print, profile, raw=True)
+    return SimpleNamespace(subscription=subscription, publisher=node.create_publisher(Vector3Stamped, name, profile))
 
 
 def _group(**keys):
@@ -225,10 +225,12 @@ def test_a_source_whose_messages_cannot_be_taken_in_is_named_and_the_others_go_o
 
 def test_sources_come_and_go_while_messages_come(here):
     came, ended = [], threading.Event()
+    # What is never taken must not hold up who publishes.
+    topics = [_topic(here.node, f"/u{n}", QoSProfile(depth=100)) for n in range(3)]
 
     def publish() -> None:
         while not ended.is_set():
-            for topic in here.topics:
+            for topic in topics:
                 topic.publisher.publish(vector(BEGIN))
 
     thread = threading.Thread(target=publish)
@@ -236,7 +238,7 @@ def test_sources_come_and_go_while_messages_come(here):
     thread.start()
     try:
         for _ in range(300):
-            sources = [here.backend.source(topic.subscription, lambda _: came.append(1)) for topic in here.topics]
+            sources = [here.backend.source(topic.subscription, lambda _: came.append(1)) for topic in topics]
             for source in sources:
                 inbox.add(source)
             inbox.receive_once(_SECOND)
