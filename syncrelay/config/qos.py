@@ -122,7 +122,7 @@ class QosOverrides(Keys):
         return depth
 
 
-AUTO: Final = QosOverrides()
+AUTO: Final = QosOverrides.model_construct()
 """Every policy matched to the publishers."""
 
 
