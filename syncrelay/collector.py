@@ -7,13 +7,16 @@ from contextlib import contextmanager
 
 @contextmanager
 def resting_collector() -> Iterator[None]:
-    """Collect no garbage meanwhile, and never go through what exists by the end: for imports, whose results stay.
+    """Collect no garbage meanwhile, and have the collector pass over all that exists by the end.
 
-    At its usual pace the collector goes through them again and again, which takes a sixth of the start of a relay.
+    For imports, whose results stay: at its usual pace the collector goes through them again and again, which takes a
+    sixth of the start of a relay.
     """
+    usual = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
         gc.freeze()
-        gc.enable()
+        if usual:
+            gc.enable()
