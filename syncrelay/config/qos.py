@@ -122,7 +122,7 @@ class QosOverrides(Keys):
         return depth
 
 
-AUTO: Final = QosOverrides.model_construct()
+AUTO: Final = QosOverrides()
 """Every policy matched to the publishers."""
 
 
