@@ -1,5 +1,6 @@
 """The command line: the only place that exits. Imports nothing slow, so that a signal is heard from the start."""
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -13,6 +14,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if _runs_until_stopped(words):
         stop.install()
     release_signals()
+    # No model of ours has a use for them, and to find that there are none takes a look at every installed package.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Only now: what follows is imported with the signals in hand.
     from syncrelay.cli.boundary import guarded
     from syncrelay.cli.dispatch import dispatch

@@ -1,6 +1,7 @@
 """`syncrelay analyze BAG`: figures of a recording, what a file makes of it, and the values that would fit."""
 
 import json
+from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -8,12 +9,12 @@ from dataclasses import dataclass
 from syncrelay.bag import Channel, Recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, with_changes
 from syncrelay.bag.bindings import bind
-from syncrelay.cli import parsers
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
@@ -36,10 +37,8 @@ class Asked:
     json: bool
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay analyze`."""
-    parser = parsers.analyze()
-    arguments = parser.read(words)
     config, *others = arguments.config or [None]
     if others:
         parser.error("--config was given more than once: analyze takes one file")

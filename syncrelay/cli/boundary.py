@@ -110,6 +110,10 @@ def _abandon(stream: TextIO) -> None:
 
 
 def _tell(error: SyncRelayError) -> None:
+    if isinstance(error, UsageError):
+        # At once: the import below takes far longer than to read the words.
+        remark(str(error))
+        return
     from syncrelay.config import ConfigError, render
 
     if isinstance(error, ConfigError):

@@ -36,9 +36,9 @@ _BEFORE: Final = re.compile(r".*[;&|({]|\w+=.*|sudo|env|exec|nice|nohup|time|!")
 _Completer = Callable[[str, Namespace], Iterable[str] | Mapping[str, str]]
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay completion`."""
-    put(shellcode([_PROGRAM], shell=parsers.completion().read(words).shell).strip())
+    put(shellcode([_PROGRAM], shell=arguments.shell).strip())
     return DONE
 
 

@@ -4,7 +4,8 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from importlib.resources import files
 from logging.handlers import MemoryHandler
@@ -14,9 +15,9 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.demo_screen import Moment, frame, plain_line, summary
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
 from syncrelay.logs import LOGGER, configure
@@ -43,10 +44,8 @@ def shipped_config() -> str:
     return (files("syncrelay.cli") / "demo.yaml").read_text(encoding="utf-8")
 
 
-def command(words: Sequence[str], stop: StopRequest) -> int:
+def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     """Run `syncrelay demo`."""
-    parser = parsers.demo()
-    arguments = parser.read(words)
     if arguments.record is not None:
         from syncrelay.cli.demo_recording import record
 

@@ -4,13 +4,17 @@ import os
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, USAGE, put, say
 from syncrelay.cli.parser import HelpRequested, Parser
 from syncrelay.cli.stop import StopRequest
+from syncrelay.collector import resting_collector
 from syncrelay.errors import UsageError
+
+if TYPE_CHECKING:
+    from argparse import Namespace
 
 
 class Command(NamedTuple):
@@ -51,23 +55,26 @@ def dispatch(words: Sequence[str], *, stop: StopRequest) -> int:
         return complete()
     try:
         if not words or words[0].startswith("-"):
-            return _command(_RELAY)(words or ["--help"], stop)
+            return _run(parsers.relay(), _RELAY, words or ["--help"], stop)
         first, *rest = words
         if first == "help":
-            return _command(_RELAY)(["--help"], stop)
+            return _run(parsers.relay(), _RELAY, ["--help"], stop)
         if first not in COMMANDS:
             raise UsageError(_unknown_command(first))
-        return _command(COMMANDS[first].module)(rest, stop)
+        return _run(COMMANDS[first].parser(), COMMANDS[first].module, rest, stop)
     except HelpRequested as help_requested:
         tell, code = (put, DONE) if words else (say, USAGE)
         tell(str(help_requested).rstrip("\n"))
         return code
 
 
-def _command(module: str) -> Callable[[Sequence[str], StopRequest], int]:
-    """Import a command only when it is to run: some need a second for what they import."""
-    command: Callable[[Sequence[str], StopRequest], int] = import_module(f"syncrelay.cli.{module}").command
-    return command
+def _run(parser: Parser, module: str, words: Sequence[str], stop: StopRequest) -> int:
+    """Read the words, and import the command only when it is to run: some need a second for what they import."""
+    arguments = parser.read(words)
+    command: Callable[[Parser, Namespace, StopRequest], int]
+    with resting_collector():
+        command = import_module(f"syncrelay.cli.{module}").command
+    return command(parser, arguments, stop)
 
 
 def commands_help() -> str:

@@ -3,14 +3,15 @@
 import json
 import os
 import sys
+from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import asdict
 from logging import NullHandler
 from typing import Any, Final
 
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.cli.heartbeat import VARIABLE
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.examine import Examination, Observed, Request, examine
@@ -21,10 +22,8 @@ from syncrelay.printable import printable
 _LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay doctor`."""
-    parser = parsers.doctor()
-    arguments = parser.read(words)
     if arguments.seconds and not arguments.live:
         parser.error("--seconds N needs --live: it is how long to observe the graph")
     parser.refuse_repeated(arguments.config)

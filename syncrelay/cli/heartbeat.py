@@ -7,12 +7,14 @@ starts. Times are those of the machine's monotonic clock, which its containers s
 import os
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, Self
 
 if TYPE_CHECKING:
+    from argparse import Namespace
+
+    from syncrelay.cli.parser import Parser
     from syncrelay.cli.stop import StopRequest
 
 VARIABLE: Final = "SYNCRELAY_HEARTBEAT"
@@ -64,11 +66,8 @@ def ailment(path: Path) -> str | None:
     return f"the receive loop last turned {age / 1e9:.0f} s ago" if age > 0 else "the heartbeat is from an earlier run"
 
 
-def command(words: Sequence[str], _stop: "StopRequest") -> int:
+def command(_parser: "Parser", _arguments: "Namespace", _stop: "StopRequest") -> int:
     """Run `syncrelay healthcheck`."""
-    from syncrelay.cli import parsers
-
-    parsers.healthcheck().read(words)
     return healthcheck()
 
 

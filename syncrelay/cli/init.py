@@ -1,7 +1,8 @@
 """`syncrelay init`: a first file, from what a recording or the ROS graph shows."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from argparse import Namespace
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -11,9 +12,9 @@ from syncrelay.bag.analysis import Proposal, inventory_of, propose, propose_for
 from syncrelay.bag.analysis.inventory import NO_HEADER
 from syncrelay.bag.analysis.streams import UNREADABLE, Stream
 from syncrelay.bag.qos import Profile
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
@@ -23,10 +24,8 @@ if TYPE_CHECKING:
     from syncrelay.ros.listening import Heard
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay init`."""
-    parser = parsers.init()
-    arguments = parser.read(words)
     if arguments.from_graph:
         return init_from_graph(arguments.seconds or 10.0, arguments.output)
     if arguments.seconds is not None:

@@ -3,12 +3,12 @@
 import os
 import signal
 import time
-from collections.abc import Sequence
+from argparse import Namespace
 from pathlib import Path
 from typing import Final
 
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find_one
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
@@ -22,9 +22,9 @@ _POLL_S: Final = 0.1
 _OTHERWISE: Final = "  If the relay's file says `metrics: null`, send SIGHUP to its process"
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay reload`."""
-    return reload(parsers.reload().read(words).url)
+    return reload(arguments.url)
 
 
 def reload(named: str | None) -> int:

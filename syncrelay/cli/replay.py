@@ -1,5 +1,6 @@
 """`syncrelay replay BAG...`: what a file makes of a recording."""
 
+from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -12,8 +13,8 @@ from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import Listener
 from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.writing import SetWriter
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
@@ -32,10 +33,8 @@ class Wanted:
     output: str | None
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay replay`."""
-    parser = parsers.replay()
-    arguments = parser.read(words)
     parser.refuse_repeated(arguments.config)
     return replay(arguments.bags, arguments.config, Wanted(arguments.json, arguments.drops, arguments.output))
 

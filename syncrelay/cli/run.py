@@ -2,23 +2,26 @@
 
 import os
 import traceback
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from syncrelay import own_version
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.config_files import ConfigFiles, Reading
 from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
+from syncrelay.collector import resting_collector
 from syncrelay.errors import ListenError, ReloadError, SyncRelayError, UsageError
 
 if TYPE_CHECKING:
     from syncrelay.config import Config, Listen
     from syncrelay.ros.relay import Relay
-    from syncrelay.status import Server
+    from syncrelay.status.server import Server
 
 _FAILED: Final = "reload failed; keeping the running configuration:"
 _FAILED_WITHOUT_GROUPS: Final = "reload failed; no groups are running:"
@@ -28,10 +31,8 @@ _BUG: Final = (
 )
 
 
-def command(words: Sequence[str], stop: StopRequest) -> int:
+def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     """Run `syncrelay --config FILE`, or answer --help and --version."""
-    parser = parsers.relay()
-    arguments = parser.read(words)
     if arguments.version:
         put(f"syncrelay {own_version()}")
         return DONE
@@ -69,9 +70,10 @@ def run(
     Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
     cannot be used.
     """
-    from syncrelay.config import Severity, load, where
-    from syncrelay.logs import LOGGER, configure
-    from syncrelay.ros.environment import require_rclpy
+    with resting_collector():
+        from syncrelay.config import Severity, load, where
+        from syncrelay.logs import LOGGER, configure
+        from syncrelay.ros.environment import require_rclpy
 
     configure(log_level, log_format)
     # Before they are read: what changes while the relay starts is seen too.
@@ -82,18 +84,21 @@ def run(
             LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)
     _require_groups(groups, config, config_paths)
     require_rclpy()
-    from syncrelay.cli.explain import explain
-    from syncrelay.cli.managed import Managed
-    from syncrelay.cli.services import services
-    from syncrelay.cli.summary import log_summary
-    from syncrelay.ros.entities import Purpose
-    from syncrelay.ros.relay import Relay
+    with resting_collector():
+        from syncrelay.cli.explain import explain
+        from syncrelay.cli.services import services
+        from syncrelay.cli.summary import log_summary
+        from syncrelay.ros.entities import Purpose
+        from syncrelay.ros.relay import Relay
 
-    def managed(relay: Relay) -> Managed:
+    def managed(relay: Relay) -> Callable[..., Any]:
+        from syncrelay.cli.managed import Managed
+        from syncrelay.ros.lifecycle import ManagedNode
+
         def require(config: "Config") -> None:
             _require_groups(groups, config, config_paths)
 
-        return Managed(relay, paths=config_paths, require=require, stop=stop)
+        return partial(ManagedNode, transitions=Managed(relay, paths=config_paths, require=require, stop=stop))
 
     stop.defer()
     with (
@@ -176,11 +181,11 @@ def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]
 
     Raises ListenError where the port that it asks for cannot be had.
     """
-    from syncrelay.logs import LOGGER
-    from syncrelay.status import Server
-
     if listen is None:
         return nullcontext()
+    from syncrelay.logs import LOGGER
+    from syncrelay.status.server import Server
+
     try:
         return Server(listen)
     except ListenError as error:

@@ -1,17 +1,16 @@
 """`syncrelay schema`: the JSON Schema of the file."""
 
 import json
-from collections.abc import Sequence
+from argparse import Namespace
 
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config.schema import json_schema
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(_parser: Parser, _arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay schema`."""
-    parsers.schema().read(words)
     return schema()
 
 

@@ -3,11 +3,12 @@
 import json
 import os
 import sys
+from argparse import Namespace
 from collections.abc import Sequence
 from enum import Enum
 
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find, find_one
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
@@ -22,10 +23,8 @@ class Output(Enum):
     JSON = "json"
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay top`."""
-    parser = parsers.top()
-    arguments = parser.read(words)
     if arguments.json and not arguments.once:
         parser.error("--json goes with --once")
     return top(arguments.url, Output.JSON if arguments.json else Output.TEXT if arguments.once else Output.SCREEN)

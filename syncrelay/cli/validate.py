@@ -2,12 +2,13 @@
 
 import json
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from syncrelay.cli import parsers
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 from syncrelay.config.source import shown_name
@@ -24,10 +25,8 @@ class Finding:
     problems: tuple[Problem, ...]
 
 
-def command(words: Sequence[str], _stop: StopRequest) -> int:
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay validate`."""
-    parser = parsers.validate()
-    arguments = parser.read(words)
     files = arguments.files
     parser.refuse_repeated(files if arguments.together else [each for each in files if each == "-"])
     return validate([files] if arguments.together else [[file] for file in files], arguments.format)

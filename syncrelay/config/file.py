@@ -51,7 +51,7 @@ class FileFormat:
     """The models of a file. `groups` has those of groups by policy, `topics` those of their topics.
 
     `any_group` and `any_topic` have the keys of all policies, for a group whose policy is missing or misspelt.
-    `defaults` has every key of a group but its topics. In `partial_file` no key is needed.
+    `defaults` has every key of a group but its topics.
     """
 
     groups: dict[str, type[Group]]
@@ -60,7 +60,6 @@ class FileFormat:
     any_topic: type[Topic]
     defaults: type[Keys]
     file: type[FileKeys]
-    partial_file: type[FileKeys]
 
     def group(self, policy: object) -> type[Group]:
         """Return the model of a policy's groups; that of all policies for one that there is not."""
@@ -70,6 +69,11 @@ class FileFormat:
 def file_format() -> FileFormat:
     """Return the models of a file with all policies."""
     return _format_of(policies.GROUP_MODELS)
+
+
+def partial_format() -> type[FileKeys]:
+    """Return the model of a file in which no key is needed."""
+    return _partial_format_of(policies.GROUP_MODELS)
 
 
 @cache
@@ -95,8 +99,7 @@ def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
         policy=(names, Field(default=None, description=about)),
         **keys,
     )
-    file = _file(defaults, _by_policy(groups, any_group))
-    return FileFormat(groups, topics, any_group, any_topic, defaults, file, _partial_file(groups, any_group))
+    return FileFormat(groups, topics, any_group, any_topic, defaults, _file(defaults, _by_policy(groups, any_group)))
 
 
 # What `defaults` can't hold, or holds in its own way.
@@ -171,9 +174,11 @@ def _partial(model: type[AnyKeys], **fields: Any) -> type[AnyKeys]:
     return create_model(f"Partial{model.__name__}", __base__=model, **(loose | fields))
 
 
-def _partial_file(groups: Mapping[str, type[Group]], any_group: type[Group]) -> type[FileKeys]:
-    by_policy = {policy: _partial_group(model) for policy, model in groups.items()}
-    group = _by_policy(by_policy, _partial_group(any_group))
+@cache
+def _partial_format_of(models: tuple[type[Group], ...]) -> type[FileKeys]:
+    form = _format_of(models)
+    by_policy = {policy: _partial_group(model) for policy, model in form.groups.items()}
+    group = _by_policy(by_policy, _partial_group(form.any_group))
     return _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, group), {}))
 
 

@@ -21,7 +21,8 @@ from syncrelay.config.wording import describe
 class Keys(BaseModel):
     """A mapping of the file with the keys that its fields name."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    # Built when it is first needed: that of the whole file builds the others along, and those for faults may never be.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 def tag_of_mapping(value: Any) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from syncrelay.config.document import Document, MappingNode, Node, ScalarNode, SequenceNode
-from syncrelay.config.file import FileKeys, file_format
+from syncrelay.config.file import FileKeys, partial_format
 from syncrelay.config.problems import Path
 from syncrelay.config.translate import path_of
 
@@ -21,7 +21,7 @@ def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Do
     faulty = frozenset(_key(path_of(error["loc"])) for error in errors if error["loc"][2:] != ("[key]",))
     usable = _usable(document.root, (), faulty)
     keys = usable if isinstance(usable, dict) else {}
-    return replace(document, faulty=faulty), file_format().partial_file.model_validate(keys)
+    return replace(document, faulty=faulty), partial_format().model_validate(keys)
 
 
 def _key(path: Path) -> Path:

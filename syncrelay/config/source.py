@@ -29,8 +29,8 @@ _NO_FILES: Final = {
 }
 # The line breaks of YAML 1.1, which PyYAML counts by.
 _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
-# What YAML does not allow in a file (YAML 1.2, 5.1).
-_UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+# What YAML does not allow in a file (YAML 1.2, 5.1, which lists the others: a set of those takes long to compile).
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 @dataclass(frozen=True, slots=True)

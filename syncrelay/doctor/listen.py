@@ -12,7 +12,7 @@ def check_listen(listen: Listen | None) -> Iterator[Diagnosis]:
     if listen is None or not listen.is_asked_for:
         return
     # The web server's packages are not needed to look at a broken installation.
-    from syncrelay.status import Server  # noqa: PLC0415
+    from syncrelay.status.server import Server  # noqa: PLC0415
 
     try:
         with Server(listen):

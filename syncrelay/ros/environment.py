@@ -9,6 +9,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from syncrelay.collector import resting_collector
 from syncrelay.errors import RosUnavailableError
 
 _STDOUT, _STDERR = 1, 2
@@ -16,6 +17,7 @@ _WHEELS = "pip install '.[ros]'                 in a clone of syncrelay: x86_64,
 _SOURCED = "source /opt/ros/jazzy/setup.bash    where ROS 2 is installed; then start syncrelay from that shell"
 
 
+@resting_collector()
 def require_rclpy() -> None:
     """Import rclpy, or raise RosUnavailableError saying which way to ROS is missing and how to mend it.
 

@@ -1,20 +1,19 @@
 """The relay: a ROS node and its threads, and what its main thread does turn by turn."""
 
-import gc
 import logging
 import os
 import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
-from functools import partial
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
 from syncrelay import own_version
+from syncrelay.collector import resting_collector
 from syncrelay.config import Config
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.calls import Calls
@@ -30,7 +29,6 @@ from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
-from syncrelay.ros.lifecycle import ManagedNode, Transitions
 from syncrelay.ros.manifests import Manifests
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.parameters import Parameters
@@ -66,6 +64,7 @@ class Relay:
     the clock are served on a third.
     """
 
+    @resting_collector()
     def __init__(
         self,
         config: Config,
@@ -75,7 +74,7 @@ class Relay:
         ros_args: Sequence[str] = (),
         on_turn: Callable[[], None] | None = None,
         purpose: Purpose = Purpose.RELAY,
-        manage: "Callable[[Relay], Transitions] | None" = None,
+        manage: "Callable[[Relay], Callable[..., Any]] | None" = None,
     ) -> None:
         """Join the ROS graph; `groups` are the names of those to run, None for all of them.
 
@@ -96,7 +95,7 @@ class Relay:
                 namespace=config.node.namespace,
                 context=self._context,
                 ros_args=ros_args,
-                make=rclpy.create_node if manage is None else partial(ManagedNode, transitions=manage(self)),
+                make=rclpy.create_node if manage is None else manage(self),
             )
             relay_name = self.node.get_fully_qualified_name()
         resolve = resolver(self.node, ros_args)
@@ -161,9 +160,6 @@ class Relay:
         self._receiving: Future[None] | None = None
 
     def __enter__(self) -> Self:
-        # What exists by now stays: the garbage collector need not search all modules again and again.
-        gc.collect()
-        gc.freeze()
         self._receiving = self._threads.submit(self._loop.run)
         self._receiving.add_done_callback(lambda _: self._wake.set())
         if self._is_managed:

@@ -1,14 +1,12 @@
 """The state of a running relay for programs: as JSON and as metrics, over HTTP."""
 
 from syncrelay.status.document import document, group_document
-from syncrelay.status.server import Server
 from syncrelay.status.state import Level, Phase, RelayState, advice, is_ready, level
 
 __all__ = [
     "Level",
     "Phase",
     "RelayState",
-    "Server",
     "advice",
     "document",
     "group_document",

@@ -10,11 +10,11 @@ import logging
 import socket
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from threading import Thread
 from types import TracebackType
 from typing import Any, Final, Self
 
-from prometheus_client import make_wsgi_app
 from waitress.server import create_server
 from waitress.wasyncore import close_all
 
@@ -23,7 +23,6 @@ from syncrelay.errors import ListenError
 from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
 from syncrelay.status.hosts import Hosts
-from syncrelay.status.metrics import registry
 from syncrelay.status.state import RelayState, is_ready
 
 # An idle loop turns once a second; what has not turned for this long hangs.
@@ -113,10 +112,17 @@ def _bound(listen: Listen) -> socket.socket:
 
 
 def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
-    metrics: Any = make_wsgi_app(registry(state))
+    @cache
+    def metrics() -> Any:
+        # Its library takes as long to import as all else here, and most relays are never scraped.
+        from prometheus_client import make_wsgi_app  # noqa: PLC0415
+
+        from syncrelay.status.metrics import registry  # noqa: PLC0415
+
+        return make_wsgi_app(registry(state))
 
     def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
-        answer: Iterable[bytes] = metrics(environ, start)
+        answer: Iterable[bytes] = metrics()(environ, start)
         return answer
 
     answers: dict[str, _Answer] = {

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, TypeAlias
+from functools import cache
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, TypeAdapter, ValidationError
 
@@ -173,18 +174,21 @@ class State:
     groups: tuple[Group, ...]
 
 
-_STATE: Final = TypeAdapter(State)
+@cache
+def _reader() -> TypeAdapter[State]:
+    """Return what reads a state, made when one is first asked for: a relay may never be."""
+    return TypeAdapter(State)
 
 
 def state_of(document: Mapping[str, Any]) -> State:
     """Return the state that a document of this process holds."""
-    return _STATE.validate_python(document)
+    return _reader().validate_python(document)
 
 
 def read_state(document: bytes) -> State:
     """Return the state that a JSON document holds; ignores keys that it does not know. Raises NotAStateError."""
     try:
-        return _STATE.validate_json(document)
+        return _reader().validate_json(document)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"])) or "the document"

@@ -193,14 +193,3 @@ def test_the_signals_of_the_relay_are_taken_before_anything_slow_is_imported(tmp
     )
     done = run_python("-c", script, folder=tmp_path)
     assert set(done.stdout.split()) <= {"syncrelay", "collections"}
-
-
-def test_commands_without_ros_import_none(tmp_path):
-    (tmp_path / "f.yaml").write_text(GOOD)
-    script = (
-        "import sys; from syncrelay.cli import main\n"
-        "for words in (['validate', 'f.yaml'], ['schema'], ['demo', '--show-config']): main(words)\n"
-        "print('rclpy' in sys.modules, 'std_msgs' in sys.modules)\n"
-    )
-    done = run_python("-c", script, folder=tmp_path)
-    assert done.stdout.splitlines()[-1] == "False False"

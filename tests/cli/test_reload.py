@@ -6,7 +6,8 @@ from contextlib import ExitStack
 import pytest
 
 from syncrelay.config import Listen
-from syncrelay.status import Server, document
+from syncrelay.status import document
+from syncrelay.status.server import Server
 from tests.cli.command import run
 from tests.top import states
 from tests.top.relay_server import serving

@@ -13,7 +13,8 @@ from states import CAMERA, relay, started, working
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
 from syncrelay.explain import Endpoint, Mismatch, Refusal
-from syncrelay.status import Phase, Server
+from syncrelay.status import Phase
+from syncrelay.status.server import Server
 
 HEALTHY = relay(working())
 STOPPED = replace(working(), facts=replace(working().facts, failure="KeyError: 'x'"))

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Listen
-from syncrelay.status import Server, document
+from syncrelay.status import document
 from syncrelay.status.announcement import Place, announce, announced, places_in
+from syncrelay.status.server import Server
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask, base_urls, search
 from tests.top import states
 from tests.top.relay_server import serving

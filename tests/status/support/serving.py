@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from syncrelay.config.listen import Listen
-from syncrelay.status import RelayState, Server
+from syncrelay.status import RelayState
+from syncrelay.status.server import Server
 
 ANY = Listen("127.0.0.1", range(1))
 _PATIENCE_S = 60
