@@ -63,7 +63,8 @@ class SetWriter:
         manifest = self._manifests.get(binding.group.name)
         if manifest is not None:
             newest = max(member.received for member in members if member is not None)
-            content = manifest.writer.write(manifest.output.count + 1, outcome, members, now - newest)
+            number, latency = manifest.output.count + 1, now - newest
+            content = manifest.writer.write(number, members, common=outcome.stamp, latency=latency)
             self._recording.write(manifest.output, content, now)
 
     def _write(self, each: Input, message: Message, stamp: int | None, now: int) -> Member:

@@ -5,13 +5,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, Final, NamedTuple, TypeAlias, TypeVar
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
-from syncrelay.dataflow.manifest import ManifestWriter, Member
+from syncrelay.dataflow.manifest_queue import GroupManifests, Note
 from syncrelay.explain import Code, RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
@@ -26,6 +26,7 @@ _RECENT = 256
 _WATCHED = 10_000
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
+_ALL_PUBLISHED: Final[dict[int, str]] = {}
 
 
 class Batch(NamedTuple):
@@ -82,14 +83,16 @@ class GroupRelay:
         self._held_by = StoppedEngine(0, ())
         self._was_connected: list[bool] = []
         self._left = 0
-        self._manifest: tuple[ManifestWriter, Outlet] | None = None
-        self._manifest_failed = False
+        self._manifests: GroupManifests | None = None
 
     def connect(self, index: int, outlet: Outlet, *, restamped: bool) -> None:
         """Publish one input's messages through an outlet from now on.
 
         `restamped` says that its payloads begin with a Header, whose stamp the set's common stamp replaces.
         """
+        # Whoever joins by them forgets what an output gave before it numbers anew.
+        if self._manifests is not None:
+            self._manifests.publish_noted()
         self._outlets[index] = outlet
         self._restamped[index] = restamped
 
@@ -108,14 +111,9 @@ class GroupRelay:
         if isinstance(self.engine, PausedEngine):
             self.engine = self.engine.engine
 
-    @property
-    def tells_sets(self) -> bool:
-        """Whether it has where to publish its manifests. Any thread."""
-        return self._manifest is not None
-
-    def tell_sets(self, writer: ManifestWriter, outlet: Outlet) -> None:
-        """Publish a manifest behind each set from now on, while anyone subscribes to it."""
-        self._manifest = writer, outlet
+    def tell_sets(self, manifests: GroupManifests) -> None:
+        """Have a manifest published of each set from now on, while anyone subscribes to it."""
+        self._manifests = manifests
 
     def suspend(self) -> None:
         """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
@@ -228,8 +226,8 @@ class GroupRelay:
                 self._sets.append((stamps, latency))
                 self.last.append(stamps)
                 self._left += 1
-                if self._manifest is not None and self._manifest[1].is_heard():
-                    self._tell(outcome, latency, *self._manifest)
+                if self._manifests is not None and self._manifests.is_heard:
+                    self._manifests.note(self._note(outcome, stamps, latency))
             else:
                 message = outcome.message
                 self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
@@ -258,25 +256,22 @@ class GroupRelay:
                     self._published(message.input, outlet)
         return newest
 
-    def _tell(self, match: Match, latency: int, writer: ManifestWriter, outlet: Outlet) -> None:
-        """Publish the manifest of the set that was just sent."""
-        members = [None if message is None else self._member(message, match.stamp) for message in match.messages]
-        try:
-            outlet.send_content(writer.write(self._left, match, members, latency))
-        except PublishError as error:
-            if not self._manifest_failed:
-                _LOG.error("%s: a manifest could not be published: %s", self.config.name, error)
-            self._manifest_failed = True
-        else:
-            self._manifest_failed = False
-
-    def _member(self, message: Message, common_stamp: int | None) -> Member:
-        index, stamp, (_, received) = message.input, message.stamp, message.payload
-        leaves_as = common_stamp if common_stamp is not None and self._restamped[index] else stamp
-        outlet = self._outlets[index]
-        if self.unpublished and index in self.unpublished:
-            return Member(leaves_as, stamp, received, 0, self.unpublished[index].why)
-        return Member(leaves_as, stamp, received, 0 if outlet is None else outlet.sent)
+    def _note(self, match: Match, stamps: tuple[int | None, ...], latency: int) -> Note:
+        """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
+        common, left_as = match.stamp, stamps
+        if common is not None:
+            pairs = zip(stamps, self._restamped, strict=True)
+            left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
+        return Note(
+            self._left,
+            common,
+            latency,
+            stamps,
+            left_as,
+            [None if message is None else message.payload[1] for message in match.messages],
+            [0 if outlet is None else outlet.sent for outlet in self._outlets],
+            {index: each.why for index, each in self.unpublished.items()} if self.unpublished else _ALL_PUBLISHED,
+        )
 
     def _not_published(self, index: int, outlet: Outlet, why: str) -> None:
         before = self.unpublished.get(index)

@@ -8,7 +8,6 @@ from struct import Struct
 from typing import Final, NamedTuple
 
 from syncrelay.config import GroupConfig
-from syncrelay.sync import Match
 
 MANIFEST_DEPTH: Final = 500
 """How many DDS keeps of a group: whoever joins sets needs each one, and a stall of some seconds must cost none."""
@@ -55,19 +54,21 @@ class ManifestWriter:
         self._names = [(_text(output), _text(source)) for source, output in topics]
         self._templates: dict[tuple[object, ...], bytes] = {}
 
-    def write(self, number: int, match: Match, members: Sequence[Member | None], latency: int) -> bytes:
-        """Return the manifest of a set, which is the `number`-th of its group; `latency` in ns."""
-        offsets, common = self._offsets, match.stamp
-        there = [message for message in match.messages if message is not None]
+    def write(self, number: int, members: Sequence[Member | None], *, common: int | None, latency: int) -> bytes:
+        """Return the manifest of a set, which is the `number`-th of its group; `common` is the stamp that it was given.
+
+        Times in nanoseconds.
+        """
+        there = [member for member in members if member is not None]
         # With the offsets, as the span of `/status` and of `analyze`.
-        matched = [message.stamp + offsets[message.input] for message in there]
-        stamp = max([message.stamp for message in there]) if common is None else common
+        pairs = zip(members, self._offsets, strict=True)
+        matched = [member.original_stamp + offset for member, offset in pairs if member is not None]
+        stamp = max([member.original_stamp for member in there]) if common is None else common
         numbers = [number, len(members) - len(there), max(matched) - min(matched), latency]
         if common is not None:
             numbers.append(common)
-        for member in members:
-            if member is not None:
-                numbers += member[:4]
+        for member in there:
+            numbers += member[:4]
         digits = list(map(b"%d".__mod__, numbers))
         kinds = tuple([None if member is None else member.why_not for member in members])
         key = (common is None, kinds, *map(len, digits))
