@@ -11,7 +11,8 @@ from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
-from syncrelay.dataflow.manifest_queue import GroupManifests, Note
+from syncrelay.dataflow.manifest import Note
+from syncrelay.dataflow.manifest_queue import GroupManifests
 from syncrelay.explain import Code, RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
@@ -26,7 +27,7 @@ _RECENT = 256
 _WATCHED = 10_000
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
-_ALL_PUBLISHED: Final[dict[int, str]] = {}
+_NONE_UNPUBLISHED: Final[dict[int, str]] = {}
 
 
 class Batch(NamedTuple):
@@ -262,16 +263,13 @@ class GroupRelay:
         if common is not None:
             pairs = zip(stamps, self._restamped, strict=True)
             left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
-        return Note(
-            self._left,
-            common,
-            latency,
-            stamps,
-            left_as,
-            [None if message is None else message.payload[1] for message in match.messages],
-            [0 if outlet is None else outlet.sent for outlet in self._outlets],
-            {index: each.why for index, each in self.unpublished.items()} if self.unpublished else _ALL_PUBLISHED,
-        )
+        received = [None if message is None else message.payload[1] for message in match.messages]
+        sent = [0 if outlet is None else outlet.sent for outlet in self._outlets]
+        unpublished = _NONE_UNPUBLISHED
+        if self.unpublished:
+            unpublished = {index: each.why for index, each in self.unpublished.items()}
+            sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
+        return Note(self._left, latency, common, stamps, left_as, received, sent, unpublished)
 
     def _not_published(self, index: int, outlet: Outlet, why: str) -> None:
         before = self.unpublished.get(index)

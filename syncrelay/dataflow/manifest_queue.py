@@ -8,12 +8,12 @@ import logging
 from collections import deque
 from collections.abc import Collection
 from threading import Lock
-from typing import Final, NamedTuple
+from typing import Final
 
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.bugs import Bugs
-from syncrelay.dataflow.manifest import ManifestWriter, Member
+from syncrelay.dataflow.manifest import ManifestWriter, Note
 from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
@@ -22,35 +22,6 @@ _LOG = logging.getLogger("syncrelay")
 _BATCH_S: Final = 0.05
 MOST_NOTED: Final = 10_000
 """How many manifests of all groups may wait to be published: ten seconds of a set each millisecond."""
-
-
-class Note(NamedTuple):
-    """What the manifest of a set tells, as known when the set had left: a value for each input, None of a missing one.
-
-    `left_as` are stamps as published. `sent` counts the messages of each output. Times in nanoseconds.
-    """
-
-    number: int
-    common: int | None
-    latency: int
-    stamps: tuple[int | None, ...]
-    left_as: tuple[int | None, ...]
-    received: list[int | None]
-    sent: list[int]
-    unpublished: dict[int, str]
-
-    def members(self) -> list[Member | None]:
-        """Return the messages of the set, by inputs."""
-        members: list[Member | None] = []
-        rows = zip(self.stamps, self.left_as, self.received, self.sent, strict=True)
-        for index, (stamp, left_as, received, sent) in enumerate(rows):
-            if stamp is None or left_as is None or received is None:
-                members.append(None)
-            elif index in self.unpublished:
-                members.append(Member(left_as, stamp, received, 0, self.unpublished[index]))
-            else:
-                members.append(Member(left_as, stamp, received, sent))
-        return members
 
 
 class GroupManifests:
@@ -77,7 +48,7 @@ class GroupManifests:
 
     def publish(self, note: Note) -> None:
         """Publish a manifest; say it once where DDS refuses."""
-        content = self._writer.write(note.number, note.members(), common=note.common, latency=note.latency)
+        content = self._writer.write(note)
         try:
             self._outlet.send_content(content)
         except PublishError as error:

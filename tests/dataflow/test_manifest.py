@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 
 from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
-from syncrelay.dataflow.manifest import ManifestWriter, Member
+from syncrelay.dataflow.manifest import ManifestWriter
 from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
 from tests.ros.configs import config, inputs
-from tests.ros.manifests import ERROR, MANIFEST_TYPE, OK, STALE, WARN, Told, ToldInput, read
+from tests.ros.manifests import ERROR, MANIFEST_TYPE, OK, STALE, WARN, Member, Told, ToldInput, note, read
 
 _NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,40}", fullmatch=True)
 _STAMPS = st.integers(-(2**31) * NS_PER_SECOND, 2**31 * NS_PER_SECOND - 1)
@@ -32,7 +32,7 @@ def test_others_read_what_was_written(data, name, node, number, latency):
     common = data.draw(st.one_of(st.none(), _STAMPS))
     topics = [(f"/{each}", f"/out/{each}") for each in tokens]
     writer = ManifestWriter(_group(name, [each for each, _ in topics]).config, node=f"/{node}", topics=topics)
-    payload = writer.write(number, members, common=common, latency=latency)
+    payload = writer.write(note(number, members, common=common, latency=latency))
 
     told = read(payload)
     stamps = [each.original_stamp for each in members if each is not None]
@@ -69,4 +69,4 @@ def test_a_long_reason_is_told_in_part():
     group = _group("front", ["/a", "/b"])
     writer = ManifestWriter(group.config, node="/n", topics=[("/a", "/x"), ("/b", "/y")])
     members = [Member(1, 1, 1, 0, "no room\0, " * 100), Member(1, 1, 1, 1)]
-    assert 0 < len(read(writer.write(1, members, common=None, latency=0)).inputs[0].message) <= 200
+    assert 0 < len(read(writer.write(note(1, members))).inputs[0].message) <= 200

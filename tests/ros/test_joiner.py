@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.dataflow.manifest import ManifestWriter, Member
+from syncrelay.dataflow.manifest import ManifestWriter
 from tests.ros.cdr_messages import NS_PER_SECOND, VECTOR
 from tests.ros.configs import config, inputs
+from tests.ros.manifests import Member, note
 from tests.ros.streams import BEGIN, MS
 
 serialization = pytest.importorskip("rclpy.serialization", reason="rclpy is not installed")
@@ -48,7 +49,7 @@ class _Run:
             members.append(None if stamp is None else Member(stamp, stamp, stamp, sequence))
             if stamp is not None:
                 self.published[topic].append((joined[topic], {"publication_sequence_number": sequence}))
-        payload = _WRITER.write(number, members, common=None, latency=0)
+        payload = _WRITER.write(note(number, members))
         self.published[""].append((serialization.deserialize_message(payload, DiagnosticArray),))
         self.sets.append(joined)
 
