@@ -170,8 +170,9 @@ class GroupRelay:
         return Batch(arrivals, sets, tuple(self._keys), self.counts(), self.engine.sets, tuple(self.last))
 
     def _watch(self) -> None:
-        self._arrivals = tuple(deque[tuple[int, int]](maxlen=_WATCHED) for _ in range(self._n_inputs))
-        self._sets = deque[tuple[tuple[int | None, ...], int]](maxlen=_WATCHED)
+        # To make them by way of their generic types takes several times as long.
+        self._arrivals: tuple[deque[tuple[int, int]], ...] = tuple([deque(maxlen=_WATCHED) for _ in self._keys])
+        self._sets: deque[tuple[tuple[int | None, ...], int]] = deque(maxlen=_WATCHED)
 
     def expire(self, now: int) -> None:
         """Let go what has waited long enough."""
