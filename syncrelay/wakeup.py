@@ -20,8 +20,11 @@ class Wakeup:
         """End the rest, or the next one. Any thread, any handler."""
         os.eventfd_write(self._descriptor, 1)
 
-    def wait(self, timeout_s: float) -> bool:
-        """Rest until `set` is called, or was since the last rest, for so many seconds at most; whether it was."""
+    def wait(self, timeout_s: float | None) -> bool:
+        """Rest until `set` is called, or was since the last rest, for so many seconds at most; whether it was.
+
+        None is as long as it takes.
+        """
         if not select.select([self._descriptor], [], [], timeout_s)[0]:
             return False
         os.eventfd_read(self._descriptor)

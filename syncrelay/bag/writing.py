@@ -10,7 +10,7 @@ from syncrelay.bag.qos import Profile, output_profile
 from syncrelay.bag.recording import Channel, Encoding
 from syncrelay.cdr import patch_stamp
 from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
-from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Member
+from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Note
 from syncrelay.errors import BagError
 from syncrelay.sync import Match, Message, Outcome
 
@@ -57,22 +57,25 @@ class SetWriter:
         if not isinstance(outcome, Match):
             return
         pairs = zip(binding.inputs, outcome.messages, strict=True)
-        members = [
-            None if message is None else self._write(each, message, outcome.stamp, now) for each, message in pairs
+        stamp = outcome.stamp
+        written = [
+            (None, None, 0) if message is None else self._write(each, message, stamp, now) for each, message in pairs
         ]
         manifest = self._manifests.get(binding.group.name)
         if manifest is not None:
-            newest = max(member.received for member in members if member is not None)
-            content = manifest.writer.write(manifest.output.count + 1, outcome, members, now - newest)
-            self._recording.write(manifest.output, content, now)
+            left_as, received, sent = zip(*written, strict=True)
+            latency = now - max(each for each in received if each is not None)
+            note = Note(manifest.output.count + 1, latency, stamp, outcome.stamps, left_as, received, sent, {})
+            self._recording.write(manifest.output, manifest.writer.write(note), now)
 
-    def _write(self, each: Input, message: Message, stamp: int | None, now: int) -> Member:
+    def _write(self, each: Input, message: Message, stamp: int | None, now: int) -> tuple[int, int, int]:
+        """Write a message; return its stamp as it leaves, when it was received, and its number among its topic's."""
         channel, received, payload = message.payload
         output, payload_of = self._outputs[each.output], self._payloads[each.output, channel]
         self._recording.write(output, payload_of.written(payload, stamp), now)
         self.messages += 1
         leaves_as = stamp if stamp is not None and payload_of.is_restamped else message.stamp
-        return Member(leaves_as, message.stamp, received, output.count)
+        return leaves_as, received, output.count
 
     def _manifest(self, binding: GroupBinding) -> "_Manifest":
         node = binding.group.inputs.node

@@ -5,14 +5,15 @@ import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
-from typing import NamedTuple, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
-from syncrelay.dataflow.backend import Outlet, PublishError
+from syncrelay.dataflow.backend import Outlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.flow import Engine, Flow, Stamps
-from syncrelay.dataflow.manifest import ManifestWriter, Member
+from syncrelay.dataflow.manifest import Note
+from syncrelay.dataflow.manifest_queue import GroupManifests
 from syncrelay.explain import Code, RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
@@ -22,6 +23,7 @@ _Result = TypeVar("_Result")
 
 # What is held while a group is suspended, which takes some tenths of a second.
 _HELD = 10_000
+_NONE_UNPUBLISHED: Final[dict[int, str]] = {}
 
 
 class Batch(NamedTuple):
@@ -71,7 +73,7 @@ class GroupRelay:
         self._suspended = self.engine
         self._held_by = StoppedEngine(0, ())
         self._was_connected: list[bool] = []
-        self._manifest_failed = False
+        self._manifests: GroupManifests | None = None
 
     @property
     def engine(self) -> Engine:
@@ -87,6 +89,9 @@ class GroupRelay:
 
         `restamped` says that its payloads begin with a Header, whose stamp the set's common stamp replaces.
         """
+        # Whoever joins by them forgets what an output gave before it numbers anew.
+        if self._manifests is not None:
+            self._manifests.publish_noted()
         self.flow.outlets[index] = outlet
         self.flow.restamped[index] = restamped
 
@@ -105,19 +110,14 @@ class GroupRelay:
         if isinstance(self.engine, PausedEngine):
             self.engine = self.engine.engine
 
-    @property
-    def tells_sets(self) -> bool:
-        """Whether it has where to publish its manifests. Any thread."""
-        return self.flow.tell is not None
-
-    def tell_sets(self, writer: ManifestWriter, outlet: Outlet) -> None:
-        """Publish a manifest behind each set from now on, while anyone subscribes to it."""
+    def tell_sets(self, manifests: GroupManifests) -> None:
+        """Have a manifest published of each set from now on, while anyone subscribes to it."""
 
         def tell(match: Match, latency: int) -> None:
-            if outlet.is_heard():
-                self._tell(match, latency, writer, outlet)
+            if manifests.is_heard:
+                manifests.note(self._note(match, latency))
 
-        self.flow.tell = tell
+        self._manifests, self.flow.tell = manifests, tell
 
     def suspend(self) -> None:
         """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
@@ -210,25 +210,20 @@ class GroupRelay:
             return self.engine.counts()
         return self.config.engine().counts()
 
-    def _tell(self, match: Match, latency: int, writer: ManifestWriter, outlet: Outlet) -> None:
-        """Publish the manifest of the set that was just sent."""
-        members = [None if message is None else self._member(message, match.stamp) for message in match.messages]
-        try:
-            outlet.send_content(writer.write(self.flow.n_sets, match, members, latency))
-        except PublishError as error:
-            if not self._manifest_failed:
-                _LOG.error("%s: a manifest could not be published: %s", self.config.name, error)
-            self._manifest_failed = True
-        else:
-            self._manifest_failed = False
-
-    def _member(self, message: Message, common_stamp: int | None) -> Member:
-        index, stamp, received = message.input, message.stamp, message.payload.received
-        leaves_as = common_stamp if common_stamp is not None and self.flow.restamped[index] else stamp
-        outlet = self.flow.outlets[index]
-        if self.unpublished and index in self.unpublished:
-            return Member(leaves_as, stamp, received, 0, self.unpublished[index].why)
-        return Member(leaves_as, stamp, received, 0 if outlet is None else outlet.sent)
+    def _note(self, match: Match, latency: int) -> Note:
+        """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
+        common, stamps = match.stamp, match.stamps
+        left_as = stamps
+        if common is not None:
+            pairs = zip(stamps, self.flow.restamped, strict=True)
+            left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
+        received = [None if message is None else message.payload.received for message in match.messages]
+        sent = [0 if outlet is None else outlet.sent for outlet in self.flow.outlets]
+        unpublished = _NONE_UNPUBLISHED
+        if self.unpublished:
+            unpublished = {index: each.why for index, each in self.unpublished.items()}
+            sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
+        return Note(self.flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished)
 
     def refused(self, index: int, outlet: Outlet, why: str) -> None:
         """Note that an outlet did not publish a message of this input."""

@@ -3,12 +3,11 @@
 docs/manifest.md is its contract. Whatever is the same in every set of a group is serialized once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import Final, NamedTuple
 
 from syncrelay.config import GroupConfig
-from syncrelay.sync import Match
 
 MANIFEST_DEPTH: Final = 500
 """How many DDS keeps of a group: whoever joins sets needs each one, and a stall of some seconds must cost none."""
@@ -27,17 +26,22 @@ _MOST_TEMPLATES: Final = 500
 _LONGEST: Final = 200
 
 
-class Member(NamedTuple):
-    """A message of a set: its stamp as it leaves and as it came, and when it was received, in nanoseconds.
+class Note(NamedTuple):
+    """What the manifest of a set tells; of `stamps` and what follows, one for each input. Times in nanoseconds.
 
-    It is the `sequence`-th message of its output, from 1. One that could not be published has 0, and a reason.
+    `common` is the stamp that the set was given, if any. The stamp of a missing input is None. A message is the
+    `sent`-th of its output, from 1; that of one that could not be published is 0, and `unpublished` says why, by its
+    input.
     """
 
-    stamp: int
-    original_stamp: int
-    received: int
-    sequence: int
-    why_not: str = ""
+    number: int
+    latency: int
+    common: int | None
+    stamps: Sequence[int | None]
+    left_as: Sequence[int | None]
+    received: Sequence[int | None]
+    sent: Sequence[int]
+    unpublished: Mapping[int, str]
 
 
 class ManifestWriter:
@@ -55,24 +59,22 @@ class ManifestWriter:
         self._names = [(_text(output), _text(source)) for source, output in topics]
         self._templates: dict[tuple[object, ...], bytes] = {}
 
-    def write(self, number: int, match: Match, members: Sequence[Member | None], latency: int) -> bytes:
-        """Return the manifest of a set, which is the `number`-th of its group; `latency` in ns."""
-        offsets, common = self._offsets, match.stamp
-        there = [message for message in match.messages if message is not None]
+    def write(self, note: Note) -> bytes:
+        """Return the manifest of a set."""
+        stamps, common, unpublished = note.stamps, note.common, note.unpublished
         # With the offsets, as the span of `/status` and of `analyze`.
-        matched = [message.stamp + offsets[message.input] for message in there]
-        stamp = max([message.stamp for message in there]) if common is None else common
-        numbers = [number, len(members) - len(there), max(matched) - min(matched), latency]
+        matched = [stamp + offset for stamp, offset in zip(stamps, self._offsets, strict=True) if stamp is not None]
+        header = max([stamp for stamp in stamps if stamp is not None]) if common is None else common
+        numbers = [note.number, len(stamps) - len(matched), max(matched) - min(matched), note.latency]
         if common is not None:
             numbers.append(common)
-        for member in members:
-            if member is not None:
-                numbers += member[:4]
-        digits = list(map(b"%d".__mod__, numbers))
-        kinds = tuple([None if member is None else member.why_not for member in members])
+        rows = zip(note.left_as, stamps, note.received, note.sent, strict=True)
+        values = [value for row in rows if row[1] is not None for value in row]
+        kinds = tuple([None if stamp is None else unpublished.get(index, "") for index, stamp in enumerate(stamps)])
+        digits = list(map(b"%d".__mod__, [*numbers, *values]))
         key = (common is None, kinds, *map(len, digits))
         template = self._templates.get(key) or self._template(key, digits, kinds, has_common=common is not None)
-        return template % (_BEGIN(0, 1, 0, 0, *divmod(stamp, _NS_PER_SECOND)), *digits)
+        return template % (_BEGIN(0, 1, 0, 0, *divmod(header, _NS_PER_SECOND)), *digits)
 
     def _template(
         self, key: tuple[object, ...], digits: Sequence[bytes], kinds: Sequence[str | None], *, has_common: bool

@@ -124,7 +124,8 @@ class Groups:
         self.manifests.wait_until_acknowledged(deadline)
 
     def count_listeners(self) -> None:
-        """Have lazy groups sleep while nobody subscribes to their outputs or manifests."""
+        """Have lazy groups sleep while nobody subscribes to their outputs or manifests, which then are not made."""
+        self.manifests.queue.look()
         self.bindings.count_listeners(self.manifests.publishers_of)
 
     def forget(self) -> None:
@@ -173,6 +174,7 @@ class Groups:
         """Let nothing leave any more, when this returns, of these groups and of those that a reload brings."""
         self.is_paused = True
         self._of_each(GroupRelay.pause)
+        self.manifests.queue.publish()
 
     def resume(self) -> None:
         """Let sets leave again."""

@@ -11,8 +11,10 @@ from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReli
 
 from syncrelay.config.names_in_graph import manifest_topic
 from syncrelay.dataflow.backend import Outlet, RclBackend
+from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter
+from syncrelay.dataflow.manifest_queue import GroupManifests, ManifestQueue
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 
@@ -27,14 +29,16 @@ _PROFILE: Final = QoSProfile(
 
 
 class Manifests:
-    """Has groups publish the manifests of their sets. On the main thread."""
+    """Has the manifests of groups' sets published, on the thread that runs `queue`. On the main thread."""
 
-    def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop) -> None:
+    def __init__(self, *, entities: Entities, node: Any, backend: RclBackend, loop: ReceiveLoop, bugs: Bugs) -> None:
+        self.queue = ManifestQueue(bugs=bugs)
         self._entities = entities
         self._node = node
         self._backend = backend
         self._loop = loop
         self._publishers: dict[str, tuple[Any, Outlet]] = {}
+        self._begun: dict[GroupRelay, GroupManifests] = {}
         self._said: set[str] = set()
 
     def begin(self, groups: Iterable[GroupRelay]) -> None:
@@ -43,7 +47,7 @@ class Manifests:
         What DDS refuses is logged once: those groups run without.
         """
         for group in groups:
-            if self._is_wanted(group) and not group.tells_sets:
+            if self._is_wanted(group) and group not in self._begun:
                 try:
                     outlet = self._outlet(group.config.name)
                 except RefusedError as error:
@@ -52,7 +56,9 @@ class Manifests:
                     self._connect(group, outlet)
 
     def end_others(self, groups: Iterable[GroupRelay]) -> None:
-        """End the publishers that none of these groups needs, once no other runs."""
+        """End the publishers that none of these groups needs, once no other runs and all manifests are published."""
+        self._begun = {group: self._begun[group] for group in groups if group in self._begun}
+        self.queue.keep(self._begun.values())
         wanted = {group.config.name for group in groups if self._is_wanted(group)}
         for name in [name for name in self._publishers if name not in wanted]:
             self._entities.end(self._publishers.pop(name)[0])
@@ -63,7 +69,8 @@ class Manifests:
         return [held[0]] if held and self._is_wanted(group) else []
 
     def wait_until_acknowledged(self, deadline: int) -> None:
-        """Give subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
+        """Publish what was noted; give subscribers until `deadline`, by time.monotonic_ns(), to get it."""
+        self.queue.publish()
         for publisher, _ in self._publishers.values():
             publisher.wait_for_all_acked(Duration(nanoseconds=max(0, deadline - time.monotonic_ns())))
 
@@ -80,7 +87,8 @@ class Manifests:
         resolve = self._node.resolve_topic_name
         topics = [(resolve(each.topic), resolve(each.output)) for each in group.config.topics]
         writer = ManifestWriter(group.config, node=self._node.get_fully_qualified_name(), topics=topics)
-        self._loop.call(lambda: group.tell_sets(writer, outlet))
+        begun = self._begun[group] = self.queue.begin(group.config.name, writer, outlet)
+        self._loop.call(lambda: group.tell_sets(begun))
 
     def _say_once(self, text: str) -> None:
         if text not in self._said:

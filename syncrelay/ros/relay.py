@@ -61,7 +61,7 @@ class Relay:
     """A node that relays the groups of a file; a context manager that runs its receive thread.
 
     Made on the main thread, whose turns at `step` poll the graph. Data flows on a thread of its own; parameters and
-    the clock are served on a third.
+    the clock are served on a third, and manifests are published on a fourth.
     """
 
     @resting_collector()
@@ -133,13 +133,15 @@ class Relay:
             simulated=self._clock.is_simulated,
             bugs=self._bugs,
         )
+        manifests = Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop, bugs=self._bugs)
+        self._manifest_queue = manifests.queue
         self._groups = Groups(
             config,
             chosen=groups,
             node=self.node,
             resolve=resolve,
             bindings=bindings,
-            manifests=Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop),
+            manifests=manifests,
             loop=self._loop,
             clock=self._clock,
             flow=backend.flow,
@@ -153,7 +155,7 @@ class Relay:
         self._started = time.monotonic()
         self._wake = Wakeup()
         self._calls = Calls(self._wake.set)
-        self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="syncrelay")
+        self._threads = ThreadPoolExecutor(max_workers=3, thread_name_prefix="syncrelay")
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._services = Services(self.node, {}, bugs=self._bugs)
@@ -166,6 +168,7 @@ class Relay:
             self.forget_groups(Phase.UNCONFIGURED)
             _LOG.info("%s", self._advice)
         self._threads.submit(self._serve)
+        self._threads.submit(self._manifest_queue.run)
         self._clock.follow(jumped_back=self._groups.clock_jumped_back, ticked=self._groups.clock_ticked)
         return self
 
@@ -367,7 +370,9 @@ class Relay:
         finally:
             self._clock.close()
             self._executor.shutdown()
+            self._manifest_queue.stop()
             self._threads.shutdown()
+            self._manifest_queue.keep(())
             self._loop.close()
             _LOG.removeHandler(self._rosout)
             self._leave()

@@ -1,19 +1,14 @@
 """The manifest as bytes: what is written by hand is what others read, and what could not be published is told."""
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import load_text
-from syncrelay.dataflow.backend import PublishError
 from syncrelay.dataflow.group import GroupRelay
-from syncrelay.dataflow.manifest import ManifestWriter, Member
-from syncrelay.sync import Match, Message
-from tests.dataflow.payloads import Named
+from syncrelay.dataflow.manifest import ManifestWriter
 from tests.ros.cdr_messages import NS_PER_SECOND, STORE, VECTOR
 from tests.ros.configs import config, inputs
-from tests.ros.manifests import ERROR, MANIFEST_TYPE, OK, STALE, WARN, Told, ToldInput, read
-from tests.ros.streams import BEGIN
+from tests.ros.manifests import ERROR, MANIFEST_TYPE, OK, STALE, WARN, Member, Told, ToldInput, note, read
 
 _NAMES = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,40}", fullmatch=True)
 _STAMPS = st.integers(-(2**31) * NS_PER_SECOND, 2**31 * NS_PER_SECOND - 1)
@@ -37,10 +32,7 @@ def test_others_read_what_was_written(data, name, node, number, latency):
     common = data.draw(st.one_of(st.none(), _STAMPS))
     topics = [(f"/{each}", f"/out/{each}") for each in tokens]
     writer = ManifestWriter(_group(name, [each for each, _ in topics]).config, node=f"/{node}", topics=topics)
-    match = Match(
-        tuple(each and Message(index, each.original_stamp, None) for index, each in enumerate(members)), common
-    )
-    payload = writer.write(number, match, members, latency)
+    payload = writer.write(note(number, members, common=common, latency=latency))
 
     told = read(payload)
     stamps = [each.original_stamp for each in members if each is not None]
@@ -77,78 +69,4 @@ def test_a_long_reason_is_told_in_part():
     group = _group("front", ["/a", "/b"])
     writer = ManifestWriter(group.config, node="/n", topics=[("/a", "/x"), ("/b", "/y")])
     members = [Member(1, 1, 1, 0, "no room\0, " * 100), Member(1, 1, 1, 1)]
-    match = Match((Message(0, 1, None), Message(1, 1, None)))
-    assert 0 < len(read(writer.write(1, match, members, 0)).inputs[0].message) <= 200
-
-
-class _Outlet:
-    """Publishes, refuses or is not heard, as it is told."""
-
-    topic = "/out"
-
-    def __init__(self) -> None:
-        self.sent = 0
-        self.contents: list[bytes] = []
-        self.heard = True
-        self.refuses = False
-
-    def send(self, _payload: object) -> None:
-        if self.refuses:
-            raise PublishError("no room")
-        self.sent += 1
-
-    def send_stamped(self, payload: object, _stamp: int) -> None:
-        self.send(payload)
-
-    def send_content(self, content: bytes) -> None:
-        self.send(content)
-        self.contents.append(content)
-
-    def is_heard(self) -> bool:
-        return self.heard
-
-
-@pytest.fixture
-def told():
-    """A group of two inputs with outlets, and that of its manifest."""
-    group, outlets, manifest = _group("front", ["/a", "/b"]), (_Outlet(), _Outlet()), _Outlet()
-    for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)
-    topics = [("/a", "/front/a"), ("/b", "/front/b")]
-    group.tell_sets(ManifestWriter(group.config, node="/syncrelay", topics=topics), manifest)
-    return group, outlets, manifest
-
-
-def _feed_set(group: GroupRelay, number: int) -> None:
-    for index in range(2):
-        group.flow.receive(index, Named(b"", BEGIN), BEGIN + number)
-
-
-def test_what_could_not_be_published_is_told(told):
-    group, outlets, manifest = told
-    for number, refuses in enumerate([False, True, False], 1):
-        outlets[1].refuses = refuses
-        _feed_set(group, number)
-    first, refused, last = map(read, manifest.contents)
-    assert (first.level, first.message, last.level, last.message) == (OK, "complete", OK, "complete")
-    assert (refused.level, refused.message) == (ERROR, "1 of 2 not published")
-    assert (refused.inputs[1].level, refused.inputs[1].message, refused.inputs[1].sequence) == (ERROR, "no room", 0)
-    assert [[each.sequence for each in one.inputs] for one in (first, refused, last)] == [[1, 1], [2, 0], [3, 2]]
-
-
-def test_sets_are_counted_while_nobody_listens(told):
-    group, _, manifest = told
-    for number, heard in enumerate([True, False, False, True], 1):
-        manifest.heard = heard
-        _feed_set(group, number)
-    assert [read(content).number for content in manifest.contents] == [1, 4]
-
-
-def test_a_manifest_that_cannot_be_published_is_said_once_and_costs_no_set(told, caplog):
-    group, outlets, manifest = told
-    for number, refuses in enumerate([True, True, False], 1):
-        manifest.refuses = refuses
-        _feed_set(group, number)
-    assert [outlet.sent for outlet in outlets] == [3, 3]
-    assert [read(content).number for content in manifest.contents] == [3]
-    assert [record.message for record in caplog.records] == ["front: a manifest could not be published: no room"]
+    assert 0 < len(read(writer.write(note(1, members))).inputs[0].message) <= 200

@@ -1,11 +1,37 @@
 """Manifests as their readers see them: by the keys that docs/manifest.md names, deserialized by rosbags."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
+from syncrelay.dataflow.manifest import Note
 from tests.ros.cdr_messages import NS_PER_SECOND, STORE
 
 MANIFEST_TYPE = "diagnostic_msgs/msg/DiagnosticArray"
 OK, WARN, ERROR, STALE = range(4)
+
+
+class Member(NamedTuple):
+    """A message of a set, as its manifest is to tell of it."""
+
+    stamp: int
+    original_stamp: int
+    received: int
+    sequence: int
+    why_not: str = ""
+
+
+def note(number: int, members: Sequence[Member | None], *, common: int | None = None, latency: int = 0) -> Note:
+    """Give what the manifest of a set is written from."""
+    return Note(
+        number=number,
+        latency=latency,
+        common=common,
+        stamps=[each and each.original_stamp for each in members],
+        left_as=[each and each.stamp for each in members],
+        received=[each and each.received for each in members],
+        sent=[each.sequence if each is not None else 0 for each in members],
+        unpublished={index: each.why_not for index, each in enumerate(members) if each is not None and each.why_not},
+    )
 
 
 class ToldInput(NamedTuple):

@@ -10,6 +10,7 @@ import pytest
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, config, inputs
+from tests.ros.manifests import MANIFEST_TYPE, read
 from tests.ros.stage import Stage
 from tests.ros.streams import at, jittery, merged
 from tests.ros.summary import read_summary
@@ -121,10 +122,10 @@ def test_it_ends_in_order_while_messages_pour_in(stage: Stage, number: signal.Si
         jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1),
         jittery("/lidar", period_ms=5, jitter_ms=1, count=4000, seed=2),
     )
-    collector = stage.collector(_PAIR_OUT)
+    collector = stage.collector({**_PAIR_OUT, "/syncrelay/front/sets": MANIFEST_TYPE})
     relay = stage.relay(config({"front": _FRONT | {"policy": "approximate_time", "slop": "10ms"}}))
     player = stage.player(_PAIR)
-    first_sets = relaying.connect(player, collector, recording, _PAIR_OUT)
+    first_sets = relaying.connect(player, collector, recording, [*_PAIR_OUT, "/syncrelay/front/sets"])
     player.start(recording, speed=1)
     collector.wait_for("/front/camera", 200)
     relay.send(number)
@@ -136,6 +137,12 @@ def test_it_ends_in_order_while_messages_pour_in(stage: Stage, number: signal.Si
             lambda output=output: len(relaying.within(recording, collector.payloads(output))) == sets,
             f"all {sets} sets of the summary on {output}",
         )
+
+    def told() -> list[int]:
+        return [read(payload).number for payload in collector.payloads("/syncrelay/front/sets")]
+
+    due = [*range(first_sets + 1, first_sets + sets + 1)]
+    collector.process.wait_until(lambda: told()[-sets:] == due, "the manifests of all sets")
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.dataflow.manifest import ManifestWriter, Member
-from syncrelay.sync import Match, Message
+from syncrelay.dataflow.manifest import ManifestWriter
 from tests.ros.cdr_messages import NS_PER_SECOND, VECTOR
 from tests.ros.configs import config, inputs
+from tests.ros.manifests import Member, note
 from tests.ros.streams import BEGIN, MS
 
 serialization = pytest.importorskip("rclpy.serialization", reason="rclpy is not installed")
@@ -49,8 +49,7 @@ class _Run:
             members.append(None if stamp is None else Member(stamp, stamp, stamp, sequence))
             if stamp is not None:
                 self.published[topic].append((joined[topic], {"publication_sequence_number": sequence}))
-        match = Match(tuple(each and Message(index, each.stamp, None) for index, each in enumerate(members)))
-        payload = _WRITER.write(number, match, members, 0)
+        payload = _WRITER.write(note(number, members))
         self.published[""].append((serialization.deserialize_message(payload, DiagnosticArray),))
         self.sets.append(joined)
 
