@@ -11,7 +11,7 @@ from tests.faults.vitals import memory_mb
 from tests.ros.processes import Process, wait_until
 from tests.ros.sensors import OF_A_BUSY_MACHINE
 from tests.ros.stage import Stage
-from tests.ros.status import findings, status
+from tests.ros.status import findings, first_group
 
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
 
@@ -70,12 +70,12 @@ def test_what_is_too_much_is_lost_in_order_and_told_and_then_all_is_as_before(st
 
 def _newest_set(relay: Process) -> int:
     """The stamp of the last set that the relay tells of."""
-    sets = [each["set"] for each in status(relay)["groups"][0]["recent"] if "set" in each]
+    sets = [each["set"] for each in first_group(relay)["recent"] if "set" in each]
     return max(sets[-1]) if sets else 0
 
 
 def _received(relay: Process) -> list[int]:
-    return [each["received"] for each in status(relay)["groups"][0]["inputs"]]
+    return [each["received"] for each in first_group(relay)["inputs"]]
 
 
 @pytest.mark.parametrize("history", ["keep_all", "keep_last"])

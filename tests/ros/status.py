@@ -38,6 +38,13 @@ def status(relay: Process) -> dict[str, Any]:
     return dict(json.loads(get(relay, "/status")))
 
 
+def first_group(relay: Process) -> dict[str, Any]:
+    """What is told of the file's first group, as soon as it was looked at once."""
+    groups: list[dict[str, Any]] = []
+    wait_until(lambda: groups.extend(status(relay)["groups"]) or groups, "the first look")
+    return groups[0]
+
+
 def findings(relay: Process, group: str = "front") -> dict[str, dict[str, Any]]:
     """The findings of a group by their codes, the last of each."""
     groups = {each["name"]: each for each in status(relay)["groups"]}

@@ -22,7 +22,7 @@ from tests.ros.sensors import (
     stream,
 )
 from tests.ros.stage import Stage
-from tests.ros.status import ANY_PORT, status, wait_for_finding
+from tests.ros.status import ANY_PORT, first_group, status, wait_for_finding
 from tests.ros.streams import merged
 
 pytestmark = pytest.mark.ros
@@ -33,7 +33,7 @@ def test_a_working_rig_is_healthy_and_nothing_is_said(stage: Stage):
     collector = stage.collector({"/front/camera": VECTOR, "/front/lidar": VECTOR})
     play(stage, merged(stream("/camera", hz=20), stream("/lidar", hz=10, shift_ms=7)))
     collector.wait_for("/front/camera", 150)
-    wait_until(lambda: status(relay)["groups"][0]["level"] == "ok", "a group in order")
+    wait_until(lambda: first_group(relay)["level"] == "ok", "a group in order")
     wait_for_finding(
         relay,
         "healthy",
@@ -59,7 +59,7 @@ def test_an_optional_input_that_nobody_publishes_is_told_by_that_alone(stage: St
     relay = stage.relay(front(topics, max_wait="100ms"))
     play(stage, merged(stream("/camera", hz=10), stream("/lidar", hz=10)))
     assert_logged(relay, r"\[WARN\] .* front: nobody publishes /imu ")
-    assert "waiting_for_optional" not in {each["code"] for each in status(relay)["groups"][0]["findings"]}
+    assert "waiting_for_optional" not in {each["code"] for each in first_group(relay)["findings"]}
 
 
 def test_an_input_that_slows_down_is_told_and_its_recovery_too(stage: Stage):

@@ -10,7 +10,7 @@ from tests.ros.frames import Frame
 from tests.ros.processes import wait_until
 from tests.ros.sensors import BY_RECEIPT, LASTED, ON_AND_ON_MS, assert_logged, front, play, stream, wait_for_sets
 from tests.ros.stage import Stage
-from tests.ros.status import findings, get, page, status
+from tests.ros.status import findings, first_group, get, page, status
 from tests.ros.streams import BEGIN, MS, merged
 
 pytestmark = pytest.mark.ros
@@ -27,7 +27,7 @@ def test_a_topic_that_nobody_publishes_is_named_with_the_one_that_was_meant(stag
         rf"\[WARN\] .* front: no set for {LASTED}: nobody publishes /camra \(geometry_msgs/msg/Vector3Stamped\);"
         r" did you mean `topic: /camera`\? It is published as geometry_msgs/msg/Vector3Stamped\n",
     )
-    assert status(relay)["groups"][0]["level"] == "stale"
+    assert first_group(relay)["level"] == "stale"
     assert camera.process.running()
 
 

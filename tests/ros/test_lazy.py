@@ -11,7 +11,7 @@ from tests.ros.processes import Process, wait_until
 from tests.ros.reloaded import ReloadedFile
 from tests.ros.sensors import OF_A_BUSY_MACHINE
 from tests.ros.stage import Collector, Stage, both_backends
-from tests.ros.status import ANY_PORT, findings, page, status, wait_for_finding
+from tests.ros.status import ANY_PORT, findings, first_group, page, status, wait_for_finding
 from tests.ros.streams import at, merged
 
 pytestmark = pytest.mark.ros
@@ -51,7 +51,7 @@ def test_a_lazy_group_receives_only_while_somebody_listens(stage: Stage):
     wait_until(lambda: observer.endpoints("/front/lidar", kind="publisher", node="/syncrelay"), "the outputs")
     found = wait_for_finding(relay, "nobody_listens")
     assert found["text"] == "nobody subscribes to /front/camera or /front/lidar, so this lazy group receives nothing"
-    wait_until(lambda: status(relay)["groups"][0]["level"] == "ok", "a group in order")
+    wait_until(lambda: first_group(relay)["level"] == "ok", "a group in order")
     wait_until(lambda: page(relay, "/readyz") == (200, "ready\n"), "a relay that is ready")
     assert not _subscribed(observer)
     for _ in range(2):
@@ -62,7 +62,7 @@ def test_a_lazy_group_receives_only_while_somebody_listens(stage: Stage):
         listener.process.ask_to_end()
         wait_until(lambda: not _subscribed(observer) and not _subscribed(observer, "/lidar"), "the end of the inputs")
         wait_for_finding(relay, "nobody_listens")
-    for each in status(relay)["groups"][0]["inputs"]:
+    for each in first_group(relay)["inputs"]:
         assert each["buffered"] == 0
         assert each["received"] == each["matched"] + sum(each["dropped"].values())
     assert _said_of_groups(relay) == [_WAITS, _RUNS, _WAITS, _RUNS, _WAITS]

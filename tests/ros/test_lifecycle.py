@@ -16,7 +16,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
 from tests.ros.stage import Collector, Player, Stage, both_backends
-from tests.ros.status import ANY_PORT, findings, page, status
+from tests.ros.status import ANY_PORT, findings, first_group, page, status
 from tests.ros.streams import BEGIN, MS, at, merged
 from tests.ros.summary import read_summary
 
@@ -109,7 +109,7 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
     _play_until_out(player, collector, _pairs(1000))
     wait_until(lambda: status(relay)["relay"]["ready"] is True, "the ready relay")
     player.play(at("/camera", *range(5000, 5005)))
-    wait_until(lambda: status(relay)["groups"][0]["inputs"][0]["buffered"] == 5, "the messages that wait")
+    wait_until(lambda: first_group(relay)["inputs"][0]["buffered"] == 5, "the messages that wait")
     assert manager.change("deactivate")
     assert read_summary(relay.stderr)["front"].inputs["/camera"].dropped["shutdown"] == 5
     wait_until(lambda: not _endpoints(collector), "the end of all that the relay had on topics")

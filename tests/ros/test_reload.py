@@ -21,7 +21,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import Process, wait_until
 from tests.ros.reloaded import ReloadedFile
 from tests.ros.stage import Stage, both_backends
-from tests.ros.status import ANY_PORT, status
+from tests.ros.status import ANY_PORT, first_group, status
 from tests.ros.streams import at, jittery, merged
 
 pytestmark = pytest.mark.ros
@@ -60,9 +60,7 @@ def test_an_unchanged_group_loses_and_doubles_nothing_while_others_come_change_a
     expected = relaying.expected_sets(policy, recording, list(_PAIR))
     assert relaying.sets_within(recording, collector, aligned) == expected
     # The state is that of the relay's last look, a second old at most.
-    wait_until(
-        lambda: status(file.relay)["groups"][0]["inputs"][0]["received"] >= len(camera), "the counts of the same group"
-    )
+    wait_until(lambda: first_group(file.relay)["inputs"][0]["received"] >= len(camera), "the counts of the same group")
 
 
 def test_a_changed_group_is_built_anew_and_a_new_one_begins(stage: Stage):
@@ -77,7 +75,7 @@ def test_a_changed_group_is_built_anew_and_a_new_one_begins(stage: Stage):
     relaying.conclude(player, collector, recording, aligned)
     # The state is that of the relay's last look, and all of this may come before the first.
     wait_until(lambda: [each["name"] for each in status(relay)["groups"]] == ["front", "rear"], "both groups")
-    assert status(relay)["groups"][0]["policy"] == "exact_time"
+    assert first_group(relay)["policy"] == "exact_time"
     assert not collector.endpoints("/front/camera", kind="publisher")
 
 

@@ -16,7 +16,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.reloaded import ReloadedFile
 from tests.ros.stage import Stage, both_backends
-from tests.ros.status import ANY_PORT, findings, get, status, wait_for_finding
+from tests.ros.status import ANY_PORT, findings, first_group, get, status, wait_for_finding
 from tests.ros.streams import at, jittery, merged
 
 pytestmark = pytest.mark.ros
@@ -33,7 +33,7 @@ def _file(**groups) -> str:
 
 
 def _front(relay) -> list[dict]:
-    return status(relay)["groups"][0]["inputs"]
+    return first_group(relay)["inputs"]
 
 
 def test_a_reload_by_service_says_what_changed_and_parameters_tell_what_runs(stage: Stage):
