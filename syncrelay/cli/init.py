@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from syncrelay.bag import Channel, Encoding, open_recording
 from syncrelay.bag.analysis import Proposal, inventory_of, propose, propose_for
 from syncrelay.bag.analysis.inventory import NO_HEADER
-from syncrelay.bag.analysis.streams import UNREADABLE, Stream
+from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.qos import Profile
 from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put, remark, say
@@ -17,6 +17,7 @@ from syncrelay.cli.new_file import write_new
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
+from syncrelay.explain import UNREADABLE
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:

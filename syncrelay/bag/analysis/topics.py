@@ -5,7 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds, Stream
+from syncrelay.bag.analysis.streams import Stream
+from syncrelay.bag.columns import Nanoseconds
+from syncrelay.explain import UNREADABLE
 from syncrelay.explain.clocks import drift
 
 _SECOND: Final = 1_000_000_000
