@@ -11,6 +11,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from types import FrameType
 from typing import Final, NoReturn
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, INTERRUPTED, OUR_BUG, guarded, pass_on, remark
@@ -85,12 +86,19 @@ def _work(work: Work, parent: int, out: int, err: int) -> NoReturn:
     """Do a piece of work in a process that has just been forked, and end it without what the parent does as it ends."""
     code = OUR_BUG
     try:
+        signal.signal(signal.SIGINT, _interrupt_once)
         _end_with(parent)
         os.dup2(out, 1)
         os.dup2(err, 2)
         code = guarded(work.do)
     finally:
         os._exit(code)
+
+
+def _interrupt_once(_number: int, _frame: FrameType | None) -> None:
+    """Interrupt what is done, and not what it then clears away: Ctrl-C comes from the terminal, and from the parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    raise KeyboardInterrupt
 
 
 def _end_with(parent: int) -> None:

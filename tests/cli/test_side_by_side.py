@@ -68,7 +68,7 @@ def test_jobs_are_a_whole_number(jobs, folder):
 
 
 def _script(body: str) -> str:
-    lines = ("import os, signal, sys", "from syncrelay.cli.side_by_side import Work, side_by_side", body)
+    lines = ("import os, signal, sys, time", "from syncrelay.cli.side_by_side import Work, side_by_side", body)
     return "\n".join(lines)
 
 
@@ -84,8 +84,13 @@ def test_a_process_that_dies_is_one_recordings_fault(folder):
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, -15), (signal.SIGKILL, -9)])
-def test_no_process_is_left_when_the_command_is_ended(number, code):
-    waits = "def wait():\n    os.write(told, b'%d\\n' % os.getpid())\n    signal.pause()\n"
+def test_no_process_is_left_when_the_command_is_ended_and_each_clears_away_what_it_made(number, code):
+    works = (
+        "    try:\n        os.write(told, b'%d\\n' % os.getpid())\n        while True:\n            time.sleep(0.01)"
+    )
+    # A terminal interrupts each of them, and so does the command.
+    clears = "    finally:\n        os.kill(os.getpid(), signal.SIGINT)\n        os.write(told, b'cleared ')"
+    waits = f"def wait():\n{works}\n{clears}\n"
     runs = "sys.exit(guarded(lambda: side_by_side([Work('a', wait), Work('b', wait), Work('c', wait)], jobs=2)))"
     read, told = os.pipe()
     with subprocess.Popen(
@@ -99,5 +104,5 @@ def test_no_process_is_left_when_the_command_is_ended(number, code):
             command.send_signal(number)
             assert command.wait(60) == code
             # It ends when none of them holds it.
-            assert pids.read() == ""
+            assert pids.read() == "cleared " * 2
         assert len(set(workers)) == 2
