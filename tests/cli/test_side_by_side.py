@@ -85,12 +85,11 @@ def test_a_process_that_dies_is_one_recordings_fault(folder):
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, -15), (signal.SIGKILL, -9)])
 def test_no_process_is_left_when_the_command_is_ended_and_each_clears_away_what_it_made(number, code):
-    works = (
-        "    try:\n        os.write(told, b'%d\\n' % os.getpid())\n        while True:\n            time.sleep(0.01)"
-    )
+    begins = "    try:\n        os.write(told, b'%d\\n' % os.getpid())"
+    works = "        while True:\n            time.sleep(0.01)"
     # A terminal interrupts each of them, and so does the command.
     clears = "    finally:\n        os.kill(os.getpid(), signal.SIGINT)\n        os.write(told, b'cleared ')"
-    waits = f"def wait():\n{works}\n{clears}\n"
+    waits = f"def wait():\n{begins}\n{works}\n{clears}\n"
     runs = "sys.exit(guarded(lambda: side_by_side([Work('a', wait), Work('b', wait), Work('c', wait)], jobs=2)))"
     read, told = os.pipe()
     with subprocess.Popen(
