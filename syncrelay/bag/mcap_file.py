@@ -17,7 +17,7 @@ from syncrelay.bag.mcap_records import (
     MESSAGE_FIELDS,
     RECORD,
     UNREADABLE,
-    messages,
+    add_messages,
     parsed,
     parsed_from,
     records,
@@ -68,13 +68,13 @@ class McapFile:
         """See Recording."""
         return self._losses.sentences
 
-    def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
         for segment, found in read_in_order(self._segments, lambda each: self._read(each, chosen), self._losses):
             self.position += segment.size
-            yield from found
+            yield found
         self.position = self.size
 
     def close(self) -> None:
@@ -96,7 +96,7 @@ class McapFile:
     def _read(self, segment: Segment, channels: dict[int, Channel | None]) -> list[RawMessage]:
         found: list[RawMessage] = []
         try:
-            found.extend(messages(self._content(segment), channels))
+            add_messages(found, self._content(segment), channels)
         except UNREADABLE as fault:
             self._losses.damaged(f"the chunk at byte {segment.offset}", fault, read=len(found))
         return found

@@ -19,8 +19,8 @@ from syncrelay.bag.unpacking import unlz4, zstd_unpacker
 RECORD: Final = Struct("<BQ")
 """What every record begins with: its opcode, and the length of what follows."""
 
-# Opcode, length, channel id, sequence, log time, publish time; the payload follows.
-_MESSAGE: Final = Struct("<BQHIQQ")
+# Opcode, length, channel id, (sequence,) log time (, publish time); the payload follows.
+_MESSAGE: Final = Struct("<BQH4xQ8x")
 MESSAGE_FIELDS: Final = _MESSAGE.size - RECORD.size
 """The least length of a message."""
 
@@ -88,26 +88,27 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
         yield opcode, begin, place
 
 
-def messages(content: bytes, channels: Mapping[int, Channel | None]) -> Iterator[RawMessage]:
-    """Yield the messages of a run of records that are of one of the channels by number, but of those that are None.
+def add_messages(found: list[RawMessage], content: bytes, channels: Mapping[int, Channel | None]) -> None:
+    """Add the messages of a run of records that are of one of the channels by number, but of those that are None.
 
-    Those of no channel are STRAY. Raises one of UNREADABLE where the records end. The innermost loop of reading: half
-    a microsecond each.
+    Those of no channel are STRAY. Raises one of UNREADABLE where the records end, with all added that stand before.
+    The innermost loop of reading: half a microsecond each.
     """
     unpack, begin_payload, message, least = _MESSAGE.unpack_from, _MESSAGE.size, Opcode.MESSAGE.value, MESSAGE_FIELDS
+    add = found.append
     place, size = 0, len(content)
     while place < size:
         if content[place] != message:
             place += RECORD.size + RECORD.unpack_from(content, place)[1]
             continue
-        _, length, number, _, time, _ = unpack(content, place)
+        _, length, number, time = unpack(content, place)
         end = place + RECORD.size + length
         if end > size:
             raise ValueError("a message in it ends past its end")
         if number not in channels or length < least:
-            yield STRAY
+            add(STRAY)
         elif (channel := channels[number]) is not None:
-            yield channel, time, content[place + begin_payload : end]
+            add((channel, time, content[place + begin_payload : end]))
         place = end
     if place > size:
         raise ValueError(_BEHIND)

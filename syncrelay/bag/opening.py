@@ -18,6 +18,7 @@ from typing import Any, Final
 import zstandard
 
 from syncrelay.bag import mcap_file, ros1_file, sqlite_file
+from syncrelay.bag.batching import batched, filled
 from syncrelay.bag.recording import Channel, RawMessage, Recording
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError
@@ -67,6 +68,15 @@ def open_recording(paths: Sequence[str]) -> Recording:
         return Files(files, opened.pop_all(), faults=[*map(str, unreadable), *faults])
 
 
+def is_recording(word: str) -> bool:
+    """Tell whether a word means a recording and no topic: something that is there, or has a dot, which no topic has."""
+    path = Path(word)
+    try:
+        return "." in path.name or path.is_file() or (path.is_dir() and bool(_files_in(path)))
+    except (OSError, BagError):
+        return False
+
+
 class Files:
     """Recordings of one drive as one; see Recording."""
 
@@ -90,12 +100,12 @@ class Files:
         """See Recording."""
         return sum(file.position for file in self._files)
 
-    def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
-        streams = [file.messages(wanted) for file in self._files]
+        parts = [file.batches(wanted) for file in self._files]
         if any(earlier.end > later.begin for earlier, later in pairwise(self._files)):
-            return heapq.merge(*streams, key=itemgetter(1))
-        return chain.from_iterable(streams)
+            return batched(heapq.merge(*map(chain.from_iterable, parts), key=itemgetter(1)))
+        return filled(chain.from_iterable(parts))
 
     def close(self) -> None:
         """See Recording."""

@@ -44,12 +44,6 @@ def message_reader(group: GroupConfig, index: int, channel: Channel) -> ReadMess
     return read_if_it_can_be_restamped
 
 
-def stamp_or_receipt_reader(channel: Channel) -> ReadMessage:
-    """Return what reads the headers' stamps, or the times of receipt of a type that is not known or has no header."""
-    has_header = isinstance(channel.encoding, Encoding) and bool(begins_with_header(channel))
-    return _stamped_by(stamp_reader("header" if has_header else "receive", channel))
-
-
 def _stamped_by(read_stamp: ReadStamp | None) -> ReadMessage:
     if read_stamp is None:
         return lambda raw: (raw[1], None)

@@ -60,7 +60,7 @@ LATEST: Final = 2**62 - 1
 
 
 class Recording(Protocol):
-    """A recording that is open for reading. Messages are read once, from the begin to the end."""
+    """A recording that is open for reading. Batches are read once, from the begin to the end."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -74,12 +74,12 @@ class Recording(Protocol):
 
     @property
     def size(self) -> int:
-        """Bytes that `messages` has to go through."""
+        """Bytes that `batches` has to go through."""
         ...
 
     @property
     def position(self) -> int:
-        """Bytes that `messages` has gone through."""
+        """Bytes that `batches` has gone through."""
         ...
 
     @property
@@ -92,8 +92,11 @@ class Recording(Protocol):
         """When the last message was received in nanoseconds; 0 if there is none."""
         ...
 
-    def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
-        """Yield the messages of some channels by their receive time; of equal times, as they were written."""
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+        """Yield the messages of some channels by their receive time; of equal times, as they were written.
+
+        A batch is what is read at a time, and may be empty.
+        """
         ...
 
     def close(self) -> None:

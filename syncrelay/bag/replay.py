@@ -1,19 +1,17 @@
 """A recording fed to the groups of a file as the relay would have got it, with receive time as `now`."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 from syncrelay.bag.bindings import GroupBinding
-from syncrelay.bag.payloads import message_reader
-from syncrelay.bag.recording import Channel, RawMessage, Recording
-from syncrelay.explain import EngineDriver
+from syncrelay.bag.columns import Batch, Columns, ReadColumn, column_reader
+from syncrelay.bag.recording import Channel, Recording
+from syncrelay.explain import UNREADABLE, EngineDriver
 from syncrelay.sync import InputCounts, Message, Outcome
 
 Listener: TypeAlias = Callable[[GroupBinding, Outcome, int], None]
 """Told of each set and drop of a group when it leaves, and at what time. The payload of a message is the RawMessage."""
-
-_Feed: TypeAlias = Callable[[RawMessage], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +36,13 @@ class GroupReplay:
 
     def __init__(self, binding: GroupBinding, listeners: Sequence[Listener]) -> None:
         self.binding = binding
-        self.driver: Final = EngineDriver(binding.group, self._take if listeners else _take_nothing)
+        self.driver: Final = EngineDriver(binding.group, self._take if listeners else None)
         self._listeners = listeners
 
-    def feeds(self) -> Iterable[tuple[Channel, _Feed]]:
-        """Give what takes in the messages of each channel; raises BagError for a stamp or key that isn't there."""
+    def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
+        """Give what reads the channels of each input; raises BagError for a stamp or key that isn't there."""
         for index, each in enumerate(self.binding.inputs):
-            for channel in each.channels:
-                yield channel, self._feed(index, channel)
+            yield [(channel, column_reader(self.binding.group, index, channel)) for channel in each.channels]
 
     def result(self) -> GroupResult:
         """Give the counts so far."""
@@ -54,27 +51,10 @@ class GroupReplay:
         inputs = tuple(InputResult(*each) for each in zip(topics, engine.counts(), strict=True))
         return GroupResult(self.binding.group.name, inputs, engine.sets)
 
-    def _feed(self, index: int, channel: Channel) -> _Feed:
-        read = message_reader(self.binding.group, index, channel)
-        add, reject = self.driver.add, self.driver.reject
-
-        def feed(raw: RawMessage) -> None:
-            stamp, key = read(raw)
-            if stamp is None:
-                reject(index, raw, now=raw[1])
-            else:
-                add(Message(index, stamp, raw, key), now=raw[1])
-
-        return feed
-
     def _take(self, outcomes: Sequence[Outcome], now: int) -> None:
         for outcome in outcomes:
             for listener in self._listeners:
                 listener(self.binding, outcome, now)
-
-
-def _take_nothing(_outcomes: Sequence[Outcome], _now: int) -> None:
-    """Stand in for listeners where there are none."""
 
 
 def replay(
@@ -87,17 +67,19 @@ def replay(
     groups = [GroupReplay(binding, listeners) for binding in bindings]
     # What waited in one group leaves before a later message of another arrives.
     waiting = [group.driver for group in groups if group.driver.has_deadlines]
-    feeds: dict[Channel, list[_Feed]] = {}
-    for group in groups:
-        for channel, feed in group.feeds():
-            feeds.setdefault(channel, []).append(feed)
+    inputs = [(group.driver, index) for group in groups for index in range(len(group.binding.inputs))]
+    columns = Columns([readers for group in groups for readers in group.readers()])
     now = recording.begin
-    for raw in recording.messages(feeds.keys()):
-        channel, now, _ = raw
-        for driver in waiting:
-            driver.expire(now)
-        for feed in feeds[channel]:
-            feed(raw)
+    for batch in map(Batch, recording.batches(columns.channels)):
+        for place, raw, stamp, key in columns.in_order(batch):
+            now = raw[1]
+            for driver in waiting:
+                driver.expire(now)
+            driver, index = inputs[place]
+            if stamp == UNREADABLE:
+                driver.reject(index, raw, now=now)
+            else:
+                driver.add(Message(index, stamp, raw, key), now=now)
     for group in groups:
         # A damaged recording may give a false end.
         group.driver.finish(max(now, recording.end))

@@ -64,13 +64,13 @@ class Ros1File:
         """See Recording."""
         return self._losses.sentences
 
-    def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
         for segment, found in read_in_order(self._segments, lambda each: self._read(each, chosen), self._losses):
             self.position += segment.size
-            yield from found
+            yield found
         self.position = self.size
 
     def close(self) -> None:

@@ -14,6 +14,7 @@ from urllib.parse import quote
 
 from zstandard import ZstdError
 
+from syncrelay.bag.batching import batched
 from syncrelay.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.bag.qos import read_profiles
 from syncrelay.bag.recording import LATEST, Channel, Definition, Encoding, RawMessage
@@ -64,8 +65,15 @@ class SqliteFile:
         """See Recording."""
         return self._losses.sentences
 
-    def messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
+        return batched(self._messages(wanted))
+
+    def close(self) -> None:
+        """See Recording."""
+        self._database.close()
+
+    def _messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
         among = frozenset(wanted)
         chosen = {channel.id: channel for channel in self.channels if channel in among}
         others = [channel.id for channel in self.channels if channel.id not in chosen]
@@ -86,10 +94,6 @@ class SqliteFile:
         except _UNREADABLE as fault:
             self._losses.say(f"damaged; read as far as possible: {fault or 'there is not enough memory'}")
         self.position = self.size
-
-    def close(self) -> None:
-        """See Recording."""
-        self._database.close()
 
     def _channels(self) -> Iterator[Channel]:
         columns = {row[1] for row in self._database.execute("PRAGMA table_info(topics)")}

@@ -1,12 +1,14 @@
-"""`syncrelay analyze BAG`: figures of a recording, what a file makes of it, and the values that would fit."""
+"""`syncrelay analyze BAG...`: figures of recordings, what a file makes of each, and the values that would fit."""
 
 import json
+import os
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
-from syncrelay.bag import Channel, Recording, open_recording
+from syncrelay.bag import Channel, Recording, is_recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, with_changes
 from syncrelay.bag.bindings import bind
 from syncrelay.cli.analysis_json import as_json
@@ -16,6 +18,7 @@ from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
+from syncrelay.cli.side_by_side import Work, side_by_side
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
 from syncrelay.config.source import read_source
@@ -28,13 +31,18 @@ _GROUP = "matched"
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What is analyzed: a file's groups, or topics as one group; and what comes of it beside the text."""
+    """What is analyzed: a file's groups, or topics as one group; and what comes of it beside the text.
+
+    `text` is what the file of this name holds. `indent` is that of JSON.
+    """
 
     config: str | None
+    text: str | None
     topics: tuple[str, ...]
     write: str | None
     html: str | None
     json: bool
+    indent: int | None
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
@@ -42,23 +50,38 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     config, *others = arguments.config or [None]
     if others:
         parser.error("--config was given more than once: analyze takes one file")
-    asked = Asked(config, tuple(arguments.topics), arguments.write, arguments.html, arguments.json)
-    return analyze_bag(arguments.bag, asked)
+    bags = [arguments.bag, *filter(is_recording, arguments.more)]
+    asked = Asked(
+        config=config,
+        text=None,
+        topics=tuple(word for word in arguments.more if not is_recording(word)),
+        write=arguments.write,
+        html=arguments.html,
+        json=arguments.json,
+        indent=2 if len(bags) == 1 else None,
+    )
+    _require_sense(asked, bags)
+    if config is not None:
+        asked = replace(asked, text=read_source(config).text)
+    if len(bags) == 1:
+        return analyze_bag(bags[0], asked)
+    if asked.text is not None:
+        load_text(asked.text, name=config)
+    works = [Work(bag, partial(analyze_bag, bag, asked)) for bag in bags]
+    return side_by_side(works, jobs=arguments.jobs or len(os.sched_getaffinity(0)))
 
 
 def analyze_bag(bag: str, asked: Asked) -> int:
     """Print what a recording tells, with neither file nor topics what is in it; 1 if a required topic is not.
 
-    Raises ConfigError for a faulty file, BagError for a recording that cannot be read, UsageError where both a file
-    and topics are named, or something is to be written of neither.
+    Raises ConfigError for a faulty file, BagError for a recording that cannot be read.
     """
-    _require_sense(asked)
     with closing(open_recording([bag])) as recording:
         if asked.config is None and not asked.topics:
-            put_inventory(bag, recording, is_json=asked.json)
+            put_inventory(bag, recording, is_json=asked.json, indent=asked.indent)
             _tell_faults(recording)
             return DONE
-        text = read_source(asked.config).text if asked.config else _proposed(recording, asked.topics)
+        text = _proposed(recording, asked.topics) if asked.text is None else asked.text
         bindings = bind(load_text(text, name=asked.config or "<topics>"), recording)
         for problem in (problem for binding in bindings for problem in binding.problems):
             remark(printable(problem))
@@ -71,12 +94,14 @@ def analyze_bag(bag: str, asked: Asked) -> int:
     return DONE if all(binding.is_complete for binding in bindings) else AT_FAULT
 
 
-def _require_sense(asked: Asked) -> None:
+def _require_sense(asked: Asked, bags: Sequence[str]) -> None:
     more = "\n  see syncrelay analyze --help"
     if asked.config is not None and asked.topics:
         raise UsageError(f"name a file with --config FILE, or the topics to match, not both{more}")
     if asked.config is None and not asked.topics and (asked.write or asked.html):
         raise UsageError(f"name a file with --config FILE, or the topics to match: there is nothing to write yet{more}")
+    if len(bags) > 1 and (asked.write or asked.html):
+        raise UsageError(f"--write and --html are for one recording, found {len(bags)}{more}")
 
 
 def _tell_faults(recording: Recording) -> None:
@@ -98,7 +123,7 @@ def _proposed(recording: Recording, topics: Sequence[str]) -> str:
 
 def _print(bag: str, analysis: Analysis, asked: Asked) -> None:
     if asked.json:
-        put(json.dumps(as_json(bag, analysis), indent=2))
+        put(json.dumps(as_json(bag, analysis), indent=asked.indent))
     else:
         for line in report(bag, analysis):
             put(line)

@@ -81,6 +81,16 @@ def put(text: str) -> None:
     _to_stdout(lambda: sys.stdout.write(f"{_safe(text, sys.stdout)}\n"))
 
 
+def pass_on(output: bytes, talk: bytes) -> None:
+    """Print what another process of ours printed on its stdout and its stderr."""
+    sys.stderr.flush()
+    sys.stderr.buffer.write(talk)
+    sys.stderr.flush()
+    _to_stdout(sys.stdout.flush)
+    _to_stdout(lambda: sys.stdout.buffer.write(output))
+    _to_stdout(sys.stdout.flush)
+
+
 def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isatty
     """Tell whether output may be coloured (https://no-color.org)."""
     return is_terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"

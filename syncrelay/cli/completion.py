@@ -172,13 +172,16 @@ class _Opened:
         return text if is_key else ""
 
 
-def _topics(_typed: str, arguments: Namespace) -> Iterator[str]:
-    """Give the topics of the recording that is named before."""
+def _recordings_and_topics(typed: str, arguments: Namespace) -> Iterator[str]:
+    """Give the topics of the recording that is named first; where none begins so, more recordings."""
     from syncrelay.bag import open_recording
     from syncrelay.errors import BagError
 
+    topics = set[str]()
     with suppress(BagError), closing(open_recording([arguments.bag])) as recording:
-        yield from sorted({channel.topic for channel in recording.channels} - set(arguments.topics))
+        topics = {channel.topic for channel in recording.channels} - set(arguments.more)
+    begun = sorted(topic for topic in topics if topic.startswith(typed))
+    yield from begun or _files(_RECORDING)(typed, arguments)
 
 
 _YAML: Final = r".*\.ya?ml"
@@ -190,7 +193,7 @@ COMPLETERS: Final[Mapping[str, _Completer]] = {
     "NAME": _groups,
     "BAG": _files(_RECORDING),
     "OUT": _files(_RECORDING),
-    "TOPIC": _topics,
+    "BAG|TOPIC": _recordings_and_topics,
     "REPORT": _files(r".*\.html"),
 }
 """What completes a word, by its metavar. Where there are choices they do, and a number or a URL nothing does."""

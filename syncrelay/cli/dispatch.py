@@ -31,7 +31,7 @@ COMMANDS: Final = {
     for each in (
         Command("validate FILE...", "check files; show every error at its line", parsers.validate, "validate"),
         Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", parsers.init, "init"),
-        Command("analyze BAG", "measure a recording, and suggest values that fit it", parsers.analyze, "analyze"),
+        Command("analyze BAG...", "measure recordings, and suggest values that fit", parsers.analyze, "analyze"),
         Command("replay BAG...", "run a file's groups on a recording, without ROS", parsers.replay, "replay"),
         Command("demo", "try it on simulated sensors; needs no robot", parsers.demo, "demo"),
         Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),

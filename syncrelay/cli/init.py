@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from syncrelay.bag import Channel, Encoding, open_recording
 from syncrelay.bag.analysis import Proposal, inventory_of, propose, propose_for
 from syncrelay.bag.analysis.inventory import NO_HEADER
-from syncrelay.bag.analysis.streams import UNREADABLE, Stream
+from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.qos import Profile
 from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
@@ -18,6 +18,7 @@ from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
+from syncrelay.explain import UNREADABLE
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:

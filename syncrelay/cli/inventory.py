@@ -19,12 +19,12 @@ from syncrelay.printable import printable
 _HEADING: Final = ("topic", "type", "messages", "rate", "stamps")
 
 
-def put_inventory(bag: str, recording: Recording, *, is_json: bool) -> None:
+def put_inventory(bag: str, recording: Recording, *, is_json: bool, indent: int | None) -> None:
     """Read a recording to its end and print its topics, types, counts, rates and stamps."""
     with reading(recording):
         topics = inventory(recording)
     if is_json:
-        put(json.dumps(_as_json(bag, recording, topics), indent=2))
+        put(json.dumps(_as_json(bag, recording, topics), indent=indent))
         return
     messages = sum(topic.figures.messages for topic in topics)
     lasts = words.seconds(recording.end - recording.begin)

@@ -5,7 +5,7 @@ A metavar says what kind of word is expected, and so what completes it (syncrela
 
 from typing import Final
 
-from syncrelay.cli.parser import Parser, positive
+from syncrelay.cli.parser import Parser, count, positive
 
 _RELAY_USAGE: Final = """\
 syncrelay --config FILE [option ...] [--ros-args ...]
@@ -87,14 +87,20 @@ def analyze() -> Parser:
         "syncrelay analyze",
         description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
         "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
-        "Exit code 1 if the recording lacks a required topic.",
+        "Several recordings are measured one by one, on all cores. "
+        "Exit code 1 if a recording lacks a required topic.",
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
-    parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topics to match, if there is no file yet")
+    parser.add_argument(
+        "more", metavar="BAG|TOPIC", nargs="*", help="more recordings; topics to match, if there is no file yet"
+    )
     parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
     parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
     parser.add_argument("--html", metavar="REPORT", help="write a report with charts: one HTML file, opens offline")
-    parser.add_argument("--json", action="store_true", help="print all figures as JSON")
+    parser.add_argument(
+        "--json", action="store_true", help="print all figures as JSON, of each of several recordings in one line"
+    )
+    parser.add_argument("--jobs", metavar="N", type=count, help="recordings at a time (as many as there are cores)")
     return parser
 
 

@@ -6,7 +6,7 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 from syncrelay.config import Tolerance
 from syncrelay.explain.clocks import STEP_NS, Step
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
-from syncrelay.explain.dry_run import Arrival, DryRun, EngineDriver, dry_run
+from syncrelay.explain.dry_run import UNREADABLE, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
     ClockState,
     Endpoint,
@@ -32,7 +32,7 @@ from syncrelay.explain.watch import GroupWatch
 __all__ = [
     "BOUNDS_NS",
     "STEP_NS",
-    "Arrival",
+    "UNREADABLE",
     "ClockState",
     "Code",
     "Distribution",

@@ -1,8 +1,8 @@
 """A group's engine driven through messages in the order of their receipt, each at its time, as the relay drives it."""
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 
 from syncrelay.config import GroupConfig
 from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome
@@ -10,21 +10,35 @@ from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome
 Take: TypeAlias = Callable[[Sequence[Outcome], int], None]
 """Told of what leaves together, and at what time, in nanoseconds of receipt."""
 
+UNREADABLE: Final = -(2**63)
+"""Stands in place of a stamp that could not be read."""
+
+
+class _Add(Protocol):
+    def __call__(self, message: Message, *, now: int) -> object:
+        """Add a message after all that is due before it."""
+        ...
+
 
 class EngineDriver:
     """Drives an engine of its own through one group's messages; times of receipt are the only clock."""
 
-    def __init__(self, group: GroupConfig, take: Take) -> None:
+    def __init__(self, group: GroupConfig, take: Take | None) -> None:
+        """Take None where nobody is to be told."""
         self.engine: Final = group.engine()
         # Without max_wait nothing is ever due, and asking for each message costs a tenth of a replay.
         self.has_deadlines: Final = group.options.max_wait is not None
-        self._take = take
+        self._due: int | None = None
+        self._take = take or _take_nothing
+        # Every message would pay for a call between.
+        self.add: Final[_Add] = self._add if take is not None or self.has_deadlines else self.engine.add
 
-    def add(self, message: Message, *, now: int) -> None:
-        """Add a message after all that is due before it."""
-        if self.has_deadlines:
+    def _add(self, message: Message, *, now: int) -> None:
+        if self._due is not None:
             self.expire(now)
         outcomes = self.engine.add(message, now=now)
+        if self.has_deadlines:
+            self._due = self.engine.next_deadline()
         if outcomes:
             self._take(outcomes, now)
 
@@ -33,18 +47,30 @@ class EngineDriver:
         self.expire(now)
         self._take([self.engine.reject(Message(index, 0, payload), DropReason.MALFORMED)], now)
 
-    def feed(self, arrival: "Arrival") -> None:
-        """Add an arrival, or count it as malformed; the message's payload is the time when it was received."""
-        index, stamp, received, key = arrival
-        if stamp is None:
-            self.reject(index, received, now=received)
-        else:
-            self.add(Message(index, stamp, received, key), now=received)
+    def run(self, messages: Iterable[Message]) -> None:
+        """Add messages whose payload is the time when they were received; count those that are UNREADABLE as malformed.
+
+        Then let all leave that may.
+        """
+        add, take, now = self.engine.add, self._take, 0
+        for message in messages:
+            now = message.payload
+            if message.stamp == UNREADABLE:
+                self.reject(message.input, now, now=now)
+            elif self.has_deadlines:
+                self.add(message, now=now)
+            # Every message would pay for a call between.
+            elif outcomes := add(message, now=now):
+                take(outcomes, now)
+        self.finish(now)
 
     def expire(self, now: int) -> None:
         """Let what has waited long enough leave, each at its own time, up to `now`."""
-        while (deadline := self.engine.next_deadline()) is not None and deadline <= now:
-            self._take(self.engine.expire(now=deadline), deadline)
+        while self._due is not None and self._due <= now:
+            due = self._due
+            outcomes = self.engine.expire(now=due)
+            self._due = self.engine.next_deadline()
+            self._take(outcomes, due)
 
     def finish(self, now: int) -> None:
         """Let all leave that may: what still waits has a deadline, or will never have a partner."""
@@ -54,13 +80,8 @@ class EngineDriver:
         self._take(self.engine.flush(DropReason.SHUTDOWN), now)
 
 
-class Arrival(NamedTuple):
-    """A message as it came: its input, its stamp, None where none could be read, when it was received, its key."""
-
-    input: int
-    stamp: int | None
-    received: int
-    key: Hashable = None
+def _take_nothing(_outcomes: Sequence[Outcome], _now: int) -> None:
+    """Stand in for who is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +97,8 @@ class DryRun:
     held: tuple[int, ...]
 
 
-def dry_run(group: GroupConfig, arrivals: Iterable[Arrival]) -> DryRun:
-    """Return what a group would have made of messages that came in this order, with nobody waiting at the end."""
+def dry_run(group: GroupConfig, messages: Iterable[Message]) -> DryRun:
+    """Return what a group would have made of messages as `run` takes them, with nobody waiting at the end."""
     spans: list[int] = []
     held = [0] * len(group.topics)
     offsets = [topic.offset_ns for topic in group.topics]
@@ -92,9 +113,5 @@ def dry_run(group: GroupConfig, arrivals: Iterable[Arrival]) -> DryRun:
                     held[each.input] += 1
 
     driver = EngineDriver(group, take)
-    now = 0
-    for arrival in arrivals:
-        now = arrival.received
-        driver.feed(arrival)
-    driver.finish(now)
+    driver.run(messages)
     return DryRun(driver.engine.sets, driver.engine.counts(), tuple(spans), tuple(held))

@@ -12,11 +12,11 @@ from syncrelay.config.file import file_format
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.distribution import Distribution
-from syncrelay.explain.dry_run import Arrival, dry_run
+from syncrelay.explain.dry_run import dry_run
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.nearest import NearestSpans, greatest_age, signed_distances, tightest_span
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
-from syncrelay.sync.messages import DropReason
+from syncrelay.sync import DropReason, Message
 from syncrelay.sync.queues import LONGEST_QUEUE
 
 _SECOND: Final = 1_000_000_000
@@ -191,13 +191,13 @@ class Trials:
         self._trigger = config.trigger
         required = [index for index, topic in enumerate(config.topics) if topic.required]
         pacemaker = min(required, key=lambda index: _rate(recent[index])) if self._trigger is None else self._trigger
-        self._arrivals = _last(recent, pacemaker)[-most:]
+        self._messages = _last(recent, pacemaker)[-most:]
         self.stamps: list[list[int]] = [[] for _ in config.topics]
         self.delays: list[list[int]] = [[] for _ in config.topics]
-        for each in self._arrivals:
-            stamp = (each.stamp or 0) + config.topics[each.input].offset_ns
+        for each in self._messages:
+            stamp = each.stamp + config.topics[each.input].offset_ns
             self.stamps[each.input].append(stamp)
-            self.delays[each.input].append(each.received - stamp)
+            self.delays[each.input].append(each.payload - stamp)
         among = self.among = required if optional is None else [*required, optional]
         slowest = min(among, key=lambda index: len(self.stamps[index]))
         self.pivot: int = slowest if self._trigger is None else self._trigger
@@ -257,7 +257,7 @@ class Trials:
         return self._given[changes]
 
     def _completed(self, changes: Changes) -> int:
-        run = dry_run(changed(self.config, changes), self._budget.spent_on(self._arrivals))
+        run = dry_run(changed(self.config, changes), self._budget.spent_on(self._messages))
         counts = run.counts[self._counted]
         # A message that is held may be in many sets.
         completed = max(run.held[self._counted], counts.matched + counts.dropped.get(DropReason.THINNED, 0))
@@ -277,18 +277,18 @@ class Trials:
         return Distribution([span for span in spans if within is None or span <= within])
 
 
-def _last(recent: Sequence[Arrivals], pacemaker: int) -> tuple[Arrival, ...]:
-    """Return the messages that came since so many of the input that sets the pace, in the order of receipt."""
+def _last(recent: Sequence[Arrivals], pacemaker: int) -> tuple[Message, ...]:
+    """Return the messages that came since so many of the input that sets the pace, as a dry run takes them."""
     since = recent[pacemaker][-_PIVOTS:]
     begin = min(since[0][1], since[-1][1] - _AT_LEAST) if since else 0
     came = [
-        Arrival(index, stamp, received)
+        Message(index, stamp, received)
         for index, each in enumerate(recent)
         for place, (stamp, received) in enumerate(each)
         # What is held until there is a newer one may have come long before.
         if received >= begin or place == len(each) - 1 or each[place + 1][1] >= begin
     ]
-    return tuple(sorted(came, key=lambda each: each.received))
+    return tuple(sorted(came, key=lambda each: each.payload))
 
 
 def with_headroom(spans: Distribution) -> str:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
-from syncrelay.explain.dry_run import Arrival
+from syncrelay.sync import Message
 
 # A run costs 3 to 20 us a message, by what the engine has to do: a few runs for a group alone ...
 _MESSAGES: Final = 30_000
@@ -47,12 +47,12 @@ class TryBudget:
         """Whether what has begun is to try no more; by a clock it is interrupted, and goes on at the next poll."""
         return self._clock is None and self._left <= 0
 
-    def spent_on(self, arrivals: Iterable[Arrival]) -> Iterator[Arrival]:
+    def spent_on(self, messages: Iterable[Message]) -> Iterator[Message]:
         """Yield messages that a run takes. Raises OutOfTimeError where it takes too long.
 
         The first of a poll may take as long as it needs: on a slow machine none would end else.
         """
-        for number, each in enumerate(arrivals):
+        for number, each in enumerate(messages):
             if self._clock and self._has_finished and number % _ASKED_EVERY == 0 and self._spent() >= _ENDS_NS:
                 raise OutOfTimeError
             self._left -= 1

@@ -13,10 +13,11 @@ from syncrelay.bag.analysis.changes import Change, patch, with_changes
 from syncrelay.bag.analysis.curves import curves_of
 from syncrelay.bag.analysis.evaluation import completed, evaluate
 from syncrelay.bag.analysis.nearest import pair, tightest
-from syncrelay.bag.analysis.streams import UNREADABLE, Stream
+from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.analysis.suggest import possible_sets, suggest
 from syncrelay.bag.analysis.topics import figures_of
 from syncrelay.bag.analysis.watching import judged_seconds, watch_group
+from syncrelay.explain import UNREADABLE
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs

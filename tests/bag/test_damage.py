@@ -2,6 +2,7 @@
 
 import tracemalloc
 from contextlib import closing
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,7 @@ def _is_read(path: Path, what: str, *, most: int, least: int = 0) -> bool:
     """
     try:
         with closing(open_recording([str(path)])) as recording:
-            messages = list(recording.messages(recording.channels))
+            messages = list(chain.from_iterable(recording.batches(recording.channels)))
             faults = list(recording.faults)
             assert recording.position == recording.size
             assert 0 <= recording.begin <= recording.end < _YEAR_2116

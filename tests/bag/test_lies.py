@@ -4,6 +4,7 @@ import os
 import sqlite3
 import struct
 from contextlib import closing
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,7 @@ _RIG = rig(6)
 
 def _read(path: Path) -> tuple[list[Frame], list[str]]:
     with closing(open_recording([str(path)])) as recording:
-        found = list(recording.messages(recording.channels))
+        found = list(chain.from_iterable(recording.batches(recording.channels)))
         return [Frame(each.topic, each.type, time, payload) for each, time, payload in found], [
             fault.removeprefix(f"{path}: ") for fault in recording.faults
         ]

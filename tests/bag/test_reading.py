@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -107,7 +108,7 @@ _ROS1_KINDS = {
 def _read(*paths: Path) -> tuple[list[Frame], list[str]]:
     recording = open_recording([str(path) for path in paths])
     try:
-        messages = list(recording.messages(recording.channels))
+        messages = list(chain.from_iterable(recording.batches(recording.channels)))
         assert recording.position == recording.size
         return [Frame(each.topic, each.type, time, payload) for each, time, payload in messages], recording.faults
     finally:
@@ -132,7 +133,7 @@ def test_every_kind_of_ros1_bag_gives_the_bytes_that_were_recorded(make, tmp_pat
 def test_only_the_channels_that_are_wanted_are_read(make, tmp_path):
     recording = open_recording([str(make(tmp_path))])
     lidar = [channel for channel in recording.channels if channel.topic == "/lidar"]
-    assert {channel.topic for channel, _, _ in recording.messages(lidar)} == {"/lidar"}
+    assert {channel.topic for channel, _, _ in chain.from_iterable(recording.batches(lidar))} == {"/lidar"}
     assert (recording.begin, recording.end) == (_RIG[0].time, _RIG[-1].time)
     recording.close()
 
@@ -292,7 +293,7 @@ _PEAK = """
 import resource, sys
 from syncrelay.bag import open_recording
 recording = open_recording(sys.argv[1:])
-for _ in recording.messages(recording.channels):
+for _ in recording.batches(recording.channels):
     pass
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
 """

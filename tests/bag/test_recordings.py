@@ -1,5 +1,6 @@
 """Real recordings replayed: the sets are those that come out over DDS (tests/ros/test_recordings.py), byte for byte."""
 
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -89,7 +90,7 @@ def test_real_recordings_hold_what_their_sources_say(bag, real_data: Path):
     recording = open_recording([str(real_data / bag)])
     channels = [channel for channel in recording.channels if channel.topic in _TYPES[bag]]
     counts = {channel.topic: 0 for channel in channels}
-    for channel, _, _ in recording.messages(channels):
+    for channel, _, _ in chain.from_iterable(recording.batches(channels)):
         counts[channel.topic] += 1
     recording.close()
     assert {channel.topic: (channel.type, counts[channel.topic]) for channel in channels} == _TYPES[bag]

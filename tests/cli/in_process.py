@@ -1,6 +1,7 @@
 """The commands that read recordings, run here: hundreds of times in the time that a process takes to start."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from syncrelay.cli.analyze import Asked, analyze_bag
@@ -12,9 +13,10 @@ from syncrelay.errors import SyncRelayError
 
 def _readers(bag: str, file: str, folder: Path) -> dict[str, Callable[[], int]]:
     """What reads a recording, by how it is called; what is written goes into the folder."""
-    by_topics = Asked(config=None, topics=("/camera", "/lidar"), write=None, html=None, json=False)
-    with_html = Asked(config=file, topics=(), write=None, html=str(folder / "report.html"), json=False)
-    as_json = Asked(config=file, topics=(), write=None, html=None, json=True)
+    of_file = Asked(config=file, text=Path(file).read_text(), topics=(), write=None, html=None, json=False, indent=None)
+    by_topics = replace(of_file, config=None, text=None, topics=("/camera", "/lidar"))
+    with_html = replace(of_file, html=str(folder / "report.html"))
+    as_json = replace(of_file, json=True)
     return {
         "replay": lambda: replay([bag], [file], Wanted(sets=True, drops=True, output=None)),
         "replay -o": lambda: replay([bag], [file], Wanted(sets=False, drops=False, output=str(folder / "out.mcap"))),

@@ -100,10 +100,12 @@ def test_topics_are_those_of_the_recording_that_are_not_named_yet(folder):
         "syncrelay analyze ",
         "syncrelay analyze rig.mcap ",
         "syncrelay analyze drive /camera /",
+        "syncrelay analyze rig.mcap d",
         "syncrelay analyze notes.txt ",
         folder=folder,
     )
-    assert answers == [["drive/", "maps/", "rig.mcap"], ["/camera", "/lidar"], ["/lidar"], []]
+    recordings = ["drive/", "maps/", "rig.mcap"]
+    assert answers == [recordings, ["/camera", "/lidar"], ["/lidar"], ["drive/"], recordings]
 
 
 def test_nobody_waits_for_a_pipe(folder):

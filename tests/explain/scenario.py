@@ -16,7 +16,6 @@ import yaml
 
 from syncrelay.config import GroupConfig, load_text
 from syncrelay.explain import (
-    Arrival,
     Endpoint,
     EngineDriver,
     Finding,
@@ -164,7 +163,7 @@ def run(
             continue
         while place < len(taken) and taken[place][0] <= second:
             at, received, index, stamp = taken[place]
-            relay.take(Arrival(index, stamp, _ns(received)), now=_ns(at), waited=_ns(at) - _ns(received))
+            relay.take(index, stamp, _ns(received), now=_ns(at))
             place += 1
         stop = next(((begin, end) for begin, end in stops if second - 1 <= end <= second), None)
         relay.asleep = _until(sleeps, second) > second
@@ -241,14 +240,14 @@ class _Relay:
         self.found: list[tuple[int, tuple[Finding, ...]]] = []
         self.facts: GroupFacts | None = None
 
-    def take(self, arrival: Arrival, *, now: int, waited: int) -> None:
+    def take(self, index: int, stamp: int | None, received: int, *, now: int) -> None:
         """Take one message."""
-        self._waits[-1] = max(self._waits[-1], waited)
-        if arrival.stamp is None:
-            self._driver.reject(arrival.input, arrival.received, now=now)
+        self._waits[-1] = max(self._waits[-1], now - received)
+        if stamp is None:
+            self._driver.reject(index, received, now=now)
             return
-        self._arrived[arrival.input].append((arrival.stamp, arrival.received))
-        message = Message(arrival.input, arrival.stamp, arrival.received, arrival.key)
+        self._arrived[index].append((stamp, received))
+        message = Message(index, stamp, received)
         if self._pause_at(now) is None:
             self._driver.add(message, now=now)
             return

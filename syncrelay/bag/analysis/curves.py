@@ -9,9 +9,10 @@ import numpy as np
 
 from syncrelay.bag.analysis.evaluation import completed
 from syncrelay.bag.analysis.nearest import PossibleSets
-from syncrelay.bag.analysis.streams import Stream, arrivals
+from syncrelay.bag.analysis.streams import Stream, messages
 from syncrelay.config import GroupConfig
-from syncrelay.explain import Arrival, dry_run
+from syncrelay.explain import dry_run
+from syncrelay.sync import Message
 
 MOST_MESSAGES: Final = 50_000
 """Of a longer recording, these first ones are used: some 20 runs of the engine on them take seconds."""
@@ -63,7 +64,7 @@ def curves_of(
     most: int = MOST_MESSAGES,
 ) -> Curves:
     """Return what a group gives with other values, with its own and with the suggested ones among them."""
-    used = list(islice(arrivals(streams), most))
+    used = list(islice(messages(streams), most))
     pivot, slop = possible.tightest.pivot, slop_key(group)
 
     def points(option: str, values: set[int]) -> tuple[Point, ...]:
@@ -77,8 +78,8 @@ def curves_of(
         by_queue_size=points("queue_size", _sizes(group, suggested, possible)),
         messages=len(used),
         recorded=sum(len(stream.places) for stream in streams),
-        lasts=used[-1].received - used[0].received if used else 0,
-        of=sum(arrival.input == pivot for arrival in used),
+        lasts=used[-1].payload - used[0].payload if used else 0,
+        of=sum(message.input == pivot for message in used),
     )
 
 
@@ -88,7 +89,7 @@ def slop_key(group: GroupConfig) -> str | None:
     return tolerance.key if tolerance is not None and hasattr(group.options, tolerance.key) else None
 
 
-def _point(group: GroupConfig, option: str, value: int, used: Sequence[Arrival], pivot: int) -> Point:
+def _point(group: GroupConfig, option: str, value: int, used: Sequence[Message], pivot: int) -> Point:
     tried = replace(group, options=group.options.model_copy(update={option: value}))
     run = dry_run(tried, used)
     span = int(np.quantile(run.spans, 0.5, method="inverted_cdf")) if run.spans else 0

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from syncrelay.bag.analysis.streams import Stream, arrivals
+from syncrelay.bag.analysis.streams import Stream, messages
 from syncrelay.config import GroupConfig
 from syncrelay.explain import EngineDriver
 from syncrelay.sync import DropReason, InputCounts, Match, Outcome
@@ -71,9 +71,5 @@ def evaluate(group: GroupConfig, streams: Sequence[Stream]) -> Evaluation:
     """Return what a group makes of the streams of its inputs."""
     outcomes = Outcomes(group)
     driver = EngineDriver(group, outcomes.take)
-    end = 0
-    for arrival in arrivals(streams):
-        driver.feed(arrival)
-        end = arrival.received
-    driver.finish(end)
+    driver.run(messages(streams))
     return Evaluation(driver.engine.counts(), tuple(outcomes.sets), tuple(outcomes.drops))

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds, Stream
+from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.analysis.topics import Spread, spread
+from syncrelay.bag.columns import Nanoseconds
 from syncrelay.bag.recording import LATEST
+from syncrelay.explain import UNREADABLE
 
 # Farther than what is told apart, and twice it still fits.
 _FAR = 2**61

@@ -1,30 +1,39 @@
 """The stamps of a recording, read once: all that the analysis asks for comes from these arrays."""
 
 from array import array
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from itertools import repeat
+from typing import Final, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from syncrelay.bag.bindings import GroupBinding
-from syncrelay.bag.payloads import ReadMessage, message_reader, stamp_or_receipt_reader
-from syncrelay.bag.recording import Channel, Encoding, RawMessage, Recording
+from syncrelay.bag.columns import (
+    Batch,
+    Column,
+    Columns,
+    Nanoseconds,
+    ReadColumn,
+    column_reader,
+    in_order,
+    keys_in_order,
+    stamp_or_receipt_column,
+)
+from syncrelay.bag.recording import Channel, Encoding, Recording
 from syncrelay.config import StampSource
-from syncrelay.explain import Arrival
+from syncrelay.sync import Message
 
-Nanoseconds: TypeAlias = npt.NDArray[np.int64]
-
-UNREADABLE = -(2**63)
-"""Stands in place of a stamp that could not be read."""
+# So many messages of a group are made at a time.
+_AT_ONCE: Final = 10_000
 
 
 @dataclass(slots=True)
 class Stream:
     """One input's messages as they were received: stamps, times of receipt, places in the whole recording, keys.
 
-    `type` is empty where the file has none and nothing was recorded.
+    Where no stamp or no key could be read, the stamp is UNREADABLE. `type` is empty where the file has none and nothing
+    was recorded.
     """
 
     topic: str
@@ -42,9 +51,17 @@ class Stream:
         """Give stamps, times of receipt and places as arrays for arithmetic."""
         return _array(self.stamps), _array(self.received), _array(self.places)
 
+    def add(self, column: Column, batch: Batch, begin: int) -> None:
+        """Take messages of a batch, which begins at a place of the recording."""
+        self.stamps.frombytes(column.stamps.tobytes())
+        self.received.frombytes(batch.received[column.places].tobytes())
+        self.places.frombytes((column.places + begin).tobytes())
+        if self.keys is not None:
+            self.keys += column.keys or repeat(None, len(column.places))
+
 
 _Wanted: TypeAlias = tuple[str, StampSource, str | None, bool]
-_Take: TypeAlias = Callable[[int, RawMessage], None]
+_Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]]]]
 
 
 def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tuple[tuple[Stream, ...], ...]:
@@ -53,7 +70,7 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
     Raises BagError for a stamp or key that a recorded type does not have.
     """
     streams: dict[_Wanted, Stream] = {}
-    takers: dict[Channel, list[_Take]] = {}
+    filled: _Filled = []
     chosen: list[tuple[Stream, ...]] = []
     for binding in bindings:
         of_group = []
@@ -63,12 +80,11 @@ def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tupl
             wanted = (each.topic, topic.stamp, topic.key, needs_place)
             if wanted not in streams:
                 streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
-                for channel in each.channels:
-                    read = message_reader(binding.group, index, channel)
-                    takers.setdefault(channel, []).append(_taker(streams[wanted], read))
+                readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
+                filled.append((streams[wanted], readers))
             of_group.append(streams[wanted])
         chosen.append(tuple(of_group))
-    _pour(recording, takers)
+    _pour(recording, filled)
     return tuple(chosen)
 
 
@@ -77,48 +93,36 @@ def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
 
     Stamps are those of the headers; of a topic without, or whose type is not known, the times of receipt.
     """
-    found: dict[tuple[str, str, Encoding | str], tuple[Channel, Stream]] = {}
-    takers: dict[Channel, list[_Take]] = {}
+    found: dict[tuple[str, str, Encoding | str], list[Channel]] = {}
     for channel in recording.channels:
-        first = (channel, Stream(channel.topic, channel.type))
-        _, stream = found.setdefault((channel.topic, channel.type, channel.encoding), first)
-        takers[channel] = [_taker(stream, stamp_or_receipt_reader(channel))]
-    _pour(recording, takers)
-    return tuple(found.values())
+        found.setdefault((channel.topic, channel.type, channel.encoding), []).append(channel)
+    filled: _Filled = [
+        (Stream(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels])
+        for (topic, type_name, _), channels in found.items()
+    ]
+    _pour(recording, filled)
+    return tuple((readers[0][0], stream) for stream, readers in filled)
 
 
-def arrivals(streams: Sequence[Stream]) -> Iterator[Arrival]:
-    """Yield the messages of a group's inputs in the order of the recording."""
-    lengths = [len(stream.places) for stream in streams]
-    places = np.concatenate([stream.numbers()[2] for stream in streams])
-    inputs = np.repeat(np.arange(len(streams)), lengths)
-    indexes = np.concatenate([np.arange(length) for length in lengths])
-    # Stable: a topic that feeds two inputs feeds them in their order.
-    order = np.argsort(places, kind="stable")
-    for index, at in zip(inputs[order].tolist(), indexes[order].tolist(), strict=True):
-        stream = streams[index]
-        stamp = stream.stamps[at]
-        key = None if stream.keys is None else stream.keys[at]
-        is_unusable = stamp == UNREADABLE or (stream.keys is not None and key is None)
-        yield Arrival(index, None if is_unusable else stamp, stream.received[at], key)
+def messages(streams: Sequence[Stream]) -> Iterator[Message]:
+    """Yield the messages of a group's inputs in the order of the recording; the payload is the time of receipt."""
+    numbers = [stream.numbers() for stream in streams]
+    places = [places for _, _, places in numbers]
+    order, inputs = in_order(places)
+    stamps, received = (np.concatenate([each[column] for each in numbers])[order] for column in (0, 1))
+    keys = iter(keys_in_order([(stream.keys, len(stream.places)) for stream in streams], order) or repeat(None))
+    for begin in range(0, len(order), _AT_ONCE):
+        among = slice(begin, begin + _AT_ONCE)
+        yield from map(Message, inputs[among].tolist(), stamps[among].tolist(), received[among].tolist(), keys)
 
 
-def _pour(recording: Recording, takers: Mapping[Channel, Sequence[_Take]]) -> None:
-    for place, raw in enumerate(recording.messages(takers.keys())):
-        for take in takers[raw[0]]:
-            take(place, raw)
-
-
-def _taker(stream: Stream, read: ReadMessage) -> _Take:
-    def take(place: int, raw: RawMessage) -> None:
-        stamp, key = read(raw)
-        stream.stamps.append(UNREADABLE if stamp is None else stamp)
-        stream.received.append(raw[1])
-        stream.places.append(place)
-        if stream.keys is not None:
-            stream.keys.append(key)
-
-    return take
+def _pour(recording: Recording, filled: _Filled) -> None:
+    columns = Columns([readers for _, readers in filled])
+    begin = 0
+    for batch in map(Batch, recording.batches(columns.channels)):
+        for index, column in columns.read(batch):
+            filled[index][0].add(column, batch, begin)
+        begin += len(batch.rows)
 
 
 def _array(values: "array[int]") -> Nanoseconds:

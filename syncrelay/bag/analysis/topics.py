@@ -5,7 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds, Stream
+from syncrelay.bag.analysis.streams import Stream
+from syncrelay.bag.columns import Nanoseconds
+from syncrelay.explain import UNREADABLE
 from syncrelay.explain.clocks import drift
 
 _SECOND: Final = 1_000_000_000
@@ -61,7 +63,7 @@ def figures_of(stream: Stream) -> TopicFigures:
     stamped, at = stamps[is_set], received[is_set]
     steps = np.diff(stamped)
     # Of a topic without stamps, the arrivals tell the rhythm.
-    distinct = np.unique(stamped if len(stamped) else received)
+    distinct = _distinct(stamped if len(stamped) else received)
     periods: Nanoseconds = np.diff(distinct)
     usual = int(np.median(periods)) if len(periods) else None
     gaps = periods[periods > _GAP * usual] if usual else periods[:0]
@@ -75,7 +77,7 @@ def figures_of(stream: Stream) -> TopicFigures:
         least_period=int(np.min(periods)) if len(periods) else None,
         gaps=len(gaps),
         longest_gap=int(np.max(gaps)) if len(gaps) else None,
-        duplicates=int(len(stamped) - len(np.unique(stamped))),
+        duplicates=len(stamped) - len(distinct) if len(stamped) else 0,
         out_of_order=int(np.count_nonzero(steps < 0)),
         unstamped=unstamped,
         unreadable=int(np.count_nonzero(stamps == UNREADABLE)),
@@ -88,6 +90,12 @@ def spread(values: Nanoseconds) -> Spread:
     """Return the spread of one value or more."""
     low, median, high = (_quantile(values, share) for share in (0.05, 0.5, 0.95))
     return Spread(int(np.min(values)), low, median, high, int(np.max(values)))
+
+
+def _distinct(values: Nanoseconds) -> Nanoseconds:
+    """As np.unique, which since numpy 2.3 takes six times as long for what is nearly in order."""
+    ordered = np.sort(values)
+    return ordered[np.concatenate(([True], ordered[1:] != ordered[:-1]))[: len(ordered)]]
 
 
 def _quantile(values: Nanoseconds, share: float) -> int:

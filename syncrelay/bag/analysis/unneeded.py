@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from syncrelay.bag.analysis.evaluation import Evaluation
 from syncrelay.bag.analysis.nearest import shifted
-from syncrelay.bag.analysis.streams import Nanoseconds
+from syncrelay.bag.columns import Nanoseconds
 from syncrelay.config import GroupConfig
 from syncrelay.sync import DropReason
 

@@ -5,9 +5,20 @@ from dataclasses import dataclass
 from typing import Final
 
 from syncrelay.bag.analysis.evaluation import Outcomes
-from syncrelay.bag.analysis.streams import Stream, arrivals
+from syncrelay.bag.analysis.streams import Stream, messages
 from syncrelay.config import GroupConfig, TopicConfig
-from syncrelay.explain import Arrival, Code, Endpoint, EngineDriver, Finding, GroupWatch, InputGraph, Judge, Severity
+from syncrelay.explain import (
+    UNREADABLE,
+    Code,
+    Endpoint,
+    EngineDriver,
+    Finding,
+    GroupWatch,
+    InputGraph,
+    Judge,
+    Severity,
+)
+from syncrelay.sync import Message
 
 _SECOND: Final = 1_000_000_000
 # The start and the end of a recording bring findings that last less long.
@@ -30,11 +41,10 @@ def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingF
     However long nothing is received, that takes no more than some tens of judgements.
     """
     watch = None
-    for arrival in arrivals(streams):
+    for message in messages(streams):
         if watch is None:
-            watch = _Watch(group, streams, began=arrival.received)
-        watch.judge_until(arrival.received)
-        watch.add(arrival)
+            watch = _Watch(group, streams, began=message.payload)
+        watch.add(message)
     return () if watch is None else watch.lasting()
 
 
@@ -63,7 +73,7 @@ class _Watch:
         self._found: dict[tuple[Code, int | None], LastingFinding] = {}
         self._graph = [_graph(topic, stream) for topic, stream in zip(group.topics, streams, strict=True)]
 
-    def judge_until(self, now: int) -> None:
+    def _judge_until(self, now: int) -> None:
         """Judge the seconds that end by `now`."""
         before = 0
         for second in judged_seconds((now - self._due) // _SECOND + 1):
@@ -71,13 +81,18 @@ class _Watch:
             before = second
         self._due += before * _SECOND
 
-    def add(self, arrival: Arrival) -> None:
-        """Add a message."""
-        self._driver.feed(arrival)
-        if arrival.stamp is not None:
-            self._arrivals[arrival.input].append((arrival.stamp, arrival.received))
-        if arrival.key is not None:
-            self._keys[arrival.input] = arrival.key
+    def add(self, message: Message) -> None:
+        """Judge the seconds that end by when a message was received, then add it."""
+        index, stamp, received = message.input, message.stamp, message.payload
+        if received >= self._due:
+            self._judge_until(received)
+        if message.key is not None:
+            self._keys[index] = message.key
+        if stamp == UNREADABLE:
+            self._driver.reject(index, received, now=received)
+            return
+        self._driver.add(message, now=received)
+        self._arrivals[index].append((stamp, received))
 
     def lasting(self) -> tuple[LastingFinding, ...]:
         """Judge the last second, and return what was wrong for longer than it takes to start or to end."""

@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from syncrelay.bag.analysis import GroupAnalysis
-from syncrelay.bag.analysis.streams import UNREADABLE, Nanoseconds
+from syncrelay.bag.columns import Nanoseconds
 from syncrelay.cli.analysis_html.fates import CODES, MATCHED, UNNEEDED
+from syncrelay.explain import UNREADABLE
 
 _SECOND: Final = 1_000_000_000
 _STRETCH: Final = 10 * _SECOND
