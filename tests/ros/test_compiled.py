@@ -2,6 +2,7 @@
 
 import gc
 import random
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -357,6 +358,14 @@ def test_where_it_is_not_as_expected_librcl_is_used_from_python_and_the_log_says
     assert "messages pass through librcl, without a copy in Python, at a higher cost: the compiled path" in caplog.text
     with pytest.raises(RosUnavailableError, match="SYNCRELAY_RECEIVE=compiled: the compiled path is not as expected"):
         choose_backend("compiled", node=here.node, context=here.context)
+
+
+def test_where_it_was_built_of_a_source_that_lacked_something_librcl_is_used(here, monkeypatch, caplog):
+    for module in ("backend", "check"):
+        monkeypatch.delitem(sys.modules, f"syncrelay.ros.compiled.{module}")
+    monkeypatch.delattr(compiled_backend.path, "Outlet")
+    assert choose_backend(None, node=here.node, context=here.context).name is BackendName.LIBRCL
+    assert "the compiled path is not as expected here (module" in caplog.text
 
 
 def test_where_a_message_does_not_come_back_as_it_was_it_is_not_used(here, monkeypatch):
