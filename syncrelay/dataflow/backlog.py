@@ -32,13 +32,15 @@ class Backlog:
         """Deliver what is the oldest as far as a poll at `until` can tell, a batch at most.
 
         What came after the poll is held: an older message may be in a source that had none at the time. A
-        source of which nothing is held is drained.
+        source of which nothing is held is drained. What was held before is due, though the clock was set back since:
+        all sources have been polled again.
         """
+        due = max([until, *(head[0] for head in self._heads)])
         for source in sources:
             if source not in self.held:
                 self._take(source)
         for _ in range(_BATCH):
-            if not self._heads or self._heads[0][0] > until:
+            if not self._heads or self._heads[0][0] > due:
                 return
             self._take(self._hand_on(heappop(self._heads), until))
 
@@ -59,12 +61,12 @@ class Backlog:
 
     def forget(self, source: Source) -> None:
         """Deliver what is held of a source that ends."""
-        self.failed.pop(source, None)
         if source in self.held:
             head = next(head for head in self._heads if head[3] is source)
             self._heads.remove(head)
             self._heads.sort()
             self._hand_on(head, head[0])
+        self.failed.pop(source, None)
 
     def deliver_alone(self, source: Source, until: int) -> None:
         """Deliver what one source has, as nearly always, while nothing is held: without any sorting."""

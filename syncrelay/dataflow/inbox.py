@@ -38,6 +38,8 @@ class PolledInbox:
         if source in self._sources:
             del self._sources[source]
             self._watch.remove(source)
+            # Who removes it in the midst of a delivery may destroy it.
+            source.pending = 0
 
     def receive(self, longest_ns: int) -> None:
         """Deliver what comes for so long, or until a wake or a failure."""

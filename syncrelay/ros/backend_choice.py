@@ -55,7 +55,8 @@ def _found(node: Any, context: Any, name: BackendName | None) -> tuple[RclBacken
         return librcl, ""
     try:
         return _compiled(librcl, node), ""
-    except (LibrclUnusableError, ImportError) as error:
+    # Of another source it may lack a name that is asked for at the import.
+    except (LibrclUnusableError, ImportError, AttributeError) as error:
         return librcl, f"the compiled path is not as expected here ({error})"
 
 

@@ -54,6 +54,27 @@ def test_what_came_after_the_look_waits_for_the_next_one():
     assert not backlog.held
 
 
+def test_a_clock_that_is_set_back_holds_up_no_source():
+    delivered: list[str] = []
+    backlog = Backlog()
+    ahead, other = _Source(delivered, (1000, "a"), (1001, "b")), _Source(delivered, (1, "A"))
+    _deliver(backlog, [ahead], 500)
+    assert delivered == []
+    for now in (1, 2):
+        _deliver(backlog, [other], now)
+    assert delivered == ["A", "a", "b"]
+    assert ahead.waited == 0
+
+
+def test_what_is_told_of_a_source_that_ends_is_told_no_more():
+    backlog = Backlog()
+    failing = _Source([], (6, "a"))
+    failing.deliver = {}.__getitem__
+    _deliver(backlog, [failing], 5)
+    backlog.forget(failing)
+    assert not backlog.failed
+
+
 def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
     delivered: list[str] = []
     backlog = Backlog()

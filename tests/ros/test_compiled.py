@@ -2,9 +2,12 @@
 
 import gc
 import random
+import sys
 import threading
 import time
 from collections.abc import Iterator
+from copy import copy
+from ctypes import CFUNCTYPE, POINTER, c_int, c_void_p
 from importlib.util import find_spec
 from types import SimpleNamespace
 
@@ -31,6 +34,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from syncrelay.ros.backend_choice import choose_backend
 from syncrelay.ros.compiled import backend as compiled_backend
 from syncrelay.ros.handlers import handler
+from syncrelay.ros.librcl.rcl import MessageInfo, Rcl
 from tests.ros.in_process import own_node
 
 pytestmark = pytest.mark.ros
@@ -253,12 +257,115 @@ def test_sources_come_and_go_while_messages_come(here):
     gc.collect()
 
 
+def test_a_clock_that_is_set_back_holds_up_no_topic(here):
+    real = Rcl()
+
+    @CFUNCTYPE(c_int, c_void_p, c_void_p, POINTER(MessageInfo), c_void_p)
+    def take_before(subscription, message, info, allocation):
+        code = real.take(c_void_p(subscription), c_void_p(message), info, c_void_p(allocation))
+        info.contents.received_timestamp += 3600 * _SECOND
+        return code
+
+    rcl = copy(real)
+    rcl.take = take_before
+    backend, came = compiled_backend.CompiledBackend(rcl), []
+    inbox = backend.inbox()
+    source = backend.source(here.topics[0].subscription, came.append)
+    inbox.add(source)
+    for _ in range(3):
+        here.topics[0].publisher.publish(vector(BEGIN))
+    for _ in range(10):
+        inbox.receive_once(0)
+    assert len(came) == 3
+    assert source.waited == 0
+    inbox.close()
+
+
+@pytest.mark.parametrize("name", ["compiled", "direct"])
+def test_a_source_may_be_removed_by_who_gets_its_messages(here, name):
+    backend = choose_backend(name, node=here.node, context=here.context)
+    came, inbox = [], backend.inbox()
+
+    def deliver(payload) -> None:
+        came.append(payload)
+        inbox.remove(source)
+
+    source = backend.source(here.topics[0].subscription, deliver)
+    inbox.add(source)
+    for _ in range(3):
+        here.topics[0].publisher.publish(vector(BEGIN))
+    for _ in range(3):
+        inbox.receive_once(0)
+    assert len(came) == 1
+    inbox.close()
+
+
+@pytest.mark.parametrize("name", ["compiled", "direct"])
+def test_an_inbox_that_is_closed_delivers_nothing_more(here, name):
+    backend = choose_backend(name, node=here.node, context=here.context)
+    came, inbox = [], backend.inbox()
+    inbox.add(backend.source(here.topics[0].subscription, came.append))
+    for _ in range(300):
+        here.topics[0].publisher.publish(vector(BEGIN))
+    inbox.receive_once(_SECOND)
+    delivered = len(came)
+    assert 0 < delivered < 300
+    inbox.close()
+    assert len(came) == delivered
+
+
+def test_a_source_is_drained_by_one_inbox_only(here):
+    inbox, source = here.backend.inbox(), here.backend.source(here.topics[0].subscription, print)
+    inbox.add(source)
+    for other in (inbox, here.backend.inbox()):
+        with pytest.raises(ValueError, match="drained already"):
+            other.add(source)
+    inbox.close()
+
+
+def test_a_source_that_is_fed_elsewhere_in_the_midst_of_a_delivery_that_fails_tells_what_failed(here):
+    topic, flow, told = here.topics[0], _group().flow, []
+
+    class Failing:
+        def add(self, _message, *, now):
+            source.deliver = print
+            raise KeyError(now)
+
+    flow.engine, inbox = Failing(), here.backend.inbox()
+    source = here.backend.source(topic.subscription, flow.by_header(0, told.append))
+    inbox.add(source)
+    topic.publisher.publish(vector(BEGIN))
+    inbox.receive_once(_SECOND)
+    assert [type(error) for error in told] == [KeyError]
+    inbox.close()
+
+
+def test_an_inbox_that_is_forgotten_leaves_what_dds_writes_to(here):
+    kept = []
+    for _ in range(20):
+        inbox = here.backend.inbox()
+        for topic in here.topics:
+            kept.append(here.backend.source(topic.subscription, print))
+            inbox.add(kept[-1])
+        del inbox
+        for topic in here.topics:
+            topic.publisher.publish(vector(BEGIN))
+
+
 def test_where_it_is_not_as_expected_librcl_is_used_from_python_and_the_log_says_so(here, monkeypatch, caplog):
     monkeypatch.setattr(compiled_backend, "_SIZES", (1, 2, 3))
     assert choose_backend(None, node=here.node, context=here.context).name is BackendName.LIBRCL
     assert "messages pass through librcl, without a copy in Python, at a higher cost: the compiled path" in caplog.text
     with pytest.raises(RosUnavailableError, match="SYNCRELAY_RECEIVE=compiled: the compiled path is not as expected"):
         choose_backend("compiled", node=here.node, context=here.context)
+
+
+def test_where_it_was_built_of_a_source_that_lacked_something_librcl_is_used(here, monkeypatch, caplog):
+    for module in ("backend", "check"):
+        monkeypatch.delitem(sys.modules, f"syncrelay.ros.compiled.{module}")
+    monkeypatch.delattr(compiled_backend.path, "Outlet")
+    assert choose_backend(None, node=here.node, context=here.context).name is BackendName.LIBRCL
+    assert "the compiled path is not as expected here (module" in caplog.text
 
 
 def test_where_a_message_does_not_come_back_as_it_was_it_is_not_used(here, monkeypatch):

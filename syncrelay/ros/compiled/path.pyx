@@ -309,14 +309,18 @@ cdef class Source:
     cdef int _give(self, Payload payload, int64_t until) except -1:
         if until - payload.received > self.waited:
             self.waited = until - payload.received
-        if self._by_header is not None:
-            self._by_header.give(payload)
+        # Its own reference: what is called may have another put in its place.
+        cdef Deliver by_header = self._by_header
+        if by_header is not None:
+            by_header.give(payload)
         else:
             self._deliver(payload)
         return 0
 
     cdef int _listen(self, sr_bell * bell) except -1:
         """Have the bell rung when messages come; what is there already is found by the next poll."""
+        if self.signal != NULL:
+            raise ValueError("it is drained already")
         self.signal = <sr_signal *>calloc(1, sizeof(sr_signal))
         if self.signal == NULL:
             raise MemoryError
@@ -335,6 +339,8 @@ cdef class Source:
         if not code:
             free(self.signal)
         self.signal = NULL
+        # Who leaves it in the midst of a delivery may destroy it.
+        self.pending = 0
         return not code
 
     def __dealloc__(self):
@@ -350,7 +356,7 @@ cdef class Inbox:
     cdef list sources
     cdef Py_ssize_t n_held
     cdef sr_bell * bell
-    cdef bint is_left
+    cdef Py_ssize_t n_ringers
     cdef int64_t coalesce, force_every, forced_at
 
     def __cinit__(self):
@@ -360,17 +366,17 @@ cdef class Inbox:
 
     def __init__(self, *, coalesce_ns=0, force_ns=SECOND):
         self.failed, self.sources, self.coalesce, self.force_every = {}, [], coalesce_ns, force_ns
-        self.is_left = True
         self.forced_at = sr_clock(CLOCK_REALTIME)
 
     def __dealloc__(self):
         # What DDS might still write to is left.
-        if self.is_left:
+        if not self.n_ringers:
             free(self.bell)
 
     def add(self, Source source):
         """Drain one more source; raises RclCallError."""
         source._listen(self.bell)
+        self.n_ringers += 1
         self.sources.append(source)
         sr_wake(self.bell)
 
@@ -382,9 +388,13 @@ cdef class Inbox:
             self._hand_on(source, payload, payload.received)
         self.failed.pop(source, None)
         if source in self.sources:
-            self.sources.remove(source)
-            if not source._leave():
-                self.is_left = False
+            self._leave(source)
+
+    cdef int _leave(self, Source source) except -1:
+        self.sources.remove(source)
+        if source._leave():
+            self.n_ringers -= 1
+        return 0
 
     def receive(self, int64_t longest_ns):
         """Deliver what comes for so long, or until a wake or a failure."""
@@ -401,16 +411,16 @@ cdef class Inbox:
         """Receive once; whether there was a wake."""
         cdef Source source, only = None
         cdef Py_ssize_t n_ready = 0
-        cdef int64_t now
+        cdef int64_t now, due
         if not self.n_held:
             if not sr_heard(self.bell):
                 with nogil:
                     sr_sleep(self.bell, longest_ns)
                     if sr_heard(self.bell) and self.coalesce:
-                        sr_rest(self.coalesce)
+                        self._rest()
             elif self.coalesce:
                 with nogil:
-                    sr_rest(self.coalesce)
+                    self._rest()
         else:
             sr_heard(self.bell)
         cdef int woken = sr_was_woken(self.bell)
@@ -427,9 +437,15 @@ cdef class Inbox:
         if n_ready == 1 and not self.n_held:
             self._deliver_alone(only, now)
         elif n_ready or self.n_held:
+            due = self._due(now)
             self._fill()
-            self._deliver(now, BATCH)
+            self._deliver(due, now, BATCH)
         return woken
+
+    cdef void _rest(self) noexcept nogil:
+        sr_rest(self.coalesce)
+        # What rang meanwhile is looked at now, and not after a rest of its own.
+        sr_heard(self.bell)
 
     def deliver_all(self):
         """Deliver what was received until now, however much it is."""
@@ -437,7 +453,8 @@ cdef class Inbox:
         for source in self.sources:
             source.pending = ALL
         self._fill()
-        self._deliver(sr_clock(CLOCK_REALTIME), -1)
+        cdef int64_t now = sr_clock(CLOCK_REALTIME)
+        self._deliver(now, now, -1)
 
     def deliver_held(self):
         """Deliver what was taken and held, at the end: nothing more is taken."""
@@ -476,14 +493,23 @@ cdef class Inbox:
                 self._hold(source)
         return 0
 
-    cdef int _deliver(self, int64_t until, int most) except -1:
+    cdef int64_t _due(self, int64_t now) noexcept:
+        """Until when messages may be delivered: as Backlog.deliver."""
+        cdef Source source
+        if self.n_held:
+            for source in self.sources:
+                if source.held is not None and source.held.received > now:
+                    now = source.held.received
+        return now
+
+    cdef int _deliver(self, int64_t due, int64_t now, int most) except -1:
         """Deliver the oldest first, up to a time; so many at most, or without end if that is negative."""
         cdef Source source
         while most:
             source = self._first()
-            if source is None or source.held.received > until:
+            if source is None or source.held.received > due:
                 return 0
-            self._hand_on(source, self._release(source), until)
+            self._hand_on(source, self._release(source), now)
             self._hold(source)
             most -= 1
         return 0
@@ -528,8 +554,9 @@ cdef class Inbox:
 
     def close(self):
         """Leave the sources that are left."""
+        cdef Source source
         for source in list(self.sources):
-            self.remove(source)
+            self._leave(source)
 
 
 cdef class Outlet:
