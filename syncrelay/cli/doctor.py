@@ -19,7 +19,7 @@ from syncrelay.doctor.text import diagnosis_lines, observed_lines, verdict
 from syncrelay.logs import LOGGER
 from syncrelay.printable import printable
 
-_LIBRARIES: Final = {"direct": "librcl", "rclpy": "rclpy"}
+_THROUGH: Final = {"compiled": "librcl in compiled code", "direct": "librcl", "rclpy": "rclpy"}
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
@@ -57,7 +57,7 @@ def _is_ok(examination: Examination) -> bool:
 
 def _print_text(examination: Examination) -> None:
     colour = wants_colour(sys.stdout.isatty())
-    put(printable(_heading(examination)))
+    put(printable(heading(examination)))
     if examination.observed is not None:
         put("\n".join(observed_lines(examination.observed)))
     for diagnosis in examination.diagnoses:
@@ -67,7 +67,8 @@ def _print_text(examination: Examination) -> None:
     put(verdict(examination.diagnoses))
 
 
-def _heading(examination: Examination) -> str:
+def heading(examination: Examination) -> str:
+    """Return the first line: what is installed, how nodes find each other, and how messages would pass."""
     installation = examination.installation
     rclpy = f"rclpy {installation.version or '(version unknown)'}" if installation.rclpy else "no rclpy"
     return ", ".join(
@@ -77,7 +78,7 @@ def _heading(examination: Examination) -> str:
             examination.middleware or "no middleware",
             "no valid domain" if examination.domain is None else f"domain {examination.domain}",
             f"discovery {examination.discovery_range}",
-            *([f"messages through {_LIBRARIES[examination.path]}"] if examination.path else []),
+            *([f"messages through {_THROUGH[examination.path]}"] if examination.path else []),
         ]
     )
 

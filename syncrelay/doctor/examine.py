@@ -63,8 +63,8 @@ class Observed:
 class Examination:
     """What was found, the worst first.
 
-    `domain` is None where the environment names none that ROS takes; `path` is how messages would pass, direct or
-    rclpy, empty where no node starts.
+    `domain` is None where the environment names none that ROS takes; `path` is how messages would pass, a
+    BackendName, empty where no node starts or that cannot be had.
     """
 
     installation: Installation

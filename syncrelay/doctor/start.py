@@ -1,4 +1,4 @@
-"""What came of starting a node for a started."""
+"""What came of starting a node for a check."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -18,9 +18,16 @@ _WHAT: Final = {
 def check_start(started: StartResult, *, before: Sequence[Diagnosis]) -> Iterator[Diagnosis]:
     """Yield why a node does not start, unless an error that was found `before` explains it.
 
-    Of one that starts, yield why it receives at a higher cost, if it does.
+    Of one that starts, yield why messages pass at a higher cost, or not at all as the environment asks.
     """
-    if started.path_fault:
+    if started.path_fault and not started.path:
+        yield error(
+            "receive_path",
+            started.path_fault,
+            impact="the relay exits at once",
+            fix="unset SYNCRELAY_RECEIVE: the relay then takes the cheapest path that works here",
+        )
+    elif started.path_fault:
         yield info(
             "receive_path",
             f"messages take the path `{started.path}`: {started.path_fault}",

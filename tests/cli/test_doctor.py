@@ -68,6 +68,7 @@ def test_where_all_is_well_it_says_so_and_exits_with_0(base):
         ({"ROS_LOG_DIR": "/proc/nowhere"}, "log_folder", "info", "/proc/nowhere (by ROS_LOG_DIR)"),
         ({"ROS_LOG_DIR": "", "ROS_HOME": "", "HOME": ""}, "log_folder", "info", "are all unset"),
         ({"SYNCRELAY_HEARTBEAT": "/nowhere/beat"}, "heartbeat", "error", "/nowhere/beat: No such file or directory"),
+        ({"SYNCRELAY_RECEIVE": "dds"}, "receive_path", "error", "=dds: expected compiled, direct or rclpy"),
         ({"RMW_IMPLEMENTATION": "rmw_nowhere_cpp"}, "middleware_not_there", "error", "asks for rmw_nowhere_cpp"),
     ],
 )

@@ -2,9 +2,15 @@
 
 import socket
 
+import pytest
+
+from syncrelay.cli.doctor import heading
 from syncrelay.config import Listen
+from syncrelay.dataflow.backend import BackendName
 from syncrelay.doctor.diagnosis import Severity
+from syncrelay.doctor.examine import Examination
 from syncrelay.doctor.listen import check_listen
+from syncrelay.doctor.machine.installation import look_at_installation
 from syncrelay.doctor.start import check_start
 from syncrelay.doctor.start_check import StartResult
 
@@ -17,6 +23,24 @@ def test_a_path_that_costs_more_is_an_info_with_its_reason():
     assert found.what == "messages take the path `rclpy`: librcl is not as expected here (other fields)"
     assert list(check_start(StartResult(path="direct"), before=())) == []
     assert list(check_start(StartResult(path="rclpy"), before=())) == []
+
+
+def test_a_path_that_is_asked_for_and_cannot_be_had_is_an_error():
+    (found,) = check_start(StartResult(path_fault="SYNCRELAY_RECEIVE=dds: expected direct or rclpy"), before=())
+    assert (found.code, found.severity) == ("receive_path", Severity.ERROR)
+    assert found.what == "SYNCRELAY_RECEIVE=dds: expected direct or rclpy"
+    assert "unset SYNCRELAY_RECEIVE" in found.fix
+
+
+@pytest.mark.parametrize("path", BackendName)
+def test_the_first_line_says_how_messages_pass_on_each_path(path):
+    examined = Examination(look_at_installation({}), "rmw_fastrtps_cpp", 0, "SUBNET", (), None, path.value)
+    words = {
+        BackendName.COMPILED: "messages through librcl in compiled code",
+        BackendName.LIBRCL: "messages through librcl",
+        BackendName.RCLPY: "messages through rclpy",
+    }
+    assert heading(examined).split(", ")[-1] == words[path]
 
 
 def test_a_port_that_is_taken_is_an_info_where_the_file_asks_for_it():

@@ -45,7 +45,8 @@ class StartResult:
     """How it went. `failed` is the step that failed, None if all went well, and `fault` says why.
 
     `unusable` has the fault of every type that cannot be imported. `names` are the topics after all remaps. `path` is
-    how messages pass, a BackendName, and `path_fault` what is wrong with a way that costs less.
+    how messages pass, a BackendName, and `path_fault` what is wrong with a way that costs less; where `path` is empty,
+    with the one that the environment asks for.
     """
 
     failed: Step | None = None

@@ -69,12 +69,17 @@ def _start(plan: dict[str, Any]) -> None:
 
 
 def _path(node: Any, context: Any) -> dict[str, str]:
-    """Find how messages would pass, and what is wrong with a way that costs less."""
-    from syncrelay.ros.backend_choice import VARIABLE, find_backend  # noqa: PLC0415  after require_rclpy
+    """Find how messages would pass, and what is wrong with a way that costs less or is asked for."""
+    from syncrelay.ros.backend_choice import VARIABLE, choose_backend, find_backend  # noqa: PLC0415  after require_rclpy
 
-    if asked := os.environ.get(VARIABLE):
-        return {"path": asked, "path_fault": ""}
-    backend, fault = find_backend(node=node, context=context)
+    asked, fault = os.environ.get(VARIABLE), ""
+    try:
+        if asked:
+            backend = choose_backend(asked, node=node, context=context)
+        else:
+            backend, fault = find_backend(node=node, context=context)
+    except (UsageError, RosUnavailableError) as error:
+        return {"path": "", "path_fault": str(error)}
     return {"path": backend.name.value, "path_fault": fault}
 
 
