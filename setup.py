@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: the compiled path is built where a C compiler and Python's headers are."""
+"""What pyproject.toml cannot say: the compiled path is built where there are a C compiler and Python's headers."""
 
 import hashlib
 import logging
@@ -26,14 +26,14 @@ class _BuildWherePossible(build_ext):
             if in_clone.absolute() != built.absolute():
                 self.copy_file(in_clone, built)
             return
-        # An earlier build's would be installed for this one's if this one fails.
+        # If this build fails, the result of an earlier one must not be installed in its place.
         in_clone.unlink(missing_ok=True)
         built.unlink(missing_ok=True)
         try:
             super().build_extension(ext)
         except (BaseError, CCompilerError) as error:
             self.announce(
-                f"syncrelay is installed without its compiled path: it does the same, at a higher cost ({error})",
+                f"syncrelay is installed without its compiled path: each message costs more CPU ({error})",
                 logging.WARNING,
             )
 

@@ -1,14 +1,14 @@
 """Compare what a relayed message costs: `python bench/compare.py [--load NAME] A B [C ...]`, in ratios to A.
 
 A candidate is a checkout of syncrelay (`.`, `/path/to/another`), `c` (bench/floor.c, bare C on rcl) or `typed`
-(bench/typed_relay.py), with settings behind an @: `.@SYNCRELAY_RECEIVE=rclpy`, `.@PYTHON=/path/to/python,NAME=VALUE`,
-and of a checkout `heard` (its manifest is subscribed), `scalars` (on /diagnostics) and `untold` (nothing is observed
-or told).
+(bench/typed_relay.py). Settings follow an @, with commas between: environment variables (`.@SYNCRELAY_RECEIVE=rclpy`)
+and the interpreter (`.@PYTHON=/path/to/python`); for a checkout also `coalesce=300us` (as in the file), `heard` (its
+manifest has a subscriber), `scalars` (on /diagnostics) and `untold` (it neither watches itself nor tells of it).
 
 Each is started once, between processes that publish and receive, and loaded in turns, for a second in each round, while
 the others are idle. CPU is what all threads of its process ran, by the scheduler's count, per message that came out.
 Rounds in which neighbours took over 5 % of the machine are dropped. It ends when the 95 % confidence interval of each
-ratio is narrow enough, or after so many rounds.
+ratio is narrower than --width, or after --rounds.
 """
 
 import argparse
@@ -31,10 +31,10 @@ def main():
         action="append",
         choices=LOADS,
         metavar="LOAD",
-        help=f"of {', '.join(LOADS)}; may be repeated (default: the first)",
+        help=f"one of {', '.join(LOADS)}; may be repeated (default: the first)",
     )
-    parser.add_argument("--rounds", type=int, default=200, help="at most (default: %(default)s)")
-    parser.add_argument("--width", type=float, default=0.05, help="of the interval (default: %(default)s)")
+    parser.add_argument("--rounds", type=int, default=200, help="rounds at most (default: %(default)s)")
+    parser.add_argument("--width", type=float, default=0.05, help="of an interval, to its ratio (default: %(default)s)")
     parser.add_argument("candidates", nargs="+", metavar="CANDIDATE")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
@@ -52,7 +52,7 @@ def main():
 def show(candidates, kept, n_rounds):
     """Print a table of the candidates' figures, and how many rounds they are of."""
     if not kept:
-        print(f"none of {n_rounds} rounds was undisturbed\n", flush=True)
+        print(f"all of {n_rounds} rounds were disturbed by neighbours\n", flush=True)
         return
     print(f"| candidate | CPU a message | {' | '.join(PURPOSES)} | to the first | p50 latency | to the first | lost |")
     print("|---" * (len(PURPOSES) + 6) + "|")

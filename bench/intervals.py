@@ -10,7 +10,7 @@ MOST_STOLEN = 0.05
 
 
 class Interval(NamedTuple):
-    """A median, and between which values that of endless rounds lies, with a confidence of 95 %."""
+    """A median, and the bounds of its 95 % confidence interval."""
 
     low: float
     median: float

@@ -1,6 +1,6 @@
-"""What a relayed message costs: `python bench/relay.py`, printed as tables, ratios taken in this one run.
+"""What a relayed message costs: `python bench/relay.py` prints tables, with ratios taken in this one run.
 
-Measured as compare.py does. The relay in C++ on rclcpp is not among them: neither PyPI nor Debian has rclcpp.
+Measured as compare.py does. There is no relay in C++ on rclcpp among them: neither PyPI nor Debian has rclcpp.
 """
 
 import argparse
@@ -50,7 +50,7 @@ class Tables:
         except ValueError as error:
             print(error)
         for load in LOADS:
-            # What is taught takes no 2,000 messages a second.
+            # The typed relay cannot keep up with 2,000 messages a second.
             self._compare(load, [word for word in words if (word, load) != ("typed", "2 x 1 kHz x 1 kB")])
 
     def telling(self):
@@ -111,8 +111,8 @@ def cpu_s_of(process):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=30, help="of a table, at most (default: %(default)s)")
-    parser.add_argument("parts", nargs="*", metavar="PART", help="of cost, telling, large, scale, rest (default: all)")
+    parser.add_argument("--rounds", type=int, default=30, help="rounds of a table at most (default: %(default)s)")
+    parser.add_argument("parts", nargs="*", metavar="PART", help="cost, telling, large, scale or rest (default: all)")
     asked = parser.parse_args()
     print(f"Python {sys.version.split()[0]}, {os.cpu_count()} cores\n")
     with tempfile.TemporaryDirectory() as folder:

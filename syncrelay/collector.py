@@ -9,8 +9,8 @@ from contextlib import contextmanager
 def resting_collector() -> Iterator[None]:
     """Collect no garbage meanwhile, and have the collector pass over all that exists by the end.
 
-    For imports, whose results stay: at its usual pace the collector goes through them again and again, which takes a
-    sixth of the start of a relay.
+    For imports, whose results stay: the collector goes through them again and again otherwise, which takes a sixth of
+    the start of a relay.
     """
     usual = gc.isenabled()
     gc.disable()

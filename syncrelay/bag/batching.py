@@ -1,4 +1,4 @@
-"""Messages by the batch: enough that what is done for each batch does not show, few enough to be held in memory."""
+"""Batches of messages: large enough that the work for each batch does not count, small enough to hold in memory."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final
@@ -15,7 +15,7 @@ def batched(messages: Iterable[RawMessage]) -> Iterator[list[RawMessage]]:
 
 
 def filled(batches: Iterable[list[RawMessage]]) -> Iterator[list[RawMessage]]:
-    """Yield batches that are small as fewer ones; none is empty."""
+    """Yield small batches put together into larger ones; none is empty."""
     held: list[RawMessage] = []
     size = 0
     for batch in batches:

@@ -1,4 +1,4 @@
-"""Stamps and keys of a batch of messages, column by column: what is alike in all of them is read in one go."""
+"""Stamps and keys of a batch of messages as columns: the stamps of leading headers are read all at once."""
 
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
 from functools import cached_property

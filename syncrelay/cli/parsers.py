@@ -87,7 +87,7 @@ def analyze() -> Parser:
         "syncrelay analyze",
         description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
         "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
-        "Several recordings are measured one by one, on all cores. "
+        "Each of several recordings is measured by itself, on all cores. "
         "Exit code 1 if a recording lacks a required topic.",
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
@@ -98,9 +98,9 @@ def analyze() -> Parser:
     parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
     parser.add_argument("--html", metavar="REPORT", help="write a report with charts: one HTML file, opens offline")
     parser.add_argument(
-        "--json", action="store_true", help="print all figures as JSON, of each of several recordings in one line"
+        "--json", action="store_true", help="print all figures as JSON; of several recordings, each in one line"
     )
-    parser.add_argument("--jobs", metavar="N", type=count, help="recordings at a time (as many as there are cores)")
+    parser.add_argument("--jobs", metavar="N", type=count, help="recordings at a time; default: one for each core")
     return parser
 
 

@@ -1,7 +1,7 @@
-"""Pieces of work side by side, each in a process of its own, that print as if they were done one after another.
+"""Pieces of work side by side, each in a process of its own, that print as if done one after another.
 
 Processes are forked: what is imported is there at once, and what a piece of work breaks is its own. So this is for
-commands that have started no thread. One that ends takes its memory with it.
+commands that have started no thread. When a process ends, its memory is free.
 """
 
 import os
@@ -110,14 +110,14 @@ def _end_with(parent: int) -> None:
 
 
 def _tell(worker: _Worker, code: int) -> int:
-    """Print what a process printed, and say how it ended if it is not by itself; return its exit code."""
+    """Print what a process printed, and say what ended it if a signal did; return its exit code."""
     pass_on(_content(worker.out), _content(worker.err))
     if code < 0:
         why = f"the process that read it was ended by {signal.Signals(-code).name}"
         remark(f"{worker.work.name}: {why}; check whether there is enough memory, or use fewer --jobs")
         return AT_FAULT
     if code == OUR_BUG:
-        remark(f"{worker.work.name} is the recording that it happened with")
+        remark(f"it happened with the recording {worker.work.name}")
     return code
 
 

@@ -81,7 +81,7 @@ _LONGEST_PAUSE_NS: Final = 100_000_000
 def _short(value: object) -> int:
     pause = _not_negative(value)
     if pause > _LONGEST_PAUSE_NS:
-        raise ValueError("at most 100ms: all messages of the relay wait for so long")
+        raise ValueError("at most 100ms: all messages of the relay wait that long")
     return pause
 
 

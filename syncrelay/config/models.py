@@ -74,9 +74,9 @@ class NodeConfig(Keys):
     coalesce: ShortDuration = Field(
         default=0,
         description=(
-            "How long the relay waits, when a message comes, for those that come with it, to take them all in one go:"
-            " less CPU for many inputs that are stamped together, and so much more latency. At most 100ms. A number is"
-            " seconds, a string has a unit (ns, us, ms, s, min). Default: 0, not at all."
+            "How long the relay waits for others when a message comes, to take them all in one go. It may save CPU"
+            " where many inputs come shortly after each other, and adds as much latency. At most 100ms. A number is"
+            " seconds, a string has a unit (ns, us, ms, s, min). Default: 0, no wait."
         ),
         examples=["300us"],
     )

@@ -47,7 +47,7 @@ class Source(Protocol):
     """How many messages it has at most: what was reported, or `ALL` until `take` finds that there is no more."""
 
     def take(self) -> Payload | None:
-        """Take its oldest message, one less then being pending; None if there is none after all."""
+        """Take its oldest message, so that one less is pending; None if there is none after all."""
         ...
 
 

@@ -15,7 +15,7 @@ _NS_PER_SECOND: Final = 1_000_000_000
 class PolledInbox:
     """Drains the sources that a watch names.
 
-    After the first message that comes it waits `coalesce_ns` for those that go with it.
+    When a message comes, it waits `coalesce_ns` for others before it takes them all.
     """
 
     def __init__(self, watch: Watch, *, coalesce_ns: int = 0) -> None:

@@ -1,7 +1,7 @@
-"""Manifests on their way out: noted on the receive thread, written and published on another, some milliseconds later.
+"""Manifests on their way out: noted on the receive thread, written and published on another, up to 50 ms later.
 
 Code that runs once in some milliseconds costs by its length, as nothing of it is in the processor's caches: a batch
-of manifests costs far less than as many alone.
+of manifests costs far less than the same manifests one by one.
 """
 
 import logging
@@ -21,7 +21,7 @@ _LOG = logging.getLogger("syncrelay")
 # How long a manifest may wait for others. Measured: to wake, and to publish the first, costs as much as twenty more.
 _BATCH_S: Final = 0.05
 MOST_NOTED: Final = 10_000
-"""How many manifests of all groups may wait to be published: ten seconds of a set each millisecond."""
+"""How many manifests of all groups may wait to be published: those of ten seconds at 1000 sets a second."""
 
 
 class GroupManifests:
@@ -64,7 +64,7 @@ class GroupManifests:
         if self._left_out and not self._says_left_out:
             self._says_left_out = True
             _LOG.error(
-                "%s: manifests are left out, because %d are waiting to be published; the sets themselves leave",
+                "%s: leaving out manifests, because %d are waiting to be published; sets leave as usual",
                 self.name,
                 MOST_NOTED,
                 extra={"group": self.name},
@@ -86,8 +86,8 @@ class GroupManifests:
 class ManifestQueue:
     """Publishes the manifests of all groups in the order of their sets, in batches, on the thread that calls `run`.
 
-    Each is published once, however many threads ask for it. On the main thread, where nothing else is said. An outlet
-    may end when its group has ended and `keep` has returned: by then nothing is left that would leave by it.
+    Each is published once, however many threads ask for it. All is called on the main thread, unless it says otherwise.
+    An outlet may end when its group has ended and `keep` has returned: by then nothing is left to publish on it.
     """
 
     def __init__(self, *, bugs: Bugs) -> None:

@@ -23,7 +23,7 @@ _AFTER_FAILURE_S = 0.01
 
 
 class ReceiveLoop:
-    """Has an inbox deliver its messages on the thread that calls `run`.
+    """Has an inbox deliver messages on the thread that calls `run`.
 
     Only `call`, `wake`, `stop` and the attributes may be used from other threads. `expire` is called with the time of
     `now`, in nanoseconds, when that is due, and `on_turn` at least once a second. `contain` takes an

@@ -14,6 +14,7 @@ VARIABLE: Final = "SYNCRELAY_RECEIVE"
 """The environment variable that names the backend, a BackendName; without it the cheapest is taken."""
 
 _LOG = logging.getLogger("syncrelay")
+_NOT_BUILT: Final = "the compiled path was not built: install syncrelay again where there is a C compiler"
 _WORDS: Final = {
     BackendName.COMPILED: "messages pass through librcl, in compiled code",
     BackendName.LIBRCL: "messages pass through librcl, without a copy in Python",
@@ -30,7 +31,7 @@ def choose_backend(asked: str | None, *, node: Any, context: Any) -> RclBackend:
     backend, fault = (RclpyBackend(context), "") if name is BackendName.RCLPY else _found(node, context, name)
     words = _WORDS[backend.name]
     if name is not None and name is not backend.name:
-        raise RosUnavailableError(f"{VARIABLE}={asked}: {fault or 'the compiled path was not built here'}")
+        raise RosUnavailableError(f"{VARIABLE}={asked}: {fault or _NOT_BUILT}")
     if name is not None:
         _LOG.info("%s, as %s asks", words, VARIABLE)
     elif fault:
@@ -41,7 +42,7 @@ def choose_backend(asked: str | None, *, node: Any, context: Any) -> RclBackend:
 
 
 def find_backend(*, node: Any, context: Any) -> tuple[RclBackend, str]:
-    """Return the cheapest backend that proves itself here, and what is wrong with one that would be cheaper."""
+    """Return the cheapest backend that works here, and what is wrong with a cheaper one, or nothing."""
     return _found(node, context, None)
 
 

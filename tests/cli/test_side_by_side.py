@@ -80,7 +80,7 @@ def test_a_process_that_dies_is_one_recordings_fault(folder):
     assert (done.returncode, done.stdout) == (70, "a\nd\n")
     assert "syncrelay: b.mcap: the process that read it was ended by SIGKILL" in done.stderr
     assert "ZeroDivisionError" in done.stderr
-    assert "syncrelay: c.mcap is the recording that it happened with" in done.stderr
+    assert "syncrelay: it happened with the recording c.mcap" in done.stderr
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, -15), (signal.SIGKILL, -9)])

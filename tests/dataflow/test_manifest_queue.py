@@ -224,5 +224,5 @@ def test_what_is_left_out_while_too_many_wait_is_counted_and_said_once(queue, ca
     assert told.numbers == [*range(1, 11), *range(14, 24)]
     assert told.outlets[0].sent == 25
     said, in_all = [record.message for record in caplog.records]
-    assert said == "front: manifests are left out, because 10 are waiting to be published; the sets themselves leave"
+    assert said == "front: leaving out manifests, because 10 are waiting to be published; sets leave as usual"
     assert in_all == "front: 5 manifests were left out"

@@ -1,10 +1,10 @@
-"""An extension module that is there where a C compiler was when syncrelay was installed; all works without it."""
+"""An extension module that is built where there is a C compiler when syncrelay is installed; all works without it."""
 
 import hashlib
 from pathlib import Path
 
 
 def source_fingerprint() -> str | None:
-    """What `path.SOURCE` is if it was built of the source beside it; None where no source is installed."""
+    """What `path.SOURCE` is if it was built from the source beside it; None where no source is installed."""
     source = Path(__file__).with_name("path.pyx")
     return hashlib.sha256(source.read_bytes()).hexdigest() if source.exists() else None

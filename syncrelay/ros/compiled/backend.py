@@ -41,7 +41,7 @@ class CompiledOutlet(path.Outlet):
 
 
 class CompiledBackend:
-    """Takes and publishes in librcl without a step of the interpreter between."""
+    """Takes and publishes in librcl, in compiled code."""
 
     name = BackendName.COMPILED
     flow = path.Flow
@@ -82,5 +82,5 @@ class CompiledBackend:
 def _address(function: Any) -> int:
     address = ctypes.cast(function, ctypes.c_void_p).value
     if address is None:
-        raise ValueError(f"{function} is nowhere")
+        raise ValueError(f"{function} has no address")
     return address

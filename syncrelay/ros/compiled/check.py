@@ -15,7 +15,7 @@ def compiled_backend(rcl: Rcl, node: Any) -> CompiledBackend:
     The functions of librcl must have proven themselves.
     """
     if source_fingerprint() not in (None, path.SOURCE):
-        raise LibrclUnusableError("it was built of another path.pyx: install syncrelay again")
+        raise LibrclUnusableError("it was built from another path.pyx: install syncrelay again")
     try:
         backend = CompiledBackend(rcl)
         with endpoints(node) as (subscription, publisher):
