@@ -3,11 +3,12 @@
 import time
 from collections import deque
 from collections.abc import Callable, Hashable, Sequence
-from typing import Final, NamedTuple, Protocol, Self, TypeAlias
+from typing import Final, NamedTuple, Self, TypeAlias
 
 from syncrelay.cdr import read_stamp
 from syncrelay.dataflow.backend import Deliver, Outlet, Payload, PublishError
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
+from syncrelay.dataflow.refusals import Refusals
 from syncrelay.explain import RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 
@@ -33,22 +34,13 @@ class Watched(NamedTuple):
         return cls(tuple([deque(maxlen=_WATCHED) for _ in range(n_inputs)]), deque(maxlen=_WATCHED))
 
 
-class Told(Protocol):
-    """Hears what becomes of what leaves."""
-
-    def refused(self, index: int, outlet: Outlet, why: str) -> None:
-        """An outlet did not publish a message of this input."""
-        ...
-
-    def accepted(self, index: int, outlet: Outlet) -> None:
-        """An outlet published a message; told while one of the last was refused."""
-        ...
-
-
 class Flow:
-    """Feeds an engine on the receive thread and publishes the sets that it gives. What it raises stops its group."""
+    """Feeds an engine on the receive thread and publishes the sets that it gives. What it raises stops its group.
 
-    def __init__(self, engine: Engine, *, n_inputs: int, now: Callable[[], int], told: Told) -> None:
+    It knows nothing of its group: in a circle, what ended would keep its messages until the collector came by.
+    """
+
+    def __init__(self, engine: Engine, *, n_inputs: int, now: Callable[[], int], refusals: Refusals) -> None:
         self.engine = engine
         self.outlets: list[Outlet | None] = [None] * n_inputs
         self.restamped = [False] * n_inputs
@@ -59,12 +51,12 @@ class Flow:
         """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
         self.n_sets = 0
         """How many sets left: what manifests number them by."""
-        self.all_accepted = True
-        """Whether the last message of each input was published."""
-        self.tell: Callable[[Match, int], None] | None = None
+        self.unpublished = refusals.unpublished
+        """The inputs of which the last message could not be published."""
+        self.tell: Callable[[Flow, Match, int], None] | None = None
         """Hears of each set that left, and of its latency in nanoseconds."""
         self._now = now
-        self._told = told
+        self._refusals = refusals
         self._watched = Watched.none_of(n_inputs)
 
     def watched(self) -> Watched:
@@ -106,7 +98,7 @@ class Flow:
                 self.last.append(stamps)
                 self.n_sets += 1
                 if self.tell is not None:
-                    self.tell(outcome, latency)
+                    self.tell(self, outcome, latency)
             else:
                 message = outcome.message
                 self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
@@ -128,8 +120,8 @@ class Flow:
                 else:
                     outlet.send(payload)
             except PublishError as error:
-                self._told.refused(index, outlet, str(error))
+                self._refusals.refused(index, outlet, str(error))
             else:
-                if not self.all_accepted:
-                    self._told.accepted(index, outlet)
+                if self.unpublished:
+                    self._refusals.accepted(index, outlet)
         return newest

@@ -3,17 +3,16 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import suppress
 from typing import Final, NamedTuple, TypeVar
 
 from syncrelay.config import GroupConfig
-from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.flow import Engine, Flow, Stamps
-from syncrelay.dataflow.manifest import Note
 from syncrelay.dataflow.manifest_queue import GroupManifests
+from syncrelay.dataflow.refusals import Refusals, Unpublished
 from syncrelay.explain import Code, RecentDrop
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
@@ -42,13 +41,6 @@ class Batch(NamedTuple):
     last: tuple[Stamps | RecentDrop, ...]
 
 
-class Unpublished(NamedTuple):
-    """How many messages of an input could not be published one after the other, and why the last one could not."""
-
-    messages: int
-    why: str
-
-
 class GroupRelay:
     """Feeds a group's engine and publishes the sets that it gives, by its flow.
 
@@ -58,7 +50,7 @@ class GroupRelay:
     def __init__(self, config: GroupConfig, *, now: Callable[[], int], flow: type[Flow] = Flow) -> None:
         self.config = config
         self._n_inputs = len(config.topics)
-        self.flow = flow(config.engine(), n_inputs=self._n_inputs, now=now, told=self)
+        self.flow = flow(config.engine(), n_inputs=self._n_inputs, now=now, refusals=Refusals(config.name))
         self.failure: str | None = None
         """What stopped it; None of one that works."""
         self.paused_since: int | None = None
@@ -67,13 +59,16 @@ class GroupRelay:
         """Whether nothing is fed, because nobody listens."""
         self.woke: int | None = None
         """When it was last fed again after a sleep, by the system clock in nanoseconds."""
-        self.unpublished: dict[int, Unpublished] = {}
-        """The inputs of which the last message could not be published."""
         self._now = now
         self._suspended = self.engine
         self._held_by = StoppedEngine(0, ())
         self._was_connected: list[bool] = []
         self._manifests: GroupManifests | None = None
+
+    @property
+    def unpublished(self) -> Mapping[int, Unpublished]:
+        """The inputs of which the last message could not be published."""
+        return self.flow.unpublished
 
     @property
     def engine(self) -> Engine:
@@ -112,12 +107,7 @@ class GroupRelay:
 
     def tell_sets(self, manifests: GroupManifests) -> None:
         """Have a manifest published of each set from now on, while anyone subscribes to it."""
-
-        def tell(match: Match, latency: int) -> None:
-            if manifests.is_heard:
-                manifests.note(self._note(match, latency))
-
-        self._manifests, self.flow.tell = manifests, tell
+        self._manifests, self.flow.tell = manifests, manifests.tell
 
     def suspend(self) -> None:
         """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
@@ -209,45 +199,3 @@ class GroupRelay:
         with suppress(Exception):
             return self.engine.counts()
         return self.config.engine().counts()
-
-    def _note(self, match: Match, latency: int) -> Note:
-        """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
-        common, stamps = match.stamp, match.stamps
-        left_as = stamps
-        if common is not None:
-            pairs = zip(stamps, self.flow.restamped, strict=True)
-            left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
-        received = [None if message is None else message.payload.received for message in match.messages]
-        sent = [0 if outlet is None else outlet.sent for outlet in self.flow.outlets]
-        unpublished = _NONE_UNPUBLISHED
-        if self.unpublished:
-            unpublished = {index: each.why for index, each in self.unpublished.items()}
-            sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
-        return Note(self.flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished)
-
-    def refused(self, index: int, outlet: Outlet, why: str) -> None:
-        """Note that an outlet did not publish a message of this input."""
-        before = self.unpublished.get(index)
-        self.unpublished[index] = Unpublished(1 + (before.messages if before else 0), why)
-        self.flow.all_accepted = False
-        if before is None:
-            _LOG.error(
-                "%s: a message could not be published on %s: %s; trying again with the next one",
-                self.config.name,
-                outlet.topic,
-                why,
-                extra={"group": self.config.name, "finding": Code.REFUSED_BY_DDS.value},
-            )
-
-    def accepted(self, index: int, outlet: Outlet) -> None:
-        """Note that an outlet published a message of this input."""
-        recovered = self.unpublished.pop(index, None)
-        self.flow.all_accepted = not self.unpublished
-        if recovered is not None:
-            _LOG.info(
-                "%s: publishing on %s again; %s not published",
-                self.config.name,
-                outlet.topic,
-                f"{counted(recovered.messages, 'message')} {'was' if recovered.messages == 1 else 'were'}",
-                extra={"group": self.config.name},
-            )

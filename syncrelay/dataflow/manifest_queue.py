@@ -13,7 +13,9 @@ from typing import Final
 from syncrelay.config.wording import counted
 from syncrelay.dataflow.backend import Outlet, PublishError
 from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.manifest import ManifestWriter, Note
+from syncrelay.sync import Match
 from syncrelay.wakeup import Wakeup
 
 _LOG = logging.getLogger("syncrelay")
@@ -22,6 +24,25 @@ _LOG = logging.getLogger("syncrelay")
 _BATCH_S: Final = 0.05
 MOST_NOTED: Final = 10_000
 """How many manifests of all groups may wait to be published: those of ten seconds at 1000 sets a second."""
+
+
+_NONE_UNPUBLISHED: Final[dict[int, str]] = {}
+
+
+def _noted(flow: Flow, match: Match, latency: int) -> Note:
+    """Note what the manifest of the set that was just sent tells. Its payloads are not kept: they may be large."""
+    common, stamps = match.stamp, match.stamps
+    left_as = stamps
+    if common is not None:
+        pairs = zip(stamps, flow.restamped, strict=True)
+        left_as = tuple([common if restamped and stamp is not None else stamp for stamp, restamped in pairs])
+    received = [None if message is None else message.payload.received for message in match.messages]
+    sent = [0 if outlet is None else outlet.sent for outlet in flow.outlets]
+    unpublished = _NONE_UNPUBLISHED
+    if flow.unpublished:
+        unpublished = {index: each.why for index, each in flow.unpublished.items()}
+        sent = [0 if index in unpublished else count for index, count in enumerate(sent)]
+    return Note(flow.n_sets, latency, common, stamps, left_as, received, sent, unpublished)
 
 
 class GroupManifests:
@@ -38,6 +59,11 @@ class GroupManifests:
         self._noted = queue.noted
         self._left_out = 0
         self._says_left_out = self._failed = False
+
+    def tell(self, flow: Flow, match: Match, latency: int) -> None:
+        """Have a manifest published of the set that a flow just sent, if anyone subscribes. On the receive thread."""
+        if self.is_heard:
+            self.note(_noted(flow, match, latency))
 
     def note(self, note: Note) -> None:
         """Have a manifest published, behind all that were noted before. On the receive thread."""

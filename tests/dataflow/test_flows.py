@@ -61,14 +61,14 @@ def _played(flow, keys, stream, connected) -> list:
     outlets = [_Outlet(noted, index) for index in range(3)]
     for index in connected:
         group.connect(index, outlets[index], restamped=index != 1)
-    group.flow.tell = lambda match, _: noted.append(("told", match.stamps, match.stamp))
+    group.flow.tell = lambda flow, match, _: noted.append(("told", flow.n_sets, match.stamps, match.stamp))
     for count, (index, ahead, refuses) in enumerate(stream):
         seen[0], outlets[index].refuses = count * MS, refuses
         stamp = None if ahead is None else BEGIN + (10 * count + ahead) * MS
         group.flow.receive(
             index, Named(count, BEGIN + count), stamp, count // 4 if keys["policy"] == "equal_key" else None
         )
-        noted.append((group.flow.n_sets, group.flow.all_accepted, dict(group.unpublished), list(group.flow.keys)))
+        noted.append((group.flow.n_sets, dict(group.unpublished), list(group.flow.keys)))
         if count % 20 == 19:
             watched = group.flow.watched()
             noted.append((*map(list, watched.arrivals), [stamps for stamps, _ in watched.sets]))

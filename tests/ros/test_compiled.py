@@ -109,6 +109,23 @@ def test_every_memory_comes_back_once_whatever_became_of_its_message(here):
     assert source.pool.made - source.pool.freed <= 9
 
 
+def test_a_group_that_ends_gives_its_memory_back_without_the_collector(here):
+    topic, group = here.topics[0], _group(queue_size=30)
+    source = here.backend.source(topic.subscription, handler(group, 0, Vector3Stamped))
+    group.connect(0, here.backend.outlet(topic.publisher), restamped=False)
+    for n in range(20):
+        topic.publisher.publish(vector(BEGIN + n * MS))
+        source.deliver(_take(source))
+    assert source.pool.lent == 21
+    gc.disable()
+    try:
+        source.deliver = print
+        del group
+        assert source.pool.lent == 1
+    finally:
+        gc.enable()
+
+
 @pytest.mark.parametrize("little_endian", [True, False])
 def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, little_endian):
     topic, chance = here.topics[0], random.Random(2)

@@ -13,7 +13,10 @@ import pytest
 
 from syncrelay.config import load
 from syncrelay.dataflow.backend import ALL, BackendName, PublishError
+from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.group import GroupRelay
+from syncrelay.dataflow.manifest import ManifestWriter
+from syncrelay.dataflow.manifest_queue import ManifestQueue
 from syncrelay.errors import RosUnavailableError, UsageError
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR, padded, stamp_of, vector, with_stamp
@@ -159,6 +162,40 @@ def test_a_burst_takes_no_more_memory_than_the_queues_and_gives_it_back(here, to
     del payload
     group.flush(DropReason.SHUTDOWN)
     assert pool.made - pool.freed <= 10
+
+
+def test_a_group_that_ends_gives_its_memory_back_without_the_collector(here, topic, tmp_path):
+    pool, group = buffers.Pool(here.rcl), _group(tmp_path, queue_size=30)
+    source = _source(here, topic, handler(group, 0, Vector3Stamped), pool)
+    group.connect(0, here.backend.outlet(topic.publisher), restamped=False)
+    queue = ManifestQueue(bugs=Bugs())
+    writer = ManifestWriter(group.config, node="/n", topics=[("/camera", "/a"), ("/lidar", "/b")])
+    group.tell_sets(queue.begin("front", writer, here.backend.outlet(topic.publisher)))
+    for n in range(20):
+        topic.publisher.publish(vector(BEGIN + n * MS))
+        source.deliver(_take(source))
+    assert pool.lent == 21
+    gc.disable()
+    try:
+        source.deliver = print
+        del group
+        assert pool.lent == 1
+    finally:
+        gc.enable()
+
+
+def test_what_the_collector_ends_in_whatever_order_comes_back_as_new(here, topic):
+    pool = buffers.Pool(here.rcl)
+    source = _source(here, topic, print, pool)
+    for n in range(50):
+        topic.publisher.publish(vector(BEGIN + n * MS))
+        payload = _take(source)
+        assert bytes(payload.content()) == padded(vector(BEGIN + n * MS))
+        # The payload, its memory and what refers to it are garbage at once.
+        circle: list[object] = [payload]
+        circle.append(circle)
+        del payload, circle
+        gc.collect()
 
 
 def test_python_never_holds_the_bytes_of_a_message(here, topic, tmp_path):

@@ -672,16 +672,16 @@ cdef class Flow:
     cdef public list outlets, restamped, keys
     cdef readonly object last
     cdef readonly int64_t n_sets
-    cdef public bint all_accepted
-    cdef object _now, _told, _watched, _note_left, _note_set
+    cdef readonly dict unpublished
+    cdef object _now, _refusals, _watched, _note_left, _note_set
     cdef list _note_arrival
 
-    def __init__(self, engine, *, n_inputs, now, told):
-        self.engine, self.tell, self._told, self.n_sets = engine, None, told, 0
+    def __init__(self, engine, *, n_inputs, now, refusals):
+        self.engine, self.tell, self.n_sets = engine, None, 0
+        self._refusals, self.unpublished = refusals, refusals.unpublished
         self.outlets, self.restamped, self.keys = [None] * n_inputs, [False] * n_inputs, [None] * n_inputs
         self.last = deque(maxlen=RECENT)
         self._note_left = self.last.append
-        self.all_accepted = True
         self._now = None if now is time.monotonic_ns else now
         self._watch()
 
@@ -735,7 +735,7 @@ cdef class Flow:
                 self._note_left(stamps)
                 self.n_sets += 1
                 if self.tell is not None:
-                    self.tell(outcome, latency)
+                    self.tell(self, outcome, latency)
             else:
                 message = outcome.message
                 self._note_left(RecentDrop(message.input, message.stamp, outcome.reason))
@@ -760,8 +760,8 @@ cdef class Flow:
                 else:
                     outlet.send(payload)
             except PublishError as error:
-                self._told.refused(index, outlet, str(error))
+                self._refusals.refused(index, outlet, str(error))
             else:
-                if not self.all_accepted:
-                    self._told.accepted(index, outlet)
+                if self.unpublished:
+                    self._refusals.accepted(index, outlet)
         return newest

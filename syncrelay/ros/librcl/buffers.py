@@ -42,6 +42,8 @@ class Memory:
 
     def __del__(self) -> None:
         self._rcl.array_fini(self.pointer)
+        # The collector may end it before its payload, which gives it back: it is as new then.
+        self._capacity = self._length = 0
 
 
 class OwnMessage:
