@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from syncrelay.errors import SyncRelayError
+from syncrelay.fastdds_files import held_by, remove_unused
 from syncrelay.rig.schedule import SENSORS
 
 UP = "publishes"
@@ -25,6 +26,7 @@ _UP_WITHIN_S = 60.0
 _END_WITHIN_S = 60.0
 # Whoever waits at a terminal is told by then what for.
 _SILENT_S = 3.0
+_LOOK_EVERY_S = 1.0
 
 _LOG = logging.getLogger("syncrelay")
 
@@ -33,12 +35,13 @@ class Rig:
     """Runs every sensor in a process of its own while entered.
 
     However this process ends, SIGKILL included, the sensors' stdin ends with it, and so do they: in an order
-    that leaves nothing in /dev/shm.
+    that leaves nothing in /dev/shm. What a sensor leaves there that hangs and is killed is removed at the exit.
     """
 
     def __init__(self, *, seed: int) -> None:
         self._seed = seed
         self._sensors: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+        self._held: dict[str, set[str]] = {name: set() for name in SENSORS}
         self._up_by = 0.0
 
     def __enter__(self) -> Self:
@@ -76,14 +79,28 @@ class Rig:
             # One that is still being imported reads no stdin yet: it ends at once, DDS knows nothing of it.
             process.terminate()
         began = time.monotonic()
-        if late := self._running_at(began + _SILENT_S):
+        if late := self._note_held(self._running_at(began + _SILENT_S)):
             _LOG.warning("waiting for the rig's %s to end; another Ctrl-C ends the demo at once", ", ".join(late))
-        for name in self._running_at(began + _END_WITHIN_S):
+        end = began + _END_WITHIN_S
+        while late and time.monotonic() < end:
+            late = self._note_held(self._running_at(min(end, time.monotonic() + _LOOK_EVERY_S)))
+        for name in late:
             self._sensors[name][0].kill()
+        left = set()
         for name, (process, talk) in self._sensors.items():
-            if (code := process.wait()) not in (0, -signal.SIGTERM) and name in to_tell:
-                _LOG.warning("%s", _end_of(name, code, talk))
+            if (code := process.wait()) not in (0, -signal.SIGTERM):
+                left |= self._held[name]
+                if name in to_tell:
+                    _LOG.warning("%s", _end_of(name, code, talk))
             talk.close()
+        if left:
+            remove_unused(left)
+
+    def _note_held(self, late: list[str]) -> list[str]:
+        """Note what these sensors have in shared memory: once they are dead, nothing tells. Returns the sensors."""
+        for name in late:
+            self._held[name] |= held_by(self._sensors[name][0].pid)
+        return late
 
     def _running_at(self, deadline: float) -> list[str]:
         """Wait until then at most; give the names of those that run on."""

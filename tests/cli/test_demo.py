@@ -169,6 +169,23 @@ def test_a_signal_ends_it_with_the_summary_and_leaves_nothing(stage, number):
 
 
 @pytest.mark.ros
+def test_it_removes_what_a_sensor_left_that_hung_in_dds_and_was_killed(stage):
+    stage.before_each_sensor(
+        "import sys, time; from rclpy.node import Node\n"
+        "if 'imu' in sys.orig_argv: Node.destroy_node = lambda self: time.sleep(600)"
+    )
+    demo = stage.start("demo", [*_DEMO, "--seconds", "2"])
+    demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
+    _, _, imu = children(demo.pid)
+    stage.note_shared_memory()
+    demo.wait_for_log("imu to end;")
+    os.kill(imu, signal.SIGKILL)
+    demo.wait()
+    assert "the rig's imu ended with exit code -9" in demo.stderr
+    assert stage.left_in_shared_memory() == set()
+
+
+@pytest.mark.ros
 def test_the_rig_does_not_outlive_it(stage):
     demo = stage.start("demo", _DEMO)
     demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")

@@ -1,22 +1,16 @@
 """What Fast DDS has in /dev/shm. A file is in use while a process holds the lock beside it (`fastdds shm clean`)."""
 
-import fcntl
 import os
 import pwd
-import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile
-
-_FOLDER: Final = Path("/dev/shm")  # noqa: S108  where POSIX shared memory is on Linux
-# Fast DDS 3 (Kilted) writes fastdds_ where Fast DDS 2 (Jazzy) writes fastrtps_.
-_NAME: Final = re.compile(r"fast(?:rtps|dds)_(?:[0-9a-z]{16}|port([0-9]{1,5}))")
+from syncrelay.fastdds_files import FOLDER, NAME, is_locked, locks_of
 
 
-def look_at_shared_memory(folder: Path = _FOLDER) -> SharedMemory:
+def look_at_shared_memory(folder: Path = FOLDER) -> SharedMemory:
     """Return how much room there is, and every segment and port with its owner."""
     try:
         with tempfile.TemporaryFile(dir=folder):
@@ -30,7 +24,7 @@ def look_at_shared_memory(folder: Path = _FOLDER) -> SharedMemory:
 
 def _files(folder: Path) -> Iterator[ShmFile]:
     for path in sorted(folder.glob("fast*_*")):
-        found = _NAME.fullmatch(path.name)
+        found = NAME.fullmatch(path.name)
         if found is None:
             continue
         try:
@@ -44,17 +38,8 @@ def _files(folder: Path) -> Iterator[ShmFile]:
 
 def _is_live(path: Path) -> bool:
     """Whether a process holds a lock beside a file; without a lock file that cannot be told, and counts as live."""
-    locks = [lock for lock in (path.with_name(f"{path.name}_el"), path.with_name(f"{path.name}_sl")) if lock.exists()]
-    return not locks or any(_is_locked(lock) for lock in locks)
-
-
-def _is_locked(lock: Path) -> bool:
-    try:
-        with lock.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return True
-    return False
+    locks = locks_of(path)
+    return not locks or any(map(is_locked, locks))
 
 
 def _user(uid: int) -> str:
