@@ -192,6 +192,7 @@ def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_o
 # The second message after there is a file of this name: that of the first set's second topic.
 _FAILING_PUBLISH = """
 import os
+from ctypes import CFUNCTYPE, c_int, c_void_p
 from syncrelay.ros.librcl.rcl import Rcl
 
 init, calls = Rcl.__init__, []
@@ -200,10 +201,12 @@ def failing_init(self):
     init(self)
     publish = self.publish
 
-    def failing_publish(*words):
+    # A function that compiled code can call too.
+    @CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p)
+    def failing_publish(publisher, message, allocation):
         if os.path.exists("fail"):
             calls.append(1)
-        return 1 if len(calls) == 2 else publish(*words)
+        return 1 if len(calls) == 2 else publish(c_void_p(publisher), c_void_p(message), None)
 
     self.publish = failing_publish
 
