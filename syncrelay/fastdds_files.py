@@ -33,7 +33,7 @@ def is_locked(lock: Path) -> bool:
 
 
 def held_by(pid: int, folder: Path = FOLDER) -> set[str]:
-    """The names of the segments and ports that a process has mapped or open; of one that we may not look at, none."""
+    """The names of the segments and ports that a process has mapped or open; none if we may not look at it."""
     found = (_BESIDE.fullmatch(file.removeprefix(f"{folder}/")) for file in _files_of(Path(f"/proc/{pid}")))
     return {match["name"] for match in found if match}
 

@@ -100,12 +100,18 @@ class InputGraph:
     type_from: Endpoint | None = None
 
 
+def serving(graph: InputGraph, type_name: str | None) -> Sequence[Endpoint]:
+    """Return the publishers whose messages an input of this type can receive."""
+    return [each for each in graph.publishers if each.type == type_name and not each.mismatch]
+
+
 @dataclass(frozen=True, slots=True)
 class InputFacts:
     """An input and its output.
 
     `type` is the file's, or else the graph's; None until it is known. `key` is the newest message's. `offset` is added
-    to stamps for matching, in nanoseconds.
+    to stamps for matching, in nanoseconds. `served_since` is since when without a break the graph has shown a publisher
+    whose messages can be received, None while it shows none.
     """
 
     graph: InputGraph
@@ -115,6 +121,7 @@ class InputFacts:
     figures: InputFigures
     key: Hashable = None
     offset: int = 0
+    served_since: int | None = None
 
     @property
     def name(self) -> str:

@@ -19,13 +19,13 @@ class InputFigures:
 
     `usual_hz` is the rate of the last messages while they came, 0 of too few to tell. `pace_hz` is the rate by the
     median period, `slowed_from_hz` the steady pace that the input had before it slowed down, None if it has not.
-    `first_received` is when the first message of all came. Of the last messages, oldest first, `received` holds when
-    they came, `stamps` and `delays`, the times of receipt minus the stamps, leave out stamps of 0. `nearest` holds, of
-    an optional input, the spans of the tightest sets with it, whenever its messages came. `bursts` counts how often
-    messages were held up and came at once, `held` is for how long at most, `held_up` from when to when, each time.
-    `fell_by` and `fell_at` tell of the last backward jump of its stamps, `stepped` of a lasting step of them against
-    the times of receipt in the last half minute; `swings` counts how often they stepped there and back, `swung_by` is
-    how far.
+    `flows_since` is when the first message of all came, or the first after a silence. Of the last messages, oldest
+    first, `received` holds when they came, `stamps` and `delays`, the times of receipt minus the stamps, leave out
+    stamps of 0. `nearest` holds, of an optional input, the spans of the tightest sets with it, whenever its messages
+    came. `bursts` counts how often messages were held up and came at once, `held` is for how long at most, `held_up`
+    from when to when, each time. `fell_by` and `fell_at` tell of the last backward jump of its stamps, `stepped` of a
+    lasting step of them against the times of receipt in the last half minute; `swings` counts how often they stepped
+    there and back, `swung_by` is how far.
     """
 
     rate_hz: float = 0.0
@@ -34,7 +34,7 @@ class InputFigures:
     slowed_from_hz: float | None = None
     fed: int = 0
     dropped: Mapping[DropReason, int] = field(default_factory=dict)
-    first_received: int | None = None
+    flows_since: int | None = None
     received: Sequence[int] = ()
     stamps: Sequence[int] = ()
     delays: Sequence[int] = ()

@@ -49,6 +49,7 @@ class InputObservation:
         self._stamps = no_values()
         self._received = no_values()
         self._first: int | None = None
+        self._flows_since: int | None = None
         self._pace = Pace()
         self._nearest = no_values()
         self._delays = no_values()
@@ -78,7 +79,10 @@ class InputObservation:
             self._forget()
             self._steps.forget()
         if self._first is None or last < self._first:
-            self._first = received[0]
+            self._first = self._flows_since = received[0]
+        elif self._flows_since is None or last < self._flows_since or self._is_silent_at(received[0]):
+            self._flows_since = received[0]
+            self.forget_clock()
         duplicates, out_of_order, fallen = self._judge(stamps, received)
         all_received = received
         # A stamp of 0 was never set: it tells nothing of a clock.
@@ -109,13 +113,20 @@ class InputObservation:
         self._pace.observe(times)
         if before != self._pace.slowed_from:
             # The least delay of fewer messages is greater: that is no drift.
-            self._points.clear()
-            self._drift = None
+            self._forget_drift()
 
     def forget_publishers(self) -> None:
         """Bear that others publish now than did: their rate and their clocks are not those of before."""
         self._pace.forget()
         self._steps.forget()
+        self.forget_clock()
+
+    def forget_clock(self) -> None:
+        """Bear that the messages from now on may be stamped by another clock, or come another way."""
+        del self._stamps[:], self._delays[:]
+        self._forget_drift()
+
+    def _forget_drift(self) -> None:
         self._points.clear()
         self._drift = None
 
@@ -146,7 +157,7 @@ class InputObservation:
             slowed_from_hz=self._pace.slowed_from if rate_hz else None,
             fed=fed,
             dropped=dropped,
-            first_received=self._first,
+            flows_since=self._flows_since,
             received=self._received[:],
             stamps=self._stamps[-_LAST_MESSAGES:],
             delays=self._delays[-_LAST_MESSAGES:],
@@ -176,8 +187,7 @@ class InputObservation:
         self._bursts.clear()
         self._newest_arrivals.clear()
         self._newest_delays.clear()
-        self._points.clear()
-        self._drift = None
+        self._forget_drift()
 
     def _judge(self, stamps: Sequence[int], received: Sequence[int]) -> tuple[int, int, bool]:
         """Count what repeats the newest stamp and what is older; whether one fell by more than a second."""
@@ -227,6 +237,14 @@ class InputObservation:
         if held_up >= LEAST_HELD_NS:
             self._bursts.extend(bursts([*before, *stamped]))
 
+    def _is_silent_at(self, now: int) -> bool:
+        """Whether the pause since the last message is a silence, by the rate until then."""
+        times = self._received
+        if not times:
+            return False
+        pause, usual = now - times[-1], (times[-1] - times[0]) / max(1, len(times) - 1)
+        return pause > _SILENT_NS and pause > _SILENT_PERIODS * usual
+
     def _rates(self, fed: int, seconds: float, now: int) -> tuple[float, float]:
         """Give messages a second, of the window or of the last few where it held fewer, and while they came."""
         times = self._received
@@ -234,7 +252,7 @@ class InputObservation:
             return 0.0, 0.0
         mean = (len(times) - 1) * _SECOND / (times[-1] - times[0])
         usual = mean if len(times) >= _RATE_FROM else 0.0
-        if (now - times[-1]) * mean > _SILENT_PERIODS * _SECOND and now - times[-1] > _SILENT_NS:
+        if self._is_silent_at(now):
             return 0.0, usual
         if fed < _RATE_FROM or seconds <= 0:
             return mean, usual

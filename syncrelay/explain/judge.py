@@ -294,7 +294,18 @@ def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...
     if facts.figures.last_set is None:
         since = words.seconds(facts.figures.now - facts.figures.began)
         return (*found, Finding(Code.STARTING, Severity.OK, f"no set yet, {since} after the start"))
+    if facts.is_silent:
+        quiet = words.seconds(facts.figures.now - facts.figures.last_set)
+        return (
+            *found,
+            Finding(Code.STARTING, Severity.OK, f"no set for {quiet}, but {_last_back(facts)} just came back"),
+        )
     return (*found, _healthy(facts))
+
+
+def _last_back(facts: GroupFacts) -> str:
+    inputs = (each for each in facts.inputs if each.required)
+    return max(inputs, key=lambda each: max(each.served_since or 0, each.figures.flows_since or 0)).name
 
 
 def _is_well(found: Iterable[Finding]) -> bool:
@@ -310,10 +321,10 @@ def explanation(findings: tuple[Finding, ...]) -> Finding:
 
 
 def _had_time(facts: GroupFacts) -> bool:
-    """Whether messages came on all inputs for long enough that there should be a set."""
-    firsts = [each.figures.first_received for each in facts.inputs if each.required]
-    now, longest = facts.figures.now, facts.silent_after
-    return facts.figures.last_set is not None or all(at is not None and now - at >= longest for at in firsts)
+    """Whether messages have come on all inputs for long enough that there should be a set."""
+    required = [each for each in facts.inputs if each.required]
+    since = [max(each.figures.flows_since or facts.figures.now, each.served_since or 0) for each in required]
+    return facts.figures.now - max(since) >= facts.silent_after
 
 
 def _unexplained(facts: GroupFacts) -> Finding:

@@ -126,6 +126,10 @@ class Observation:
         """Bear that others publish an input now than did."""
         self._inputs[index].forget_publishers()
 
+    def forget_clock(self, index: int) -> None:
+        """Bear that an input is published anew: by the same node, maybe, maybe not by the same clock."""
+        self._inputs[index].forget_clock()
+
     def begin_sets_anew(self, now: int) -> None:
         """Bear that sets may leave again, which could not: their rate is that from now on."""
         self._resumed = now

@@ -5,7 +5,7 @@ from typing import Final
 
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
-from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts
+from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks
 
 # Discovery takes this long.
@@ -297,12 +297,13 @@ def silent(facts: GroupFacts) -> Found:
 
 
 def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | None:
-    fitting = [each for each in an_input.graph.publishers if each.type == an_input.type and not each.mismatch]
+    fitting = serving(an_input.graph, an_input.type)
     now, figures = facts.figures.now, an_input.figures
-    if not fitting:
+    if not fitting or now - max(facts.figures.began, an_input.served_since or 0) < _NO_MESSAGE:
+        # It may be about to send.
         return None
     node, quiet = fitting[0].node, now - (figures.last_received or now)
-    if figures.last_received is None and not figures.fed and now - facts.figures.began >= _NO_MESSAGE:
+    if figures.last_received is None and not figures.fed:
         lately = " lately" if an_input.counts.fed else ""
         return Finding(
             Code.SILENT,
@@ -321,7 +322,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
         f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
         f"check whether recording of {an_input.name} stopped"
         if facts.is_recorded
-        else f"check {node}, which {_is_there(quiet)}{_or_hold_longer(facts, index)}",
+        else f"check {node}, which {_is_there(facts, an_input, quiet)}{_or_hold_longer(facts, index)}",
         index,
     )
 
@@ -338,7 +339,9 @@ def _is_silent(facts: GroupFacts, an_input: InputFacts, quiet: int) -> bool:
     return quiet >= _NO_MESSAGE and not an_input.figures.rate_hz
 
 
-def _is_there(quiet: int) -> str:
+def _is_there(facts: GroupFacts, an_input: InputFacts, quiet: int) -> str:
+    if (served_since := an_input.served_since) is not None and facts.figures.now - served_since < quiet:
+        return f"has published it again for {words.seconds(facts.figures.now - served_since)}"
     return (
         "still publishes it" if quiet > _LEASE else "publishes it or has died: a dead node stays in the graph for 20 s"
     )

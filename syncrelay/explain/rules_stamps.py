@@ -308,6 +308,8 @@ def may_drift(facts: GroupFacts) -> bool:
     nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
     if not nearest.share_over(tolerance.ns):
         return False
+    if facts.by_stamp and any(_is_too_young_to_tell(facts, each) for each in facts.inputs if each.required):
+        return True
     needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
     is_urgent = facts.is_silent and facts.silent_for >= _DRIFT_PROVEN_SILENT
     return any(
@@ -315,6 +317,12 @@ def may_drift(facts: GroupFacts) -> bool:
         or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)
         for each in _drifts(facts)[1].values()
     )
+
+
+def _is_too_young_to_tell(facts: GroupFacts, an_input: InputFacts) -> bool:
+    figures = an_input.figures
+    since = facts.figures.now if figures.flows_since is None else figures.flows_since
+    return figures.drift is None and facts.figures.now - since < _DRIFT_SOON
 
 
 def clock_drift(facts: GroupFacts) -> Found:

@@ -4,7 +4,16 @@ from collections.abc import Callable, Hashable, Sequence
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.clocks import Step
-from syncrelay.explain.facts import ClockState, GraphSnapshot, GroupFacts, InputFacts, InputGraph, Pause, Standstill
+from syncrelay.explain.facts import (
+    ClockState,
+    GraphSnapshot,
+    GroupFacts,
+    InputFacts,
+    InputGraph,
+    Pause,
+    Standstill,
+    serving,
+)
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.suggestions import Evaluator
@@ -23,6 +32,7 @@ class GroupWatch:
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
         self._publishers = [0] * len(config.topics)
+        self._served_since: list[int | None] = [began] * len(config.topics)
         self._was_paused = False
         self._unpaused: int | None = None
         self._woke: int | None = None
@@ -82,8 +92,15 @@ class GroupWatch:
         options = self.config.options
         self._follow_pauses(now, is_paused=pause is not None)
         self._compare_publishers(graph)
+        types = [
+            shown.type_from.type if topic.type is None and shown.type_from else topic.type
+            for topic, shown in zip(self.config.topics, graph, strict=True)
+        ]
+        self._follow_publishers(graph, types, now)
         figures, input_figures = self._observation.figures(now=now)
-        rows = zip(self.config.topics, graph, self._counts, input_figures, self._keys, strict=True)
+        rows = zip(
+            self.config.topics, graph, types, self._counts, input_figures, self._keys, self._served_since, strict=True
+        )
         return GroupFacts(
             name=self.config.name,
             policy=options.policy,
@@ -91,14 +108,15 @@ class GroupWatch:
             inputs=tuple(
                 InputFacts(
                     graph=shown,
-                    type=shown.type_from.type if topic.type is None and shown.type_from else topic.type,
+                    type=type_name,
                     required=topic.required,
                     counts=counts,
                     figures=seen,
                     key=key,
                     offset=topic.offset_ns,
+                    served_since=since,
                 )
-                for topic, shown, counts, seen, key in rows
+                for topic, shown, type_name, counts, seen, key, since in rows
             ),
             figures=figures,
             tolerance=options.tolerance,
@@ -129,6 +147,18 @@ class GroupWatch:
             # This machine's clock may be set back.
             self._unpaused = min(self._unpaused, now)
         self._was_paused = is_paused
+
+    def _follow_publishers(self, graph: Sequence[InputGraph], types: Sequence[str | None], now: int) -> None:
+        for index, (shown, type_name) in enumerate(zip(graph, types, strict=True)):
+            since = self._served_since[index]
+            if not serving(shown, type_name):
+                self._served_since[index] = None
+            elif since is None:
+                self._served_since[index] = now
+                self._observation.forget_clock(index)
+            elif since > now:
+                # This machine's clock was set back.
+                self._served_since[index] = now
 
     def _compare_publishers(self, graph: Sequence[InputGraph]) -> None:
         """See whether inputs have more or fewer publishers than they had; one that is restarted is the same."""

@@ -35,7 +35,7 @@ class Rig:
     """Runs every sensor in a process of its own while entered.
 
     However this process ends, SIGKILL included, the sensors' stdin ends with it, and so do they: in an order
-    that leaves nothing in /dev/shm. What a sensor leaves there that hangs and is killed is removed at the exit.
+    that leaves nothing in /dev/shm. A sensor that hangs is killed, and what it left there is removed at the exit.
     """
 
     def __init__(self, *, seed: int) -> None:

@@ -93,7 +93,7 @@ def test_a_graph_that_was_empty_explains_nothing_once_others_are_there():
 
 def test_a_group_whose_messages_have_just_begun_is_not_said_to_be_unexplained():
     def began(ago):
-        first = {"first_received": NOW - ago}
+        first = {"flows_since": NOW - ago}
         return a_silent_group(camera(figures=first), an_input("/lidar", figures=first), figures={"last_set": None})
 
     assert [each.code for each in with_ok(began(3 * S), judge(began(3 * S)))] == [Code.STARTING]

@@ -34,7 +34,7 @@ def _input_figures(*, last_received=NOW - 50 * MS, longest_pause=101 * MS, delay
         rate_hz=10.0,
         usual_hz=10.0,
         fed=100,
-        first_received=BEGAN,
+        flows_since=BEGAN,
         received=() if last_received is None else (last_received - longest_pause, last_received),
         delays=() if delay is None else (delay,),
     )
