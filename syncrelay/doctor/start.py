@@ -32,7 +32,7 @@ def check_start(started: StartResult, *, before: Sequence[Diagnosis]) -> Iterato
             "receive_path",
             f"messages take the path `{started.path}`: {started.path_fault}",
             impact="the relay works, but each message costs more CPU",
-            fix="please report it, with the first line of this output",
+            fix="install syncrelay again; if this stays, please report it, with the first line of this output",
         )
     if started.failed is Step.ARGUMENTS:
         fault, _, advice = started.fault.partition("\n")
