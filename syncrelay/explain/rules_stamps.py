@@ -8,6 +8,7 @@ from syncrelay.explain import words
 from syncrelay.explain.clocks import Drift, apart
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
+from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.suggestions import Change
 from syncrelay.sync.messages import DropReason
 
@@ -105,7 +106,7 @@ def other_clock(facts: GroupFacts) -> Found:
     odd = max(known, key=lambda index: abs(known[index] - usual))
     behind = known[odd] - usual
     # What waited for the relay seems as late as that.
-    waited = 2 * max(facts.waited, facts.standstill.ns if facts.standstill else 0)
+    waited = 2 * max(waited_for_relay(facts))
     if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0, waited):
         return
     an_input, offset = facts.inputs[odd], facts.inputs[odd].offset
