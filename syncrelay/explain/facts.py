@@ -239,6 +239,19 @@ class GroupFacts:
         return not is_resting and self.silent_for >= self.silent_after
 
     @property
+    def had_time(self) -> bool:
+        """Whether messages have come on all inputs for long enough that there should be a set."""
+        required = [each for each in self.inputs if each.required]
+        since = [max(each.figures.flows_since or self.figures.now, each.served_since or 0) for each in required]
+        return self.figures.now - max(since) >= self.silent_after
+
+    @property
+    def has_just_begun(self) -> bool:
+        """Whether a publisher came so recently that its messages do not yet tell why no set leaves."""
+        since = max(each.served_since or 0 for each in self.inputs if each.required)
+        return self.figures.now - since < 2 * self.silent_after and not self.had_time
+
+    @property
     def silent_for(self) -> int:
         """For how long no set has left that might have: not while the group was paused."""
         last = self.figures.began if self.figures.last_set is None else self.figures.last_set
