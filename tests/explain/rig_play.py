@@ -20,6 +20,8 @@ LONGEST_ACT_S = 75.0
 _LONGEST_PLAY_S = 1000.0
 # More publishers than that come and go in no play.
 _CHANGES = 20
+# By then all is well again that was mended.
+_HEALED_S = 40.0
 _LATE_S = 1.5
 _BOOTED_AT_S = 1_699_950_000
 # What DDS takes to find a publisher and to drop one, and the relay to have subscribed; longer on a slow machine.
@@ -249,7 +251,7 @@ def played(name: str, scenario: Scenario, seed: int) -> Played:
         named = next((line.second for line in told.warnings if line.code == scenario.first), 0.0)
         second = max(second, named - begins_2 + 0.3)
     if not scenario.cure:
-        play = Play(name, scenario, moments.with_acts(second=second, third=LONGEST_ACT_S))
+        play = Play(name, scenario, moments.with_acts(second=second, third=_HEALED_S))
         return Played(play, play.run(), None, None)
     play = Play(name, scenario, moments.with_acts(second=second, third=0))
     told = play.run()
