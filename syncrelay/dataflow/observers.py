@@ -37,9 +37,9 @@ class Standstills:
         self._longest_now = None
 
     @property
-    def longest(self) -> Standstill | None:
-        """The longest of the last evaluations."""
-        return max(filter(None, self._recent), key=lambda each: each.ns, default=None)
+    def recent(self) -> tuple[Standstill, ...]:
+        """The longest of each of the last evaluations."""
+        return tuple(filter(None, self._recent))
 
 
 class Waits:

@@ -166,7 +166,7 @@ class GroupFacts:
     stamps are what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest
     of the others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
     and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
-    graph; `waited` how long its messages at most lay of late before the relay took them; `standstill` the longest of
+    graph; `waited` how long its messages at most lay of late before the relay took them; `standstills` those of
     late; `failure` what stopped the group for good; `pause` since when it is paused, and `unpaused` when the last pause
     ended; `asleep` that it is lazy and nobody subscribes to what it gives; `empty_graph` the graph, where it holds no
     node but our own.
@@ -189,7 +189,7 @@ class GroupFacts:
     clock_set: Step | None = None
     is_recorded: bool = False
     waited: int = 0
-    standstill: Standstill | None = None
+    standstills: tuple[Standstill, ...] = ()
     failure: str | None = None
     pause: Pause | None = None
     unpaused: int | None = None
@@ -237,6 +237,19 @@ class GroupFacts:
         """Whether sets that should have come did not."""
         is_resting = self.asleep or self.pause is not None or self.inactive is not None
         return not is_resting and self.silent_for >= self.silent_after
+
+    @property
+    def had_time(self) -> bool:
+        """Whether messages have come on all inputs for long enough that there should be a set."""
+        required = [each for each in self.inputs if each.required]
+        since = [max(each.figures.flows_since or self.figures.now, each.served_since or 0) for each in required]
+        return self.figures.now - max(since) >= self.silent_after
+
+    @property
+    def has_just_begun(self) -> bool:
+        """Whether a publisher came so recently that its messages do not yet tell why no set leaves."""
+        since = max(each.served_since or 0 for each in self.inputs if each.required)
+        return self.figures.now - since < 2 * self.silent_after and not self.had_time
 
     @property
     def silent_for(self) -> int:

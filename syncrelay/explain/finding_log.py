@@ -62,9 +62,12 @@ class FindingLog:
             for (code, _), warning in self._warned.items():
                 warning.holds = warning.holds and code not in explained
         if facts.is_silent:
-            if findings:
-                yield from self._silent(facts, explanation(findings), now)
-            return
+            worst = explanation(findings) if findings else None
+            if worst is not None and worst.severity is Severity.ERROR:
+                yield from self._silent(facts, worst, now)
+            # What only warns is not why no set leaves: its messages have just begun to come.
+            if worst is None or worst.severity is not Severity.WARN:
+                return
         last = facts.figures.last_set
         # After a pause, a group is not silent though no set has left yet.
         if self._quiet_since is not None and last is not None and last > self._quiet_since:

@@ -135,6 +135,12 @@ class InputObservation:
         """The steady pace that the input had before it slowed down, None if it has not."""
         return self._pace.slowed_from
 
+    @property
+    def period(self) -> float:
+        """The median of its last periods, by its stamps; 0 of too few to tell."""
+        last = self._stamps[-_PERIODS:]
+        return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0
+
     def add_nearest(self, spans: Sequence[int]) -> None:
         """Take the spans of the tightest sets with this input."""
         keep_last(self._nearest, spans, _LAST_MESSAGES)

@@ -65,7 +65,9 @@ _OF_GRAPH: Final = frozenset(
         Code.ALONE,
         Code.NO_PUBLISHER,
         Code.TYPE_NOT_IMPORTABLE,
+        Code.OTHER_TYPE,
         Code.SEVERAL_TYPES,
+        Code.INCOMPATIBLE_QOS,
         Code.NOBODY_LISTENS,
         Code.NO_CLOCK,
     }
@@ -132,7 +134,9 @@ EXPLAINS: Final[Mapping[Code, _Explained]] = {
     Code.ALONE: _Explained(_MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
     Code.NO_PUBLISHER: _Explained(_MATCHING),
     Code.TYPE_NOT_IMPORTABLE: _Explained(_MATCHING),
+    Code.OTHER_TYPE: _Explained(_MATCHING),
     Code.SEVERAL_TYPES: _Explained(_MATCHING),
+    Code.INCOMPATIBLE_QOS: _Explained(_MATCHING),
     Code.NOBODY_LISTENS: _Explained(_FLOW),
     Code.NO_CLOCK: _Explained(frozenset({Code.SILENT, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.CLOCK_STOPPED: _Explained(_MATCHING | {Code.SILENT, Code.SLOWED}),
@@ -199,7 +203,8 @@ class Judge:
         found = [finding for rule in _CAUSE_RULES for finding in rule(facts)]
         self._remember(found, facts)
         may_drift = rules_stamps.may_drift(facts)
-        for code, rule in _MATCHING_RULES:
+        is_too_soon = facts.is_silent and facts.has_just_begun
+        for code, rule in () if is_too_soon else _MATCHING_RULES:
             if self._is_explained(code, facts):
                 continue
             if not (may_drift and code in _OF_DRIFT):
@@ -208,7 +213,7 @@ class Judge:
                 found += [replace(finding, suggestion=_WAIT) for finding in rule(facts)]
         found += [finding for rule in _OTHER_RULES for finding in rule(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
-            found += [_unexplained(facts)] if _had_time(facts) else []
+            found += [_unexplained(facts)] if facts.had_time else []
         elif _is_well(found) and facts.figures.last_set is not None and not may_drift:
             # Few sets are what other findings come to: they are said where there is none of those.
             found += rules_matching.few_sets(facts)
@@ -318,13 +323,6 @@ def explanation(findings: tuple[Finding, ...]) -> Finding:
     if worst is Severity.OK:
         return findings[-1]
     return next(finding for finding in findings if finding.severity is worst)
-
-
-def _had_time(facts: GroupFacts) -> bool:
-    """Whether messages have come on all inputs for long enough that there should be a set."""
-    required = [each for each in facts.inputs if each.required]
-    since = [max(each.figures.flows_since or facts.figures.now, each.served_since or 0) for each in required]
-    return facts.figures.now - max(since) >= facts.silent_after
 
 
 def _unexplained(facts: GroupFacts) -> Finding:

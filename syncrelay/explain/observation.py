@@ -22,6 +22,8 @@ _SILENCE: Final = 5 * _SECOND
 # Of a slow input so many of the last messages tell, however long ago they came.
 _NEAREST_WINDOW: Final = 60 * _SECOND
 _FEWEST_NEAREST: Final = 20
+# An input whose period is a smaller share of the longest comes faster, and does not set the pace.
+_AS_SLOW: Final = 0.7
 
 
 class Observation:
@@ -182,7 +184,11 @@ class Observation:
             del self._nearest[:old], self._nearest_at[:old]
 
     def _slowest(self, among: Sequence[int]) -> int:
-        """Give the input of these of which the fewest came in the window."""
+        """Give the input of these of which the fewest came in the window, of those that do not come faster by far."""
+        # Few came of one that has just begun, or is back, however fast it comes.
+        periods = {index: self._inputs[index].period for index in among}
+        longest = max(periods.values())
+        among = [index for index, period in periods.items() if not period or period > _AS_SLOW * longest]
         last = self._polls[-1].counts
         before = [each.fed for each in self._polls[0].counts] if len(self._polls) > 1 else [0] * len(last)
         return min(among, key=lambda index: last[index].fed - before[index])

@@ -38,7 +38,7 @@ _SECOND: Final = 1_000_000_000
 # The median of so many periods is the pace of now: neither a pause nor a burst changes it.
 _PERIODS: Final = 20
 _PACES: Final = 120
-_FEWEST_PACES: Final = 10
+_FEWEST_PACES: Final = 6
 # What varies by more than this share of its median has no pace to fall from ...
 _STEADY: Final = 0.25
 # ... but for one poll in so many at either end, in which a busy machine held messages up.

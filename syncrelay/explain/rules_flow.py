@@ -75,11 +75,11 @@ def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found
 
 def too_slow(facts: GroupFacts) -> Found:
     """Find that messages of the group waited for the relay, or were missed while it stood still."""
-    waited = max(facts.waited, _overlapped(facts, [each.figures.held_up for each in facts.inputs]))
+    waited, missed = waited_for_relay(facts)
     if waited >= _TOO_SLOW:
         text = f"messages waited up to {words.duration(waited)} for the relay"
-    elif facts.standstill is not None and _overlapped(facts, map(_pauses, facts.inputs)) >= _TOO_SLOW:
-        text = f"the relay stood still for {words.duration(facts.standstill.ns)}"
+    elif missed >= _TOO_SLOW:
+        text = f"the relay stood still for {words.duration(max(each.ns for each in facts.standstills))}"
     else:
         return
     yield Finding(
@@ -91,12 +91,20 @@ def too_slow(facts: GroupFacts) -> Found:
     )
 
 
+def waited_for_relay(facts: GroupFacts) -> tuple[int, int]:
+    """Return for how long messages waited for the relay, and for how long none came as it stood still."""
+    held_up = _overlapped(facts, [each.figures.held_up for each in facts.inputs])
+    return max(facts.waited, held_up), _overlapped(facts, map(_pauses, facts.inputs))
+
+
 def _overlapped(facts: GroupFacts, inputs: Iterable[Iterable[tuple[int, int]]]) -> int:
-    """Return for how long of the standstill an input was held up. A standstill alone has kept nothing waiting."""
-    if facts.standstill is None:
+    """Return for how long of a standstill an input was held up. A standstill alone has kept nothing waiting."""
+    long = [each for each in facts.standstills if each.ns >= _TOO_SLOW]
+    if not long:
         return 0
-    until, ns = facts.standstill
-    return max((min(end, until) - max(begin, until - ns) for each in inputs for begin, end in each), default=0)
+    held_up = [span for each in inputs for span in each]
+    overlaps = (min(end, until) - max(begin, until - ns) for until, ns in long for begin, end in held_up)
+    return max(overlaps, default=0)
 
 
 def _pauses(an_input: InputFacts) -> Iterator[tuple[int, int]]:

@@ -98,6 +98,7 @@ def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             if alone
             else f"have {publisher.node} use another topic",
             index,
+            explains=alone,
         )
 
 
@@ -241,6 +242,7 @@ def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Fou
                 f" {why.requested}",
                 f"write `qos: auto` at {an_input.name}, or have {publisher.node} offer {why.requested}",
                 index,
+                explains=alone,
             )
 
 

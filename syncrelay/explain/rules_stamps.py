@@ -8,6 +8,7 @@ from syncrelay.explain import words
 from syncrelay.explain.clocks import Drift, apart
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
+from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.suggestions import Change
 from syncrelay.sync.messages import DropReason
 
@@ -92,7 +93,7 @@ def _blocks_if_most(facts: GroupFacts, an_input: InputFacts, count: int) -> Seve
 
 def other_clock(facts: GroupFacts) -> Found:
     """Find an input whose stamps, against the time of their receipt, are far off those of the others."""
-    if not facts.by_stamp or not facts.is_silent:
+    if not facts.by_stamp or not facts.is_silent or facts.has_just_begun:
         return
     delays = {
         index: each.figures.delay for index, each in enumerate(facts.inputs) if each.required and each.figures.rate_hz
@@ -105,7 +106,7 @@ def other_clock(facts: GroupFacts) -> Found:
     odd = max(known, key=lambda index: abs(known[index] - usual))
     behind = known[odd] - usual
     # What waited for the relay seems as late as that.
-    waited = 2 * max(facts.waited, facts.standstill.ns if facts.standstill else 0)
+    waited = 2 * max(waited_for_relay(facts))
     if abs(behind) <= max(_OTHER_CLOCK, facts.tolerance.ns if facts.tolerance else 0, waited):
         return
     an_input, offset = facts.inputs[odd], facts.inputs[odd].offset

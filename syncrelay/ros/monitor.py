@@ -161,7 +161,7 @@ class Monitor:
             clock=self._clock.state if self._clock else None,
             clock_set=self._system_clock.last_step(now),
             waited=max(self._waits[each.topic].longest for each in binding.inputs),
-            standstill=self.standstills.longest,
+            standstills=self.standstills.recent,
             failure=binding.group.failure,
             pause=None if binding.group.paused_since is None else Pause(binding.group.paused_since, self._ends_pauses),
             asleep=binding.group.sleeps,

@@ -16,14 +16,14 @@ def test_the_longest_standstill_is_told_for_ten_evaluations():
     standstills.overslept(3, now=100)
     standstills.overslept(7, now=200)
     standstills.overslept(5, now=300)
-    assert standstills.longest is None
+    assert standstills.recent == ()
     standstills.observe()
     for _ in range(9):
-        assert standstills.longest == Standstill(200, 7)
+        assert standstills.recent == (Standstill(200, 7),)
         standstills.observe()
-    assert standstills.longest == Standstill(200, 7)
+    assert standstills.recent == (Standstill(200, 7),)
     standstills.observe()
-    assert standstills.longest is None
+    assert standstills.recent == ()
 
 
 def test_the_longest_wait_is_told_for_ten_evaluations():

@@ -87,7 +87,7 @@ class Source(_SourceFaults):
 class Line:
     """A line of the log: at which second, and whether it warns."""
 
-    second: int
+    second: float
     warns: bool
     text: str
     code: str | None
@@ -98,7 +98,7 @@ class Told:
     """What was said: `lines` of the log, and at each second what was found, what is well left out."""
 
     lines: list[Line]
-    found: list[tuple[int, tuple[Finding, ...]]]
+    found: list[tuple[float, tuple[Finding, ...]]]
     facts: GroupFacts
 
     @property
@@ -120,7 +120,7 @@ class Told:
         """The codes of all that was ever found to be wrong, whether it lasted or not."""
         return {each.code.value for _, found in self.found for each in found if each.severity is not Severity.OK}
 
-    def findings(self, code: str) -> list[tuple[int, Finding]]:
+    def findings(self, code: str) -> list[tuple[float, Finding]]:
         """All findings of one code, with their seconds."""
         return [(second, each) for second, found in self.found for each in found if each.code.value == code]
 
@@ -136,8 +136,9 @@ def run(
     paused: Sequence[tuple[float, float]] = (),
     publishers: Callable[[str, float], tuple[Endpoint, ...]] | None = None,
     facts: Callable[[float], dict[str, Any]] | None = None,
+    looks: Sequence[float] | None = None,
 ) -> Told:
-    """Run a rig for so many seconds.
+    """Run a rig for so many seconds, and look at it at each, or at those that are given.
 
     `stops` are when the whole process stands still, as by SIGSTOP, each from one second to another: what comes
     meanwhile is received at the end. `starved` is the same of the thread that takes messages: they are received in
@@ -154,10 +155,13 @@ def run(
     relay = _Relay(config, paused)
     heard = (each for each in arrivals if _until(sleeps, each[0]) == each[0])
     waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in heard)
+    for index in (index for index, topic in enumerate(config.topics) if topic.stamp == "receive"):
+        waiting = _stamped_by_receipt(waiting, index)
     taken = sorted((_until(starved, at), at, index, stamp) for at, index, stamp in waiting)
     place = 0
     shown = publishers or (lambda topic, _: tuple(each.endpoint for each in sources if each.topic == topic))
-    for second in range(1, seconds + 1):
+    before = 0.0
+    for second in looks or range(1, seconds + 1):
         # Who polls asks the thread that takes messages, and waits for it.
         if _until([*stops, *starved], float(second)) > second:
             continue
@@ -165,7 +169,8 @@ def run(
             at, received, index, stamp = taken[place]
             relay.take(index, stamp, _ns(received), now=_ns(at))
             place += 1
-        stop = next(((begin, end) for begin, end in stops if second - 1 <= end <= second), None)
+        stop = next(((begin, end) for begin, end in stops if before <= end <= second), None)
+        before = second
         relay.asleep = _until(sleeps, second) > second
         relay.woke = max((_ns(end) for _, end in sleeps if end <= second), default=None)
         standstill = stop and Standstill(_ns(stop[1]), round((stop[1] - stop[0]) * S))
@@ -194,6 +199,17 @@ def _chance(seed: int, place: int, source: Source) -> random.Random:
 
 def _ns(second: float) -> int:
     return BEGAN + round(second * S)
+
+
+def _stamped_by_receipt(
+    waiting: Sequence[tuple[float, int, int | None]], index: int
+) -> list[tuple[float, int, int | None]]:
+    """Return messages of which those of one input have the time of their receipt for a stamp: no two the same."""
+    number, found = 0, []
+    for at, each, stamp in waiting:
+        number += each == index
+        found.append((at, each, _ns(at) + number if each == index else stamp))
+    return found
 
 
 def _until(stops: Sequence[tuple[float, float]], at: float) -> float:
@@ -237,7 +253,7 @@ class _Relay:
         self.asleep = False
         self.woke: int | None = None
         self.lines: list[Line] = []
-        self.found: list[tuple[int, tuple[Finding, ...]]] = []
+        self.found: list[tuple[float, tuple[Finding, ...]]] = []
         self.facts: GroupFacts | None = None
 
     def take(self, index: int, stamp: int | None, received: int, *, now: int) -> None:
@@ -266,13 +282,13 @@ class _Relay:
 
     def poll(
         self,
-        second: int,
+        second: float,
         publishers: Sequence[tuple[Endpoint, ...]],
         standstill: Standstill | None,
         more: dict[str, Any],
     ) -> None:
         """Poll as the monitor does, and write what the log is told."""
-        now = BEGAN + second * S
+        now = _ns(second)
         self._driver.expire(now)
         if self.asleep:
             self._driver.engine.flush(DropReason.SHUTDOWN)
@@ -287,7 +303,6 @@ class _Relay:
             InputGraph(*name, publishers=each, type_from=taken)
             for name, each, taken in zip(self._names, publishers, self._taken, strict=True)
         ]
-        worst = max((each for each in self._standstills if each), key=lambda each: each.ns, default=None)
         waited = max(self._waits[-10:])
         self._waits.append(0)
         self.facts = self._watch.facts(
@@ -295,7 +310,7 @@ class _Relay:
             now=now,
             **{
                 "waited": waited,
-                "standstill": worst,
+                "standstills": [each for each in self._standstills if each],
                 "asleep": self.asleep,
                 "pause": self._pause_at(now),
                 **more,

@@ -171,7 +171,7 @@ def test_a_short_queue_beside_another_clock_suggests_nothing():
 
 def test_a_standstill_explains_what_was_lost_and_seems_silent():
     lost = camera(lost=7, figures={"longest_pause": 3 * S, "last_received": NOW - S})
-    assert codes(judge(a_group(lost, LIDAR, standstill=Standstill(NOW - S, 3 * S)))) == [Code.TOO_SLOW]
+    assert codes(judge(a_group(lost, LIDAR, standstills=(Standstill(NOW - S, 3 * S),)))) == [Code.TOO_SLOW]
 
 
 _CONFIGS = load_text(

@@ -317,7 +317,7 @@ def test_a_publisher_that_returns_as_another_is_told_with_whose_type_was_taken()
 
 
 def test_a_standstill_in_which_nothing_was_due_is_nobodys_fault():
-    more = {"facts": lambda second: {"standstill": Standstill(1_700_000_000 * S + 20 * S, S)} if second < 30 else {}}
+    more = {"facts": lambda second: {"standstills": [Standstill(1_700_000_000 * S + 20 * S, S)]} if second < 30 else {}}
     assert a_pair(more=more).warnings == []
 
 

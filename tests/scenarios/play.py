@@ -159,14 +159,7 @@ class Watch:
     def suggested(self, name: str, scenario: Scenario) -> dict[str, str]:
         """What the first warning of the cause suggests: the keys of the scenario's cure, behind their input's topic."""
         texts = (line.message for _, line in self.lines if (line.group, line.finding) == (name, scenario.first))
-        found: dict[str, str] = {}
-        for offer in _KEY.finditer(next(texts, "")):
-            topic = (
-                (offer["topic"] or self._topics.get((name, scenario.first), "")) if offer["key"] in _OF_INPUTS else ""
-            )
-            if offer["key"] in scenario.cure:
-                found.setdefault(f"{topic} {offer['key']}".strip(), offer["value"])
-        return found
+        return offered(next(texts, ""), self._topics.get((name, scenario.first), ""), scenario.cure)
 
     def wait(self, condition: Callable[[], bool], *, least_s: float = ACT_S) -> None:
         """Look on until the condition holds, or will not hold any more: what is missing then, a test tells."""
@@ -238,7 +231,7 @@ def play(stage: Stage, scenarios: Mapping[str, Scenario]) -> Played:
     watch.wait(lambda: all(watch.has_warned_of(name, each.first) for name, each in scenarios.items() if each.first))
     written = {name: watch.suggested(name, each) for name, each in scenarios.items() if each.cure}
     for name, changes in written.items():
-        _write(theatre.groups[name], changes)
+        write(theatre.groups[name], changes)
     theatre.begin("3")
     theatre.file.reload(**theatre.groups)
     watch.wait(lambda: all(watch.is_well(name) for name, each in scenarios.items() if each.heals))
@@ -248,7 +241,18 @@ def play(stage: Stage, scenarios: Mapping[str, Scenario]) -> Played:
     return _with_what_the_relay_says_of_the_machine(watch.played(written))
 
 
-def _write(group: dict[str, Any], changes: Mapping[str, str]) -> None:
+def offered(text: str, about: str, cure: Sequence[str]) -> dict[str, str]:
+    """The keys of a cure and their values in a warning about a topic; those of an input behind their topic."""
+    found: dict[str, str] = {}
+    for offer in _KEY.finditer(text):
+        topic = (offer["topic"] or about) if offer["key"] in _OF_INPUTS else ""
+        if offer["key"] in cure:
+            found.setdefault(f"{topic} {offer['key']}".strip(), offer["value"])
+    return found
+
+
+def write(group: dict[str, Any], changes: Mapping[str, str]) -> None:
+    """Write what was offered into the group of a file."""
     for where, value in changes.items():
         topic, _, key = where.rpartition(" ")
         for owner in [row for row in group["topics"] if row["topic"] == topic] if topic else [group]:

@@ -133,7 +133,7 @@ FOUND = {
         a_group(
             camera(figures={"longest_pause": 3 * S, "last_received": NOW - S}),
             LIDAR,
-            standstill=Standstill(NOW - S, 3 * S),
+            standstills=(Standstill(NOW - S, 3 * S),),
         ),
         "the relay stood still for 3 s",
         (
@@ -165,7 +165,7 @@ FOUND = {
             # The last second of them by the network, which sends again what it could not deliver.
             camera(figures={"bursts": 1, "held": 4 * S, "held_up": [(NOW - 8 * S, NOW - 4 * S)]}),
             LIDAR,
-            standstill=Standstill(NOW - 5 * S, 2 * S),
+            standstills=(Standstill(NOW - 5 * S, 2 * S),),
         ),
         "messages waited up to 2 s for the relay",
         (
@@ -253,13 +253,13 @@ QUIETLY = {
         Code.BURSTS,
         a_group(camera(figures={"bursts": 1, "held": S}), LIDAR, waited=S),
     ),
-    "a standstill in which no message came": (Code.TOO_SLOW, a_group(standstill=Standstill(NOW - S, 3 * S))),
+    "a standstill in which no message came": (Code.TOO_SLOW, a_group(standstills=(Standstill(NOW - S, 3 * S),))),
     "messages that came at once at another time than that of a standstill": (
         Code.TOO_SLOW,
         a_group(
             camera(figures={"bursts": 1, "held": S, "held_up": [(NOW - 5 * S, NOW - 4 * S)]}),
             LIDAR,
-            standstill=Standstill(NOW - 5 * S, 2 * S),
+            standstills=(Standstill(NOW - 5 * S, 2 * S),),
         ),
     ),
     "messages that lay for less than half a second": (Code.TOO_SLOW, a_group(waited=499 * MS)),
