@@ -161,7 +161,8 @@ class _Thread(threading.Thread):
     """Receives in an inbox until it is ended; whatever ends it is raised there."""
 
     def __init__(self, inbox, longest_ns: int) -> None:
-        super().__init__()
+        # Where a test fails, it must not keep Python from ending.
+        super().__init__(daemon=True)
         self._inbox, self._longest, self._ended = inbox, longest_ns, False
         self.turns = 0
 

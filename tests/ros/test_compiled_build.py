@@ -1,22 +1,33 @@
 """The compiled path is built wherever it can be, and of the source that is here."""
 
 import shutil
+import subprocess
 import sysconfig
 from importlib import import_module
-from pathlib import Path
+from importlib.util import find_spec
 
 import pytest
 
 from syncrelay.ros.compiled import source_fingerprint
 
 _COMPILER = str(sysconfig.get_config_var("CC")).split()[0]
-_HEADERS = Path(sysconfig.get_path("include")) / "Python.h"
+_HEADERS = ("Python.h", "linux/futex.h")
+
+
+def _can_be_built() -> bool:
+    """Whether there are a compiler and the headers: Python's, and those of C's library and the kernel."""
+    if shutil.which(_COMPILER) is None:
+        return False
+    words = [_COMPILER, "-fsyntax-only", f"-I{sysconfig.get_path('include')}", "-xc", "-"]
+    text = "".join(f"#include <{header}>\n" for header in _HEADERS)
+    return subprocess.run(words, input=text, text=True, capture_output=True, check=False).returncode == 0
 
 
 @pytest.mark.skipif(
-    shutil.which(_COMPILER) is None or not _HEADERS.exists(),
-    reason=f"the compiled path cannot be built here: it takes {_COMPILER} and {_HEADERS}",
+    not _can_be_built(),
+    reason=f"the compiled path cannot be built here: it takes {_COMPILER}, {' and '.join(_HEADERS)}",
 )
 def test_the_compiled_path_is_built_of_the_source_beside_it():
+    assert find_spec("syncrelay.ros.compiled.path"), "it is not built, though it could be by now: pip install -e ."
     path = import_module("syncrelay.ros.compiled.path")
     assert source_fingerprint() == path.SOURCE, "path.pyx has changed since: make test, or pip install -e ."
