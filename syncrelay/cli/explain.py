@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 def explain(relay: "Relay", seconds: float, *, stop: StopRequest) -> int:
     """Print the findings of all groups once the time is over or a signal came; 0 if every group is healthy."""
     began = time.monotonic()
-    end = began + seconds
-    while not stop.requested and (left := end - time.monotonic()) > 0:
-        relay.step(left)
-    reports = relay.evaluate()
+    reports = relay.look(seconds, is_over=lambda: stop.requested)
     return conclude(reports, time.monotonic() - began, unjudged=relay.monitor.unjudged)
 
 

@@ -1,6 +1,5 @@
 """The whole examination, from the environment to the graph: each step rests on those before."""
 
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -183,10 +182,7 @@ def _observe(config: Config | None, ros_args: Sequence[str], node: str, *, secon
     except ConfigError:
         return None
     with relay:
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            relay.step(left)
-        reports = relay.evaluate()
+        reports = relay.look(seconds)
         graph = snapshot(relay.node)
         is_there = config.node.lifecycle and node in graph.nodes
         state = state_of(relay.node, node, patience_s=_PATIENCE_S) if is_there else None

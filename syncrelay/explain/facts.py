@@ -12,6 +12,8 @@ from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
 _NO_SETS: Final = 5 * _SECOND
+DISCOVERY_NS: Final = 2 * _SECOND
+"""Finding all publishers takes up to about this long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,14 +244,21 @@ class GroupFacts:
     def had_time(self) -> bool:
         """Whether messages have come on all inputs for long enough that there should be a set."""
         required = [each for each in self.inputs if each.required]
-        since = [max(each.figures.flows_since or self.figures.now, each.served_since or 0) for each in required]
-        return self.figures.now - max(since) >= self.silent_after
+        since = max(max(each.figures.flows_since or self.figures.now, each.served_since or 0) for each in required)
+        return self.figures.now - self._from_the_start_on(since) >= self.silent_after
 
     @property
-    def has_just_begun(self) -> bool:
-        """Whether a publisher came so recently that its messages do not yet tell why no set leaves."""
+    def is_new(self) -> bool:
+        """Whether no set leaves, of a publisher that came so recently that its messages do not yet tell why."""
+        if not self.is_silent:
+            return False
         since = max(each.served_since or 0 for each in self.inputs if each.required)
-        return self.figures.now - since < 2 * self.silent_after and not self.had_time
+        return self.figures.now - self._from_the_start_on(since) < 2 * self.silent_after and not self.had_time
+
+    def _from_the_start_on(self, since: int) -> int:
+        """Return when a flow began, or when the group did if discovery alone made it seem later."""
+        began = self.figures.began
+        return began if began <= since <= began + DISCOVERY_NS else since
 
     @property
     def silent_for(self) -> int:

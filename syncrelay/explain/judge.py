@@ -203,8 +203,7 @@ class Judge:
         found = [finding for rule in _CAUSE_RULES for finding in rule(facts)]
         self._remember(found, facts)
         may_drift = rules_stamps.may_drift(facts)
-        is_too_soon = facts.is_silent and facts.has_just_begun
-        for code, rule in () if is_too_soon else _MATCHING_RULES:
+        for code, rule in () if facts.is_new else _MATCHING_RULES:
             if self._is_explained(code, facts):
                 continue
             if not (may_drift and code in _OF_DRIFT):

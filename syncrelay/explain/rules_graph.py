@@ -5,11 +5,9 @@ from typing import Final
 
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
-from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
+from syncrelay.explain.facts import DISCOVERY_NS, Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
 from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks
 
-# Discovery takes this long.
-_GRACE: Final = 2 * SECOND
 _NO_MESSAGE: Final = 5 * SECOND
 # Fast DDS's lease: for so long one that was killed is still in the graph.
 _LEASE: Final = 20 * SECOND
@@ -157,7 +155,7 @@ def no_publisher(facts: GroupFacts) -> Found:
 
 
 def _is_past_grace(facts: GroupFacts) -> bool:
-    return facts.figures.now - facts.figures.began >= _GRACE
+    return facts.figures.now - facts.figures.began >= DISCOVERY_NS
 
 
 def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: tuple[str, str]) -> Finding:

@@ -50,6 +50,8 @@ _POLL_S = 1.0
 _ASKED_S = 3.0
 # What fails again at once must not take all of a core.
 _AFTER_FAILURE_S = 0.1
+# Who looks for a while looks so much longer at what has just begun.
+_LONGER_S = 10.0
 _ACTIVE = (Phase.STARTING, Phase.RUNNING, Phase.PAUSED)
 _WITHOUT_GROUPS = (Phase.UNCONFIGURED, Phase.FINALIZED)
 # How long an end may take to see that reliable subscribers have what was published on all outputs. They say so
@@ -295,6 +297,19 @@ class Relay:
         self._wake.wait(rest_s)
         too_long_s = time.monotonic() - began - rest_s
         self.monitor.standstills.overslept(round(too_long_s * 1e9), now=time.time_ns())
+
+    def look(self, seconds: float, *, is_over: Callable[[], bool] = lambda: False) -> tuple[GroupReport, ...]:
+        """Run for a time, and return how the groups fare.
+
+        A group without a set to which messages have only just begun to come is given a little longer.
+        """
+        end = time.monotonic() + seconds
+        latest = end + _LONGER_S
+        while not is_over() and (left := end - time.monotonic()) > 0:
+            self.step(left)
+            if time.monotonic() >= end and any(each.facts.is_new for each in self.evaluate()):
+                end = min(end + EVALUATE_S, latest)
+        return self.evaluate()
 
     def _poll_graph(self) -> None:
         has_changed = self._graph_changes.seen()
