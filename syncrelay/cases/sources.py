@@ -101,7 +101,9 @@ def _simulated(source: InputSource, index: int, case: Case, group: GroupConfig) 
         loss=source.drop / _ALL,
         reliable=True,
     )
-    messages = -(-(case.lasts - source.phase) // source.rate)
+    # 30 Hz for 2 s are 60, though their period is a third of a nanosecond less than it should be.
+    time = case.lasts - source.phase
+    messages = -(-(time - time // (2 * source.rate) - 1) // source.rate)
     for shot in takewhile(lambda shot: shot.number < messages, schedule(sensor, seed=case.seed, start=START)):
         # Their numbers are the keys of messages that are not drawn.
         arrival = Arrival(shot.sent, index, _clamped(shot.stamp), shot.number, "")

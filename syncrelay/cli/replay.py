@@ -63,6 +63,8 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         opened.callback(recording.close)
         if wanted.what_if:
             recording = Disturbed(recording, wanted.what_if, seed=wanted.seed)
+            faults = ", ".join(f"`{fault.written}`" for fault in wanted.what_if)
+            remark(printable(f"laid over the recording, with seed {wanted.seed}: {faults}"))
         bindings = bind(config, recording)
         _say_all(problem for binding in bindings for problem in binding.problems)
         written = _written(wanted.output, bindings, opened)

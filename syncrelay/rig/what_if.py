@@ -65,7 +65,9 @@ def parse_fault(text: str) -> Fault:
     name, colon, rest = text.partition(":")
     kinds = {kind.value: kind for kind in Kind}
     kind = kinds.get(name.strip())
-    if not colon or kind is None:
+    if not colon:
+        raise ValueError(f"{quoted(text)} is no fault, expected one such as {quoted(_EXAMPLES[Kind.LATE])}")
+    if kind is None:
         hint = did_you_mean(name.strip(), kinds) or f", expected {one_of(kinds)}, as in `late: /lidar/points 80ms`"
         raise ValueError(f"{quoted(text)} is no fault{hint}")
     words: Sequence[str]
