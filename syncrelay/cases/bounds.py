@@ -56,6 +56,10 @@ class Bound:
     def __str__(self) -> str:
         return f"{self.comparison} {told(self.quantity, self.value)}".strip()
 
+    def told(self, found: Decimal) -> str:
+        """Return what was found as a file would have it, rounded so that it is seen to differ."""
+        return told(self.quantity, found, {"<": "<=", ">": ">="}.get(self.comparison, self.comparison))
+
     def renewed(self, found: Decimal) -> str | int:
         """Return how a file says that what was found is as it shall be, compared as before."""
         comparison = {"<": "<=", ">": ">="}.get(self.comparison, self.comparison)

@@ -15,7 +15,6 @@ from syncrelay.bag.analysis.watching import watch_group
 from syncrelay.bag.bindings import bind
 from syncrelay.bag.what_if import Disturbed
 from syncrelay.cases.bounds import Bound
-from syncrelay.cases.bounds import told as as_written
 from syncrelay.cases.load import LoadedCase, Suite
 from syncrelay.cases.models import InputExpectation
 from syncrelay.cases.sources import START, Arrival, arrivals, streams
@@ -181,7 +180,7 @@ def _of_bound(bound: Bound, found: Decimal | None, path: Path) -> Iterator[Misma
     if found is None:
         yield Mismatch(path, (str(bound),), ("no set left",), None)
     elif not bound.holds(found):
-        yield Mismatch(path, (str(bound),), (as_written(bound.quantity, found),), bound.renewed(found))
+        yield Mismatch(path, (str(bound),), (bound.told(found),), bound.renewed(found))
 
 
 def _figures(group: GroupConfig, evaluation: Evaluation) -> _Figures:

@@ -160,6 +160,16 @@ def what_differs(result: Result) -> Iterator[str]:
             yield f"{label}: expected {', '.join(mismatch.expected)}, found {', '.join(mismatch.found)}"
 
 
+def _headline(result: Result) -> str:
+    """Return what is not as it shall be, in a few words."""
+    if result.error is not None:
+        return result.error.splitlines()[0]
+    is_drawn = [isinstance(each.renewed, tuple) for each in result.mismatches]
+    if any(is_drawn):
+        return "not what was drawn"
+    return f"not as expected: {', '.join(dotted(each.path[3:]) for each in result.mismatches)}"
+
+
 def _diff(mismatch: Mismatch) -> Iterator[str]:
     from difflib import SequenceMatcher
 
@@ -226,9 +236,9 @@ def _junit_case(file: str, result: Result) -> Iterator[str]:
     if result.passed:
         yield f"{head}/>"
         return
-    lines = list(what_differs(result))
+    lines = "\n".join(what_differs(result))
     yield f"{head}>"
-    yield f"      <failure message={_attribute(lines[0])}>{_text(chr(10).join(lines))}</failure>"
+    yield f"      <failure message={_attribute(_headline(result))}>{_text(lines)}</failure>"
     yield "    </testcase>"
 
 

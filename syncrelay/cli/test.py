@@ -8,13 +8,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from syncrelay.cases import Result, check, load_suite, updated
+from syncrelay.cases import Result, Suite, check, load_suite, updated
 from syncrelay.cli.boundary import AT_FAULT, DONE, remark
 from syncrelay.cli.case_reports import REPORTS, FileResult, Report
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import ConfigError
-from syncrelay.config.source import STDIN, read_source, shown_name
+from syncrelay.config.source import STDIN, shown_name
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
 
@@ -33,23 +33,22 @@ def test(files: Sequence[str], output_format: str, *, update: bool) -> int:
     1 if a case fails or a file has an error. `update` has the files expect what is, where they can.
     """
     report = REPORTS[output_format]()
-    results = [_run(file, report) for file in files]
-    report.end(results)
-    if update:
-        results = [_updated(file, result) for file, result in zip(files, results, strict=True)]
+    runs = [_run(file, report) for file in files]
+    report.end([result for _, result in runs])
+    results = [_updated(*run) if update else run[1] for run in runs]
     return DONE if all(result.passed for result in results) else AT_FAULT
 
 
-def _run(file: str, report: Report) -> FileResult:
+def _run(file: str, report: Report) -> tuple[Suite | None, FileResult]:
     name = shown_name(file)
     try:
         suite = load_suite(file)
     except ConfigError as error:
         result = FileResult(name, error.problems, ())
         report.fault(result)
-        return result
+        return None, result
     report.begin(name)
-    return FileResult(name, (), tuple(_told(check(suite), report, name)))
+    return suite, FileResult(name, (), tuple(_told(check(suite), report, name)))
 
 
 def _told(results: Iterator[Result], report: Report, name: str) -> Iterator[Result]:
@@ -58,12 +57,15 @@ def _told(results: Iterator[Result], report: Report, name: str) -> Iterator[Resu
         yield result
 
 
-def _updated(file: str, result: FileResult) -> FileResult:
+def _updated(suite: Suite | None, result: FileResult) -> FileResult:
     """Write what was found into a test file; return what is still not as it shall be."""
+    if suite is None:
+        return result
     mismatches = [each for case in result.cases for each in case.mismatches]
     renewed = [each for each in mismatches if each.renewed is not None]
     if renewed:
-        _replace(file, updated(read_source(file).text, renewed))
+        (source,) = suite.document.sources.values()
+        _replace(suite.name, updated(suite.document, source.text, renewed))
         remark(f"{result.name}: {counted(len(renewed), 'expectation')} updated")
     cases = (case for case in result.cases if case.error or any(each.renewed is None for each in case.mismatches))
     return FileResult(result.name, result.problems, tuple(cases))

@@ -22,6 +22,16 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 DURATIONS = ("slop", "max_wait", "max_age", "offset", "min_period")
 
 
+# The engine does the same with any of them. A set leaves at once when what is next of an input must be farther off than
+# the set is wide: with slop 20 ms, any period above 38 ms says so, and with 60 ms any above 115 ms. Beside the period
+# of the GNSS, that of the lidar tells nothing more up to 150 ms.
+ALIKE = {
+    *(("camera_lidar.yaml", f"front.topics[1].min_period: {ms}000000ns") for ms in (45, 81, 99, 180)),
+    *(("camera_lidar_imu_gnss.yaml", f"localization.topics[1].min_period: {ms}000000ns") for ms in (45, 81, 99)),
+    *(("camera_lidar_imu_gnss.yaml", f"localization.topics[3].min_period: {ms}000000ns") for ms in (135, 165, 300)),
+}
+
+
 class Mutant(NamedTuple):
     """A file of this name whose value at a place is another."""
 
@@ -53,14 +63,14 @@ def _changed(document: Any) -> Iterator[tuple[str, Any]]:
         if below is None:
             continue
         for key in below:
-            for value in _others(key, below, document):
+            for value in _others(key, below):
                 changed = deepcopy(document)
                 group = changed["groups"].get(section, changed.get(section))
                 _set(group, key, value)
                 yield f"{section}.{key}: {value}", changed
         for index, topic in enumerate(below.get("topics", ())):
             for key in topic:
-                for value in _others(key, topic, document):
+                for value in _others(key, topic):
                     changed = deepcopy(document)
                     _set(changed["groups"][section]["topics"][index], key, value)
                     yield f"{section}.topics[{index}].{key}: {value}", changed
@@ -89,7 +99,7 @@ def _fit(mapping: dict[str, Any], model: Any) -> None:
         mapping.setdefault("key", "header.frame_id")
 
 
-def _others(key: str, mapping: dict[str, Any], document: Any) -> Iterator[Any]:
+def _others(key: str, mapping: dict[str, Any]) -> Iterator[Any]:
     """Yield other values of a key; None for the key left out."""
     value = mapping[key]
     if key in DURATIONS:
@@ -138,9 +148,10 @@ def main() -> int:
     with TemporaryDirectory() as folder:
         left, tried = survivors(Path(folder))
     for mutant in left:
-        print(f"not noticed: {mutant.name}: {mutant.place}")
-    print(f"{tried - len(left)} of {tried} changed values are noticed")
-    return 1 if left else 0
+        print(f"not noticed: {mutant.name}: {mutant.place}")  # noqa: T201  what it is for
+    left_alike = sum((mutant.name, mutant.place) in ALIKE for mutant in left)
+    print(f"{tried - len(left)} of {tried} changed values are noticed; {left_alike} of the others change nothing")  # noqa: T201
+    return 1 if len(left) > left_alike else 0
 
 
 if __name__ == "__main__":
