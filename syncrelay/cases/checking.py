@@ -14,7 +14,7 @@ from syncrelay.bag.analysis.streams import Stream, read_streams
 from syncrelay.bag.analysis.watching import watch_group
 from syncrelay.bag.bindings import bind
 from syncrelay.bag.what_if import Disturbed
-from syncrelay.cases.bounds import Bound
+from syncrelay.cases.bounds import Bound, Quantity
 from syncrelay.cases.load import LoadedCase, Suite
 from syncrelay.cases.models import InputExpectation
 from syncrelay.cases.sources import START, Arrival, arrivals, streams
@@ -178,7 +178,8 @@ def _of_bounds(expect: InputExpectation, figures: _Figures, path: Path) -> Itera
 
 def _of_bound(bound: Bound, found: Decimal | None, path: Path) -> Iterator[Mismatch]:
     if found is None:
-        yield Mismatch(path, (str(bound),), ("no set left",), None)
+        lack = "no message came" if bound.quantity is Quantity.SHARE else "no set left"
+        yield Mismatch(path, (str(bound),), (lack,), None)
     elif not bound.holds(found):
         yield Mismatch(path, (str(bound),), (bound.told(found),), bound.renewed(found))
 

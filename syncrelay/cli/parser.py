@@ -101,4 +101,7 @@ def count(text: str) -> int:
 
 def seed(text: str) -> int:
     """Read a whole number of 0 or more."""
-    return 0 if text == "0" else count(text)
+    try:
+        return 0 if text == "0" else count(text)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"expected a whole number of 0 or more, found {text}") from error
