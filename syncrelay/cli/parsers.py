@@ -130,9 +130,8 @@ def replay() -> Parser:
         metavar="FAULT",
         action="append",
         default=[],
-        help="lay a fault over the recording: 'late: TOPIC 80ms', 'drop: TOPIC 10%%', 'offset: TOPIC -12ms', 'drift:"
-        " TOPIC 100ppm' or 'dead: TOPIC', each with `from 12s` and `until 20s` behind it if it is to begin or end;"
-        " may be repeated",
+        help="lay a fault over the recording, such as 'late: TOPIC 80ms' or 'drop: TOPIC 10%% from 12s'; also offset,"
+        " drift, dead; may be repeated",
     )
     parser.add_argument("--seed", metavar="N", type=seed, default=0, help="with --what-if: which messages are lost (0)")
     return parser
