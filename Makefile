@@ -49,6 +49,7 @@ lint: $(VENV)/lint
 # The schema that editors read, where they find it; a test holds it to the models.
 schema: $(VENV)/test
 	$(BIN)/python -m syncrelay schema > schema/syncrelay-1.json
+	$(BIN)/python -m syncrelay schema --test > schema/syncrelay-test-1.json
 
 bench: $(VENV)/test
 	$(BIN)/python bench/engine.py

@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
+from syncrelay.cases import check, load_suite_text
 from syncrelay.config import load_text
 from syncrelay.config.file import file_format
 from syncrelay.explain import Code
@@ -21,7 +23,9 @@ _PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *sorted((_ROO
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _BLOCKS = _BLOCK.findall(_README)
 _ALL_BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
-_FILES = [text for kind, text in _ALL_BLOCKS if kind == "yaml" and text.startswith("version:")]
+_YAML = [text for kind, text in _ALL_BLOCKS if kind == "yaml"]
+_FILES = [text for text in _YAML if text.startswith("version:")]
+_SUITES = [text for text in _YAML if "\ncases:" in text]
 _SHOWN = [line.removeprefix("$ ") for kind, text in _ALL_BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
 _WORKSPACE = _ROOT / "docs" / "workspace.md"
@@ -34,6 +38,22 @@ _COMMANDS = sorted({command for command in [*_SHOWN, *_INLINE] if command})
 @pytest.mark.parametrize("text", _FILES, ids=range(len(_FILES)))
 def test_every_file_that_a_page_shows_is_in_order(text):
     assert load_text(text).groups
+
+
+def test_every_test_file_that_a_page_shows_is_in_order_and_passes_where_it_can(tmp_path):
+    (tmp_path / "fusion.yaml").write_text(_FILES[0])
+    for text in _SUITES:
+        suite = load_suite_text(text, name=str(tmp_path / "tests.yaml"))
+        assert [each.case.name for each in check(suite) if not each.passed and each.case.recording is None] == []
+    assert _SUITES
+
+
+def test_the_workflow_runs_commands_that_exist():
+    (workflow,) = [yaml.safe_load(text) for text in _YAML if "runs-on:" in text]
+    runs = [step["run"] for step in workflow["jobs"]["test"]["steps"] if "run" in step]
+    commands = [run.removeprefix("syncrelay ").split() for run in runs if run.startswith("syncrelay ")]
+    assert [words[0] for words in commands] == ["validate", "test"]
+    assert all(_is_syncrelay_command(words) for words in commands)
 
 
 @pytest.mark.parametrize("command", _LAUNCHED)

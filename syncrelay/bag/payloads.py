@@ -20,6 +20,7 @@ ReadMessage: TypeAlias = Callable[[RawMessage], tuple[int | None, Hashable]]
 _NS_PER_SECOND: Final = 1_000_000_000
 # A ROS 1 Header begins with uint32 seq; the time behind it is two uint32, always little-endian.
 _ROS1_STAMP: Final = Struct("<4xII")
+_ROS1_TIME: Final = Struct("<II")
 
 
 def message_reader(group: GroupConfig, index: int, channel: Channel) -> ReadMessage:
@@ -120,3 +121,9 @@ def read_ros1_stamp(payload: bytes) -> int | None:
         return None
     stamp = int(seconds * _NS_PER_SECOND + nanoseconds)
     return stamp if stamp <= LATEST_STAMP else None
+
+
+def with_ros1_stamp(payload: bytes, stamp: int) -> bytes:
+    """Return a ROS 1 payload that `read_ros1_stamp` can read with another stamp, of 0 or more nanoseconds."""
+    begin, end = payload[: _ROS1_STAMP.size - _ROS1_TIME.size], payload[_ROS1_STAMP.size :]
+    return begin + _ROS1_TIME.pack(*divmod(stamp, _NS_PER_SECOND)) + end

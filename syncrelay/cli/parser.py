@@ -97,3 +97,11 @@ def count(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < _WIDTH and int(text)):
         raise argparse.ArgumentTypeError(f"expected a whole number above 0, found {text}")
     return int(text)
+
+
+def seed(text: str) -> int:
+    """Read a whole number of 0 or more."""
+    try:
+        return 0 if text == "0" else count(text)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"expected a whole number of 0 or more, found {text}") from error

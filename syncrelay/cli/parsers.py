@@ -5,7 +5,7 @@ A metavar says what kind of word is expected, and so what completes it (syncrela
 
 from typing import Final
 
-from syncrelay.cli.parser import Parser, count, positive
+from syncrelay.cli.parser import Parser, count, positive, seed
 
 _RELAY_USAGE: Final = """\
 syncrelay --config FILE [option ...] [--ros-args ...]
@@ -125,6 +125,37 @@ def replay() -> Parser:
     )
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
     parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
+    parser.add_argument(
+        "--what-if",
+        metavar="FAULT",
+        action="append",
+        default=[],
+        help="lay a fault over the recording, such as 'late: TOPIC 80ms' or 'drop: TOPIC 10%% from 12s'; also offset,"
+        " drift, dead; may be repeated",
+    )
+    parser.add_argument("--seed", metavar="N", type=seed, default=0, help="with --what-if: which messages are lost (0)")
+    return parser
+
+
+def test() -> Parser:
+    """Return the parser of `syncrelay test`."""
+    parser = Parser(
+        "syncrelay test",
+        description="Runs the tests of a configuration, without ROS: messages that are drawn, simulated or recorded go "
+        "through the engine, and what comes of them is compared to what the test file expects. Exit code 1 if a case "
+        "fails.",
+    )
+    parser.add_argument("files", metavar="FILE", nargs="+", help="a test file, or - for standard input")
+    parser.add_argument(
+        "--format",
+        choices=("text", "junit", "json", "github"),
+        default="text",
+        metavar="FORMAT",
+        help="text (default), junit, json, or github: annotations for a workflow",
+    )
+    parser.add_argument(
+        "--update", action="store_true", help="write what came into the test files, in place of what was expected"
+    )
     return parser
 
 
@@ -212,10 +243,12 @@ def healthcheck() -> Parser:
 
 def schema() -> Parser:
     """Return the parser of `syncrelay schema`."""
-    return Parser(
+    parser = Parser(
         "syncrelay schema",
         description="Prints the JSON Schema (draft 7) of the file: with it, editors complete and check what you write.",
     )
+    parser.add_argument("--test", action="store_true", help="print that of test files, see syncrelay test")
+    return parser
 
 
 def completion() -> Parser:

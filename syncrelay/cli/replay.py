@@ -12,6 +12,7 @@ from syncrelay.bag.lines import drop_line, set_line
 from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import Listener
 from syncrelay.bag.replay import replay as replay_groups
+from syncrelay.bag.what_if import Disturbed
 from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.parser import Parser
@@ -21,22 +22,33 @@ from syncrelay.cli.summary import summarize
 from syncrelay.config import load
 from syncrelay.config.wording import counted
 from syncrelay.printable import printable
+from syncrelay.rig.what_if import Fault, parse_fault
 from syncrelay.sync import Match, Outcome
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a replay gives beside its summary: a line a set, a line a drop, the outputs in a recording."""
+    """What a replay gives beside its summary: a line a set, a line a drop, the outputs in a recording.
+
+    `what_if` are faults laid over the recording, whose chance is that of `seed`.
+    """
 
     sets: bool
     drops: bool
     output: str | None
+    what_if: tuple[Fault, ...] = ()
+    seed: int = 0
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay replay`."""
     parser.refuse_repeated(arguments.config)
-    return replay(arguments.bags, arguments.config, Wanted(arguments.json, arguments.drops, arguments.output))
+    try:
+        what_if = tuple(map(parse_fault, arguments.what_if))
+    except ValueError as error:
+        parser.error(f"argument --what-if: {error}")
+    wanted = Wanted(arguments.json, arguments.drops, arguments.output, what_if, arguments.seed)
+    return replay(arguments.bags, arguments.config, wanted)
 
 
 def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> int:
@@ -49,6 +61,10 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     with ExitStack() as opened:
         recording = open_recording(bags)
         opened.callback(recording.close)
+        if wanted.what_if:
+            recording = Disturbed(recording, wanted.what_if, seed=wanted.seed)
+            faults = ", ".join(f"`{fault.written}`" for fault in wanted.what_if)
+            remark(printable(f"laid over the recording, with seed {wanted.seed}: {faults}"))
         bindings = bind(config, recording)
         _say_all(problem for binding in bindings for problem in binding.problems)
         written = _written(wanted.output, bindings, opened)

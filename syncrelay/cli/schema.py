@@ -1,4 +1,4 @@
-"""`syncrelay schema`: the JSON Schema of the file."""
+"""`syncrelay schema`: the JSON Schema of the file, or of test files."""
 
 import json
 from argparse import Namespace
@@ -6,15 +6,18 @@ from argparse import Namespace
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config.schema import json_schema
+from syncrelay.config.schema import Schema, json_schema
 
 
-def command(_parser: Parser, _arguments: Namespace, _stop: StopRequest) -> int:
+def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay schema`."""
-    return schema()
+    if arguments.test:
+        from syncrelay.cases.schema import cases_schema
+
+        return _print(cases_schema())
+    return _print(json_schema())
 
 
-def schema() -> int:
-    """Print the JSON Schema (draft 7) of the file."""
-    put(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+def _print(schema: Schema) -> int:
+    put(json.dumps(schema, indent=2, ensure_ascii=False))
     return DONE

@@ -9,11 +9,12 @@ from typing import Any, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.cli.parser import Parser
+from syncrelay.cli.problems import inert, problem_as_json, problem_command
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
 from syncrelay.config.source import shown_name
 from syncrelay.config.wording import counted
-from syncrelay.printable import printable, printable_lines
+from syncrelay.printable import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +67,9 @@ def _print_json(findings: Sequence[Finding]) -> None:
 def _print_github(findings: Sequence[Finding]) -> None:
     for finding in findings:
         for problem in finding.problems:
-            put(_workflow_command(problem))
+            put(problem_command(problem))
         if finding.config is not None:
-            put(_inert(_ok(finding.files, finding.config)))
+            put(inert(_ok(finding.files, finding.config)))
 
 
 _PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
@@ -90,46 +91,5 @@ def _as_json(file: str, finding: Finding) -> dict[str, Any]:
     return {
         "file": file,
         "ok": all(problem.severity is not Severity.ERROR for problem in problems),
-        "problems": [_problem_as_json(problem) for problem in problems],
+        "problems": [problem_as_json(problem) for problem in problems],
     }
-
-
-def _problem_as_json(problem: Problem) -> dict[str, Any]:
-    span = problem.span
-    return {
-        "severity": problem.severity.value,
-        "code": problem.code,
-        "path": problem.path,
-        "message": problem.text,
-        "line": span.line if span else None,
-        "column": span.column if span else None,
-        "end_column": span.column + span.width if span else None,
-    }
-
-
-def _workflow_command(problem: Problem) -> str:
-    """Return a command that GitHub turns into an annotation (workflow commands: ::error, ::warning, ::notice)."""
-    command = "notice" if problem.severity is Severity.NOTE else problem.severity.value
-    properties = {"file": problem.file}
-    if problem.span is not None:
-        properties |= {
-            "line": str(problem.span.line),
-            "col": str(problem.span.column),
-            "endColumn": str(problem.span.column + problem.span.width),
-        }
-    written = ",".join(f"{key}={_escaped_property(value)}" for key, value in properties.items())
-    text = f"{problem.path}: {problem.text}" if problem.path else problem.text
-    return f"::{command} {written}::{_escaped(text)}"
-
-
-def _inert(line: str) -> str:
-    """Return a line that GitHub takes for no command, whatever the file is called."""
-    return line.replace("::", "%3A%3A").replace("##[", "##%5B")
-
-
-def _escaped(text: str) -> str:
-    return printable_lines(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-
-
-def _escaped_property(text: str) -> str:
-    return _escaped(text).replace(":", "%3A").replace(",", "%2C")

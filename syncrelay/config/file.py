@@ -27,10 +27,14 @@ def _version(value: Any) -> Any:
     return value
 
 
+Version = Annotated[Literal[1], BeforeValidator(_version)]
+"""The version of the format of a file."""
+
+
 class FileKeys(Keys):
     """A syncrelay file: which topics are matched by time, and where the matched messages go."""
 
-    version: Annotated[Literal[1], BeforeValidator(_version)] = Field(description="Version of this format: 1.")
+    version: Version = Field(description="Version of this format: 1.")
     node: NodeConfig = Field(default_factory=NodeConfig, description="The ROS node.")
     metrics: MetricsConfig | None = Field(
         default_factory=MetricsConfig,

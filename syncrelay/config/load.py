@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Final
 
 from pydantic import ValidationError
 
@@ -17,12 +18,14 @@ from syncrelay.config.models import DiagnosticsConfig, NodeConfig
 from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.partial import partial_file
 from syncrelay.config.problems import ConfigError, Problem, Severity
+from syncrelay.config.relay_form import RelayForm
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
 from syncrelay.config.source import PATIENCE_S, Source, check_text, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
 from syncrelay.config.yaml_tree import compose
 
+_LEAST: Final = "at least `version: 1` and `groups:`"
 _NO_INDEX = "message types were not checked: there is no ament index here (source ROS 2, or install with '.[ros]')"
 
 
@@ -108,7 +111,7 @@ def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) ->
 
 
 def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Part:
-    document, problems = compose(source, environ)
+    document, problems = compose(source, environ, expected=_LEAST)
     document = with_defaults(document)
     keys = plain(document.root)
     if isinstance(keys, dict) and not is_alone:
@@ -118,7 +121,7 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
         return _Part(document, file_format().file.model_validate(keys), problems)
     except ValidationError as error:
         faults = error.errors(include_url=False)
-        return _Part(*partial_file(document, faults), problems + translate(faults, document))
+        return _Part(*partial_file(document, faults), problems + translate(faults, document, RelayForm()))
 
 
 def _types(groups: Sequence[GroupConfig], document: Document, environ: Mapping[str, str]) -> Iterator[Problem]:

@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 from syncrelay.config.document import Document, MappingNode, Node, ScalarNode, SequenceNode
 from syncrelay.config.file import FileKeys, partial_format
 from syncrelay.config.problems import Path
-from syncrelay.config.translate import path_of
+from syncrelay.config.relay_form import path_of
 
 
 def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Document, FileKeys]:

@@ -14,12 +14,17 @@ Schema: TypeAlias = dict[str, Any]
 ID: Final = "urn:syncrelay:schema:1"
 """The schema's name, whatever place it is read from; it ends in the `version` of the files that it describes."""
 
-_REF: Final = "#/definitions/"
-_VARIABLE: Final[Schema] = {
+DRAFT: Final = "http://json-schema.org/draft-07/schema#"
+REF: Final = "#/definitions/"
+"""What a reference to a definition begins with."""
+
+VARIABLE: Final[Schema] = {
     "type": "string",
     "pattern": r"\$\{[A-Za-z_][A-Za-z0-9_]*(:-[^{}$]*)?\}",
     "description": "${NAME} or ${NAME:-default}, filled in from the environment.",
 }
+"""What may stand in place of any value."""
+
 # What is said about a value whatever its kind.
 _ANNOTATIONS: Final = ("description", "default", "examples")
 
@@ -27,22 +32,22 @@ _ANNOTATIONS: Final = ("description", "default", "examples")
 def json_schema() -> Schema:
     """Return the schema of a file."""
     form = file_format()
-    generated = form.file.model_json_schema(ref_template=_REF + "{model}")
+    generated = form.file.model_json_schema(ref_template=REF + "{model}")
     models: dict[str, Schema] = generated.pop("$defs")
     needed = {policy: _take_required(models[model.__name__]) for policy, model in form.groups.items()}
     _take_required(models[form.any_group.__name__])
-    generated["properties"]["groups"]["additionalProperties"] = {"$ref": f"{_REF}Group"}
+    generated["properties"]["groups"]["additionalProperties"] = {"$ref": f"{REF}Group"}
     return {
-        "$schema": "http://json-schema.org/draft-07/schema#",
+        "$schema": DRAFT,
         "$id": ID,
         "title": "syncrelay file",
-        **_mapping(generated),
+        **of_mapping(generated),
         "if": {"not": {"required": ["defaults"]}},
         "then": {"properties": {"groups": {"additionalProperties": {"allOf": list(_without_defaults(needed))}}}},
         "definitions": {
-            **{name: _mapping(model) for name, model in models.items()},
+            **{name: of_mapping(model) for name, model in models.items()},
             "Group": _by_policy(form),
-            "Variable": _VARIABLE,
+            "Variable": VARIABLE,
         },
     }
 
@@ -56,9 +61,9 @@ def _take_required(group: Schema) -> list[str]:
 
 def _by_policy(form: FileFormat) -> Schema:
     """Return a group: by its policy's keys, or by those of all policies where it names none that is known."""
-    schema: Schema = {"$ref": _REF + form.any_group.__name__}
+    schema: Schema = {"$ref": REF + form.any_group.__name__}
     for policy, model in reversed(form.groups.items()):
-        schema = {"if": _has_policy(policy), "then": {"$ref": _REF + model.__name__}, "else": schema}
+        schema = {"if": _has_policy(policy), "then": {"$ref": REF + model.__name__}, "else": schema}
     return schema
 
 
@@ -73,7 +78,7 @@ def _has_policy(policy: str) -> Schema:
     return {"required": ["policy"], "properties": {"policy": {"const": policy}}}
 
 
-def _mapping(model: Schema) -> Schema:
+def of_mapping(model: Schema) -> Schema:
     """Return a model's schema with its keys in order."""
     properties = {key: _key(value) for key, value in model["properties"].items()}
     return {**{key: value for key, value in model.items() if key != "title"}, "properties": properties}
@@ -86,7 +91,7 @@ def _key(generated: Schema) -> Schema:
     if is_nullable:
         kinds.append({"type": "null"})
     if any(_is_written_as_one_word(kind) for kind in kinds):
-        kinds.append({"$ref": f"{_REF}Variable"})
+        kinds.append({"$ref": f"{REF}Variable"})
     if len(kinds) > 1:
         return {**said, "anyOf": kinds}
     # Draft 7 passes over all that stands beside a $ref.

@@ -1,27 +1,19 @@
 """pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode
-from syncrelay.config.file import FileFormat, file_format
-from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.problems import Path, Problem
-from syncrelay.config.qos import QosOverrides
-from syncrelay.config.wording import all_of, describe, one_of, or_nearest, quoted
+from syncrelay.config.wording import describe, one_of, or_nearest, quoted
 from syncrelay.config.yaml_tree import read_plain
 
 Location: TypeAlias = tuple[str | int, ...]
 """A place in pydantic's words: a path with the tags of unions in it."""
 
-_SECTIONS: Final[dict[str, type[BaseModel]]] = {
-    "node": NodeConfig,
-    "metrics": MetricsConfig,
-    "diagnostics": DiagnosticsConfig,
-}
 _EXPECTED: Final = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -33,11 +25,6 @@ _EXPECTED: Final = {
     "model_attributes_type": "a mapping",
     "finite_number": "a finite number",
 }
-_WHAT_IS_MISSING: Final = {
-    "groups": "expected one group or more",
-    "topics": "expected a list of 2 or more topics",
-    "version": "expected `version: 1`",
-}
 # What a key takes beside single words.
 _MAPPING_FORMS: Final = {"qos": "a mapping", "stamp": "{field: path.to.a.Time}"}
 # So alike is `topic` to `topics`: meant is the key here, although there is such a key elsewhere.
@@ -46,14 +33,38 @@ _A_SLIP: Final = 0.8
 _TRUTH_WORDS: Final = ("yes", "no", "on", "off", "true", "false")
 
 
-def translate(errors: Sequence[ErrorDetails], document: Document) -> list[Problem]:
+class Form(Protocol):
+    """What the words of an error come from, for one kind of file."""
+
+    def path(self, loc: Location) -> Path:
+        """Return the path of a place of pydantic's."""
+        ...
+
+    def model(self, loc: Location) -> type[BaseModel]:
+        """Return the model whose keys stand at a place of pydantic's."""
+        ...
+
+    def levels(self) -> Iterator[tuple[str, type[BaseModel]]]:
+        """Yield where keys can stand, in words, and the model of each place."""
+        ...
+
+    def owners(self, loc: Location) -> str | None:
+        """Return where alone a key can stand that is one of another kind of mapping at this place; None for others."""
+        ...
+
+    def missing(self, loc: Location) -> str:
+        """Say what is expected where a key is missing."""
+        ...
+
+
+def translate(errors: Sequence[ErrorDetails], document: Document, form: Form) -> list[Problem]:
     """Return a problem for every error, but none for what only follows from another problem."""
     # In the order of the file: what is meant is looked for in the first of many.
     located = sorted(
-        ((path_of(error["loc"]), error) for error in errors), key=lambda each: document.key_span(each[0])[:2]
+        ((form.path(error["loc"]), error) for error in errors), key=lambda each: document.key_span(each[0])[:2]
     )
     meant = {
-        path: document.nearest(str(path[-1]), _model(error["loc"][:-1]).model_fields)
+        path: document.nearest(str(path[-1]), form.model(error["loc"][:-1]).model_fields)
         for path, error in located
         if error["type"] == "extra_forbidden"
     }
@@ -65,17 +76,17 @@ def translate(errors: Sequence[ErrorDetails], document: Document) -> list[Proble
         node = document.node(path)
         if isinstance(node, ScalarNode) and not node.readable:
             continue
-        problems.append(_problem(error, path, meant.get(path), document))
+        problems.append(_problem(error, path, meant.get(path), document, form))
     return problems
 
 
-def _problem(error: ErrorDetails, path: Path, meant: str | None, document: Document) -> Problem:
+def _problem(error: ErrorDetails, path: Path, meant: str | None, document: Document, form: Form) -> Problem:
     match error["type"]:
         case "extra_forbidden":
-            text = _unknown_key(error["loc"], meant, document)
+            text = _unknown_key(error["loc"], meant, document, form)
             return document.problem(path, text, code="unknown_key", span=document.key_span(path))
         case "missing":
-            text = f"missing, {_what_is_missing(error['loc'])}"
+            text = f"missing, {form.missing(error['loc'])}"
             return document.problem(path, text, code="missing_key", span=_owner_span(path, document))
         case kind if kind in _EXPECTED:
             text = f"expected {_EXPECTED[kind]}, {_found(error['input'], kind)}"
@@ -122,16 +133,12 @@ def _found(value: object, kind: str) -> str:
     return found
 
 
-def _unknown_key(loc: Location, meant: str | None, document: Document) -> str:
-    key, form = str(loc[-1]), file_format()
-    model = _model(loc[:-1])
-    for models in (form.groups, form.topics):
-        if models.get(_policy(loc)) is not model:
-            continue
-        owners = [policy for policy, other in models.items() if key in other.model_fields]
-        if owners:
-            return f"{_policy(loc)} has no `{key}`, only {all_of(owners)} {'does' if len(owners) == 1 else 'do'}"
-    levels = [level for level, owner in _levels(form) if key in owner.model_fields]
+def _unknown_key(loc: Location, meant: str | None, document: Document, form: Form) -> str:
+    key, model = str(loc[-1]), form.model(loc[:-1])
+    owners = form.owners(loc)
+    if owners is not None:
+        return owners
+    levels = [level for level, owner in form.levels() if key in owner.model_fields]
     if levels and document.nearest(key, model.model_fields, likeness=_A_SLIP) is None:
         return f"`{key}` does not belong here, it is a key of {levels[0]}"
     if "$" in key:
@@ -139,49 +146,6 @@ def _unknown_key(loc: Location, meant: str | None, document: Document) -> str:
     if ":" in key:
         return "unknown key: is a space missing after the colon?"
     return f"unknown key{or_nearest(meant)}" if meant else f"unknown key, expected {one_of(model.model_fields)}"
-
-
-def _levels(form: FileFormat) -> Iterator[tuple[str, type[BaseModel]]]:
-    yield "the file", form.file
-    yield from ((f"`{key}`", model) for key, model in _SECTIONS.items())
-    yield "a group", form.any_group
-    yield "a topic", form.any_topic
-    yield "a topic's `qos`", QosOverrides
-
-
-def _model(loc: Location) -> type[BaseModel]:
-    """Return the model whose keys stand at a place of pydantic's."""
-    form = file_format()
-    match loc:
-        case (*_, "qos", "<mapping>"):
-            return QosOverrides
-        case (*_, "stamp", "<mapping>"):
-            return StampField
-        case ("groups", _, _, "topics", _):
-            return form.topics.get(_policy(loc), form.any_topic)
-        case ("groups", _, _):
-            return form.group(_policy(loc))
-        case (str(key),):
-            return _SECTIONS.get(key, form.defaults)
-        case _:
-            return form.file
-
-
-def _policy(loc: Location) -> str:
-    """Return the tag of the group's model, which is its policy's name; nothing outside of groups."""
-    return str(loc[2]).strip("<>") if loc[0] == "groups" else ""
-
-
-def _what_is_missing(loc: Location) -> str:
-    key, policies = str(loc[-1]), file_format().groups
-    if loc[3:] == ("policy",):
-        return f"expected {one_of(policies)}"
-    if key in _WHAT_IS_MISSING:
-        return _WHAT_IS_MISSING[key]
-    model = _model(loc[:-1])
-    example = (model.model_fields[key].examples or [""])[0]
-    needs = f"{_policy(loc)} needs it, " if model in policies.values() else ""
-    return f"{needs}for example `{key}: {example}`"
 
 
 def _owner_span(path: Path, document: Document) -> Any:
@@ -192,14 +156,3 @@ def _owner_span(path: Path, document: Document) -> Any:
     if isinstance(node, MappingNode) and node.entries:
         return next(iter(node.entries.values())).key
     return node.span
-
-
-def path_of(loc: Location) -> Path:
-    """Return the path of a place of pydantic's, which has tags too: at a group, and below `qos` and `stamp`."""
-    match loc:
-        case ("groups", name, _, "topics", index, ("qos" | "stamp") as key, _, *rest):
-            return ("groups", name, "topics", index, key, *rest)
-        case ("groups", name, _, *rest):
-            return ("groups", name, *rest)
-        case _:
-            return loc

@@ -55,10 +55,10 @@ _DOLLAR = re.compile(
 )
 
 
-def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[Problem]]:
+def compose(source: Source, environ: Mapping[str, str], *, expected: str) -> tuple[Document, list[Problem]]:
     """Return the tree of a file and what is wrong with single keys and values of it.
 
-    Raises ConfigError where no tree can be made.
+    Raises ConfigError where no tree can be made; of an empty file it says what was expected.
     """
     composer = _Composer(source, environ)
     try:
@@ -68,11 +68,8 @@ def compose(source: Source, environ: Mapping[str, str]) -> tuple[Document, list[
         text, span = in_words(error, source.lines)
         raise ConfigError([source.problem(text, span=span, code="yaml")]) from error
     if composer.root is None or (isinstance(composer.root, ScalarNode) and composer.root.value is None):
-        raise ConfigError([source.problem(_EMPTY, span=None, code="empty")])
+        raise ConfigError([source.problem(f"the file is empty, expected {expected}", span=None, code="empty")])
     return Document({source.index: source}, composer.root), composer.problems
-
-
-_EMPTY = "the file is empty, expected at least `version: 1` and `groups:`"
 
 
 @dataclass(slots=True)

@@ -3,6 +3,7 @@
 import random
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ class Sensor:
     """
 
     topic: str
-    rate_hz: int
+    rate_hz: int | Fraction
     phase: int
     clock_error: int
     jitter: int

@@ -22,8 +22,8 @@ groups:
   front: {policy: exact_time, topics: []}
   rear: {policy: exact_time, topics: []}
 """
-# What a word of the line may be that no completion knows: a number, a place.
-_UNKNOWN = {"N", "URL"}
+# What a word of the line may be that no completion knows: a number, a place, a sentence.
+_UNKNOWN = {"N", "URL", "FAULT"}
 
 
 # One process for many lines; all that argcomplete is told by a shell but where to write.
@@ -73,6 +73,8 @@ _LINES = {
     "syncrelay --explain ": [],
     "syncrelay validate ": ["fusion.yaml", "maps/"],
     "syncrelay validate fusion.yaml --fo": ["--format"],
+    "syncrelay test ": ["fusion.yaml", "maps/"],
+    "syncrelay test fusion.yaml --format ": ["text", "junit", "json", "github"],
     "syncrelay doctor --config fusion.yaml --l": ["--live"],
     "syncrelay init --from-bag maps --from": [],
     "syncrelay completion ": ["bash", "zsh", "fish"],

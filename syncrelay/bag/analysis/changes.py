@@ -29,23 +29,23 @@ def with_changes(text: str, changes: Sequence[Change]) -> str:
 
     A new policy takes keys with it that it does not have.
     """
-    yaml = _yaml()
+    yaml = editor()
     document = yaml.load(text)
     for change in changes:
         group = document["groups"][change.group]
         if change.key == _POLICY:
             _fit(group, str(change.value))
         _set(group if change.topic is None else group["topics"][change.topic], change)
-    return _dumped(yaml, document)
+    return dumped(yaml, document)
 
 
 def with_evidence(text: str, group: str, evidence: Sequence[str]) -> str:
     """Return the text of a file with a comment at each topic of a group."""
-    yaml = _yaml()
+    yaml = editor()
     document = yaml.load(text)
     for topic, comment in zip(document["groups"][group]["topics"], evidence, strict=True):
         _comment(topic, "topic", comment)
-    return _dumped(yaml, document)
+    return dumped(yaml, document)
 
 
 def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
@@ -62,7 +62,7 @@ def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
         if "topics" in group:
             # Those keys first that stand first in a file.
             group["topics"] = [each for _, each in sorted(group.pop("topics").items())]
-    return _dumped(_yaml(), {"groups": groups})
+    return dumped(editor(), {"groups": groups})
 
 
 def _set(mapping: Any, change: Change) -> None:
@@ -88,7 +88,8 @@ def _fit(group: Any, policy: str) -> None:
             del topic[key]
 
 
-def _yaml() -> YAML:
+def editor() -> YAML:
+    """Return what reads and writes files with their comments."""
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.width = _WIDEST
@@ -96,7 +97,8 @@ def _yaml() -> YAML:
     return yaml
 
 
-def _dumped(yaml: YAML, document: Any) -> str:
+def dumped(yaml: YAML, document: Any) -> str:
+    """Return the text of a document that an editor read."""
     out = StringIO()
     yaml.dump(document, out)
     return out.getvalue()

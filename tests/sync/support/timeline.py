@@ -1,19 +1,11 @@
-"""A drawn case: what arrives when, and what leaves because of it.
+"""Drawn cases for policies and groups alone; see syncrelay.cases.drawing for what is drawn how.
 
-    lidar  |ab.c
-    camera |..BC
-    -> B: bB, a superseded
-    -> C: cC
-
-A column is a tick of 10 ms, of stamps and of the clock: messages arrive by column, top row first, each at
-the moment of its stamp. Rows of one label are one input: two messages of one stamp need two rows.
-`arrive: a B b` gives another order of arrival; the clock then follows the newest column so far.
-`-> B:` is what leaves when B arrives, `-> @7:` what leaves by `expire` at column 7. A set is its letters,
-`-` where an input is missing; a drop is a letter and its reason. `keys: aA bB` gives letters common keys.
+A column is a tick of 10 ms.
 """
 
 from dataclasses import dataclass, replace
 
+from syncrelay.cases.drawing import parse as parse_drawing
 from syncrelay.sync import Drop, Match, Message
 
 TICK_NS = 10_000_000
@@ -33,35 +25,22 @@ class Timeline:
     """The lines after `->`, in order."""
 
 
-def parse(drawing):
-    labels, drawn, expected, order, keys = [], {}, [], None, {}
-    width = 0
-    for line in (line.strip() for line in drawing.strip().splitlines()):
-        if line.startswith("->"):
-            expected.append(line.removeprefix("->").strip())
-        elif line.startswith("arrive:"):
-            order = line.removeprefix("arrive:").split()
-        elif line.startswith("keys:"):
-            keys = {letter: same for same in line.removeprefix("keys:").split() for letter in same}
-        else:
-            label, row = (part.strip() for part in line.split("|"))
-            if label not in labels:
-                labels.append(label)
-            width = max(width, len(row))
-            for column, letter in enumerate(row):
-                if letter != ".":
-                    assert letter not in drawn, f"{letter} is drawn twice"
-                    drawn[letter] = (column, Message(labels.index(label), stamp(column), letter, key=letter))
-    for letter, key in keys.items():
+def parse(text):
+    drawing = parse_drawing(text)
+    assert drawing.faults == []
+    drawn = {
+        letter: (mark.column, Message(drawing.labels.index(mark.label), stamp(mark.column), letter, key=letter))
+        for letter, mark in drawing.marks.items()
+    }
+    for letter, key in drawing.keys.items():
         column, message = drawn[letter]
         drawn[letter] = column, replace(message, key=key)
-    letters = order or sorted(drawn, key=lambda letter: (drawn[letter][0], drawn[letter][1].input))
-    assert sorted(letters) == sorted(drawn), "arrive: must name each letter once"
+    letters = drawing.order or sorted(drawn, key=lambda letter: (drawn[letter][0], drawn[letter][1].input))
     arrivals, newest = [], 0
     for letter in letters:
         newest = max(newest, drawn[letter][0])
         arrivals.append((newest, drawn[letter][1]))
-    return Timeline(tuple(arrivals), width, tuple(expected))
+    return Timeline(tuple(arrivals), drawing.width, tuple(drawing.expected))
 
 
 def told(outcome):

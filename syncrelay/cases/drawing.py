@@ -1,0 +1,180 @@
+"""A drawn case: what arrives when, and what leaves because of it.
+
+    lidar  |ab.c
+    camera |..BC
+    -> B: bB, a superseded
+    -> C: cC
+
+A column is a period, of stamps and of the clock: messages arrive by column, top row first, each at the moment of its
+stamp. Rows of one label are one input: two messages of one stamp need two rows. `arrive: a B b` gives another order of
+arrival; the clock then follows the newest column so far. `-> B:` is what leaves when B arrives, `-> @7:` what leaves
+by a deadline at column 7. A set is its letters, `-` where an input is missing and
+`*` for a message that is not drawn, and `aA stamped A` where it is given
+one stamp, that of A; a drop is a letter and its reason. `keys: aA bB` gives letters common keys.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from syncrelay.config.wording import did_you_mean, one_of, quoted
+from syncrelay.sync import DropReason
+
+_ARROW: Final = "->"
+_ARRIVE: Final = "arrive:"
+_KEYS: Final = "keys:"
+_MOMENT: Final = re.compile(r"@[0-9]{1,9}(\.[0-9]{1,6})?")
+_MISSING: Final = "-"
+_OTHER: Final = "*"
+_REASONS: Final = tuple(reason.value for reason in DropReason)
+
+
+class Mark(NamedTuple):
+    """A message that is drawn: its label, and its column from 0."""
+
+    label: str
+    column: int
+
+
+class Fault(NamedTuple):
+    """What is wrong with a drawing: at which line from 0, at which column of it and how wide, and what."""
+
+    line: int
+    column: int
+    width: int
+    text: str
+
+
+@dataclass(slots=True)
+class Drawing:
+    """What was drawn: letters with their marks, labels in their order; `order` of arrival and `keys` where given.
+
+    `expected` are the lines behind `->`; of `label_lines` each is where a label stands first.
+    """
+
+    marks: dict[str, Mark] = field(default_factory=dict)
+    label_lines: dict[str, int] = field(default_factory=dict)
+    width: int = 0
+    order: Sequence[str] | None = None
+    keys: Mapping[str, str] = field(default_factory=dict)
+    expected: list[str] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+
+    @property
+    def labels(self) -> list[str]:
+        """All labels, in the order in which they stand."""
+        return list(self.label_lines)
+
+
+def parse(text: str) -> Drawing:
+    """Return what a text draws, and what is wrong with it."""
+    drawing = Drawing()
+    told: list[tuple[int, str]] = []
+    for number, line in enumerate(text.splitlines()):
+        stripped = line.strip()
+        if stripped.startswith(_ARROW):
+            told.append((number, line))
+        elif stripped.startswith(_ARRIVE):
+            drawing.order = stripped.removeprefix(_ARRIVE).split()
+            drawing.faults += _faults_of_order(drawing, number, line)
+        elif stripped.startswith(_KEYS):
+            words = stripped.removeprefix(_KEYS).split()
+            drawing.keys = {letter: word for word in words for letter in word}
+        elif "|" in stripped:
+            drawing.faults += _add_lane(drawing, number, line)
+        elif stripped:
+            drawing.faults.append(
+                _fault(number, line, stripped, "expected a lane such as `lidar |a.bc`, or `-> b: aA`")
+            )
+    for number, line in told:
+        drawing.expected.append(_normal(line))
+        drawing.faults += _faults_of_line(drawing, number, line)
+    return drawing
+
+
+def with_expected(text: str, lines: Sequence[str]) -> str:
+    """Return a drawing's text with other lines behind `->`, where these stood."""
+    kept = text.splitlines()
+    places = [number for number, line in enumerate(kept) if line.strip().startswith(_ARROW)]
+    at = places[0] if places else len(kept)
+    before = [line for line in kept[:at] if line.strip() or places]
+    after = [line for line in kept[at:] if not line.strip().startswith(_ARROW)]
+    return "\n".join([*before, *(f"{_ARROW} {line}" for line in lines), *after]) + "\n"
+
+
+def lanes(text: str) -> list[str]:
+    """Return the lines of a drawing that say what comes."""
+    return [line.strip() for line in text.splitlines() if line.strip() and not line.strip().startswith(_ARROW)]
+
+
+def _normal(line: str) -> str:
+    moment, _, left = line.strip().removeprefix(_ARROW).partition(":")
+    return f"{moment.strip()}: {', '.join(' '.join(each.split()) for each in left.split(','))}"
+
+
+def _fault(number: int, line: str, token: str, text: str) -> Fault:
+    return Fault(number, max(0, line.find(token)), len(token), text)
+
+
+def _add_lane(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
+    label, _, row = line.partition("|")
+    begin = len(label) + 1
+    label = label.strip()
+    if not label:
+        yield Fault(number, begin - 1, 1, "this lane has no name, expected an input such as `lidar |a.bc`")
+    drawing.label_lines.setdefault(label, number)
+    row = row.rstrip()
+    drawing.width = max(drawing.width, len(row))
+    for column, letter in enumerate(row):
+        if letter == ".":
+            continue
+        if not letter.isalnum():
+            text = f"{quoted(letter)} is no message, expected a letter or digit, and `.` where nothing comes"
+            yield Fault(number, begin + column, 1, text)
+        elif letter in drawing.marks:
+            yield Fault(number, begin + column, 1, f"`{letter}` is drawn twice: each message has a letter of its own")
+        else:
+            drawing.marks[letter] = Mark(label, column)
+
+
+def _faults_of_order(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
+    order = drawing.order or ()
+    if sorted(order) != sorted(drawing.marks):
+        text = "expected each letter of the lanes above once, in the order of arrival"
+        yield _fault(number, line, line.strip(), text)
+
+
+def _faults_of_line(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
+    moment, colon, left = line.strip().removeprefix(_ARROW).partition(":")
+    moment = moment.strip()
+    if not colon or not left.strip():
+        yield _fault(number, line, line.strip(), "expected what leaves at which message, such as `-> b: aA, c late`")
+        return
+    if moment not in drawing.marks and not _MOMENT.fullmatch(moment):
+        text = f"{quoted(moment)} is no moment, expected a letter that is drawn, or a column such as `@7`"
+        yield _fault(number, line, moment or _ARROW, text)
+    for each in left.split(","):
+        wrong = _wrong(drawing, each.split())
+        if wrong:
+            yield _fault(number, line, each.strip() or ",", wrong)
+
+
+def _wrong(drawing: Drawing, words: Sequence[str]) -> str | None:
+    """Return what is wrong with a set or a drop, in words."""
+    match words:
+        case [letters]:
+            return _undrawn(drawing, letters)
+        case [letters, "stamped", stamped]:
+            return _undrawn(drawing, letters + stamped)
+        case [letter, reason]:
+            hint = did_you_mean(reason, _REASONS) or f", expected {one_of(_REASONS)}"
+            is_reason = reason in _REASONS
+            return _undrawn(drawing, letter) if is_reason else f"{quoted(reason)} is no reason{hint}"
+        case _:
+            return "expected a set such as `aA`, or a drop such as `a late`"
+
+
+def _undrawn(drawing: Drawing, letters: str) -> str | None:
+    unknown = [letter for letter in letters if letter not in (_MISSING, _OTHER) and letter not in drawing.marks]
+    return f"{quoted(unknown[0])} is not drawn" if unknown else None

@@ -1,0 +1,224 @@
+"""From a test file to its cases, or to everything that is wrong with it at once."""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from syncrelay.cases import drawing as drawings
+from syncrelay.cases.drawing import Drawing
+from syncrelay.cases.form import CasesForm
+from syncrelay.cases.models import LONGEST, MOST_SECONDS, Case, CasesFile, InputSource
+from syncrelay.cases.names import input_named
+from syncrelay.config import Config, ConfigError, GroupConfig, Problem, Severity, Span, load
+from syncrelay.config.document import Document, ScalarNode, plain
+from syncrelay.config.problems import Path as Place
+from syncrelay.config.source import Source, check_text, read_source
+from syncrelay.config.translate import translate
+from syncrelay.config.wording import one_of, quoted
+from syncrelay.config.yaml_tree import compose
+from syncrelay.rig.what_if import Fault
+
+_LEAST: Final = "at least `version: 1`, `config:` and `cases:`"
+_MOST_MESSAGES: Final = 1_000_000
+_ONLY_WITH_RATE: Final = ("phase", "jitter", "latency_jitter", "drop")
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedCase:
+    """A case whose words are all known. `places` has the input of each name that it calls one by.
+
+    `span` is where its name stands. `drawing` is None where nothing is drawn, `recording` where none is read.
+    """
+
+    name: str
+    span: Span
+    group: GroupConfig
+    case: Case
+    drawing: Drawing | None
+    recording: str | None
+    places: Mapping[str, int]
+    what_if: tuple[Fault, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Suite:
+    """A test file that is in order: the file that it tests, and its cases."""
+
+    name: str
+    document: Document
+    config: Config
+    cases: tuple[LoadedCase, ...]
+
+
+def load_suite(path: str, *, environ: Mapping[str, str] = os.environ) -> Suite:
+    """Return what a test file says, `-` for standard input; raises ConfigError with everything that is wrong."""
+    return _suite(read_source(path), Path(path).parent if path != "-" else Path(), environ)
+
+
+def load_suite_text(text: str, *, name: str, environ: Mapping[str, str] = os.environ) -> Suite:
+    """Return what the text of a test file of this name says; as `load_suite`."""
+    return _suite(check_text(text, name=name), Path(name).parent, environ)
+
+
+def _suite(source: Source, folder: Path, environ: Mapping[str, str]) -> Suite:
+    document, problems = compose(source, environ, expected=_LEAST)
+    try:
+        file = CasesFile.model_validate(plain(document.root))
+    except ValidationError as error:
+        raise _refusal([*problems, *translate(error.errors(include_url=False), document, CasesForm())]) from error
+    config = _tested(file.config, folder, document, environ)
+    reader = _Reader(document, config, folder)
+    if not file.cases:
+        reader.report(("cases",), "expected one case or more", code="missing_key")
+    cases = [reader.read(name, case) for name, case in file.cases.items()]
+    problems += reader.problems
+    if problems:
+        raise _refusal(problems)
+    return Suite(source.name, document, config, tuple(case for case in cases if case is not None))
+
+
+def _refusal(problems: list[Problem]) -> ConfigError:
+    return ConfigError(sorted(problems, key=lambda problem: problem.span or (0, 0, 0)))
+
+
+def _tested(name: str, folder: Path, document: Document, environ: Mapping[str, str]) -> Config:
+    """Return the file that is tested. That there is none is told where it is named."""
+    path = str(folder / name)
+    try:
+        return load(path, environ=environ)
+    except ConfigError as error:
+        if any(problem.code != "unreadable" or problem.severity is not Severity.ERROR for problem in error.problems):
+            raise
+        texts = [f"{path}: {problem.text}" for problem in error.problems]
+        raise ConfigError([document.problem(("config",), text, code="unreadable") for text in texts]) from error
+
+
+class _Reader:
+    """Finds what the words of cases mean, and gathers what means nothing."""
+
+    def __init__(self, document: Document, config: Config, folder: Path) -> None:
+        self.problems: list[Problem] = []
+        self._document = document
+        self._groups = {group.name: group for group in config.groups}
+        self._folder = folder
+
+    def report(self, path: Place, text: str, *, code: str = "bad_value", span: Span | None = None) -> None:
+        self.problems.append(self._document.problem(path, text, code=code, span=span))
+
+    def read(self, name: str, case: Case) -> LoadedCase | None:
+        path: Place = ("cases", name)
+        group = self._group(path, case)
+        if group is None:
+            return None
+        drawing = self._drawing((*path, "drawing"), case)
+        places: dict[str, int] = {}
+        labels = {} if drawing is None else drawing.label_lines
+        for label, line in labels.items():
+            if label:
+                self._place(label, group, places, (*path, "drawing"), self._span_in(path, line, label))
+        for section, names in (("inputs", case.inputs), ("expect", case.expect.inputs)):
+            for each in names:
+                at = (*path, section, *(("inputs",) if section == "expect" else ()), each)
+                self._place(each, group, places, at, self._document.key_span(at))
+        self._check_sources(path, case, {places[label] for label in labels if label in places}, places)
+        what_if = tuple(self._faults(path, case, group))
+        if case.recording is not None and not case.expect.model_fields_set:
+            self.report(
+                path,
+                "missing, expected what shall come of the recording, for example `expect: {sets: 100}`",
+                code="missing_key",
+                span=self._document.key_span(path),
+            )
+        recording = None if case.recording is None else str(self._folder / case.recording)
+        span = self._document.key_span(path)
+        return LoadedCase(name, span, group, case, drawing, recording, places, what_if)
+
+    def _group(self, path: Place, case: Case) -> GroupConfig | None:
+        if case.group is None and len(self._groups) == 1:
+            return next(iter(self._groups.values()))
+        if case.group is None:
+            text = f"missing, expected the group that is tested: `group: {next(iter(self._groups))}`"
+            self.report((*path, "group"), text, code="missing_key", span=self._document.key_span(path))
+        elif case.group not in self._groups:
+            close = self._document.did_you_mean(case.group, self._groups)
+            text = f"the file has no group {quoted(case.group)}{close or f', expected {one_of(self._groups)}'}"
+            self.report((*path, "group"), text)
+        return self._groups.get(case.group or "")
+
+    def _drawing(self, path: Place, case: Case) -> Drawing | None:
+        if case.drawing is None:
+            return None
+        drawing = drawings.parse(case.drawing)
+        for fault in drawing.faults:
+            self.report(path, fault.text, span=self._span(path, fault.line, fault.column, fault.width))
+        if not drawing.labels and not drawing.faults:
+            self.report(path, "nothing is drawn, expected lanes such as `lidar |a.bc`")
+        if drawing.width * case.period > LONGEST:
+            self.report(path, f"is drawn longer than {MOST_SECONDS}s, with a period of {case.period / 1e9:g}s")
+        return drawing
+
+    def _span_in(self, path: Place, line: int, token: str) -> Span:
+        text = str(self._document.node((*path, "drawing")).value).splitlines()[line]  # type: ignore[union-attr]
+        return self._span((*path, "drawing"), line, max(0, text.find(token)), len(token))
+
+    def _span(self, path: Place, line: int, column: int, width: int) -> Span:
+        """Return where a token of a block of text stands in the file; the whole value, where it is no block."""
+        node = self._document.node(path)
+        assert isinstance(node, ScalarNode)  # noqa: S101  it was read as a text
+        written = self._document.sources[node.span.source].line(node.span.line + 1 + line)
+        shown = str(node.value).splitlines()[line]
+        if not shown or not written.endswith(shown):
+            return node.span
+        return Span(node.span.line + 1 + line, len(written) - len(shown) + column + 1, width, node.span.source)
+
+    def _place(self, name: str, group: GroupConfig, places: dict[str, int], path: Place, span: Span) -> None:
+        try:
+            places[name] = input_named(name, group)
+        except ValueError as error:
+            self.report(path, str(error), code="unknown_input", span=span)
+
+    def _check_sources(self, path: Place, case: Case, drawn: set[int], places: Mapping[str, int]) -> None:
+        if case.recording is not None:
+            for key in ("drawing", "inputs", "lasts", "period"):
+                if key in case.model_fields_set:
+                    at = (*path, key)
+                    self.report(at, "has no place beside a recording", span=self._document.key_span(at))
+            return
+        rates = [source.rate for source in case.inputs.values() if source.rate is not None]
+        if case.drawing is None and not rates:
+            text = "nothing comes, expected a `drawing`, a `recording`, or `inputs` with a `rate`"
+            self.report(path, text, code="missing_key", span=self._document.key_span(path))
+        if rates and case.lasts is None:
+            text = "missing, expected how long the inputs with a rate send, for example `lasts: 30s`"
+            self.report((*path, "lasts"), text, code="missing_key", span=self._document.key_span((*path, "inputs")))
+        if case.lasts is not None and sum(case.lasts // rate for rate in rates) > _MOST_MESSAGES:
+            self.report((*path, "lasts"), f"more than {_MOST_MESSAGES} messages would come: expected less time or rate")
+        for name, source in case.inputs.items():
+            self._check_source((*path, "inputs", name), source, is_drawn=places.get(name) in drawn)
+
+    def _check_source(self, path: Place, source: InputSource, *, is_drawn: bool) -> None:
+        if source.rate is not None:
+            if is_drawn:
+                self.report((*path, "rate"), "this input is drawn already, expected one or the other")
+            return
+        for key in _ONLY_WITH_RATE:
+            if key in source.model_fields_set:
+                at = (*path, key)
+                self.report(at, "is for an input with a `rate`", span=self._document.key_span(at))
+
+    def _faults(self, path: Place, case: Case, group: GroupConfig) -> Iterator[Fault]:
+        """Yield faults of messages that are not recorded, by the full names of their inputs."""
+        for index, fault in enumerate(case.what_if):
+            if case.recording is not None:
+                yield fault
+                continue
+            try:
+                place = input_named(fault.topic, group)
+            except ValueError as error:
+                self.report((*path, "what_if", index), str(error), code="unknown_input")
+            else:
+                yield fault.of_topic(group.inputs.names[place])

@@ -1,0 +1,250 @@
+"""What came of tests, for people and for programs: text, JUnit's XML, JSON, GitHub's annotations."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+from xml.sax.saxutils import escape, quoteattr
+
+from syncrelay.cases import Mismatch, Result
+from syncrelay.cases.drawing import lanes
+from syncrelay.cli.boundary import put, remark, say, wants_colour
+from syncrelay.cli.problems import inert, problem_as_json, problem_command, workflow_command
+from syncrelay.config import Problem, render
+from syncrelay.config.problems import dotted
+from syncrelay.printable import printable, printable_lines
+
+_BOLD, _RED, _RESET = "\033[1m", "\033[31m", "\033[0m"
+
+
+@dataclass(frozen=True, slots=True)
+class FileResult:
+    """A test file: what is wrong with it, or what came of its cases."""
+
+    name: str
+    problems: Sequence[Problem]
+    cases: Sequence[Result]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all is as it shall be."""
+        return not self.problems and all(case.passed for case in self.cases)
+
+
+class Report(Protocol):
+    """Tells of files as they are run, and of all at the end."""
+
+    def begin(self, name: str) -> None:
+        """Tell that the cases of a file are run next."""
+        ...
+
+    def fault(self, result: FileResult) -> None:
+        """Tell of a file that cannot be run."""
+        ...
+
+    def case(self, name: str, result: Result) -> None:
+        """Tell of a case of a file."""
+        ...
+
+    def end(self, results: Sequence[FileResult]) -> None:
+        """Tell of all."""
+        ...
+
+
+class Text:
+    """For people: a line a case, of those that fail what differs, and a closing line."""
+
+    def __init__(self) -> None:
+        is_coloured = wants_colour(sys.stdout.isatty())
+        self._bold, self._red, self._reset = (_BOLD, _RED, _RESET) if is_coloured else ("", "", "")
+
+    def begin(self, name: str) -> None:
+        """See Report."""
+        put(f"{self._bold}{printable(name)}{self._reset}")
+
+    def fault(self, result: FileResult) -> None:
+        """See Report."""
+        say(render(result.problems, colour=wants_colour(sys.stderr.isatty())))
+
+    def case(self, _name: str, result: Result) -> None:
+        """See Report."""
+        name = printable(result.case.name)
+        put(f"  ok    {name}" if result.passed else f"  {self._red}FAIL{self._reset}  {name}")
+        for line in what_differs(result):
+            put(f"        {printable(line)}")
+        for sentence in result.remarks:
+            remark(printable(sentence))
+
+    def end(self, results: Sequence[FileResult]) -> None:
+        """See Report."""
+        put(summary(results))
+
+
+class Github(Text):
+    """Annotations for a workflow, at the line of the case, and the text."""
+
+    def begin(self, name: str) -> None:
+        """See Report."""
+        put(inert(printable(name)))
+
+    def fault(self, result: FileResult) -> None:
+        """See Report."""
+        for problem in result.problems:
+            put(problem_command(problem))
+
+    def case(self, name: str, result: Result) -> None:
+        """See Report."""
+        if result.passed:
+            put(inert(f"  ok    {printable(result.case.name)}"))
+        else:
+            text = "\n".join([result.case.name, *what_differs(result)])
+            put(workflow_command("error", text, file=name, span=result.case.span))
+        for sentence in result.remarks:
+            remark(printable(sentence))
+
+
+class Json:
+    """One document, when all is done."""
+
+    def begin(self, _name: str) -> None:
+        """See Report."""
+
+    def fault(self, _result: FileResult) -> None:
+        """See Report."""
+
+    def case(self, _name: str, _result: Result) -> None:
+        """See Report."""
+
+    def end(self, results: Sequence[FileResult]) -> None:
+        """See Report."""
+        passed, failed = counts(results)
+        put(json.dumps({"passed": passed, "failed": failed, "files": [_file(each) for each in results]}, indent=2))
+
+
+class Junit(Json):
+    """JUnit's XML, as GitLab, Jenkins and others read it, when all is done."""
+
+    def end(self, results: Sequence[FileResult]) -> None:
+        """See Report."""
+        put("\n".join(_junit(results)))
+
+
+REPORTS: Final[dict[str, Callable[[], Report]]] = {"text": Text, "junit": Junit, "json": Json, "github": Github}
+
+
+def counts(results: Sequence[FileResult]) -> tuple[int, int]:
+    """Return how many cases passed and failed."""
+    cases = [case.passed for result in results for case in result.cases]
+    return sum(cases), len(cases) - sum(cases)
+
+
+def summary(results: Sequence[FileResult]) -> str:
+    """Return the closing line."""
+    passed, failed = counts(results)
+    faulty = sum(bool(result.problems) for result in results)
+    errors = f", {faulty} {'file' if faulty == 1 else 'files'} with errors" if faulty else ""
+    return f"{passed} passed, {failed} failed{errors}"
+
+
+def what_differs(result: Result) -> Iterator[str]:
+    """Yield what is not as it shall be, in lines: `-` is expected, `+` is what came."""
+    if result.error is not None:
+        yield from result.error.splitlines()
+    for mismatch in result.mismatches:
+        if isinstance(mismatch.renewed, tuple):
+            yield from lanes(result.case.case.drawing or "")
+            yield from _diff(mismatch)
+        else:
+            label = dotted(mismatch.path[3:])
+            yield f"{label}: expected {', '.join(mismatch.expected)}, found {', '.join(mismatch.found)}"
+
+
+def _headline(result: Result) -> str:
+    """Return what is not as it shall be, in a few words."""
+    if result.error is not None:
+        return result.error.splitlines()[0]
+    is_drawn = [isinstance(each.renewed, tuple) for each in result.mismatches]
+    if any(is_drawn):
+        return "not what was drawn"
+    return f"not as expected: {', '.join(dotted(each.path[3:]) for each in result.mismatches)}"
+
+
+def _diff(mismatch: Mismatch) -> Iterator[str]:
+    from difflib import SequenceMatcher
+
+    expected, found = mismatch.expected, mismatch.found
+    for kind, begin, end, other_begin, other_end in SequenceMatcher(None, expected, found).get_opcodes():
+        if kind == "equal":
+            yield from (f"  -> {line}" for line in expected[begin:end])
+        else:
+            yield from (f"- -> {line}" for line in expected[begin:end])
+            yield from (f"+ -> {line}" for line in found[other_begin:other_end])
+
+
+def _file(result: FileResult) -> dict[str, Any]:
+    return {
+        "file": result.name,
+        "problems": [problem_as_json(problem) for problem in result.problems],
+        "cases": [_case(case) for case in result.cases],
+    }
+
+
+def _case(result: Result) -> dict[str, Any]:
+    return {
+        "name": result.case.name,
+        "line": result.case.span.line,
+        "group": result.case.group.name,
+        "passed": result.passed,
+        "seconds": round(result.seconds, 6),
+        "error": result.error,
+        "mismatches": [
+            {"path": dotted(each.path), "expected": each.expected, "found": each.found} for each in result.mismatches
+        ],
+        "remarks": result.remarks,
+    }
+
+
+def _junit(results: Sequence[FileResult]) -> Iterator[str]:
+    yield '<?xml version="1.0" encoding="UTF-8"?>'
+    passed, failed = counts(results)
+    errors = sum(bool(result.problems) for result in results)
+    yield f'<testsuites name="syncrelay test" tests="{passed + failed + errors}" failures="{failed}" errors="{errors}">'
+    for result in results:
+        of_file = counts([result])
+        faulty = bool(result.problems)
+        seconds = sum(case.seconds for case in result.cases)
+        yield (
+            f'  <testsuite name={_attribute(result.name)} tests="{sum(of_file) + faulty}" failures="{of_file[1]}"'
+            f' errors="{int(faulty)}" time="{seconds:.3f}">'
+        )
+        if faulty:
+            yield f"    <testcase name={_attribute(result.name)}>"
+            yield f"      <error message={_attribute(result.problems[0].text)}>{_text(render(result.problems))}</error>"
+            yield "    </testcase>"
+        for case in result.cases:
+            yield from _junit_case(result.name, case)
+        yield "  </testsuite>"
+    yield "</testsuites>"
+
+
+def _junit_case(file: str, result: Result) -> Iterator[str]:
+    head = (
+        f"    <testcase classname={_attribute(file)} name={_attribute(result.case.name)}"
+        f' file={_attribute(file)} line="{result.case.span.line}" time="{result.seconds:.3f}"'
+    )
+    if result.passed:
+        yield f"{head}/>"
+        return
+    lines = "\n".join(what_differs(result))
+    yield f"{head}>"
+    yield f"      <failure message={_attribute(_headline(result))}>{_text(lines)}</failure>"
+    yield "    </testcase>"
+
+
+def _attribute(text: str) -> str:
+    return quoteattr(printable(text))
+
+
+def _text(text: str) -> str:
+    return escape(printable_lines(text))

@@ -1,0 +1,195 @@
+"""Faults that are laid over messages as they come: late, lost, stamped by a clock that is off, or none at all.
+
+    late: /lidar/points 80ms            drop: /imu/data 10%
+    offset: /camera/image_raw -12ms     drift: /camera/image_raw 100ppm
+    dead: /lidar/points from 12s        each with `from 12s` and `until 20s`, if it is to begin or to end
+
+The same faults, seed and messages give the same messages.
+"""
+
+import random
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from types import MappingProxyType
+from typing import Final
+
+from syncrelay.config.names import check_topic_name
+from syncrelay.config.units import parse_duration
+from syncrelay.config.wording import did_you_mean, one_of, quoted
+
+_MILLION: Final = 1_000_000
+_SHARE: Final = re.compile(r"([0-9]{1,3}(?:\.[0-9]{1,9})?)\s*%")
+_PARTS: Final = re.compile(r"([+-]?[0-9]{1,7}(?:\.[0-9]{1,6})?)\s*ppm")
+_LATEST: Final = 60 * 1_000_000_000
+_MOST_PARTS: Final = 100_000
+
+
+class Kind(Enum):
+    """What is wrong with a topic."""
+
+    LATE = "late"
+    DROP = "drop"
+    OFFSET = "offset"
+    DRIFT = "drift"
+    DEAD = "dead"
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A fault of a topic, as it was `written`.
+
+    `amount` is nanoseconds of `late` and `offset`, millionths of `drop` and `drift`. It holds from `begin` to before
+    `end`, in nanoseconds after the first message of all; an `end` of None is never.
+    """
+
+    kind: Kind
+    topic: str
+    amount: int
+    begin: int
+    end: int | None
+    written: str
+
+    def of_topic(self, topic: str) -> "Fault":
+        """Return the same fault of a topic by another of its names."""
+        return replace(self, topic=topic)
+
+    def holds(self, since: int) -> bool:
+        """Tell whether it holds so many nanoseconds after the first message."""
+        return since >= self.begin and (self.end is None or since < self.end)
+
+
+def parse_fault(text: str) -> Fault:
+    """Return the fault that a text says; raises ValueError saying what to write instead."""
+    name, colon, rest = text.partition(":")
+    kinds = {kind.value: kind for kind in Kind}
+    kind = kinds.get(name.strip())
+    if not colon:
+        raise ValueError(f"{quoted(text)} is no fault, expected one such as {quoted(_EXAMPLES[Kind.LATE])}")
+    if kind is None:
+        hint = did_you_mean(name.strip(), kinds) or f", expected {one_of(kinds)}, as in `late: /lidar/points 80ms`"
+        raise ValueError(f"{quoted(text)} is no fault{hint}")
+    words: Sequence[str]
+    topic, *words = rest.split() or [""]
+    if not topic:
+        raise ValueError(f"{quoted(text)} names no topic, expected {quoted(_EXAMPLES[kind])}")
+    check_topic_name(topic)
+    amount, words = _amount(kind, words, text)
+    begin, end = _window(words, text)
+    return Fault(kind, topic, amount, begin, end, text)
+
+
+_EXAMPLES: Final[Mapping[Kind, str]] = MappingProxyType(
+    {
+        Kind.LATE: "late: /lidar/points 80ms",
+        Kind.DROP: "drop: /imu/data 10%",
+        Kind.OFFSET: "offset: /camera/image_raw -12ms",
+        Kind.DRIFT: "drift: /camera/image_raw 100ppm",
+        Kind.DEAD: "dead: /lidar/points from 12s",
+    }
+)
+
+
+def _late(word: str) -> int:
+    delay = parse_duration(word)
+    if not 0 <= delay <= _LATEST:
+        raise ValueError(f"{quoted(word)} is out of range, expected 0 to 60s: so long messages are held in memory")
+    return delay
+
+
+def parse_share(word: str) -> int:
+    """Return the millionths of a text such as 10%; raises ValueError for another."""
+    found = _SHARE.fullmatch(word)
+    if found is None or float(found[1]) > 100:  # noqa: PLR2004  all there is
+        raise ValueError(f"expected a share of 0% to 100%, found {quoted(word)}")
+    return round(float(found[1]) * _MILLION / 100)
+
+
+def _drift(word: str) -> int:
+    found = _PARTS.fullmatch(word)
+    if found is None or abs(float(found[1])) > _MOST_PARTS:
+        raise ValueError(f"expected a drift such as 100ppm, {_MOST_PARTS}ppm at most, found {quoted(word)}")
+    return round(float(found[1]))
+
+
+_READERS: Final[Mapping[Kind, Callable[[str], int]]] = MappingProxyType(
+    {Kind.LATE: _late, Kind.DROP: parse_share, Kind.OFFSET: parse_duration, Kind.DRIFT: _drift}
+)
+
+
+def _amount(kind: Kind, words: Sequence[str], text: str) -> tuple[int, Sequence[str]]:
+    """Return the amount, and the words behind it. A unit may stand apart from its number."""
+    reader = _READERS.get(kind)
+    if reader is None:
+        return 0, words
+    until = next((at for at, word in enumerate(words) if word in ("from", "until")), len(words))
+    if not until:
+        raise ValueError(f"{quoted(text)} does not say how much, expected {quoted(_EXAMPLES[kind])}")
+    return reader("".join(words[:until])), words[until:]
+
+
+def _window(words: Sequence[str], text: str) -> tuple[int, int | None]:
+    found: dict[str, int] = {}
+    for word, moment in zip(words[::2], [*words[1::2], ""], strict=False):
+        if word not in ("from", "until") or word in found:
+            raise ValueError(f"{quoted(word)} in {quoted(text)}: expected `from 12s`, `until 20s` or both")
+        found[word] = parse_duration(moment)
+    begin, end = found.get("from", 0), found.get("until")
+    if begin < 0 or (end is not None and end <= begin):
+        raise ValueError(f"{quoted(text)} never holds: expected 0s or more, and an end after the begin")
+    return begin, end
+
+
+class Disturbance:
+    """The faults of one topic at work on its messages, in the order in which they are received."""
+
+    def __init__(self, faults: Sequence[Fault], *, topic: str, seed: int, began: int) -> None:
+        """`began` is when the first message of all was received, in nanoseconds."""
+        self._faults = [each for each in faults if each.kind is not Kind.DROP]
+        # Of their own each, so that one more fault does not change what another loses.
+        self._drops = [
+            (each, random.Random(f"{seed} {topic} {each.written}"))  # noqa: S311  repeatable is the point
+            for each in faults
+            if each.kind is Kind.DROP
+        ]
+        self._began = began
+        self._last = began
+        self.most_late: Final = sum(each.amount for each in faults if each.kind is Kind.LATE)
+        self.changes_stamps: Final = any(each.kind in (Kind.OFFSET, Kind.DRIFT) for each in faults)
+
+    def received(self, received: int) -> int | None:
+        """Return when a message comes that would have come at a time; None if it is lost. All keep their order."""
+        since = received - self._began
+        # Each is asked for each message: what one lost changes nothing of what another loses.
+        lost = [
+            fault for fault, chance in self._drops if chance.random() * _MILLION < fault.amount and fault.holds(since)
+        ]
+        if lost or any(fault.kind is Kind.DEAD and fault.holds(since) for fault in self._faults):
+            return None
+        late = sum(fault.amount for fault in self._faults if fault.kind is Kind.LATE and fault.holds(since))
+        self._last = max(self._last, received + late)
+        return self._last
+
+    def stamp(self, stamp: int, received: int) -> int:
+        """Return the stamp of a message that was received at a time, by the clock that is off; 0 stays unset."""
+        since = received - self._began
+        shift = 0
+        for fault in self._faults:
+            if fault.kind is Kind.OFFSET and fault.holds(since):
+                shift += fault.amount
+            elif fault.kind is Kind.DRIFT and since >= fault.begin:
+                # What a clock has gained it keeps.
+                until = since if fault.end is None else min(since, fault.end)
+                shift += (until - fault.begin) * fault.amount // _MILLION
+        return stamp + shift if stamp else stamp
+
+
+def disturbances(faults: Sequence[Fault], topics: Sequence[str], *, seed: int, began: int) -> dict[str, Disturbance]:
+    """Return what faults do to topics; raises ValueError for a fault of a topic that is not among them."""
+    for fault in faults:
+        if fault.topic not in topics:
+            there = did_you_mean(fault.topic, topics) or f", expected {one_of(dict.fromkeys(topics))}"
+            raise ValueError(f"{quoted(fault.written)}: there is no {fault.topic}{there}")
+    of = {topic: [fault for fault in faults if fault.topic == topic] for topic in topics}
+    return {topic: Disturbance(each, topic=topic, seed=seed, began=began) for topic, each in of.items() if each}

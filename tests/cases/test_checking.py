@@ -1,0 +1,141 @@
+"""What comes of drawn, simulated and recorded messages is what the engine and the judge make of them."""
+
+import pytest
+
+from tests.bag.making import rig, write_mcap
+from tests.cases.suites import found, left, run
+from tests.ros.cdr_messages import VECTOR
+
+PAIR = "camera |a...\nlidar  |.A..\n"
+RATES = {"inputs": {"camera": {"rate": "10 Hz"}, "lidar": {"rate": "10 Hz", "phase": "5ms"}}, "lasts": "20s"}
+RECORDED = {"topics": [{"topic": "/camera", "type": VECTOR}, {"topic": "/lidar", "type": VECTOR}]}
+
+
+@pytest.mark.parametrize(
+    ("numbers", "lines"),
+    [
+        ({}, ("A: aA",)),
+        ({"period": "25ms"}, ("A: a too_far",)),
+        ({"inputs": {"lidar": {"offset": "15ms"}}}, ("A: a too_far",)),
+        ({"inputs": {"camera": {"latency": "30ms"}}}, ("a: aA",)),
+        ({"what_if": ["late: /camera 30ms"]}, ("a: aA",)),
+        ({"what_if": ["dead: /camera from 0s"]}, ()),
+        ({"what_if": ["offset: lidar -1s"]}, ("A: A too_far",)),
+    ],
+)
+def test_numbers_say_what_a_drawing_is_too_small_for(tmp_path, numbers, lines):
+    assert left(tmp_path, PAIR, case=numbers) == lines
+
+
+def test_a_deadline_is_told_by_its_column_and_what_waits_at_the_end_is_not(tmp_path):
+    topics = [{"topic": "/camera"}, {"topic": "/lidar"}, {"topic": "/radar", "required": False}]
+    drawing = "camera |a.....b\nlidar  |.A....B\nradar  |.......\n"
+    assert left(tmp_path, drawing, topics=topics, max_wait="25ms") == ("@3.5: aA-",)
+
+
+def test_a_set_is_told_with_the_stamp_that_it_is_given(tmp_path):
+    assert left(tmp_path, PAIR, restamp="latest") == ("A: aA stamped A",)
+
+
+def test_letters_of_one_key_belong_together(tmp_path):
+    drawing = "camera |ab..\nlidar  |..BA\nkeys: aA bB\n"
+    group = {"policy": "equal_key", "slop": None, "key": "header.frame_id"}
+    fields = {"camera": {"field": "header.frame_id"}, "lidar": {"field": "header.frame_id"}}
+    assert left(tmp_path, drawing, case={"inputs": fields}, **group) == ("B: a superseded, bB",)
+    fields["lidar"]["field"] = "header.stamp"
+    assert left(tmp_path, drawing, case={"inputs": fields}, **group) == ("B: B malformed", "A: A malformed")
+
+
+def test_figures_are_those_of_the_engine(tmp_path):
+    expect = {
+        "sets": 1,
+        "received": 1,
+        "in_sets": 1,
+        "match_rate": 0.5,
+        "dropped": 1,
+        "span_p95": "1ms",
+        "span_max": "< 2ms",
+        "latency_max": "> 1ms",
+        "drops": {"late": 1},
+        "inputs": {"lidar": {"received": 1}},
+    }
+    assert found(tmp_path, expect, RATES) == {
+        "sets": "200",
+        "received": "200",
+        "in_sets": "400",
+        "match_rate": "1",
+        "dropped": "0",
+        "span_p95": "5ms",
+        "span_max": "5ms",
+        "latency_max": "0ms",
+        "late": "0",
+    }
+
+
+def test_figures_that_hold_are_not_told(tmp_path):
+    expect = {
+        "sets": ">= 200",
+        "match_rate": "100%",
+        "span_p95": "< 6ms",
+        "drops": {"overflow": 0},
+        "findings": ["healthy"],
+    }
+    assert found(tmp_path, expect, RATES) == {}
+
+
+@pytest.mark.parametrize(
+    ("what_if", "code"),
+    [([], "healthy"), (["dead: /lidar from 8s"], "silent"), (["offset: /camera 2s"], "other_clock")],
+)
+def test_findings_are_those_of_the_judge(tmp_path, what_if, code):
+    assert found(tmp_path, {"findings": ["alone"]}, {**RATES, "what_if": what_if}) == {"findings": code}
+
+
+def test_without_a_set_there_is_no_span_to_expect(tmp_path):
+    result = run(tmp_path, {**RATES, "what_if": ["dead: /lidar"], "expect": {"span_p95": "< 1ms"}})
+    assert [(each.found, each.renewed) for each in result.mismatches] == [(("no set left",), None)]
+
+
+def test_losses_are_the_same_for_a_seed_and_others_for_another(tmp_path):
+    case = {**RATES, "what_if": ["drop: /camera 30%"]}
+    first, again, other = (found(tmp_path, {"sets": 1}, {**case, "seed": seed})["sets"] for seed in (1, 1, 2))
+    assert first == again != other
+    assert 100 < int(first) < 180
+
+
+def test_an_input_that_loses_everything_sends_nothing(tmp_path):
+    case = {"inputs": {"camera": {"rate": "10 Hz", "drop": "100%"}, "lidar": {"rate": "30 Hz"}}, "lasts": "2s"}
+    assert found(tmp_path, {"received": 1}, case) == {"received": "60"}
+
+
+def test_a_recording_is_run_as_replay_runs_it(tmp_path):
+    write_mcap(tmp_path / "rig.mcap", rig())
+    expect = {"sets": 1, "match_rate": 0, "findings": ["silent"], "inputs": {"camera": {"received": 1}}}
+    assert found(tmp_path, expect, {"recording": "rig.mcap"}, **RECORDED) == {
+        "sets": "40",
+        "match_rate": "1",
+        "received": "40",
+        "findings": "healthy",
+    }
+    late = {"recording": "rig.mcap", "what_if": ["dead: /lidar from 2s"]}
+    assert found(tmp_path, {"sets": 1}, late, **RECORDED) == {"sets": "20"}
+
+
+@pytest.mark.parametrize(
+    ("case", "error"),
+    [
+        ({"recording": "rg.mcap"}, "did you mean `rig.mcap`?"),
+        ({"recording": "rig.mcap", "what_if": ["drop: /lidr 3%"]}, "there is no /lidr, did you mean `/lidar`?"),
+    ],
+)
+def test_what_cannot_be_run_fails_and_says_why(tmp_path, case, error):
+    write_mcap(tmp_path / "rig.mcap", rig(3))
+    result = run(tmp_path, {**case, "expect": {"sets": 1}}, **RECORDED)
+    assert error in result.error
+    assert not result.passed
+
+
+def test_a_recording_without_a_required_topic_fails(tmp_path):
+    write_mcap(tmp_path / "rig.mcap", [frame for frame in rig(3) if frame.topic == "/camera"])
+    result = run(tmp_path, {"recording": "rig.mcap", "expect": {"sets": 0}}, **RECORDED)
+    assert result.error == "front: /lidar is not in the recording, it has /camera"

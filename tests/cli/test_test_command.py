@@ -1,0 +1,170 @@
+"""`syncrelay test`: what people and programs read of it, its exit codes, and --update."""
+
+import io
+import json
+import sys
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from syncrelay.cli import parsers
+from syncrelay.cli.test import command
+from syncrelay.errors import UsageError
+from tests.cases.suites import write
+
+SUITE = """\
+version: 1
+config: fusion.yaml
+cases:
+  # The lidar is 10 ms later.
+  they meet:
+    drawing: |
+      camera |a..b
+      lidar  |.A..
+      -> A: aA
+  they never do:
+    drawing: |
+      camera |a..b
+      lidar  |.A..
+      -> A: a too_far
+      -> b: bA
+  figures:
+    inputs: {camera: {rate: 10 Hz}, lidar: {rate: 10 Hz}}   # both at once
+    lasts: 5s
+    expect: {sets: ">= 60", match_rate: 1, drops: {late: 3}, findings: [silent]}
+"""
+SHOWN = """\
+tests.yaml
+  ok    they meet
+  FAIL  they never do
+        camera |a..b
+        lidar  |.A..
+        - -> A: a too_far
+        - -> b: bA
+        + -> A: aA
+  FAIL  figures
+        sets: expected >= 60, found 50
+        drops.late: expected 3, found 0
+        findings: expected silent, found healthy
+1 passed, 2 failed
+"""
+UPDATED = (
+    SUITE.replace("      -> A: a too_far\n      -> b: bA\n", "      -> A: aA\n")
+    .replace(">= 60", ">= 50")
+    .replace("late: 3", "late: 0")
+    .replace("[silent]", "[healthy]")
+    .replace("   # both", " # both")
+)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    write(tmp_path, {})
+    (tmp_path / "tests.yaml").write_text(SUITE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*words):
+    parser = parsers.test()
+    return command(parser, parser.read(words), None)
+
+
+@pytest.mark.usefixtures("folder")
+def test_people_read_a_line_a_case_and_what_differs(capsys):
+    assert run("tests.yaml") == 1
+    assert capsys.readouterr() == (SHOWN, "")
+
+
+def test_what_is_can_be_what_shall_be_and_comments_stay(folder, capsys):
+    (folder / "tests.yaml").chmod(0o640)
+    assert run("tests.yaml", "--update") == 0
+    assert capsys.readouterr().err == "syncrelay: tests.yaml: 4 expectations updated\n"
+    assert [line.split() for line in (folder / "tests.yaml").read_text().splitlines()] == [
+        line.split() for line in UPDATED.splitlines()
+    ]
+    assert (folder / "tests.yaml").stat().st_mode & 0o777 == 0o640
+    assert run("tests.yaml") == 0
+    assert sorted(each.name for each in folder.iterdir()) == ["fusion.yaml", "tests.yaml"]
+
+
+def test_an_update_of_what_passes_leaves_the_file_alone(folder):
+    (folder / "tests.yaml").write_text(UPDATED)
+    before = (folder / "tests.yaml").stat()
+    assert run("tests.yaml", "--update") == 0
+    assert (folder / "tests.yaml").stat() == before
+
+
+def test_what_no_file_can_expect_still_fails_after_an_update(folder, capsys):
+    case = {"inputs": {"camera": {"rate": "9 Hz"}}, "lasts": "1s", "expect": {"span_p95": "< 1ms", "sets": 1}}
+    write(folder, case)
+    assert run("tests.yaml", "--update") == 1
+    assert "span_p95: expected < 1ms, found no set left" in capsys.readouterr().out
+
+
+def test_a_case_with_the_name_of_a_number_is_updated_too(folder):
+    (folder / "tests.yaml").write_text(
+        "version: 1\nconfig: fusion.yaml\ncases:\n  2:\n    drawing: camera |a\n"
+        "  1: {drawing: 'lidar |a', expect: {received: 4}}\n"
+    )
+    assert run("tests.yaml", "--update") == 0
+    assert "expect: {received: 1}" in (folder / "tests.yaml").read_text()
+
+
+@pytest.mark.usefixtures("folder")
+def test_programs_read_json(capsys):
+    assert run("tests.yaml", "--format", "json") == 1
+    report = json.loads(capsys.readouterr().out)
+    assert (report["passed"], report["failed"]) == (1, 2)
+    cases = report["files"][0]["cases"]
+    assert [(case["name"], case["line"], case["passed"]) for case in cases] == [
+        ("they meet", 5, True),
+        ("they never do", 10, False),
+        ("figures", 16, False),
+    ]
+    assert cases[1]["mismatches"] == [
+        {"path": 'cases."they never do".drawing', "expected": ["A: a too_far", "b: bA"], "found": ["A: aA"]}
+    ]
+
+
+def test_ci_servers_read_junit(folder, capsys):
+    (folder / "other.yaml").write_text("version: 1\n")
+    assert run("tests.yaml", "other.yaml", "--format", "junit") == 1
+    root = ET.fromstring(capsys.readouterr().out)  # noqa: S314  our own
+    assert root.attrib == {"name": "syncrelay test", "tests": "4", "failures": "2", "errors": "1"}
+    failures = [each.attrib["message"] for each in root.iter("failure")]
+    assert failures == ["not what was drawn", "not as expected: sets, drops.late, findings"]
+    assert "+ -> A: aA" in next(root.iter("failure")).text
+    assert "other.yaml:1:1: config: missing" in next(root.iter("error")).text
+
+
+def test_github_reads_annotations_at_the_case(folder, capsys):
+    text = SUITE.replace("they meet", '"::error::they 100%"')
+    (folder / "tests.yaml").write_text(text)
+    assert run("tests.yaml", "--format", "github") == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "  ok    %3A%3Aerror%3A%3Athey 100%"
+    assert lines[2].startswith("::error file=tests.yaml,line=10,col=3,endColumn=16::they never do%0Acamera |a..b%0A")
+
+
+def test_a_faulty_file_is_told_as_any_other_and_the_rest_is_run(folder, capsys):
+    (folder / "other.yaml").write_text("version: 1\nconfg: fusion.yaml\n")
+    assert run("other.yaml", "tests.yaml") == 1
+    told = capsys.readouterr()
+    assert "other.yaml:2:1: confg: unknown key, did you mean `config`?\n    2 | confg: fusion.yaml\n" in told.err
+    assert told.out.endswith("1 passed, 2 failed, 1 file with errors\n")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_file_may_come_from_standard_input_but_is_not_written_there(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(UPDATED.encode())))
+    assert run("-") == 0
+    assert capsys.readouterr().out.startswith("<stdin>\n  ok    they meet\n")
+    with pytest.raises(UsageError, match="--update cannot write standard input"):
+        run("-", "--update")
+
+
+def test_names_reach_a_terminal_as_text_alone(folder, capsys):
+    (folder / "tests.yaml").write_text(SUITE.replace("they meet", '"\\e[2Jgone\\nok"'))
+    run("tests.yaml")
+    assert "  ok    \\x1b[2Jgone\\nok\n" in capsys.readouterr().out

@@ -1,0 +1,54 @@
+"""`syncrelay replay --what-if`: a fault changes what comes of a recording, the same for a seed."""
+
+import pytest
+
+from syncrelay.cli import parsers
+from syncrelay.cli.replay import command
+from syncrelay.errors import UsageError
+from tests.bag.making import rig, write_mcap
+from tests.cases.suites import write
+from tests.ros.cdr_messages import VECTOR
+
+_TOPICS = [{"topic": "/camera", "type": VECTOR}, {"topic": "/lidar", "type": VECTOR}]
+
+
+@pytest.fixture
+def replayed(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_mcap(tmp_path / "rig.mcap", rig())
+    write(tmp_path, {}, topics=_TOPICS)
+
+    def run(*words):
+        parser = parsers.replay()
+        code = command(parser, parser.read(["rig.mcap", "--config", "fusion.yaml", *words]), None)
+        told = capsys.readouterr()
+        return code, told.out.splitlines(), told.err
+
+    return run
+
+
+def test_a_fault_changes_what_comes_and_is_named(replayed):
+    code, (sets, *_), said = replayed()
+    assert (code, sets, said) == (0, "front: 40 sets", "")
+    code, (sets, _, lidar), said = replayed("--what-if", "dead: /lidar from 2s", "--what-if", "offset: /lidar 5ms")
+    assert (code, sets, lidar) == (0, "front: 20 sets", "front:   /lidar: 20 received, 20 in sets, 0 dropped")
+    assert said == "syncrelay: laid over the recording, with seed 0: `dead: /lidar from 2s`, `offset: /lidar 5ms`\n"
+
+
+def test_a_seed_decides_what_is_lost(replayed):
+    lost = ("--what-if", "drop: /lidar 50%", "--json", "--seed")
+    assert replayed(*lost, "1") == replayed(*lost, "1") != replayed(*lost, "2")
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (("--what-if", "lat: /lidar 3ms"), "argument --what-if: `lat: /lidar 3ms` is no fault, did you mean `late`?"),
+        (("--what-if", "dead: /lida"), "`dead: /lida`: there is no /lida, did you mean `/lidar`?"),
+        (("--seed", "-1"), "expected a whole number of 0 or more, found -1"),
+    ],
+)
+def test_what_cannot_be_is_wrong_usage(replayed, words, error):
+    with pytest.raises(UsageError) as raised:
+        replayed(*words)
+    assert error in str(raised.value)
