@@ -1,5 +1,6 @@
 """From a file to a Config, or to everything that is wrong with it at once."""
 
+import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -64,6 +65,15 @@ def load_text(
 ) -> Config:
     """Return what the text of a file says; as `load`."""
     return _config(_parts([lambda: check_text(text, name=name)], environ), environ)
+
+
+def spelt_out(text: str, *, environ: Mapping[str, str] = os.environ) -> str:
+    """Return the text of a file that is in order with what its aliases and merge keys stand for in their places."""
+    if "*" not in text and "<<" not in text:
+        return text
+    document, _ = compose(check_text(text, name="<text>"), environ)
+    # Variables are filled in: what looks like one is none.
+    return json.dumps(plain(document.root)).replace("$", "$$")
 
 
 @dataclass(frozen=True, slots=True)
