@@ -85,7 +85,7 @@ def commands_help() -> str:
 def _unknown_command(word: str) -> str:
     from syncrelay.config.wording import did_you_mean
 
-    if word.endswith((".yaml", ".yml")) or Path(word).is_file():
+    if word.endswith((".yaml", ".yml")) or Path(word).exists():
         return (
             f"{word} is not a command\n  syncrelay --config {word}     to run the relay with it\n"
             f"  syncrelay validate {word}     to check it"

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from pydantic import ValidationError
@@ -19,7 +19,7 @@ from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.partial import partial_file
 from syncrelay.config.problems import ConfigError, Problem, Severity
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
-from syncrelay.config.source import PATIENCE_S, Source, check_text, read_source
+from syncrelay.config.source import PATIENCE_S, Source, check_text, listed, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
 from syncrelay.config.yaml_tree import compose
@@ -48,13 +48,24 @@ def load(
     environ: Mapping[str, str] = os.environ,
     patience_s: float = PATIENCE_S,
 ) -> Config:
-    """Return what a file says, `-` for standard input; of several files, what they say together.
+    """Return what a file says, `-` for standard input; of several, or those of a directory, what they say together.
 
     Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. A pipe is
     read for so many seconds. Raises ConfigError with everything that is wrong.
     """
-    reads = [partial(read_source, path, index=index, patience_s=patience_s) for index, path in enumerate(paths)]
+    reads: list[Callable[[], Source]] = []
+    for path in paths:
+        try:
+            files = listed(path)
+        except ConfigError as error:
+            reads.append(partial(_refuse, error))
+        else:
+            reads += [partial(read_source, file, patience_s=patience_s) for file in files]
     return _config(_parts(reads, environ), environ)
+
+
+def _refuse(error: ConfigError) -> Source:
+    raise error
 
 
 def load_text(
@@ -106,9 +117,9 @@ def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) ->
     """Read every file. Raises ConfigError, with what is wrong in the others too, where one has no tree."""
     parts: list[_Part] = []
     problems: list[Problem] = []
-    for read in reads:
+    for index, read in enumerate(reads):
         try:
-            parts.append(_part(read(), environ, is_alone=len(reads) == 1))
+            parts.append(_part(replace(read(), index=index), environ, is_alone=len(reads) == 1))
             problems += parts[-1].problems
         except ConfigError as error:
             problems += error.problems
