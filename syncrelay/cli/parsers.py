@@ -81,6 +81,39 @@ def validate() -> Parser:
     return parser
 
 
+def diff() -> Parser:
+    """Return the parser of `syncrelay diff`."""
+    parser = Parser(
+        "syncrelay diff",
+        description="Says what a reload would do to a relay that runs OLD and reads NEW: which groups go on, are "
+        "rebuilt, start and end, for which keys, and which subscriptions and publishers go and come. Needs no ROS. "
+        "Exit code 0 if nothing changes, 1 if something does or a file has an error.",
+    )
+    parser.add_argument("old", metavar="FILE", help="what the relay runs: a YAML file, a directory of them, or -")
+    parser.add_argument("new", metavar="FILE", help="what it would read: a YAML file, a directory of them, or -")
+    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+    return parser
+
+
+def graph() -> Parser:
+    """Return the parser of `syncrelay graph`."""
+    parser = Parser(
+        "syncrelay graph",
+        description="Draws the groups of files that run together: which inputs each matches, how, and its outputs. "
+        "With --url the drawing has what a running relay says: rates and findings. Needs no ROS.",
+    )
+    parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, a directory of them, or -")
+    parser.add_argument(
+        "--format",
+        choices=("mermaid", "dot", "svg"),
+        default="mermaid",
+        metavar="FORMAT",
+        help="mermaid (default), for Markdown; dot, for Graphviz; svg, for browsers",
+    )
+    parser.add_argument("--url", metavar="URL", help="the relay that runs them: its host, host:port or URL")
+    return parser
+
+
 def init() -> Parser:
     """Return the parser of `syncrelay init`."""
     parser = Parser(

@@ -10,14 +10,14 @@ from pydantic import ValidationError
 
 from syncrelay.config.checks import check_groups, check_node
 from syncrelay.config.defaults import merged_documents, merged_files, with_defaults
-from syncrelay.config.document import Document, plain
+from syncrelay.config.document import Document, flow, plain
 from syncrelay.config.file import FileKeys, file_format
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.listen import Listen
 from syncrelay.config.models import DiagnosticsConfig, NodeConfig
 from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.partial import partial_file
-from syncrelay.config.problems import ConfigError, Problem, Severity
+from syncrelay.config.problems import ConfigError, Path, Problem, Severity
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
 from syncrelay.config.source import PATIENCE_S, Source, check_text, listed, read_source
 from syncrelay.config.translate import translate
@@ -41,6 +41,11 @@ class Config:
     diagnostics: DiagnosticsConfig | None
     names: NamesInFile = field(compare=False, repr=False)
     notes: tuple[Problem, ...] = ()
+
+    def written(self, path: Path) -> str | None:
+        """Return the value at a path as it is written there or in `defaults`, on one line; None where it is not."""
+        node = self.names.document.find(path)
+        return None if node is None else flow(plain(node))
 
 
 def load(
