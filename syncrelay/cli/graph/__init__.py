@@ -12,6 +12,7 @@ from syncrelay.cli.graph.svg import as_svg
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, load
+from syncrelay.config.source import shown_name
 from syncrelay.config.wording import all_of
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def graph(files: Sequence[str], output_format: str, url: str | None) -> int:
 
 
 def _drawing(config: Config, files: Sequence[str], url: str | None) -> Drawing:
-    title = ", ".join(files)
+    title = ", ".join(map(shown_name, files))
     if url is None:
         return drawing_of(config, title=title)
     from syncrelay.cli.relays import find_one

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from syncrelay.cli.graph.drawing import Box, Drawing, Link, Mark
+from syncrelay.cli.graph.layout import broken
 
 _COLOURS: Final = {Mark.OK: "#2da44e", Mark.WARN: "#bf8700", Mark.ERROR: "#cf222e", Mark.STALE: "#818b98"}
 
@@ -29,7 +30,7 @@ def _lines(drawing: Drawing) -> Iterator[str]:
 
 
 def _attributes(box: Box) -> str:
-    label = f"label={_quoted(box.name, *box.lines, *([box.finding] if box.finding else []))}"
+    label = f"label={_quoted(box.name, *box.lines, *(broken(box.finding) if box.finding else []))}"
     colour = _COLOURS.get(box.mark)
     return f'{label}, color="{colour}", penwidth=2' if colour else label
 

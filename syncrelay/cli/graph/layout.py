@@ -97,7 +97,9 @@ def layout_of(drawing: Drawing) -> Layout:
         y += block + _BETWEEN_GROUPS
     inputs = _inputs(drawing.inputs, wanted, x=left)
     for group, box in zip(drawing.groups, groups, strict=True):
-        for link, port in zip(group.links, _ports(box, len(group.links)), strict=True):
+        # From above to below as the inputs stand, so that fewer lines cross.
+        links = sorted(group.links, key=lambda link: inputs[link.input].y)
+        for link, port in zip(links, _ports(box, len(links)), strict=True):
             start = inputs[link.input]
             lines.append(Line((start.right, start.middle), (box.x, port), link.label, link.is_dashed))
     boxes = (*inputs.values(), *outputs)
@@ -155,12 +157,11 @@ def _broken(box: Box) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]
 
 
 def broken(text: str) -> Iterator[str]:
-    """Yield the lines of a text: broken after a space, a slash or a comma where there is one, else anywhere."""
+    """Yield the lines of a text: broken after a space, else before a slash of a topic's name, else anywhere."""
     while len(text) > _WIDEST:
         head = text[:_WIDEST]
-        # A slash begins what follows, as in the names of topics.
-        at = max(head.rfind(" ") + 1, head.rfind(",") + 1, head.rfind("/"))
-        at = at if at > _WIDEST // 3 else _WIDEST
+        places = (head.rfind(" ") + 1, head.rfind("/"), _WIDEST)
+        at = next(place for place in places if place > _WIDEST // 3)
         yield text[:at].rstrip()
         text = text[at:]
     yield text

@@ -30,7 +30,7 @@ def _lines(drawing: Drawing) -> Iterator[str]:
         yield f'  i{index}["{_label(each)}"]'
     for at, group in enumerate(drawing.groups):
         marks[f"g{at}"] = group.box.mark
-        yield f'  g{at}(["{_label(group.box)}"])'
+        yield f'  g{at}("{_label(group.box)}")'
         yield from (f"  i{link.input} {_arrow(link)} g{at}" for link in group.links)
         yield from (f'  g{at} --> o{at}_{index}["{_label(each)}"]' for index, each in enumerate(group.outputs))
     for mark, style in _STYLES.items():

@@ -98,4 +98,4 @@ def _box(kind: str, placed: Placed) -> Iterator[str]:
 
 def _label(line: Line) -> str:
     x, y = line.end
-    return f'<text class="label" text-anchor="end" x="{x - 12:.1f}" y="{y - 4:.1f}">{escape(line.label)}</text>'
+    return f'<text class="label" text-anchor="end" x="{x - 12:.1f}" y="{y - 7:.1f}">{escape(line.label)}</text>'
