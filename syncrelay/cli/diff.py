@@ -32,12 +32,13 @@ def diff(old: str, new: str, output_format: str) -> int:
     if output_format == "json":
         put(json.dumps(_as_json(found), indent=2, ensure_ascii=False))
     else:
-        for line in _lines(found):
+        for line in difference_lines(found):
             put(line)
     return DONE if found.is_empty else AT_FAULT
 
 
-def _lines(found: Difference) -> Iterator[str]:
+def difference_lines(found: Difference) -> Iterator[str]:
+    """Yield what a reload does, in lines."""
     yield _summary(found)
     yield from (f"  {_key_line(section)}" for section in found.sections)
     gone = found.exchange
