@@ -191,6 +191,7 @@ _RECORDING: Final = r".*\.(mcap|db3|bag|active)(\.(bz2|zstd|zst|gz))?"
 COMPLETERS: Final[Mapping[str, _Completer]] = {
     "COMMAND": _commands,
     "FILE": _files(_YAML),
+    "OLD": _files(_YAML),
     "NEW": _files(_YAML),
     "NAME": _groups,
     "BAG": _files(_RECORDING),

@@ -89,8 +89,8 @@ def diff() -> Parser:
         "rebuilt, start and end, for which keys, and which subscriptions and publishers go and come. Needs no ROS. "
         "Exit code 0 if nothing changes, 1 if something does or a file has an error.",
     )
-    parser.add_argument("old", metavar="FILE", help="what the relay runs: a YAML file, a directory of them, or -")
-    parser.add_argument("new", metavar="FILE", help="what it would read: a YAML file, a directory of them, or -")
+    parser.add_argument("old", metavar="OLD", help="what the relay runs: a YAML file, a directory of them, or -")
+    parser.add_argument("new", metavar="NEW", help="what it would read: a YAML file, a directory of them, or -")
     parser.add_argument("--json", action="store_true", help="print JSON, for programs")
     return parser
 
