@@ -10,7 +10,11 @@ import pytest
 import yaml
 
 from syncrelay.cases import check, load_suite_text
+from syncrelay.cli.diff import difference_lines
+from syncrelay.cli.graph.drawing import drawing_of
+from syncrelay.cli.graph.mermaid import as_mermaid
 from syncrelay.config import load_text
+from syncrelay.config.difference import difference
 from syncrelay.config.file import file_format
 from syncrelay.explain import Code
 from syncrelay.sync import DropReason
@@ -118,6 +122,15 @@ def test_the_error_that_the_readme_shows_is_the_one_that_comes(tmp_path):
     )
     assert run.returncode == 1
     assert shown.strip() in run.stdout + run.stderr
+
+
+def test_the_drawing_and_the_difference_that_the_readme_shows_are_those_that_come():
+    old = load_text(_FILES[0])
+    (shown,) = [text for kind, text in _BLOCKS if kind == "mermaid"]
+    assert as_mermaid(drawing_of(old, title="fusion.yaml")) == shown.rstrip()
+    (shown,) = [text for kind, text in _BLOCKS if kind == "text" and text.startswith("a reload ")]
+    found = difference(old, load_text(_FILES[0].replace("20ms", "30ms")))
+    assert "\n".join(difference_lines(found)) == shown.rstrip()
 
 
 @pytest.mark.parametrize("page", _PAGES, ids=lambda page: page.name)

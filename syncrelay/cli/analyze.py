@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from syncrelay.bag import Channel, Recording, is_recording, open_recording
-from syncrelay.bag.analysis import Analysis, analyze, proposed_text, settled, with_changes
+from syncrelay.bag.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
 from syncrelay.bag.bindings import bind
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
@@ -130,7 +130,7 @@ def _print(bag: str, analysis: Analysis, asked: Asked) -> None:
         if asked.config is None:
             put(f"\nA file that gives these sets:\n\n{analysis.text.rstrip()}")
     if asked.write is not None:
-        write_new(asked.write, with_changes(analysis.text, analysis.changes))
+        write_new(asked.write, file_with_changes(analysis.text, analysis.changes))
     if asked.html is not None:
         from syncrelay.cli.analysis_html import MARK, as_html
 

@@ -24,6 +24,7 @@ from syncrelay.cli.dispatch import COMMANDS, COMPLETES
 from syncrelay.cli.parser import ROS_ARGS, Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
+from syncrelay.yaml_files import yaml_files
 
 _PROGRAM: Final = "syncrelay"
 # Of processor time: a recording without an index, or compressed as a whole, may take long to open.
@@ -130,11 +131,12 @@ def _files(pattern: str) -> _Completer:
 def _groups(_typed: str, arguments: Namespace) -> Iterator[str]:
     """Give the groups of the files that --config names; of a faulty file, those before its fault."""
     for name in arguments.config or ():
-        path = Path(name).expanduser()
-        # A pipe would be waited for, and emptied.
-        if path.is_file():
-            with path.open("rb") as file:
-                yield from group_names(file.read(_MOST_BYTES))
+        with suppress(OSError):
+            for path in map(Path, yaml_files(str(Path(name).expanduser()))):
+                # A pipe would be waited for, and emptied.
+                if path.is_file():
+                    with path.open("rb") as file:
+                        yield from group_names(file.read(_MOST_BYTES))
 
 
 def group_names(text: bytes) -> Iterator[str]:
@@ -189,6 +191,7 @@ _RECORDING: Final = r".*\.(mcap|db3|bag|active)(\.(bz2|zstd|zst|gz))?"
 COMPLETERS: Final[Mapping[str, _Completer]] = {
     "COMMAND": _commands,
     "FILE": _files(_YAML),
+    "OLD": _files(_YAML),
     "NEW": _files(_YAML),
     "NAME": _groups,
     "BAG": _files(_RECORDING),

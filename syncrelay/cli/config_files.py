@@ -8,6 +8,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, NamedTuple, Self
 
+from syncrelay.yaml_files import yaml_files
+
 if TYPE_CHECKING:
     from syncrelay.config import Config
 
@@ -40,6 +42,7 @@ class ConfigFiles:
         """Note what the files are: a change from here on is seen."""
         self._paths = tuple(paths)
         self._known = self._marks() if watched else None
+        self._seen = self._known
         self._lock = threading.Lock()
         self._wanted = threading.Event()
         self._ended = False
@@ -89,7 +92,7 @@ class ConfigFiles:
     def _run(self) -> None:
         while not self._ended:
             self._wanted.wait(None if self._known is None else _LOOK_S)
-            if self._have_changed():
+            if self.have_changed():
                 self.read_again()
             if self._wanted.is_set() and not self._ended:
                 self._wanted.clear()
@@ -114,18 +117,33 @@ class ConfigFiles:
                 self._read = Reading(read, (*earlier, *told))
         self._done()
 
-    def _have_changed(self) -> bool:
-        """Whether a watched file has changed since this was last called; not while one is missing."""
+    def have_changed(self) -> bool:
+        """Whether a watched file has changed since this was last called; not while one is missing.
+
+        A file that is gone from a directory is when the next look shows that too: to replace a file, some programs
+        remove it first.
+        """
         if self._known is None:
             return False
-        marks = self._marks()
-        if None in marks or marks == self._known:
+        marks, seen = self._marks(), self._seen
+        self._seen = marks
+        if None in marks.values() or marks == self._known:
+            return False
+        if self._known.keys() - marks.keys() and marks != seen:
             return False
         self._known = marks
         return True
 
-    def _marks(self) -> tuple[tuple[int, int, int] | None, ...]:
-        return tuple(_mark(Path(path)) for path in self._paths)
+    def _marks(self) -> "dict[str, tuple[int, int, int] | None]":
+        return {file: _mark(Path(file)) for path in self._paths for file in _files(path)}
+
+
+def _files(path: str) -> tuple[str, ...]:
+    """Return the files to look at; a directory that cannot be read counts as a file that is missing."""
+    try:
+        return yaml_files(path)
+    except OSError:
+        return (path,)
 
 
 def _mark(path: Path) -> tuple[int, int, int] | None:

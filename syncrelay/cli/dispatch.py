@@ -30,6 +30,8 @@ COMMANDS: Final = {
     each.usage.split()[0]: each
     for each in (
         Command("validate FILE...", "check files; show every error at its line", parsers.validate, "validate"),
+        Command("diff OLD NEW", "say what a reload to another file would do", parsers.diff, "diff"),
+        Command("graph FILE...", "draw the groups of files: Mermaid, DOT or SVG", parsers.graph, "graph"),
         Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", parsers.init, "init"),
         Command("analyze BAG...", "measure recordings, and suggest values that fit", parsers.analyze, "analyze"),
         Command("replay BAG...", "run a file's groups on a recording, without ROS", parsers.replay, "replay"),
@@ -86,7 +88,7 @@ def commands_help() -> str:
 def _unknown_command(word: str) -> str:
     from syncrelay.config.wording import did_you_mean
 
-    if word.endswith((".yaml", ".yml")) or Path(word).is_file():
+    if word.endswith((".yaml", ".yml")) or Path(word).exists():
         return (
             f"{word} is not a command\n  syncrelay --config {word}     to run the relay with it\n"
             f"  syncrelay validate {word}     to check it"

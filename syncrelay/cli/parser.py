@@ -3,10 +3,12 @@
 import argparse
 import os
 from collections.abc import Sequence
+from itertools import chain
 from textwrap import fill
 from typing import Any, Final, NoReturn
 
 from syncrelay.errors import UsageError
+from syncrelay.yaml_files import yaml_files
 
 ROS_ARGS: Final = "--ros-args"
 _WIDTH: Final = 78
@@ -72,13 +74,20 @@ class Parser(argparse.ArgumentParser):
     def refuse_repeated(self, files: Sequence[str]) -> None:
         """Refuse to read a file twice, whatever it is called; standard input can only be read once too."""
         named: dict[str, str] = {}
-        for file in files:
+        for file in chain.from_iterable(map(_listed, files)):
             place = file if file == "-" else os.path.realpath(file)
             if place in named:
                 first = named[place]
                 same = f"{file} is named twice" if first == file else f"{first} and {file} are the same file"
                 self.error(f"{same}: name each file once")
             named[place] = file
+
+
+def _listed(path: str) -> Sequence[str]:
+    try:
+        return yaml_files(path)
+    except OSError:
+        return [path]
 
 
 def positive(text: str) -> float:

@@ -27,9 +27,19 @@ def relay() -> Parser:
         epilog=f"commands:\n{commands_help()}\n\n{_EXIT_CODES}",
     )
     add = parser.add_argument_group("the relay").add_argument
-    add("--config", metavar="FILE", action="append", default=[], help="run the groups of FILE; may be repeated")
+    add(
+        "--config",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="run the groups of FILE, or of all YAML files in a directory; may be repeated",
+    )
     add("--group", metavar="NAME", action="append", default=[], help="run this group only; may be repeated")
-    add("--watch", action="store_true", help="read FILE again when it changes, not only at SIGHUP")
+    add(
+        "--watch",
+        action="store_true",
+        help="read FILE again when it changes, or a file comes to or goes from a directory; not only at SIGHUP",
+    )
     add("--explain", metavar="N", type=positive, help="publish nothing; after N s say what is wrong")
     add(
         "--log-level",
@@ -52,7 +62,12 @@ def validate() -> Parser:
         "word. Message types are checked where ROS is installed; a package that is missing there is only a note. "
         "Exit code 1 if a file has an error.",
     )
-    parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, or - for standard input")
+    parser.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="a YAML file, a directory of files that run together, or - for standard input",
+    )
     parser.add_argument(
         "--together", action="store_true", help="check the files as one, as the relay does: --config FILE ..."
     )
@@ -63,6 +78,39 @@ def validate() -> Parser:
         metavar="FORMAT",
         help="text (default), json, or github: annotations for a workflow",
     )
+    return parser
+
+
+def diff() -> Parser:
+    """Return the parser of `syncrelay diff`."""
+    parser = Parser(
+        "syncrelay diff",
+        description="Says what a reload would do to a relay that runs OLD and reads NEW: which groups go on, are "
+        "rebuilt, start and end, for which keys, and which subscriptions and publishers go and come. Needs no ROS. "
+        "Exit code 0 if nothing changes, 1 if something does or a file has an error.",
+    )
+    parser.add_argument("old", metavar="OLD", help="what the relay runs: a YAML file, a directory of them, or -")
+    parser.add_argument("new", metavar="NEW", help="what it would read: a YAML file, a directory of them, or -")
+    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+    return parser
+
+
+def graph() -> Parser:
+    """Return the parser of `syncrelay graph`."""
+    parser = Parser(
+        "syncrelay graph",
+        description="Draws the groups of files that run together: which inputs each matches, how, and its outputs. "
+        "With --url the drawing has what a running relay says: rates and findings. Needs no ROS.",
+    )
+    parser.add_argument("files", metavar="FILE", nargs="+", help="a YAML file, a directory of them, or -")
+    parser.add_argument(
+        "--format",
+        choices=("mermaid", "dot", "svg"),
+        default="mermaid",
+        metavar="FORMAT",
+        help="mermaid (default), for Markdown; dot, for Graphviz; svg, for browsers",
+    )
+    parser.add_argument("--url", metavar="URL", help="the relay that runs them: its host, host:port or URL")
     return parser
 
 
@@ -118,7 +166,11 @@ def replay() -> Parser:
         help="a rosbag2 folder, or an MCAP, sqlite3 or ROS 1 bag file, compressed or not; several are read as one",
     )
     parser.add_argument(
-        "--config", metavar="FILE", action="append", required=True, help="the file with the groups; may be repeated"
+        "--config",
+        metavar="FILE",
+        action="append",
+        required=True,
+        help="the file with the groups, or a directory of files; may be repeated",
     )
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
@@ -190,7 +242,7 @@ def doctor() -> Parser:
         metavar="FILE",
         action="append",
         default=[],
-        help="check FILE too, and whether its types can be used here; may be repeated",
+        help="check FILE or the files of a directory too, and whether their types can be used here; may be repeated",
     )
     parser.add_argument(
         "--live",

@@ -12,7 +12,7 @@ from syncrelay.cli.parser import Parser
 from syncrelay.cli.problems import inert, problem_as_json, problem_command
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
-from syncrelay.config.source import shown_name
+from syncrelay.config.source import listed, shown_name
 from syncrelay.config.wording import counted
 from syncrelay.printable import printable
 
@@ -41,12 +41,20 @@ def validate(sets: Sequence[Sequence[str]], output_format: str) -> int:
 
 
 def _check(files: Sequence[str]) -> Finding:
-    names = tuple(shown_name(file) for file in files)
+    names = tuple(shown_name(each) for file in files for each in _listed(file))
     try:
         config = load(*files)
     except ConfigError as error:
         return Finding(names, None, error.problems)
     return Finding(names, config, config.notes)
+
+
+def _listed(file: str) -> tuple[str, ...]:
+    """Return the files of a directory; what is no directory, or has none, is itself what something is wrong with."""
+    try:
+        return listed(file)
+    except ConfigError:
+        return (file,)
 
 
 def _print_text(findings: Sequence[Finding]) -> None:

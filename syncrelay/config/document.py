@@ -137,6 +137,21 @@ class Document:
         return node
 
 
+def flow(value: Any) -> str:
+    """Return a plain value on one line, as a file has it."""
+    match value:
+        case dict():
+            return "{" + ", ".join(f"{key}: {flow(each)}" for key, each in value.items()) + "}"
+        case tuple():
+            return "[" + ", ".join(map(flow, value)) + "]"
+        case bool():
+            return "true" if value else "false"
+        case None:
+            return "null"
+        case _:
+            return str(value) or '""'
+
+
 def _step(node: Node, step: str | int) -> Node | None:
     match node:
         case MappingNode():

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Final
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema, model_validator
 
 from syncrelay.config.listen import check_listen, parse_host
 from syncrelay.config.names import (
@@ -17,12 +17,22 @@ from syncrelay.config.names import (
 from syncrelay.config.units import parse_duration, parse_rate
 from syncrelay.config.wording import describe
 
+EXTENSION: Final = "x-"
+"""What a key begins with that is the user's own, as in Compose files: for anchors, notes and other programs."""
+
 
 class Keys(BaseModel):
-    """A mapping of the file with the keys that its fields name."""
+    """A mapping of the file with the keys that its fields name, and any that begin with EXTENSION."""
 
     # Built when it is first needed: that of the whole file builds the others along, and those for faults may never be.
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_extensions(cls, keys: Any) -> Any:
+        if isinstance(keys, dict) and any(key.startswith(EXTENSION) for key in keys):
+            return {key: value for key, value in keys.items() if not key.startswith(EXTENSION)}
+        return keys
 
 
 def tag_of_mapping(value: Any) -> str:

@@ -1,8 +1,9 @@
 """From a file to a Config, or to everything that is wrong with it at once."""
 
+import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Final
 
@@ -10,17 +11,17 @@ from pydantic import ValidationError
 
 from syncrelay.config.checks import check_groups, check_node
 from syncrelay.config.defaults import merged_documents, merged_files, with_defaults
-from syncrelay.config.document import Document, plain
+from syncrelay.config.document import Document, flow, plain
 from syncrelay.config.file import FileKeys, file_format
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.listen import Listen
 from syncrelay.config.models import DiagnosticsConfig, NodeConfig
 from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.partial import partial_file
-from syncrelay.config.problems import ConfigError, Problem, Severity
+from syncrelay.config.problems import ConfigError, Path, Problem, Severity
 from syncrelay.config.relay_form import RelayForm
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
-from syncrelay.config.source import PATIENCE_S, Source, check_text, read_source
+from syncrelay.config.source import PATIENCE_S, Source, check_text, listed, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
 from syncrelay.config.yaml_tree import compose
@@ -44,19 +45,35 @@ class Config:
     names: NamesInFile = field(compare=False, repr=False)
     notes: tuple[Problem, ...] = ()
 
+    def written(self, path: Path) -> str | None:
+        """Return the value at a path as it is written there or in `defaults`, on one line; None where it is not."""
+        node = self.names.document.find(path)
+        return None if node is None else flow(plain(node))
+
 
 def load(
     *paths: str,
     environ: Mapping[str, str] = os.environ,
     patience_s: float = PATIENCE_S,
 ) -> Config:
-    """Return what a file says, `-` for standard input; of several files, what they say together.
+    """Return what a file says, `-` for standard input; of several, or those of a directory, what they say together.
 
     Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. A pipe is
     read for so many seconds. Raises ConfigError with everything that is wrong.
     """
-    reads = [partial(read_source, path, index=index, patience_s=patience_s) for index, path in enumerate(paths)]
+    reads: list[Callable[[], Source]] = []
+    for path in paths:
+        try:
+            files = listed(path)
+        except ConfigError as error:
+            reads.append(partial(_refuse, error))
+        else:
+            reads += [partial(read_source, file, patience_s=patience_s) for file in files]
     return _config(_parts(reads, environ), environ)
+
+
+def _refuse(error: ConfigError) -> Source:
+    raise error
 
 
 def load_text(
@@ -67,6 +84,15 @@ def load_text(
 ) -> Config:
     """Return what the text of a file says; as `load`."""
     return _config(_parts([lambda: check_text(text, name=name)], environ), environ)
+
+
+def spelt_out(text: str, *, environ: Mapping[str, str] = os.environ) -> str:
+    """Return the text of a file that is in order with what its aliases and merge keys stand for in their places."""
+    if "*" not in text and "<<" not in text:
+        return text
+    document, _ = compose(check_text(text, name="<text>"), environ, expected=_LEAST)
+    # Variables are filled in: what looks like one is none.
+    return json.dumps(plain(document.root)).replace("$", "$$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +125,9 @@ def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) ->
     """Read every file. Raises ConfigError, with what is wrong in the others too, where one has no tree."""
     parts: list[_Part] = []
     problems: list[Problem] = []
-    for read in reads:
+    for index, read in enumerate(reads):
         try:
-            parts.append(_part(read(), environ, is_alone=len(reads) == 1))
+            parts.append(_part(replace(read(), index=index), environ, is_alone=len(reads) == 1))
             problems += parts[-1].problems
         except ConfigError as error:
             problems += error.problems

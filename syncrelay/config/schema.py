@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final, TypeAlias
 
 from syncrelay.config.file import FileFormat, file_format
+from syncrelay.config.keys import EXTENSION
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -25,6 +26,7 @@ VARIABLE: Final[Schema] = {
 }
 """What may stand in place of any value."""
 
+_EXTENSION: Final[Schema] = {"description": "Yours: syncrelay ignores it."}
 # What is said about a value whatever its kind.
 _ANNOTATIONS: Final = ("description", "default", "examples")
 
@@ -81,7 +83,8 @@ def _has_policy(policy: str) -> Schema:
 def of_mapping(model: Schema) -> Schema:
     """Return a model's schema with its keys in order."""
     properties = {key: _key(value) for key, value in model["properties"].items()}
-    return {**{key: value for key, value in model.items() if key != "title"}, "properties": properties}
+    others = {key: value for key, value in model.items() if key != "title"}
+    return {**others, "properties": properties, "patternProperties": {f"^{EXTENSION}": _EXTENSION}}
 
 
 def _key(generated: Schema) -> Schema:

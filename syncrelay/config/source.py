@@ -6,13 +6,14 @@ import select
 import stat
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 from typing import Final
 
 from syncrelay.config.problems import ConfigError, Problem, Severity, Span
 from syncrelay.config.wording import nearest
+from syncrelay.yaml_files import MOST_FILES, yaml_files
 
 STDIN: Final = "-"
 # A thousand groups of four topics are half of it.
@@ -65,13 +66,26 @@ def shown_name(path: str) -> str:
     return "<stdin>" if path == STDIN else path or "''"
 
 
-def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) -> Source:
+def listed(path: str) -> tuple[str, ...]:
+    """Return the files of a directory, or the path where it is none. Raises ConfigError for one without files."""
+    try:
+        files = yaml_files(path)
+    except OSError as error:
+        raise _unreadable(path, f"cannot be read: {error.strerror}") from error
+    if not files:
+        raise _unreadable(path, "no *.yaml or *.yml file in this directory")
+    if len(files) > MOST_FILES:
+        raise _unreadable(path, f"more than {MOST_FILES} YAML files: is this the right directory?")
+    return files
+
+
+def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
     """Return the text of a file, `-` for standard input, which alone is waited for without end.
 
     A pipe has so many seconds to come to its end. Raises ConfigError where there is no text.
     """
     if path == STDIN:
-        return replace(decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path)), index=index)
+        return decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path))
     if not path:
         raise _unreadable(shown_name(path), "is not a file name")
     try:
@@ -83,7 +97,7 @@ def read_source(path: str, *, index: int = 0, patience_s: float = PATIENCE_S) ->
         raise _unreadable(path, _reason(path, error)) from error
     except ValueError as error:
         raise _unreadable(path, "is not a file name") from error
-    return replace(decode(content, name=path), index=index)
+    return decode(content, name=path)
 
 
 def _content(path: str, patience_s: float) -> bytes:

@@ -153,6 +153,6 @@ def _owner_span(path: Path, document: Document) -> Any:
     if owner and isinstance(owner[-1], str):
         return document.key_span(owner)
     node = document.node(owner)
-    if isinstance(node, MappingNode) and node.entries:
-        return next(iter(node.entries.values())).key
-    return node.span
+    first = next(iter(node.entries.values()), None) if isinstance(node, MappingNode) else None
+    # What an item merges stands above it.
+    return node.span if first is None or first.key < node.span._replace(width=0) else first.key

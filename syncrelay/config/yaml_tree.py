@@ -20,10 +20,11 @@ from syncrelay.config.document import (
     Scalar,
     ScalarNode,
     SequenceNode,
+    plain,
 )
 from syncrelay.config.problems import ConfigError, Path, Problem, Span, dotted
 from syncrelay.config.source import Source
-from syncrelay.config.wording import quoted
+from syncrelay.config.wording import describe, quoted
 from syncrelay.config.yaml_errors import in_words
 
 LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -50,6 +51,9 @@ _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
 # Python refuses to read longer ones, and no key has a use for them.
 _LONGEST_NUMBER = 400
 
+# https://yaml.org/type/merge.html: not of YAML 1.2, but editors and Compose read it.
+_MERGE: Final = "<<"
+
 _DOLLAR = re.compile(
     r"\$(?:(?P<escaped>\$)|\{(?P<name>[A-Za-z_]\w*)(?P<default>:-[^{}$]*)?\}|(?P<other>\{[^}]*\}?|\w*))"
 )
@@ -74,13 +78,19 @@ def compose(source: Source, environ: Mapping[str, str], *, expected: str) -> tup
 
 @dataclass(slots=True)
 class _Open:
-    """A mapping or list whose end has not come yet. `key` is a mapping's key that waits for its value."""
+    """A mapping or list whose end has not come yet. `key` is a mapping's key that waits for its value.
+
+    `merged` are the entries that a mapping has from others, where it does not have them itself; `merge` is the key that
+    says so, `is_merging` while that waits for its value.
+    """
 
     node: MappingNode | SequenceNode
     anchor: str | None
     step: str | int = 0
     key: Span | None = None
-    duplicates: list[Span] = field(default_factory=list)
+    merge: Span | None = None
+    is_merging: bool = False
+    merged: dict[str, Entry] = field(default_factory=dict)
 
 
 class _Composer:
@@ -122,13 +132,17 @@ class _Composer:
         if closes_bracket and event.end_mark.line == ended.node.span.line - 1:
             start = ended.node.span
             ended.node.span = start._replace(width=event.end_mark.column - start.column + 1)
+        if isinstance(ended.node, MappingNode):
+            # Behind its own: where a mapping as a whole is meant, its first key is shown.
+            for key, entry in ended.merged.items():
+                ended.node.entries.setdefault(key, entry)
         self._place(ended.node, ended.anchor)
 
     def _scalar(self, event: yaml.ScalarEvent) -> None:
         self._check_tag(event)
         span = self._span(event)
         if self._awaits_key():
-            self._key(event.value, span)
+            self._key(event.value, span, is_plain=event.implicit[0])
             return
         top = self._open[-1] if self._open else None
         if not event.value and top is not None and top.key is not None:
@@ -136,15 +150,18 @@ class _Composer:
             span = top.key
         self._place(self._value(event, span), event.anchor)
 
-    def _key(self, key: str, span: Span) -> None:
+    def _key(self, key: str, span: Span, *, is_plain: bool) -> None:
         if len(key) > _LONGEST_KEY:
             raise self._refusal(f"a key of {len(key)} characters, at most {_LONGEST_KEY} are allowed", span)
         top = self._open[-1]
         top.step, top.key = key, span
         assert isinstance(top.node, MappingNode)  # noqa: S101  only a mapping awaits a key
-        if key == "<<":
-            text = "merge keys are not part of YAML 1.2: repeat the keys, or put them under `defaults`"
-            self._report(text, span, code="merge_key")
+        top.is_merging = key == _MERGE and is_plain
+        if top.is_merging:
+            if top.merge is not None:
+                text = f"`<<` is also on line {top.merge.line}: write one with a list, `<<: [*one, *other]`"
+                self._report(text, span, code="duplicate_key")
+            top.merge = top.merge or span
         elif key in top.node.entries:
             first = top.node.entries[key].key.line
             self._report(f"duplicate key, first on line {first}", span, code="duplicate_key")
@@ -191,9 +208,21 @@ class _Composer:
             top.step = len(top.node.items)
             return
         assert top.key is not None  # noqa: S101  a value follows its key
-        if top.step != "<<":
+        if top.is_merging:
+            self._merge(node, top, at=top.key)
+        else:
             top.node.entries.setdefault(str(top.step), Entry(top.key, node))
         top.key = None
+
+    def _merge(self, node: Node, top: _Open, *, at: Span) -> None:
+        """Note the entries of a mapping, or of a list of them; of two with one key, that of the first counts."""
+        for source in node.items if isinstance(node, SequenceNode) else [node]:
+            if isinstance(source, MappingNode):
+                for key, entry in source.entries.items():
+                    top.merged.setdefault(key, entry)
+            elif not isinstance(source, ScalarNode) or source.readable:
+                text = f"expected a mapping such as `*name`, or a list of mappings, found {describe(plain(source))}"
+                self._report(text, at, code="merge_key")
 
     def _awaits_key(self) -> bool:
         return bool(self._open) and isinstance(self._open[-1].node, MappingNode) and self._open[-1].key is None

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 from syncrelay.config import TopicConfig
 from syncrelay.config.names_in_graph import manifest_topic
+from syncrelay.config.reload import Subscription
 from syncrelay.config.wording import one_of
 from syncrelay.dataflow.backend import RclBackend
 from syncrelay.dataflow.group import GroupRelay
@@ -17,8 +18,6 @@ from syncrelay.ros.inputs import TopicInput
 from syncrelay.ros.listeners import Listeners, PublishersOf
 from syncrelay.ros.outputs import InputBinding
 from syncrelay.sync import DropReason
-
-_Key: TypeAlias = tuple[str, str | None, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +55,7 @@ class GroupBindings:
         self._node = node
         self._backend = backend
         self._loop = loop
-        self._topics: dict[_Key, TopicInput] = {}
+        self._topics: dict[Subscription, TopicInput] = {}
         # The publishers that types were taken from, by the topics' names, for those that take the place of the held.
         self._taken: dict[str, Endpoint] = {}
         self._listeners = Listeners(loop)
@@ -181,7 +180,7 @@ class GroupBindings:
                 publisher, each.publisher = each.publisher, None
                 self._entities.end(publisher)
 
-    def _binding(self, group: GroupRelay, topics: dict[_Key, TopicInput]) -> GroupBinding:
+    def _binding(self, group: GroupRelay, topics: dict[Subscription, TopicInput]) -> GroupBinding:
         inputs = enumerate(self._topic(config, topics) for config in group.config.topics)
         if group.config.options.lazy and self._entities.purpose is Purpose.RELAY and not self._may_be_heard(group):
             group.sleep()
@@ -194,9 +193,9 @@ class GroupBindings:
             names.append(manifest_topic(group.config.name))
         return any(map(self._node.count_subscribers, map(self._node.resolve_topic_name, names)))
 
-    def _topic(self, config: TopicConfig, topics: dict[_Key, TopicInput]) -> TopicInput:
+    def _topic(self, config: TopicConfig, topics: dict[Subscription, TopicInput]) -> TopicInput:
         name = self._node.resolve_topic_name(config.topic)
-        key = (name, config.type, repr(config.qos))
+        key = Subscription.of(config, topic=name)
         if key not in topics:
             topics[key] = TopicInput(
                 config, name=name, entities=self._entities, node=self._node, backend=self._backend, loop=self._loop

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
 
 from syncrelay.config import Config, ConfigError, GroupConfig
-from syncrelay.config.wording import counted
+from syncrelay.config.reload import Exchange, exchange, needs_restart
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
@@ -73,19 +73,17 @@ class Groups:
         require_distinct_names(config, self._names, self._resolve)
         before = self.bindings.groups
         try:
-            self._run(config)
+            changed = self._run(config)
         except BaseException:
             if self.bindings.groups != before:
                 self._run(self.config)
             raise
         self.config = config
-        kept = {group.config.name for group in self.bindings.groups if group in before}
-        self._announced = {name: said for name, said in self._announced.items() if name in kept}
+        self._announced = {name: said for name, said in self._announced.items() if name in changed.kept}
         self.reloads += 1
         self.reload_error = None
-        changed = _changes(before, self.bindings.groups)
         _LOG.info("%s", changed)
-        return changed
+        return str(changed)
 
     def configure(self, config: Config) -> None:
         """Prepare the groups of a file that was read again: they receive and publish nothing before `begin`.
@@ -140,17 +138,19 @@ class Groups:
         self.reload_error = reason
         self.refused_reloads += 1
 
-    def _run(self, config: Config) -> None:
-        running = [group for group in self.bindings.groups if group.failure is None]
+    def _run(self, config: Config) -> Exchange:
+        running = {group.config.name: group for group in self.bindings.groups}
+        stopped = [name for name, group in running.items() if group.failure is not None]
         chosen = _chosen(config, self._names)
-        unchanged = [next((group for group in running if group.config == each), None) for each in chosen]
-        self._exchange([group or self._begun(each) for group, each in zip(unchanged, chosen, strict=True)])
+        changed = exchange([group.config for group in running.values()], chosen, stopped=stopped)
+        self._exchange([running[each.name] if each.name in changed.kept else self._begun(each) for each in chosen])
         limited = self._limited
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         asks = bool(limited) and not self._clock.is_simulated
         self._loop.deadline = (lambda: _next_deadline(limited)) if asks else None
         self._loop.wake()
         self._changed(config)
+        return changed
 
     def _exchange(self, groups: Sequence[GroupRelay]) -> None:
         if self.bindings.is_held:
@@ -248,25 +248,8 @@ def _chosen(config: Config, names: Collection[str] | None) -> list[GroupConfig]:
 
 def _require_same_node(running: Config, asked: Config) -> None:
     """Raise ReloadError for what a running relay cannot change."""
-    for name, before, now in (
-        ("node", running.node, asked.node),
-        ("metrics", running.listen, asked.listen),
-    ):
-        if before != now:
-            raise ReloadError(f"`{name}` cannot change while the relay runs: restart it")
-
-
-def _changes(before: Sequence[GroupRelay], now: Sequence[GroupRelay]) -> str:
-    """Say which groups a reload left alone, which it built anew, and which it started and ended."""
-    names_before, names = ([group.config.name for group in groups] for groups in (before, now))
-    begun = [group.config.name for group in now if group not in before]
-    parts = {
-        "rebuilt": [name for name in begun if name in names_before],
-        "started": [name for name in begun if name not in names_before],
-        "ended": [name for name in names_before if name not in names],
-    }
-    told = [f"{verb} {', '.join(those)}" for verb, those in parts.items() if those]
-    return "; ".join([f"reloaded: {counted(len(now) - len(begun), 'group')} unchanged", *told])
+    for key in needs_restart(running, asked):
+        raise ReloadError(f"`{key}` cannot change while the relay runs: restart it")
 
 
 def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from syncrelay.bag.analysis.analysis import analyze_group, group_of
-from syncrelay.bag.analysis.changes import Change, patch, with_changes
+from syncrelay.bag.analysis.changes import Change, file_with_changes, patch, with_changes
 from syncrelay.bag.analysis.curves import curves_of
 from syncrelay.bag.analysis.evaluation import completed, evaluate
 from syncrelay.bag.analysis.nearest import pair, tightest
@@ -17,6 +17,7 @@ from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.analysis.suggest import possible_sets, suggest
 from syncrelay.bag.analysis.topics import figures_of
 from syncrelay.bag.analysis.watching import judged_seconds, watch_group
+from syncrelay.errors import BagError
 from syncrelay.explain import UNREADABLE
 from syncrelay.sync import DropReason
 from tests.ros.cdr_messages import VECTOR
@@ -467,3 +468,50 @@ def test_a_patch_holds_the_changes_alone():
     assert patch(changes, {"front": ["/a", "/b"]}) == (
         "groups:\n  front:\n    slop: 25ms\n    topics:\n      - topic: /b\n        stamp: receive\n"
     )
+
+
+_SHARED = """\
+version: 1
+x-base: &base
+  policy: approximate_time
+  slop: 20ms # of all
+groups:
+  front:
+    <<: *base
+    topics:
+      - {topic: /a, type: sensor_msgs/msg/Image}
+      - {topic: /b, type: sensor_msgs/msg/Image}
+  rear: &rear
+    <<: *base
+    topics: &topics
+      - {topic: /a, type: sensor_msgs/msg/Image}
+      - {topic: /b, type: sensor_msgs/msg/Image}
+  third:
+    <<: *base
+    topics: *topics
+  fourth:
+    <<: *rear
+"""
+
+
+@pytest.mark.parametrize("group", ["front", "third", "fourth"])
+def test_a_merged_value_is_changed_in_the_group_alone(group: str):
+    changed = file_with_changes(_SHARED, [Change(group, None, "slop", "25ms", "better")])
+    assert [line for line in changed.splitlines() if line not in _SHARED.splitlines()] == ["    slop: 25ms  # better"]
+    begin = changed.index(f"  {group}:")
+    assert begin < changed.index("slop: 25ms") == changed.index("slop: 25ms", begin)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        Change("rear", None, "slop", "25ms", ""),
+        Change("third", 1, "offset", "5ms", ""),
+        Change("rear", 1, "offset", "5ms", ""),
+        Change("front", None, "policy", "exact_time", ""),
+        Change("rear", None, "policy", "exact_time", ""),
+    ],
+)
+def test_what_would_change_another_group_or_cannot_be_taken_away_is_refused(change: Change):
+    with pytest.raises(BagError, match="cannot be written for one group alone: write them by hand"):
+        file_with_changes(_SHARED, [change])

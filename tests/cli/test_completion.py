@@ -55,6 +55,9 @@ def folder(tmp_path):
     (tmp_path / "fusion.yaml").write_text(_FILE)
     (tmp_path / "notes.txt").write_text("")
     (tmp_path / "maps").mkdir()
+    (tmp_path / "conf").mkdir()
+    for name in ("left", "right"):
+        (tmp_path / "conf" / f"{name}.yaml").write_text(_FILE.replace("front", name).replace("  rear", "  # "))
     return tmp_path
 
 
@@ -62,16 +65,21 @@ _LINES = {
     "syncrelay val": ["validate"],
     "syncrelay re": ["replay", "reload"],
     "syncrelay --wa": ["--watch"],
-    "syncrelay --config ": ["fusion.yaml", "maps/"],
+    "syncrelay --config ": ["conf/", "fusion.yaml", "maps/"],
     "syncrelay --config=f": ["--config=fusion.yaml"],
     "syncrelay --config fusion.yaml --group ": ["front", "rear"],
     "syncrelay --config fusion.yaml --group rear --group f": ["front"],
     "syncrelay --config missing.yaml --group ": [],
     "syncrelay --config maps --group ": [],
+    "syncrelay --config conf --group ": ["left", "right"],
+    "syncrelay --config fusion.yaml --config conf/ --group r": ["rear", "right"],
     "syncrelay --config fusion.yaml --log-level ": ["debug", "info", "warning", "error"],
     "syncrelay --config fusion.yaml --ros-args ": [],
     "syncrelay --explain ": [],
-    "syncrelay validate ": ["fusion.yaml", "maps/"],
+    "syncrelay validate ": ["conf/", "fusion.yaml", "maps/"],
+    "syncrelay diff ": ["conf/", "fusion.yaml", "maps/"],
+    "syncrelay diff fusion.yaml f": ["fusion.yaml"],
+    "syncrelay graph fusion.yaml --format ": ["mermaid", "dot", "svg"],
     "syncrelay validate fusion.yaml --fo": ["--format"],
     "syncrelay test ": ["fusion.yaml", "maps/"],
     "syncrelay test fusion.yaml --format ": ["text", "junit", "json", "github"],
@@ -106,7 +114,7 @@ def test_topics_are_those_of_the_recording_that_are_not_named_yet(folder):
         "syncrelay analyze notes.txt ",
         folder=folder,
     )
-    recordings = ["drive/", "maps/", "rig.mcap"]
+    recordings = ["conf/", "drive/", "maps/", "rig.mcap"]
     assert answers == [recordings, ["/camera", "/lidar"], ["/lidar"], ["drive/"], recordings]
 
 

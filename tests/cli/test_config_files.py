@@ -124,6 +124,36 @@ def test_each_of_several_files_is_watched(path: Path):
         assert names(taken(files)) == ["front", "rear"]
 
 
+def test_files_that_come_to_a_watched_directory_change_in_it_and_go_are_seen(path: Path):
+    folder = path.parent / "conf"
+    folder.mkdir()
+    path.replace(folder / "front.yaml")
+    with ConfigFiles([str(folder)], watched=True) as files:
+        replace(folder / "rear.yaml", OTHER)
+        assert names(taken(files)) == ["front", "rear"]
+        replace(folder / "rear.yaml", GOOD.replace("front", "left"))
+        assert names(taken(files)) == ["front", "left"]
+        (folder / "front.yaml").unlink()
+        assert names(taken(files)) == ["left"]
+        (folder / "rear.yaml").unlink()
+        with pytest.raises(ConfigError, match=r"no \*.yaml or \*.yml file in this directory"):
+            taken(files).result()
+        replace(folder / "front.yaml", GOOD)
+        assert names(taken(files)) == ["front"]
+
+
+def test_a_file_is_gone_from_a_directory_only_when_two_looks_show_it(path: Path):
+    # Nobody enters it: the looks are these.
+    files = ConfigFiles([str(path.parent)], watched=True)
+    text = path.read_text()
+    path.unlink()
+    assert not files.have_changed()
+    path.write_text(text)
+    assert files.have_changed()
+    path.unlink()
+    assert [files.have_changed() for _ in range(3)] == [False, True, False]
+
+
 def test_a_pipe_moved_over_a_watched_file_is_told_and_then_what_replaces_it_is_read(path: Path, monkeypatch):
     monkeypatch.setattr(config_files, "_PIPE_S", 0.05)
     with ConfigFiles([str(path)], watched=True) as files:

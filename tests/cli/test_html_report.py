@@ -1,6 +1,8 @@
 """The page of an analysis: what it holds, adds up and leaves out. How a browser shows it: test_html_browser.py."""
 
+import json
 import re
+from dataclasses import replace
 from html import escape
 
 import numpy as np
@@ -142,6 +144,14 @@ def test_18_minutes_of_three_sensors_stay_below_6_mb(tmp_path):
     (group,) = drawings_in(page)["groups"]
     drawn = sum(lane["times"]["count"] for lane in group["timeline"]["lanes"])
     assert drawn == sum(topic.messages for topic in analysis.topics) > 35_000
+
+
+def test_the_page_says_so_where_the_better_file_cannot_be_written(analysis):
+    fused = json.dumps(json.loads(analysis.text)["groups"]["fused"])
+    shared = f"{{version: 1, groups: {{fused: &fused {fused}, other: {{<<: *fused , output_prefix: /other}}}}}}"
+    assert analysis.changes
+    assert "write them by hand" not in as_html("drive", analysis)
+    assert "write them by hand" in as_html("drive", replace(analysis, text=shared))
 
 
 def test_nothing_is_fetched_from_anywhere(analysis):

@@ -45,6 +45,28 @@ def test_several_files_are_all_checked(folder, environ):
     assert done.stderr == ERROR + "missing.yaml: no such file\n"
 
 
+def test_a_directory_is_checked_as_what_runs_together(folder, environ):
+    (folder / "conf").mkdir()
+    (folder / "empty").mkdir()
+    (folder / "conf/b.yaml").write_text(GOOD.replace("front", "rear"))
+    (folder / "conf/a.yaml").write_text(GOOD)
+    done = run("validate", "conf", "empty", "good.yaml", folder=folder, environ=environ)
+    assert done.returncode == 1
+    assert (
+        done.stdout == "conf/a.yaml, conf/b.yaml: ok together, 2 groups, 2 topics\ngood.yaml: ok, 1 group, 2 topics\n"
+    )
+    assert done.stderr == "empty: no *.yaml or *.yml file in this directory\n"
+    done = run("validate", "conf", "empty", "--format", "json", folder=folder, environ=environ)
+    assert [(each["file"], each["ok"]) for each in json.loads(done.stdout)] == [
+        ("conf/a.yaml", True),
+        ("conf/b.yaml", True),
+        ("empty", False),
+    ]
+    done = run("validate", "--together", "conf", "conf/../conf/a.yaml", folder=folder, environ=environ)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "conf/a.yaml and conf/../conf/a.yaml are the same file: name each file once" in done.stderr
+
+
 def test_a_topic_of_two_groups_is_one_topic(folder, environ):
     second = GOOD.partition("groups:\n")[2].replace("front", "back").replace("/b", "/c")
     (folder / "two.yaml").write_text(GOOD + second)

@@ -131,7 +131,7 @@ def test_a_file_that_is_not_there_is_named_with_one_that_is(tmp_path, monkeypatc
 
 
 def test_what_is_no_file_says_what_it_is(tmp_path):
-    assert text_of(str(tmp_path)) == f"{tmp_path}: is a directory, expected a YAML file"
+    assert text_of(str(tmp_path)) == f"{tmp_path}: no *.yaml or *.yml file in this directory"
     assert text_of("") == "'': is not a file name"
     assert text_of("a\0b") == "a\\x00b: is not a file name"
     assert text_of("/dev/zero") == "/dev/zero: is a device, expected a YAML file"

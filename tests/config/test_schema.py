@@ -25,7 +25,6 @@ BEYOND_A_SCHEMA = {
     "coalesce_too_long",
     "default_of_another_policy_does_not_help",
     "key",
-    "merge_key",
     "slop_not_a_number",
     "slop_without_end",
     "manifests_that_meet",
@@ -61,8 +60,9 @@ BEYOND_A_SCHEMA = {
 
 
 def parsed(file):
-    """The file as an editor sees it: YAML 1.2, so that words stay words."""
-    return yaml.load(file.read_text(encoding="utf-8"), Loader=Yaml12Loader)  # noqa: S506  a SafeLoader
+    """The file as an editor sees it: YAML 1.2, so that words stay words, and a key that is a number is a text."""
+    read = yaml.load(file.read_text(encoding="utf-8"), Loader=Yaml12Loader)  # noqa: S506  a SafeLoader
+    return {str(key): value for key, value in read.items()} if isinstance(read, dict) else read
 
 
 class Yaml12Loader(yaml.SafeLoader):

@@ -35,6 +35,11 @@ _SHAPES: dict[str, Callable[[int], str]] = {
     "aliases of a long text": lambda n: (
         f"a: &a {'x' * 5 * n}\n{_file(_TOPICS + '{topic: *a , type: *a }, ' * n + ']}')}"
     ),
+    "merges of a topic": lambda n: f"x-a: &a {{topc: /a, typ: x}}\n{_file(_TOPICS + '{<<: *a }, ' * n + ']}')}",
+    "merges of a list": lambda n: f"x-a: &a {{a: 1, b: 2}}\nb: {{<<: [{'*a , ' * n}]}}\n",
+    "merges of many keys": lambda n: f"x-a: &a {{{''.join(f'k{i}: 1, ' for i in range(n))}}}\nb: {{<<: [*a , *a ]}}\n",
+    "merges one twice": lambda n: f"x-a: &a {{a: 1}}\nb: {{{'<<: *a , ' * n}}}\n",
+    "keys of the user's own": lambda n: "".join(f"x-{i}: 1\n" for i in range(n)),
     "groups with a long default": lambda n: f"defaults: {{restamp: {'x' * 5 * n}}}\n{_file(*['{}'] * n)}",
     "groups with a default of many": lambda n: f"defaults: {{restamp: [{'1, ' * n}]}}\n{_file(*['{}'] * n)}",
     "faults below a long key": lambda n: f"groups:\n  ? {'x' * 5 * n}\n  : {{{'a: 1, ' * n}}}\n",

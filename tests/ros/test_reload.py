@@ -157,6 +157,21 @@ def test_several_files_run_as_one_and_each_is_watched(stage: Stage):
     file.relay.wait_for_log(f"of {file.path}: rename one of them")
 
 
+def test_a_file_that_comes_to_a_directory_or_goes_from_it_is_a_group_more_or_less(stage: Stage, tmp_path: Path):
+    folder = tmp_path / "conf"
+    folder.mkdir()
+    (folder / "rear.yaml").write_text(config({"rear": _rear()}))
+    file = ReloadedFile(stage, "--config", str(folder), "--watch", front=_FRONT)
+    (tmp_path / "left.new").write_text(config({"left": _rear(output_prefix="/left")}))
+    (tmp_path / "left.new").replace(folder / "left.yaml")
+    file.relay.wait_for_log("reloaded: 2 groups unchanged; started left")
+    (folder / "rear.yaml").unlink()
+    file.relay.wait_for_log("reloaded: 2 groups unchanged; ended rear")
+    (folder / "left.yaml").unlink()
+    file.relay.wait_for_log("no *.yaml or *.yml file in this directory")
+    assert file.count("reloads") == 2
+
+
 def test_a_watched_file_is_read_when_it_changes(stage: Stage):
     file = ReloadedFile(stage, "--watch", front=_FRONT)
     file.write(config({"front": _FRONT, "rear": _rear()}, metrics=ANY_PORT))

@@ -20,6 +20,7 @@ from syncrelay.bag.bindings import GroupBinding
 from syncrelay.bag.definitions import begins_with_header
 from syncrelay.bag.recording import Channel, Recording
 from syncrelay.config import GroupConfig, load_text
+from syncrelay.config.load import spelt_out
 
 
 # No slots: what takes long is found when it is first asked for, and kept.
@@ -127,8 +128,11 @@ def analyze_group(group: GroupConfig, streams: tuple[Stream, ...], text: str) ->
         for first, second in combinations(range(len(streams)), 2)
     ]
 
+    # Where groups share values, those of this one alone are tried.
+    apart = spelt_out(text)
+
     def changed(changes: Sequence[Change]) -> GroupConfig:
-        return group_of(with_changes(text, changes), group.name) if changes else group
+        return group_of(with_changes(apart, changes), group.name) if changes else group
 
     suggestion = suggest(group, streams, evaluation, changed)
     return GroupAnalysis(

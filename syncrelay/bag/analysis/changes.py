@@ -1,13 +1,17 @@
 """Better values, put into the text of a file: comments and the order of keys stay."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
 from typing import Any, Final
 
 from ruamel.yaml import YAML
 
+from syncrelay.config import ConfigError, load_text
 from syncrelay.config.file import file_format
+from syncrelay.config.load import spelt_out
+from syncrelay.errors import BagError
 
 _POLICY: Final = "policy"
 _WIDEST: Final = 10_000
@@ -25,7 +29,7 @@ class Change:
 
 
 def with_changes(text: str, changes: Sequence[Change]) -> str:
-    """Return the text of a file with changes made.
+    """Return the text of a file with changes made. What they change may be of other groups too, by anchors.
 
     A new policy takes keys with it that it does not have.
     """
@@ -37,6 +41,23 @@ def with_changes(text: str, changes: Sequence[Change]) -> str:
             _fit(group, str(change.value))
         _set(group if change.topic is None else group["topics"][change.topic], change)
     return dumped(yaml, document)
+
+
+def file_with_changes(text: str, changes: Sequence[Change]) -> str:
+    """Return the text of a file with changes made, and nothing else changed.
+
+    Raises BagError where anchors or merge keys would carry a change into what it is not for.
+    """
+    wanted = load_text(with_changes(spelt_out(text), changes)).groups
+    # ruamel.yaml deletes no merged key, and fails to delete one that is merged elsewhere.
+    with suppress(ConfigError, KeyError, IndexError):
+        changed = with_changes(text, changes)
+        if load_text(changed).groups == wanted:
+            return changed
+    raise BagError(
+        "the file shares values by anchors or merge keys, so the suggested ones cannot be written for one group alone:"
+        " write them by hand"
+    )
 
 
 def with_evidence(text: str, group: str, evidence: Sequence[str]) -> str:
@@ -66,9 +87,9 @@ def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
 
 
 def _set(mapping: Any, change: Change) -> None:
-    is_new = change.key not in mapping
-    if is_new and "topics" in mapping:
-        mapping.insert(list(mapping).index("topics"), change.key, change.value)
+    own = [key for key, _ in mapping.non_merged_items()]
+    if change.key not in own and "topics" in own:
+        mapping.insert(own.index("topics") + bool(mapping.merge), change.key, change.value)
     mapping[change.key] = change.value
     _comment(mapping, change.key, change.reason)
 

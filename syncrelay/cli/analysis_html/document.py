@@ -9,10 +9,11 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from syncrelay.bag.analysis import Analysis, with_changes
+from syncrelay.bag.analysis import Analysis, file_with_changes
 from syncrelay.cli.analysis_html.drawings import drawings_of
 from syncrelay.cli.analysis_html.fates import FATES, Fate
 from syncrelay.cli.analysis_html.words import TopicRow, group_words, topic_row
+from syncrelay.errors import BagError
 from syncrelay.explain import words
 from syncrelay.printable import printable, printable_lines
 
@@ -44,13 +45,20 @@ def as_html(name: str, analysis: Analysis) -> str:
         groups=told,
         fates={fate.name: fate for fate in FATES},
         drawings={"fates": [_fate(fate) for fate in FATES], "groups": [each.for_script for each in drawings]},
-        file=printable_lines(with_changes(analysis.text, analysis.changes)).rstrip(),
+        file=_file(analysis),
         script=script,
         style=style,
         script_hash=_hash(script),
         style_hash=_hash(style),
     )
     return page
+
+
+def _file(analysis: Analysis) -> str:
+    try:
+        return printable_lines(file_with_changes(analysis.text, analysis.changes)).rstrip()
+    except BagError as error:
+        return f"# {error}"
 
 
 def _fate(fate: Fate) -> dict[str, Any]:

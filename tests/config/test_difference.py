@@ -1,0 +1,143 @@
+"""What a reload would do, key by key; what the relay does with it is in tests/ros/test_reload.py."""
+
+from dataclasses import replace
+
+import pytest
+
+from syncrelay.config import load_text
+from syncrelay.config.difference import Difference, KeyChange, difference
+from syncrelay.config.reload import exchange
+from tests.config.test_together import file, group
+
+FRONT, REAR = group("front", "/a", "/b"), group("rear", "/a", "/c")
+
+
+def between(old: str, new: str, environ: dict[str, str]) -> Difference:
+    return difference(load_text(old, environ=environ), load_text(new, environ=environ))
+
+
+def keys(old: str, new: str, environ: dict[str, str]) -> list[tuple[str, str | None, str | None]]:
+    """The keys that change in the one group that does."""
+    (change,) = between(old, new, environ).groups
+    return [(f"{each.topic or ''} {each.key}".strip(), each.old, each.new) for each in change.keys]
+
+
+def test_groups_are_kept_rebuilt_started_and_ended_by_what_they_are(environ):
+    old = file(FRONT, REAR, group("gone", "/a", "/b"))
+    new = file(group("new", "/a", "/b"), group("rear", "/a", "/c", keys="queue_size: 5"), FRONT)
+    found = between(old, new, environ)
+    gone = found.exchange
+    assert (gone.kept, gone.rebuilt, gone.started, gone.ended) == (("front",), ("rear",), ("new",), ("gone",))
+    assert str(gone) == "reloaded: 1 group unchanged; rebuilt rear; started new; ended gone"
+    assert not found.is_empty
+
+
+def test_a_group_that_a_bug_stopped_is_rebuilt_though_its_keys_are_the_same(environ):
+    groups = load_text(file(FRONT, REAR), environ=environ).groups
+    assert exchange(groups, groups, stopped=["rear"]).rebuilt == ("rear",)
+
+
+@pytest.mark.parametrize(
+    "new",
+    [
+        file(FRONT, REAR),
+        file(REAR, FRONT),
+        "# a comment\n" + file(FRONT, REAR, top="x-note: 1\nnode: {name: syncrelay}\nmetrics: {}\n"),
+        file(FRONT, REAR, top="defaults: {queue_size: 10, slop: 1s}\n"),
+        file(FRONT, REAR.replace("/a,", "/a, qos: auto, offset: 0,")),
+    ],
+)
+def test_what_says_the_same_changes_nothing(new, environ):
+    assert between(file(FRONT, REAR), new, environ).is_empty
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ({}, {"keys": "queue_size: 5"}, [("queue_size", None, "5")]),
+        ({"keys": "max_wait: 100ms"}, {"keys": "max_wait: 0.2"}, [("max_wait", "100ms", "0.2")]),
+        (
+            {},
+            {"keys": "output_prefix: /new"},
+            [
+                ("output_prefix", None, "/new"),
+                ("/a output", "/front/a", "/new/a"),
+                ("/b output", "/front/b", "/new/b"),
+            ],
+        ),
+    ],
+)
+def test_a_key_is_told_with_its_values_as_they_are_written(old, new, expected, environ):
+    files = [file(group("front", "/a", "/b", **keys)) for keys in (old, new)]
+    assert keys(*files, environ) == expected
+
+
+def test_the_keys_of_another_policy_go_and_come_with_it(environ):
+    other = FRONT.replace("policy: exact_time", "policy: approximate_time\n    slop: 20ms")
+    assert keys(file(FRONT), file(other), environ) == [
+        ("policy", "exact_time", "approximate_time"),
+        ("slop", None, "20ms"),
+    ]
+
+
+def test_a_key_of_defaults_is_told_in_the_groups_that_have_it(environ):
+    rear = group("rear", "/a", "/b", keys="queue_size: 3")
+    found = between(file(FRONT, rear), file(FRONT, rear, top="defaults: {queue_size: 7}\n"), environ)
+    assert [(each.name, each.keys) for each in found.groups] == [("front", (KeyChange("queue_size", None, "7"),))]
+
+
+def test_inputs_that_come_go_and_change_places_are_told_by_name(environ):
+    old, new = file(group("front", "/a", "/b", "/c")), file(group("front", "/c", "/d", "/a"))
+    (change,) = between(old, new, environ).groups
+    assert (change.keys, change.removed, change.added, change.reordered) == ((), ("/b",), ("/d",), True)
+
+
+def test_a_key_of_an_input_is_told_wherever_it_stands_now(environ):
+    old = file(group("front", "/a", "/b"))
+    new = file(group("front", "/b", "/a")).replace("/a,", "/a, offset: -5ms, stamp: receive,")
+    assert keys(old, new, environ) == [("/a offset", None, "-5ms"), ("/a stamp", None, "receive")]
+
+
+def test_a_type_that_another_group_writes_is_told(environ):
+    bare = group("rear", "/a", "/c").replace(", type: sensor_msgs/msg/Image", "", 1)
+    old, new = file(group("front", "/d", "/b"), bare), file(group("front", "/d", "/a"), bare)
+    changes = between(old, new, environ).groups
+    assert [(each.name, each.keys) for each in changes if each.name == "rear"] == [
+        ("rear", (KeyChange("type", None, "sensor_msgs/msg/Image", topic="/a"),))
+    ]
+
+
+def test_subscriptions_are_shared_and_end_with_their_last_group(environ):
+    old = file(FRONT, REAR)
+    assert between(old, file(FRONT), environ).subscriptions.lost == (("/c", "sensor_msgs/msg/Image", "auto"),)
+    changed = between(old, file(FRONT, group("rear", "/a", "/c", keys="queue_size: 5")), environ).subscriptions
+    assert (changed.lost, changed.made) == ((), ())
+    other_qos = between(file(FRONT), file(FRONT.replace("/b,", "/b, qos: sensor_data,")), environ).subscriptions
+    assert other_qos.lost == (("/b", "sensor_msgs/msg/Image", "auto"),)
+    assert other_qos.made == (("/b", "sensor_msgs/msg/Image", "sensor_data"),)
+
+
+def test_a_rebuilt_groups_publishers_are_made_again_but_that_of_its_manifest(environ):
+    new = file(group("front", "/a", "/b", keys="queue_size: 5"))
+    found = between(file(FRONT, REAR), new, environ).publishers
+    assert [each[0] for each in found.lost] == ["/rear/a", "/rear/c", "/syncrelay/rear/sets"]
+    assert found.made == ()
+    assert [each[0] for each in found.made_again] == ["/front/a", "/front/b"]
+    quiet = between(file(FRONT), file(group("front", "/a", "/b", keys="manifest: false")), environ).publishers
+    assert [each[0] for each in quiet.lost] == ["/syncrelay/front/sets"]
+
+
+@pytest.mark.parametrize(
+    ("top", "restart", "sections"),
+    [
+        ("node: {name: other}", ("node",), [KeyChange("node.name", None, "other")]),
+        ("metrics: null", ("metrics",), [KeyChange("metrics", None, "null")]),
+        ("metrics: {listen: '127.0.0.1:0'}", ("metrics",), [KeyChange("metrics.listen", None, "127.0.0.1:0")]),
+        ("diagnostics: {scalars: true}", (), [KeyChange("diagnostics.scalars", None, "true")]),
+    ],
+)
+def test_what_is_no_group_is_told_and_whether_it_needs_a_restart(top, restart, sections, environ):
+    found = between(file(FRONT), file(FRONT, top=f"{top}\n"), environ)
+    assert (found.restart, list(found.sections), found.is_empty) == (restart, sections, False)
+    back = between(file(FRONT, top=f"{top}\n"), file(FRONT), environ)
+    assert list(back.sections) == [replace(each, old=each.new, new=each.old) for each in sections]
