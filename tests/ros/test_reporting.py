@@ -1,4 +1,4 @@
-"""Where findings are seen: /diagnostics, topics for plotting, `--explain`, HTTP."""
+"""Where findings are seen: /diagnostics, topics for plotting, `observe`, HTTP."""
 
 import signal
 import socket
@@ -98,24 +98,24 @@ def test_nothing_is_published_about_the_relay_if_that_is_asked_for(stage: Stage)
     assert not collector.endpoints("/diagnostics", kind="publisher", node="/syncrelay")
 
 
-def test_a_run_that_explains_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
+def test_observe_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
     player = stage.player(PAIR)
     player.is_up()
     player.start(_RIG, speed=1)
-    relay = stage.relay(front(), "--explain", "12")
-    assert_looked_at_a_healthy_rig(relay)
+    assert_looked_at_a_healthy_rig(stage.observe(front(), "--seconds", "12", "--json"))
 
 
-def test_a_run_that_explains_exits_with_1_and_what_to_do(stage: Stage):
-    relay = stage.relay(front(), "--explain", "6")
-    assert relay.wait() == 1
-    assert relay.stdout.splitlines()[:2] == [
-        f"front: error: no other node was found on domain {stage.domain} (discovery range LOCALHOST) [alone]",
-        (
-            "    start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
-            " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`"
-        ),
-    ]
+def test_observe_exits_with_1_and_what_to_do(stage: Stage):
+    look = stage.observe(front(), "--seconds", "6")
+    assert look.wait() == 1
+    told = " ".join(look.stdout.split())
+    assert (
+        f"ERROR: no other node was found on domain {stage.domain} (discovery range LOCALHOST) fix: start the robot's"
+        " nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION on"
+        " both sides, and run `syncrelay doctor --live`"
+    ) in told
+    assert "would have left: 0 sets hint: no values to suggest: no messages of /camera, /lidar" in told
+    assert told.endswith("exit code 1: front has 1 error")
 
 
 def test_a_port_that_is_taken_is_an_error_that_says_so(stage: Stage):
