@@ -14,6 +14,7 @@ from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play,
 from tests.ros.stage import Collector, Stage
 from tests.ros.status import findings
 from tests.ros.streams import merged
+from tests.test_foxglove import plotted
 
 pytestmark = pytest.mark.ros
 
@@ -72,12 +73,9 @@ def test_diagnostics_have_a_status_for_each_group(stage: Stage):
     assert side[1].startswith("nobody publishes /a ")
 
 
-def test_figures_are_published_for_plotting_if_they_are_asked_for(stage: Stage):
-    topics = {
-        "/syncrelay/front/sets_hz": FLOAT,
-        "/syncrelay/front/span_ms": FLOAT,
-        "/syncrelay/front/latency_ms": FLOAT,
-    }
+def test_figures_that_the_foxglove_layout_plots_are_published_if_they_are_asked_for(stage: Stage):
+    topics = dict.fromkeys(plotted(), FLOAT)
+    assert set(topics) == {f"/syncrelay/front/{figure}" for figure in ("sets_hz", "span_ms", "latency_ms")}
     collector = stage.collector(topics)
     stage.relay(front(top={"diagnostics": {"scalars": True}}))
     play(stage, _RIG)
