@@ -11,9 +11,12 @@ _HEAD: Final = 500
 
 
 def require_new(name: str) -> None:
-    """Raise BagError where a file is there already, before work is done for it."""
-    if os.path.lexists(name):
-        raise BagError(_is_there(Path(name)))
+    """Raise BagError where a file is there already, or has no folder to be in, before work is done for it."""
+    path = Path(name)
+    if os.path.lexists(path):
+        raise BagError(_is_there(path))
+    if not path.parent.is_dir():
+        raise BagError(f"{path}: cannot be written: {path.parent} is not a folder")
 
 
 def write_new(name: str, text: str) -> None:

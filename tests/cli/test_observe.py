@@ -48,3 +48,11 @@ def test_of_two_files_none_is_written(tmp_path):
     done = run("observe", "--config", "a.yaml", "--config", "b.yaml", "--write", "new.yaml", folder=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("syncrelay: --write goes with one --config FILE\n")
+
+
+def test_a_file_that_has_no_folder_is_said_at_once(tmp_path):
+    done = run("observe", "--config", "fusion.yaml", "--write", "there/new.yaml", folder=tmp_path)
+    assert (done.returncode, done.stderr) == (
+        1,
+        "syncrelay: there/new.yaml: cannot be written: there is not a folder\n",
+    )
