@@ -35,9 +35,7 @@ COMMANDS: Final = {
         Command("replay BAG...", "run a file's groups on a recording, without ROS", parsers.replay, "replay"),
         Command("demo", "try it on simulated sensors; needs no robot", parsers.demo, "demo"),
         Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),
-        Command(
-            "observe --config FILE", "try a file beside a running robot; publishes nothing", parsers.observe, "observe"
-        ),
+        Command("observe", "try a file beside a running robot; publishes nothing", parsers.observe, "observe"),
         Command("top", "watch a running relay, here or on another machine", parsers.top, "top"),
         Command("reload", "make a running relay read its file again", parsers.reload, "reload"),
         Command("healthcheck", "check that the relay is receiving", parsers.healthcheck, "heartbeat"),
