@@ -3,13 +3,18 @@
 import json
 import logging
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime
+from logging.handlers import MemoryHandler
 
 from syncrelay.printable import one_entry
 
 LOGGER = logging.getLogger("syncrelay")
 
 _ROS_LEVELS = {"WARNING": "WARN", "CRITICAL": "FATAL"}
+# Lines; more than that, and something else is wrong.
+_MOST_HELD = 1000
 
 
 class _TextFormatter(logging.Formatter):
@@ -58,3 +63,17 @@ def configure(level: str, log_format: str) -> None:
     LOGGER.handlers = [handler]
     LOGGER.setLevel(level.upper())
     LOGGER.propagate = False
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Keep the log off a picture; it comes out at the end."""
+    shown = list(LOGGER.handlers)
+    held = [MemoryHandler(_MOST_HELD, flushLevel=sys.maxsize, target=handler) for handler in shown]
+    LOGGER.handlers[:] = held
+    try:
+        yield
+    finally:
+        LOGGER.handlers[:] = shown
+        for handler in held:
+            handler.close()

@@ -5,6 +5,7 @@ from typing import Any
 
 from syncrelay.bag.analysis import Analysis, GroupAnalysis
 from syncrelay.bag.analysis.nearest import Pair
+from syncrelay.bag.analysis.suggest import Suggestion
 from syncrelay.bag.analysis.watching import LastingFinding
 
 
@@ -20,7 +21,6 @@ def as_json(name: str, analysis: Analysis) -> dict[str, Any]:
 
 
 def _group(each: GroupAnalysis) -> dict[str, Any]:
-    suggestion = each.suggestion
     return {
         "name": each.group.name,
         "policy": each.group.options.policy,
@@ -38,13 +38,18 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
         "pairs": [_pair(pair) for pair in each.pairs],
         **_curves(each),
         "findings": [_finding(lasting) for lasting in each.findings],
-        "suggestion": {
-            "possible": suggestion.possible,
-            "now": suggestion.now,
-            "then": suggestion.then,
-            "hints": suggestion.hints,
-            "changes": [asdict(change) for change in suggestion.changes],
-        },
+        "suggestion": suggestion_as_json(each.suggestion),
+    }
+
+
+def suggestion_as_json(suggestion: Suggestion) -> dict[str, Any]:
+    """Return better values for a group, and what they would give, as what json.dumps takes."""
+    return {
+        "possible": suggestion.possible,
+        "now": suggestion.now,
+        "then": suggestion.then,
+        "hints": suggestion.hints,
+        "changes": [asdict(change) for change in suggestion.changes],
     }
 
 

@@ -86,8 +86,7 @@ def _long(nanoseconds: int) -> str:
 
 
 def _group(each: GroupAnalysis) -> Iterator[str]:
-    name, suggestion = each.group.name, each.suggestion
-    yield f"group {name}, {each.group.options.policy}"
+    yield f"group {each.group.name}, {each.group.options.policy}"
     yield f"  {_sets(each)}"
     for row in each.fates:
         yield f"  {row.topic}: {', '.join(_fates(row))}"
@@ -96,6 +95,12 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
     yield from (f"  {line}" for line in _curves(each))
     for lasting in each.findings:
         yield f"  {lasting.finding.severity.name.lower()}, for {lasting.seconds} s: {in_words(lasting.finding)}"
+    yield from suggestion_lines(each)
+
+
+def suggestion_lines(each: GroupAnalysis) -> Iterator[str]:
+    """Yield what better values would give, and where they stand in the file."""
+    name, suggestion = each.group.name, each.suggestion
     for hint in suggestion.hints:
         yield f"  hint: {hint}"
     if suggestion.changes:

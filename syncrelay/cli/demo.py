@@ -8,7 +8,6 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from importlib.resources import files
-from logging.handlers import MemoryHandler
 from typing import TYPE_CHECKING, TypeAlias
 
 from rich.console import Console
@@ -20,7 +19,7 @@ from syncrelay.cli.demo_screen import Moment, frame, plain_line, summary
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
-from syncrelay.logs import LOGGER, configure
+from syncrelay.logs import configure, held_back
 from syncrelay.status import document
 from syncrelay.top.state import State, state_of
 
@@ -34,9 +33,6 @@ _LINE_S = 1.0
 
 Show: TypeAlias = Callable[[Moment], None]
 """Shows a moment, if it is time to."""
-
-# Lines of log; more than that, and something else is wrong.
-_MOST_HELD = 1000
 
 
 def shipped_config() -> str:
@@ -179,19 +175,5 @@ def _view(console: Console) -> Iterator[Show]:
     if not _can_draw(console):
         yield _Lines().show
         return
-    with _log_held_back(), Live(Text(_STARTING), console=console, screen=True, auto_refresh=False) as live:
+    with held_back(), Live(Text(_STARTING), console=console, screen=True, auto_refresh=False) as live:
         yield _Screen(live).show
-
-
-@contextmanager
-def _log_held_back() -> Iterator[None]:
-    """Keep the log off the picture; it comes out at the end."""
-    shown = list(LOGGER.handlers)
-    held = [MemoryHandler(_MOST_HELD, flushLevel=sys.maxsize, target=handler) for handler in shown]
-    LOGGER.handlers[:] = held
-    try:
-        yield
-    finally:
-        LOGGER.handlers[:] = shown
-        for handler in held:
-            handler.close()

@@ -38,6 +38,7 @@ COMMANDS: Final = {
         Command("test FILE...", "check what files do against what they shall do", parsers.test, "test"),
         Command("demo", "try it on simulated sensors; needs no robot", parsers.demo, "demo"),
         Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),
+        Command("observe", "try a file beside a running robot; publishes nothing", parsers.observe, "observe"),
         Command("top", "watch a running relay, here or on another machine", parsers.top, "top"),
         Command("reload", "make a running relay read its file again", parsers.reload, "reload"),
         Command("healthcheck", "check that the relay is receiving", parsers.healthcheck, "heartbeat"),

@@ -1,5 +1,6 @@
 """Files that a command writes, and never over something of the user's."""
 
+import os
 from pathlib import Path
 from typing import Final
 
@@ -9,6 +10,15 @@ from syncrelay.errors import BagError
 _HEAD: Final = 500
 
 
+def require_new(name: str) -> None:
+    """Raise BagError where a file is there already, or has no folder to be in, before work is done for it."""
+    path = Path(name)
+    if os.path.lexists(path):
+        raise BagError(_is_there(path))
+    if not path.parent.is_dir():
+        raise BagError(f"{path}: cannot be written: {path.parent} is not a folder")
+
+
 def write_new(name: str, text: str) -> None:
     """Write a file that is not there yet, and say so; raises BagError for one that is, or cannot be written."""
     path = Path(name)
@@ -16,7 +26,7 @@ def write_new(name: str, text: str) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise BagError(f"{path}: already exists and is not overwritten") from error
+        raise BagError(_is_there(path)) from error
     except OSError as error:
         raise BagError(f"{path}: cannot be written: {error.strerror}") from error
     remark(f"wrote {path}")
@@ -28,6 +38,10 @@ def write_again(name: str, text: str, *, mark: str) -> None:
     if path.is_file() and _bears(path, mark):
         path.unlink()
     write_new(name, text)
+
+
+def _is_there(path: Path) -> str:
+    return f"{path}: already exists and is not overwritten"
 
 
 def _bears(path: Path, mark: str) -> bool:

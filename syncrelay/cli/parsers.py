@@ -40,7 +40,6 @@ def relay() -> Parser:
         action="store_true",
         help="read FILE again when it changes, or a file comes to or goes from a directory; not only at SIGHUP",
     )
-    add("--explain", metavar="N", type=positive, help="publish nothing; after N s say what is wrong")
     add(
         "--log-level",
         choices=("debug", "info", "warning", "error"),
@@ -251,6 +250,27 @@ def doctor() -> Parser:
     )
     parser.add_argument("--seconds", metavar="N", type=positive, help="with --live: watch for N s (5)")
     parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+    parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
+    return parser
+
+
+def observe() -> Parser:
+    """Return the parser of `syncrelay observe`."""
+    parser = Parser(
+        "syncrelay observe",
+        description="Tries a file beside a running robot: subscribes, publishes nothing, and shows live, as top does, "
+        "what its groups make of what comes. Ends with what would have left, why not more, and the values that would "
+        "fit. Exit code 1 unless all groups are healthy.",
+    )
+    parser.add_argument(
+        "--config", metavar="FILE", action="append", required=True, help="the file to try; may be repeated"
+    )
+    parser.add_argument(
+        "--group", metavar="NAME", action="append", default=[], help="try this group only; may be repeated"
+    )
+    parser.add_argument("--seconds", metavar="N", type=positive, help="end after N s, and print text only")
+    parser.add_argument("--json", action="store_true", help="print JSON at the end, for programs")
+    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
     parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
     return parser
 

@@ -45,7 +45,6 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
         arguments.log_level,
         arguments.log_format,
         arguments.ros_args,
-        explain_s=arguments.explain,
         watch=arguments.watch,
         stop=stop,
     )
@@ -58,37 +57,28 @@ def run(
     log_format: str,
     ros_args: Sequence[str],
     *,
-    explain_s: float | None = None,
     watch: bool = False,
     stop: StopRequest,
 ) -> int:
     """Relay the groups of files, all of them if `groups` is empty; 0 after an orderly end.
 
-    With `explain_s`, only look: publish nothing, and end after so many seconds with the findings, and 1 unless all
-    groups are healthy. The files are read again at SIGHUP, and with `watch` when one changes.
+    The files are read again at SIGHUP, and with `watch` when one changes.
 
     Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
     cannot be used.
     """
     with resting_collector():
-        from syncrelay.config import Severity, load, where
         from syncrelay.logs import LOGGER, configure
         from syncrelay.ros.environment import require_rclpy
 
     configure(log_level, log_format)
     # Before they are read: what changes while the relay starts is seen too.
     files = ConfigFiles(config_paths, watched=watch)
-    config = load(*config_paths)
-    for note in config.notes:
-        if note.severity is Severity.WARNING:
-            LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)
-    _require_groups(groups, config, config_paths)
+    config = loaded(config_paths, groups)
     require_rclpy()
     with resting_collector():
-        from syncrelay.cli.explain import explain
         from syncrelay.cli.services import services
         from syncrelay.cli.summary import log_summary
-        from syncrelay.ros.entities import Purpose
         from syncrelay.ros.relay import Relay
 
     def managed(relay: Relay) -> Callable[..., Any]:
@@ -103,15 +93,14 @@ def run(
     stop.defer()
     with (
         _heartbeat(os.environ.get(VARIABLE)) as heartbeat,
-        listening(config.listen if explain_s is None else None) as server,
+        listening(config.listen) as server,
         Relay(
             config,
             config_paths=config_paths,
             groups=groups or None,
             ros_args=ros_args,
             on_turn=heartbeat.beat if heartbeat else None,
-            purpose=Purpose.RELAY if explain_s is None else Purpose.OBSERVE,
-            manage=managed if config.node.lifecycle and explain_s is None else None,
+            manage=managed if config.node.lifecycle else None,
         ) as relay,
         files,
     ):
@@ -122,13 +111,28 @@ def run(
             LOGGER.info(
                 "status and metrics: http://%s/; watch with `syncrelay top --url %s`", server.place, server.place.url
             )
-        if explain_s is not None:
-            return explain(relay, explain_s, stop=stop)
         if config.node.services:
             relay.offer(services(relay, files))
         _relay_until(stop, relay, files, lambda read: _reload(relay, read, config_paths, groups))
         log_summary(relay.drain())
     return 0
+
+
+def loaded(config_paths: Sequence[str], groups: Sequence[str]) -> "Config":
+    """Read files as the relay does, log what is hardly meant, and return what they say.
+
+    Raises ConfigError for a faulty file, UsageError where they lack one of these groups.
+    """
+    with resting_collector():
+        from syncrelay.config import Severity, load, where
+        from syncrelay.logs import LOGGER
+
+    config = load(*config_paths)
+    for note in config.notes:
+        if note.severity is Severity.WARNING:
+            LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)
+    _require_groups(groups, config, config_paths)
+    return config
 
 
 def _relay_until(stop: StopRequest, relay: "Relay", files: ConfigFiles, reload: Callable[[Reading], None]) -> None:

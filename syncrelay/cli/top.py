@@ -4,7 +4,7 @@ import json
 import os
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 
 from syncrelay.cli.boundary import DONE, put
@@ -12,7 +12,7 @@ from syncrelay.cli.parser import Parser
 from syncrelay.cli.relays import find, find_one
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
-from syncrelay.top.client import Answer, base_urls
+from syncrelay.top.client import Answer, ask, base_urls
 
 
 class Output(Enum):
@@ -39,7 +39,8 @@ def top(named: str | None, output: Output) -> int:
         # What is no name of a relay is said with or without a terminal.
         base_urls(named)
         _require_terminal()
-        return _screen(find(named, otherwise=_otherwise(named)))
+        show(find(named, otherwise=_otherwise(named)))
+        return DONE
     answer = find_one(named, otherwise=_otherwise(named))
     # Made anew: JSON may hold as they are what a terminal must not see.
     put(json.dumps(json.loads(answer.document)) if output is Output.JSON else _as_text(answer))
@@ -52,25 +53,29 @@ def _as_text(answer: Answer) -> str:
     return plain_text(answer)
 
 
-def _screen(relays: Sequence[Answer]) -> int:
+def show(relays: Sequence[Answer], source: Callable[[str], Answer] = ask) -> None:
+    """Show relays on the terminal until the user has seen enough, or `source`, as TopApp takes it, ends."""
     from syncrelay.top.app import TopApp
 
-    app = TopApp(relays)
+    app = TopApp(relays, source=source)
     app.run()
     if app.failure is not None:
         raise app.failure
-    return DONE
 
 
 def _require_terminal() -> None:
+    if (why := why_no_screen()) is not None:
+        raise SyncRelayError(f"{why}\n  `syncrelay top --once` prints text")
+
+
+def why_no_screen() -> str | None:
+    """Say why nothing can be drawn here, None if it can."""
     # Keys come from stdin and the screen goes to stderr; who redirects stdout wants text.
-    streams = (sys.stdin, sys.stdout, sys.stderr)
-    if not all(stream.isatty() for stream in streams):
-        raise SyncRelayError("top needs a terminal, and there is none here\n  `syncrelay top --once` prints text")
+    if not all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr)):
+        return "top needs a terminal, and there is none here"
     if os.environ.get("TERM", "dumb") in {"dumb", "unknown"} or not sys.stderr.encoding.lower().startswith("utf"):
-        raise SyncRelayError(
-            "top cannot draw on this terminal: check TERM and LANG\n  `syncrelay top --once` prints text"
-        )
+        return "top cannot draw on this terminal: check TERM and LANG"
+    return None
 
 
 def _otherwise(named: str | None) -> str:

@@ -35,7 +35,8 @@ class Config:
     """A file that is in order. `notes` are what could not be checked, or is hardly meant.
 
     `names` tells what is wrong with it once remaps have made others of its topics' names.
-    `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published.
+    `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published. `sources` are its files
+    as they were read.
     """
 
     node: NodeConfig
@@ -44,6 +45,7 @@ class Config:
     diagnostics: DiagnosticsConfig | None
     names: NamesInFile = field(compare=False, repr=False)
     notes: tuple[Problem, ...] = ()
+    sources: tuple[Source, ...] = field(default=(), compare=False, repr=False)
 
     def written(self, path: Path) -> str | None:
         """Return the value at a path as it is written there or in `defaults`, on one line; None where it is not."""
@@ -118,7 +120,8 @@ def _config(parts: Sequence[_Part], environ: Mapping[str, str]) -> Config:
     found = _in_order(problems, files=[source.name for source in document.sources.values()])
     if document.faulty or any(problem.severity is Severity.ERROR for problem in found):
         raise ConfigError(found)
-    return Config(file.node, groups, resolve_listen(file.metrics), file.diagnostics, names, found)
+    sources = tuple(document.sources.values())
+    return Config(file.node, groups, resolve_listen(file.metrics), file.diagnostics, names, found, sources)
 
 
 def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) -> list[_Part]:

@@ -165,7 +165,7 @@ def _not_looked() -> Diagnosis:
 
 
 def _observe(config: Config | None, ros_args: Sequence[str], node: str, *, seconds: float) -> Observed | None:
-    """Observe the groups as `--explain` does, or the graph alone; None where remaps make names of the file meet."""
+    """Observe the groups as `observe` does, or the graph alone; None where remaps make names of the file meet."""
     from syncrelay.ros.environment import require_rclpy  # noqa: PLC0415  rclpy is imported where the graph is wanted
 
     require_rclpy()

@@ -40,7 +40,7 @@ def check_groups(reports: Sequence[GroupReport], unjudged: Sequence[str]) -> Ite
             Severity.ERROR,
             f"{name}: a bug in syncrelay keeps this group from being judged",
             None,
-            "report it with what `syncrelay --config FILE --explain 5` prints",
+            "report it with what `syncrelay observe --config FILE --seconds 5` prints",
         )
 
 

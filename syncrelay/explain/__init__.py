@@ -22,6 +22,7 @@ from syncrelay.explain.facts import (
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Code, Finding, Severity
+from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
@@ -33,6 +34,7 @@ __all__ = [
     "BOUNDS_NS",
     "STEP_NS",
     "UNREADABLE",
+    "Arrivals",
     "ClockState",
     "Code",
     "Distribution",

@@ -3,7 +3,7 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import islice
 from math import ceil
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -13,6 +13,7 @@ from syncrelay.dataflow.group import Batch, GroupRelay
 from syncrelay.dataflow.observers import Losses, SimulatedClock, Standstills, SystemClock, Waits
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.explain import (
+    Arrivals,
     FindingLog,
     GraphSnapshot,
     GroupReport,
@@ -68,6 +69,8 @@ class Monitor:
         self._ends_pauses = node.resolve_service_name("~/resume")
         self.inactive: str | None = None
         """The node's name, while it is managed and waits to be activated."""
+        self.heard: Callable[[str, Sequence[Arrivals]], object] = lambda _group, _arrivals: None
+        """Hears of each group that is evaluated what came since: stamps and times of receipt of each input."""
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -154,6 +157,7 @@ class Monitor:
             woke=binding.group.woke,
             now=now,
         )
+        self.heard(binding.group.config.name, batch.arrivals)
         shown = [self._surroundings.of(each, lost=self._losses[each.topic].recent) for each in binding.inputs]
         facts = watch.facts(
             shown,

@@ -151,7 +151,7 @@ class Relay:
         )
         self._is_managed = manage is not None
         self._config_paths = config_paths
-        self._phase = Phase.STARTING
+        self._phase = Phase.STARTING if purpose is Purpose.RELAY else Phase.OBSERVING
         self._asked = -_ASKED_S
         self._next_evaluation = time.monotonic() + EVALUATE_S
         self._started = time.monotonic()

@@ -10,7 +10,7 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from syncrelay import own_version
-from syncrelay.explain import BOUNDS_NS, Histogram
+from syncrelay.explain import BOUNDS_NS, Finding, GroupReport, Histogram
 from syncrelay.status.state import RelayState, is_ready
 
 _NS_PER_SECOND = 1e9
@@ -34,7 +34,11 @@ class _OfState(Collector):
     def collect(self) -> Iterator[Metric]:
         state = self._state()
         yield _build(state)
-        yield GaugeMetricFamily("syncrelay_ready", "1 if all required inputs have a publisher.", value=is_ready(state))
+        yield GaugeMetricFamily(
+            "syncrelay_ready",
+            "1 if the relay runs, is not paused, and every required input has a publisher that fits.",
+            value=is_ready(state),
+        )
         yield CounterMetricFamily("syncrelay_reloads", "Reloads that succeeded.", value=state.reloads)
         yield from _of_inputs(state)
         yield from _of_groups(state)
@@ -91,8 +95,12 @@ def _add(family: HistogramMetricFamily, group: str, histogram: Histogram) -> Non
 
 def _findings(state: RelayState) -> Metric:
     family = GaugeMetricFamily("syncrelay_finding", "What was found.", labels=("group", "code", "severity", "topic"))
-    for report in state.groups:
-        for finding in report.findings:
-            topic = "" if finding.input is None else report.facts.inputs[finding.input].name
-            family.add_metric([report.facts.name, finding.code.value, finding.severity.name.lower(), topic], 1)
+    # Of two that differ in their words alone there must be one series.
+    for labels in dict.fromkeys(_labels(report, finding) for report in state.groups for finding in report.findings):
+        family.add_metric(labels, 1)
     return family
+
+
+def _labels(report: GroupReport, finding: Finding) -> tuple[str, str, str, str]:
+    topic = "" if finding.input is None else report.facts.inputs[finding.input].name
+    return report.facts.name, finding.code.value, finding.severity.name.lower(), topic

@@ -7,11 +7,15 @@ from syncrelay.explain import Endpoint, GroupReport, InputFacts
 
 
 class Phase(Enum):
-    """Where a relay is in its life. Unconfigured, inactive and finalized are only managed nodes."""
+    """Where a relay is in its life. Unconfigured, inactive and finalized are only managed nodes.
+
+    Observing is one that only looks, for as long as it lives.
+    """
 
     UNCONFIGURED = "unconfigured"
     INACTIVE = "inactive"
     STARTING = "starting"
+    OBSERVING = "observing"
     RUNNING = "running"
     PAUSED = "paused"
     DRAINING = "draining"
@@ -71,10 +75,10 @@ def advice(phase: Phase, node: str) -> str | None:
 
 
 def is_ready(state: RelayState) -> bool:
-    """Whether the relay runs and is not paused, and every required input of every group is served and let through."""
+    """Whether the relay runs or observes, is not paused, and every required input is served and let through."""
     inputs = [each for report in state.groups for each in report.facts.inputs if each.required]
     return (
-        state.phase is Phase.RUNNING
+        state.phase in (Phase.RUNNING, Phase.OBSERVING)
         and bool(state.groups)
         and not state.unjudged
         and all(report.facts.failure is None for report in state.groups)

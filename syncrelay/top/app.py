@@ -6,7 +6,7 @@ import signal
 import sys
 import termios
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Event
 from typing import ClassVar, Final
@@ -19,6 +19,7 @@ from textual.reactive import reactive
 from textual.widgets import OptionList
 from textual.worker import get_current_worker
 
+from syncrelay.errors import SyncRelayError
 from syncrelay.top.client import Answer, NoAnswerError, OtherServerError, ask
 from syncrelay.top.dialogs import KeysScreen, RelaysScreen
 from syncrelay.top.screens import GroupsScreen
@@ -27,10 +28,14 @@ from syncrelay.top.view import Order, View
 _PERIOD_S: Final = 1.0
 
 
+class EndedError(SyncRelayError):
+    """What was watched has ended for good."""
+
+
 class Heard(Message):
     """What came of asking a relay: its answer, or why there was none."""
 
-    def __init__(self, url: str, heard: Answer | NoAnswerError | OtherServerError) -> None:
+    def __init__(self, url: str, heard: Answer | SyncRelayError) -> None:
         super().__init__()
         self.url, self.heard = url, heard
 
@@ -46,6 +51,8 @@ def _end_without_terminal() -> None:
 class TopApp(App[None]):
     """Watches one of the relays that were found, of several the one that the user chooses.
 
+    `source` gives the state of the one at a URL, on a thread of its own. It raises NoAnswerError or OtherServerError
+    where there is none, and EndedError where there will be none any more: then the application ends.
     `failure` is the error, a bug, that ended it.
     """
 
@@ -56,12 +63,15 @@ class TopApp(App[None]):
     view: reactive[View | None] = reactive(None)
     order: reactive[Order] = reactive(Order.FILE)
 
-    def __init__(self, relays: Sequence[Answer], *, period_s: float = _PERIOD_S) -> None:
+    def __init__(
+        self, relays: Sequence[Answer], *, source: Callable[[str], Answer] = ask, period_s: float = _PERIOD_S
+    ) -> None:
         # The terminal's own colours, whatever its theme; said here already, so that NO_COLOR means none at all.
         super().__init__(ansi_color=True)
         self.theme = "ansi-dark"
         self.failure: Exception | None = None
         self._relays = tuple(relays)
+        self._source = source
         self._period_s = period_s
         self._url = ""
         self._answered_at = 0.0
@@ -99,14 +109,22 @@ class TopApp(App[None]):
     def _follow(self, url: str) -> None:
         worker = get_current_worker()
         while not worker.is_cancelled and not self._ended.wait(self._period_s):
-            self.post_message(Heard(url, _asked(url)))
+            self.post_message(Heard(url, self._asked(url)))
+
+    def _asked(self, url: str) -> Answer | SyncRelayError:
+        try:
+            return self._source(url)
+        except (NoAnswerError, OtherServerError, EndedError) as error:
+            return error
 
     @on(Heard)
     def _take(self, event: Heard) -> None:
         if event.url != self._url or self._latest is None:
             return
         now = time.monotonic()
-        if isinstance(event.heard, Answer):
+        if isinstance(event.heard, EndedError):
+            self.exit()
+        elif isinstance(event.heard, Answer):
             self._answered_at = now
             self._latest = View(event.heard)
         else:
@@ -151,10 +169,3 @@ class TopApp(App[None]):
     def _fatal_error(self) -> None:
         # Textual's own would print every local, whole states among them; `failure` is for the caller to raise.
         self._close_messages_no_wait()
-
-
-def _asked(url: str) -> Answer | NoAnswerError | OtherServerError:
-    try:
-        return ask(url)
-    except (NoAnswerError, OtherServerError) as error:
-        return error

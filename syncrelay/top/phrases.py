@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.status import Level
+from syncrelay.status import Level, Phase
 from syncrelay.top.state import Group, Input, Relay
 
 _NS_PER_MS: Final = 1_000_000
@@ -77,6 +77,11 @@ def options(group: Group) -> str:
 def phase(relay: Relay) -> str:
     """Say where a relay is in its life."""
     return f"{relay.phase.value}, {'ready' if relay.ready else 'not ready'}"
+
+
+def place(relay: Relay, url: str) -> str:
+    """Say where a relay answers; of one that only observes, and answers nobody, which file it tries."""
+    return f"with {relay.config}" if relay.phase is Phase.OBSERVING else f"at {url}"
 
 
 def offsets(group: Group) -> str | None:

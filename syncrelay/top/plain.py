@@ -45,7 +45,7 @@ def _of_group(group: Group) -> str:
 
 def _lines(answer: Answer) -> Iterator[str]:
     relay = answer.state.relay
-    yield from _wrapped(f"{relay.node} at {answer.url}: {_of_relay(relay)}", indent="")
+    yield from _wrapped(f"{relay.node} {phrases.place(relay, answer.url)}: {_of_relay(relay)}", indent="")
     for group in answer.state.groups:
         yield ""
         yield from group_lines(group)

@@ -65,7 +65,7 @@ class WatchScreen(Screen[None]):
         width, height = event.size
         self.set_class(width < LEAST_WIDTH or height < LEAST_HEIGHT, "-small")
         self.query_one("#small", Static).update(
-            f"syncrelay top needs {LEAST_WIDTH}x{LEAST_HEIGHT}; this terminal has {width}x{height}."
+            f"This screen needs {LEAST_WIDTH}x{LEAST_HEIGHT}; this terminal has {width}x{height}."
         )
         self.draw()
 

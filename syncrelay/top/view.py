@@ -61,9 +61,8 @@ class View:
 def title(view: View, width: int) -> list[Text]:
     """Draw which relay it is and how it fares; more lines say what a managed node needs, or that it is stale."""
     relay = view.answer.state.relay
-    place = view.answer.url.removeprefix("http://")
     fares = f"{phrases.phase(relay)}, up {phrases.seconds(relay.uptime_s)}"
-    name = Text.assemble((relay.node, "bold"), f" at {place}")
+    name = Text.assemble((relay.node, "bold"), f" {phrases.place(relay, view.answer.url.removeprefix('http://'))}")
     name.truncate(max(0, width - len(fares) - 2), overflow="ellipsis", pad=True)
     lines = [line(name, "  ", (fares, "" if relay.ready else STYLES[Level.WARN]))]
     if (needed := advice(relay.phase, relay.node)) is not None:

@@ -2,21 +2,14 @@
 
 import json
 import os
-import pty
-import select
 import signal
-import struct
-import subprocess
 import sys
-import termios
-import time
-from contextlib import contextmanager
-from fcntl import ioctl
 
 import pytest
 
 from syncrelay.status import document
-from tests.cli.command import ROOT, run
+from tests.cli.command import run
+from tests.cli.terminals import on_terminal
 from tests.top import states
 from tests.top.relay_server import serving
 
@@ -85,14 +78,14 @@ def test_without_a_terminal_it_points_to_text(tmp_path):
 
 @pytest.mark.parametrize("setting", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "latin-1"}])
 def test_a_terminal_that_cannot_draw_gets_a_sentence(tmp_path, setting):
-    with serving(states.healthy()) as server, on_terminal(server.url, tmp_path, **setting) as top:
+    with serving(states.healthy()) as server, _top(server.url, tmp_path, **setting) as top:
         assert top.wait_for_end() == 1
     assert "top cannot draw on this terminal: check TERM and LANG" in top.written
     assert "\x1b[?1049h" not in top.written
 
 
 def test_on_a_terminal_it_draws_until_q_and_leaves_it_as_it_was(tmp_path):
-    with serving(states.rig()) as server, on_terminal(server.url, tmp_path) as top:
+    with serving(states.rig()) as server, _top(server.url, tmp_path) as top:
         top.wait_for("other clock")
         top.press("q")
         assert top.wait_for_end() == 0
@@ -101,7 +94,7 @@ def test_on_a_terminal_it_draws_until_q_and_leaves_it_as_it_was(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_leaves_the_terminal_as_it_was(tmp_path, number):
-    with serving(states.rig()) as server, on_terminal(server.url, tmp_path) as top:
+    with serving(states.rig()) as server, _top(server.url, tmp_path) as top:
         top.wait_for("other clock")
         os.kill(top.pid, number)
         top.wait_for_end()
@@ -109,7 +102,7 @@ def test_a_signal_leaves_the_terminal_as_it_was(tmp_path, number):
 
 
 def test_without_colour_no_colour_is_written(tmp_path):
-    with serving(states.rig()) as server, on_terminal(server.url, tmp_path, NO_COLOR="1") as top:
+    with serving(states.rig()) as server, _top(server.url, tmp_path, NO_COLOR="1") as top:
         top.wait_for("other clock")
         top.press("q")
         top.wait_for_end()
@@ -119,65 +112,5 @@ def test_without_colour_no_colour_is_written(tmp_path):
     assert [codes for codes in parameters if colours & set(codes)] == []
 
 
-class Terminal:
-    """`syncrelay top` on a terminal of its own, and all that it wrote."""
-
-    def __init__(self, process, descriptor):
-        self._process, self._descriptor = process, descriptor
-        self._written = b""
-
-    @property
-    def pid(self):
-        return self._process.pid
-
-    @property
-    def written(self):
-        return self._written.decode(errors="replace")
-
-    def press(self, key):
-        os.write(self._descriptor, key.encode())
-
-    def wait_for(self, text):
-        end = time.monotonic() + _DEADLINE_S
-        while text not in self.written:
-            assert self._read(end), f"waited in vain for {text!r}: {self.written!r}"
-
-    def wait_for_end(self):
-        end = time.monotonic() + _DEADLINE_S
-        while self._read(end):
-            pass
-        return self._process.wait(_DEADLINE_S)
-
-    def _read(self, end):
-        if not select.select([self._descriptor], [], [], max(0, end - time.monotonic()))[0]:
-            return False
-        try:
-            chunk = os.read(self._descriptor, 65536)
-        except OSError:  # the other end is closed
-            return False
-        self._written += chunk
-        return bool(chunk)
-
-
-@contextmanager
-def on_terminal(url, folder, **environ):
-    """Start it on a terminal of 80x24."""
-    ours, theirs = pty.openpty()
-    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-    kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLORTERM")}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "syncrelay", "top", "--url", url],
-        stdin=theirs,
-        stdout=theirs,
-        stderr=theirs,
-        env=kept | {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"} | environ,
-        cwd=folder,
-        start_new_session=True,
-    )
-    os.close(theirs)
-    try:
-        yield Terminal(process, ours)
-    finally:
-        process.kill()
-        process.wait()
-        os.close(ours)
+def _top(url, folder, **environ):
+    return on_terminal([sys.executable, "-m", "syncrelay", "top", "--url", url], folder=folder, environ=environ)

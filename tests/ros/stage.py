@@ -178,6 +178,12 @@ class Stage:
         words = [*before, sys.executable, "-m", "syncrelay", "--config", str(path), *arguments]
         return self.start("relay", words)
 
+    def observe(self, config: str, *arguments: str) -> Process:
+        """One that only observes, with a file with this text."""
+        path = self.folder / f"config-{len(self._processes)}.yaml"
+        path.write_text(config)
+        return self.start("observe", [sys.executable, "-m", "syncrelay", "observe", "--config", str(path), *arguments])
+
     def player(
         self,
         topics: Mapping[str, str],

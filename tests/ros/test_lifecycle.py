@@ -242,7 +242,7 @@ def test_who_only_looks_is_not_managed_and_the_doctor_names_the_state(stage: Sta
     path = stage.folder / "config-0.yaml"
     player = stage.player({**_PAIR, "/other": STRING})
     player.match(0)
-    looking = stage.relay(_managed(), "--explain", "3")
+    looking = stage.observe(_managed(), "--seconds", "3")
     told: dict[str, dict[str, Any]] = {}
     # Longer where a busy machine lets the doctor hear too little.
     for seconds in (3, 10, 40):

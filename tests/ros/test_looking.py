@@ -1,15 +1,18 @@
 """Who only looks publishes nothing, and who relays tells of others that publish the same outputs."""
 
 import signal
+import sys
 
 import pytest
 
+from syncrelay.config import load_text
+from tests.cli.terminals import on_terminal
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.processes import wait_until
 from tests.ros.sensors import PAIR, assert_logged, assert_looked_at_a_healthy_rig, front, play, stream
 from tests.ros.stage import Collector, Stage
 from tests.ros.status import findings, wait_for_finding
-from tests.ros.streams import merged
+from tests.ros.streams import MS, merged
 
 pytestmark = pytest.mark.ros
 
@@ -22,12 +25,12 @@ def _publishers(collector: Collector) -> list[int]:
     return [len(collector.endpoints(topic, kind="publisher", node="/syncrelay")) for topic in _PUBLISHED]
 
 
-def test_a_run_that_explains_beside_the_relay_publishes_nothing_and_sees_no_rival(stage: Stage):
+def test_who_observes_beside_the_relay_publishes_nothing_and_sees_no_rival(stage: Stage):
     collector = stage.collector()
     relay = stage.relay(front(top=_SCALARS))
     play(stage, _RIG)
     wait_until(lambda: _publishers(collector) == [1, 1, 1, 1], "the relay's publishers")
-    looks = stage.relay(front(top=_SCALARS), "--explain", "12")
+    looks = stage.observe(front(top=_SCALARS), "--seconds", "12", "--json")
     inputs = [f"{topic} of both" for topic in PAIR]
     wait_until(
         lambda: (
@@ -42,6 +45,22 @@ def test_a_run_that_explains_beside_the_relay_publishes_nothing_and_sees_no_riva
     assert_looked_at_a_healthy_rig(looks)
     assert "output_taken" not in looks.stdout
     assert "output_taken" not in findings(relay)
+
+
+def test_a_file_is_tried_on_a_terminal_and_one_that_fits_is_written(stage: Stage):
+    (stage.folder / "tried.yaml").write_text(front(slop="1ms"))
+    argv = [sys.executable, "-m", "syncrelay", "observe", "--config", "tried.yaml", "--write", "new.yaml"]
+    with on_terminal(argv, folder=stage.folder, environ=stage.environment) as look:
+        play(stage, _RIG)
+        look.wait_for("over slop")
+        look.press("q")
+        assert look.wait_for_end() == 1
+    shown, told = look.written.split("\x1b[?1049l")
+    assert "with tried.yaml" in shown
+    assert "would have left: 0 sets" in told
+    assert "exit code 1: front has 1 error" in told
+    (group,) = load_text((stage.folder / "new.yaml").read_text()).groups
+    assert group.options.slop == 7 * MS
 
 
 def test_a_relay_tells_of_a_second_one_and_of_others_that_publish_its_outputs(stage: Stage):

@@ -1,4 +1,4 @@
-"""Where findings are seen: /diagnostics, topics for plotting, `--explain`, HTTP."""
+"""Where findings are seen: /diagnostics, topics for plotting, `observe`, HTTP."""
 
 import signal
 import socket
@@ -14,6 +14,7 @@ from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play,
 from tests.ros.stage import Collector, Stage
 from tests.ros.status import findings
 from tests.ros.streams import merged
+from tests.test_foxglove import plotted
 
 pytestmark = pytest.mark.ros
 
@@ -72,12 +73,9 @@ def test_diagnostics_have_a_status_for_each_group(stage: Stage):
     assert side[1].startswith("nobody publishes /a ")
 
 
-def test_figures_are_published_for_plotting_if_they_are_asked_for(stage: Stage):
-    topics = {
-        "/syncrelay/front/sets_hz": FLOAT,
-        "/syncrelay/front/span_ms": FLOAT,
-        "/syncrelay/front/latency_ms": FLOAT,
-    }
+def test_figures_that_the_foxglove_layout_plots_are_published_if_they_are_asked_for(stage: Stage):
+    topics = dict.fromkeys(plotted(), FLOAT)
+    assert set(topics) == {f"/syncrelay/front/{figure}" for figure in ("sets_hz", "span_ms", "latency_ms")}
     collector = stage.collector(topics)
     stage.relay(front(top={"diagnostics": {"scalars": True}}))
     play(stage, _RIG)
@@ -98,24 +96,24 @@ def test_nothing_is_published_about_the_relay_if_that_is_asked_for(stage: Stage)
     assert not collector.endpoints("/diagnostics", kind="publisher", node="/syncrelay")
 
 
-def test_a_run_that_explains_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
+def test_observe_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
     player = stage.player(PAIR)
     player.is_up()
     player.start(_RIG, speed=1)
-    relay = stage.relay(front(), "--explain", "12")
-    assert_looked_at_a_healthy_rig(relay)
+    assert_looked_at_a_healthy_rig(stage.observe(front(), "--seconds", "12", "--json"))
 
 
-def test_a_run_that_explains_exits_with_1_and_what_to_do(stage: Stage):
-    relay = stage.relay(front(), "--explain", "6")
-    assert relay.wait() == 1
-    assert relay.stdout.splitlines()[:2] == [
-        f"front: error: no other node was found on domain {stage.domain} (discovery range LOCALHOST) [alone]",
-        (
-            "    start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
-            " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`"
-        ),
-    ]
+def test_observe_exits_with_1_and_what_to_do(stage: Stage):
+    look = stage.observe(front(), "--seconds", "6")
+    assert look.wait() == 1
+    told = " ".join(look.stdout.split())
+    assert (
+        f"ERROR: no other node was found on domain {stage.domain} (discovery range LOCALHOST) fix: start the robot's"
+        " nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and RMW_IMPLEMENTATION on"
+        " both sides, and run `syncrelay doctor --live`"
+    ) in told
+    assert "would have left: 0 sets hint: no values to suggest: no messages of /camera, /lidar" in told
+    assert told.endswith("exit code 1: front has 1 error")
 
 
 def test_a_port_that_is_taken_is_an_error_that_says_so(stage: Stage):

@@ -1,4 +1,4 @@
-"""The relay, `--explain` and `doctor --live` look at the same rigs at the same time, and come to the same verdict."""
+"""The relay, `observe` and `doctor --live` look at the same rigs at the same time, and come to the same verdict."""
 
 import json
 import re
@@ -11,6 +11,7 @@ import pytest
 
 from tests.ros.configs import config
 from tests.ros.processes import DEADLINE_S, wait_until
+from tests.ros.sensors import observed_codes
 from tests.ros.stage import Stage
 from tests.ros.status import findings
 from tests.scenarios import rigs_flow, rigs_graph, rigs_stamps
@@ -45,8 +46,8 @@ def test_all_views_come_to_the_same_verdict(stage: Stage):
     looked_at = {name: {**group_of(name, rig), "output_prefix": f"/looked_at/{name}"} for name, rig in _RIGS.items()}
     path.write_text(config(looked_at, node={"name": "looker"}))
     for seconds in _SECONDS:
-        explained, diagnoses = _looked(stage, path, seconds)
-        others = [*_verdicts_of_others(explained), *_diagnoses_of_others(diagnoses)]
+        observed, diagnoses = _looked(stage, path, seconds)
+        others = [*_verdicts_of_others(observed), *_diagnoses_of_others(diagnoses)]
         if not others:
             break
     assert others == []
@@ -55,23 +56,25 @@ def test_all_views_come_to_the_same_verdict(stage: Stage):
         wait_until(lambda name=name, code=code: code in findings(theatre.file.relay, name), f"{code} of {name}")
 
 
-def _looked(stage: Stage, path: Path, seconds: int) -> tuple[str, list[dict[str, Any]]]:
-    """What a run that explains prints, and the diagnoses of a doctor that looks at the same time."""
+def _looked(stage: Stage, path: Path, seconds: int) -> tuple[dict[str, set[str]], list[dict[str, Any]]]:
+    """The codes of what `observe` finds of each group, and the diagnoses of a doctor that looks at the same time."""
     syncrelay = [sys.executable, "-m", "syncrelay"]
-    explain = stage.start("explain", [*syncrelay, "--config", str(path), "--explain", f"{seconds}"])
+    observe = stage.start(
+        "observe", [*syncrelay, "observe", "--config", str(path), "--seconds", f"{seconds}", "--json"]
+    )
     live = ["--live", "--seconds", f"{seconds}", "--json"]
     doctor = stage.start("doctor", [*syncrelay, "doctor", "--config", str(path), *live])
-    assert explain.wait(seconds + DEADLINE_S) == 1
+    assert observe.wait(seconds + DEADLINE_S) == 1
     assert doctor.wait(seconds + DEADLINE_S) == 1
-    return explain.stdout, list(json.loads(doctor.stdout)["diagnoses"])
+    return observed_codes(observe), list(json.loads(doctor.stdout)["diagnoses"])
 
 
-def _verdicts_of_others(explained: str) -> Iterator[str]:
+def _verdicts_of_others(observed: dict[str, set[str]]) -> Iterator[str]:
     """What is said of a rig that is not what it is."""
     for name, rig in _RIGS.items():
-        said = set(re.findall(rf"^{name}: .* \[(\w+)\]$", explained, re.MULTILINE))
+        said = observed.get(name, set())
         if said != _BUSY and said - _BUSY != {rig.first or "healthy"}:
-            yield f"{name}, explained: {explained}"
+            yield f"{name}, observed: {said}"
 
 
 def _diagnoses_of_others(diagnoses: list[dict[str, Any]]) -> Iterator[str]:

@@ -1,12 +1,18 @@
 """The state as Prometheus metrics: a text that its own parser reads, and counters that add up."""
 
+import re
+from dataclasses import replace
+
 import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 from states import relay, started, working
 
+from syncrelay.explain import Code, Finding, Severity
 from syncrelay.status import Phase
 from syncrelay.status.metrics import registry
+
+_SILENT = Finding(Code.SILENT, Severity.WARN, "/camera has been silent for 7 s", None, 0)
 
 
 def samples(state):
@@ -61,6 +67,31 @@ def test_readiness_reloads_and_build_are_told():
 def test_each_finding_is_a_series_while_it_holds():
     found = samples(relay(working()))
     assert value(found, "syncrelay_finding", group="front", code="healthy", severity="ok", topic="") == 1
+
+
+def test_metrics_are_named_as_prometheus_has_it():
+    """What `promtool check metrics` asks for."""
+    text = generate_latest(registry(lambda: relay(working()))).decode()
+    told = {kind: dict(re.findall(rf"^# {kind} (\S+) (.+)$", text, re.MULTILINE)) for kind in ("HELP", "TYPE")}
+    assert told["HELP"].keys() == told["TYPE"].keys()
+    for name, kind in told["TYPE"].items():
+        assert re.fullmatch(r"syncrelay(_[a-z]+)+", name)
+        assert told["HELP"][name].endswith(".")
+        assert (kind == "counter") == name.endswith("_total")
+        assert not name.endswith(("_count", "_sum", "_bucket"))
+        # Base units, and none of another scale or abbreviated.
+        assert not {"ms", "us", "ns", "milliseconds", "hz", "mb", "kb", "percent"} & set(name.split("_"))
+        assert kind in {"counter", "gauge"} or (kind == "histogram" and name.endswith("_seconds"))
+    assert len(told["TYPE"]) == len(re.findall(r"^# TYPE", text, re.MULTILINE))
+    labels = {label for _, of_sample in samples(relay(working())) for label, _ in of_sample}
+    assert labels == {"group", "topic", "outcome", "code", "severity", "le", "version", "python", "receives_by"}
+
+
+def test_a_finding_that_is_made_twice_is_one_series():
+    twice = working()
+    twice = replace(twice, problems=(_SILENT, _SILENT))
+    text = generate_latest(registry(lambda: relay(twice))).decode()
+    assert len(re.findall(r'^syncrelay_finding\{.*code="silent"', text, re.MULTILINE)) == 1
 
 
 def test_the_state_is_asked_for_at_each_scrape_and_not_before():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from syncrelay.status import Phase
-from syncrelay.top.app import TopApp
+from syncrelay.top.app import EndedError, TopApp
 from syncrelay.top.client import ask
 from tests.top import states
 from tests.top.relay_server import serving
@@ -52,6 +52,27 @@ def test_groups_are_listed_with_state_rates_and_reason_and_the_selected_one_belo
     assert "▁" in next(line for line in lines if line.startswith("latency  "))
     assert "Open" in lines[-1]
     assert "Quit" in lines[-1]
+
+
+def test_one_that_only_observes_is_told_by_its_file():
+    lines = at_terminal(replace(states.healthy(), phase=Phase.OBSERVING, config="fusion.yaml"))
+    assert lines[0].startswith("/syncrelay with fusion.yaml ")
+    assert lines[0].endswith("observing, ready, up 30 s")
+
+
+def test_it_ends_with_what_it_watches():
+    async def watch():
+        with serving(states.healthy()) as server:
+            relays, asked = [ask(server.url)], []
+
+            def source(url):
+                asked.append(url)
+                raise EndedError("it ended")
+
+            await TopApp(relays, source=source, period_s=0.01).run_async(headless=True)
+            assert set(asked) == {server.url}
+
+    asyncio.run(asyncio.wait_for(watch(), 60))
 
 
 def test_a_managed_node_without_groups_says_what_it_waits_for():
@@ -237,7 +258,7 @@ def test_of_several_relays_one_is_chosen_and_another_after_it():
 @pytest.mark.parametrize("size", [(59, 24), (80, 14), (20, 5)])
 def test_a_terminal_that_is_too_small_gets_a_sentence(size):
     shown = " ".join(at_terminal(states.rig(), size=size)).split()
-    assert " ".join(shown) == f"syncrelay top needs 60x15; this terminal has {size[0]}x{size[1]}."
+    assert " ".join(shown) == f"This screen needs 60x15; this terminal has {size[0]}x{size[1]}."
 
 
 @pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)

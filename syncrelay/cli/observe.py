@@ -1,0 +1,235 @@
+"""`syncrelay observe`: try a file beside a running robot: subscribe, publish nothing, and tell what would have left."""
+
+import json
+import math
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from threading import Event
+from typing import TYPE_CHECKING
+
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
+from syncrelay.cli.new_file import require_new, write_new
+from syncrelay.cli.parser import Parser
+from syncrelay.cli.stop import StopRequest
+from syncrelay.collector import resting_collector
+
+if TYPE_CHECKING:
+    from syncrelay.bag.analysis import GroupAnalysis
+    from syncrelay.config import Config
+    from syncrelay.explain import GroupReport
+    from syncrelay.ros.relay import Relay
+    from syncrelay.status import RelayState
+    from syncrelay.top.client import Answer
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is tried, all groups if `groups` is empty, and what comes of it; until it is ended if `seconds` is None.
+
+    `write` is where the file with the suggested values goes.
+    """
+
+    files: tuple[str, ...]
+    groups: tuple[str, ...]
+    seconds: float | None
+    json: bool
+    write: str | None
+    ros_args: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What came of it."""
+
+    seconds: float
+    state: "RelayState"
+    analyses: "tuple[GroupAnalysis, ...]"
+
+
+def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
+    """Run `syncrelay observe`."""
+    parser.refuse_repeated(arguments.config)
+    if arguments.write is not None:
+        if len(arguments.config) > 1:
+            parser.error("--write goes with one --config FILE")
+        require_new(arguments.write)
+    asked = Asked(
+        files=tuple(arguments.config),
+        groups=tuple(arguments.group),
+        seconds=arguments.seconds,
+        json=arguments.json,
+        write=arguments.write,
+        ros_args=tuple(arguments.ros_args),
+    )
+    return observe(asked, stop=stop)
+
+
+def observe(asked: Asked, *, stop: StopRequest) -> int:
+    """Show what the groups of files make of what is published now, then print it; 0 if all are healthy, else 1.
+
+    Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
+    cannot be used.
+    """
+    from syncrelay.cli.run import loaded
+    from syncrelay.logs import configure
+    from syncrelay.ros.environment import require_rclpy
+
+    configure("warning", "text")
+    config = loaded(asked.files, asked.groups)
+    require_rclpy()
+    observed = _observed(asked, config, stop)
+    if asked.json:
+        put(json.dumps(_as_json(observed)))
+    else:
+        for line in _lines(observed):
+            put(line)
+    if asked.write is not None:
+        from syncrelay.bag.analysis import file_with_changes
+
+        changes = [change for each in observed.analyses for change in each.suggestion.changes]
+        write_new(asked.write, file_with_changes(config.sources[0].text, changes))
+    return conclude(observed.state.groups, observed.seconds, unjudged=observed.state.unjudged, tell=not asked.json)
+
+
+def _observed(asked: Asked, config: "Config", stop: StopRequest) -> Observed:
+    with resting_collector():
+        from syncrelay.bag.analysis.live import LiveStreams, analyze_live
+        from syncrelay.ros.entities import Purpose
+        from syncrelay.ros.relay import Relay
+
+    groups = [group for group in config.groups if not asked.groups or group.name in asked.groups]
+    live = LiveStreams(groups)
+    stop.defer()
+    with Relay(
+        config,
+        config_paths=asked.files,
+        groups=asked.groups or None,
+        ros_args=asked.ros_args,
+        purpose=Purpose.OBSERVE,
+    ) as relay:
+        relay.monitor.heard = live.take
+        stop.wake_with(relay.wake)
+        began = time.monotonic()
+        if asked.seconds is None and not asked.json and _is_on_terminal():
+            _show(relay, stop)
+        else:
+            _say_how_long(asked.seconds)
+            relay.look(asked.seconds or math.inf, is_over=lambda: stop.requested)
+        seconds, state = time.monotonic() - began, relay.state()
+    return Observed(seconds, state, tuple(analyze_live(config, groups, live)))
+
+
+def _is_on_terminal() -> bool:
+    from syncrelay.cli.top import why_no_screen
+
+    return why_no_screen() is None
+
+
+def _say_how_long(seconds: float | None) -> None:
+    if sys.stderr.isatty():
+        say(f"observing for {seconds:g} s ..." if seconds else "observing; Ctrl-C ends it ...")
+
+
+def _show(relay: "Relay", stop: StopRequest) -> None:
+    """Draw the screen of `top` until the user has seen enough; the relay's turns are taken on another thread."""
+    from syncrelay.cli.top import show
+    from syncrelay.logs import held_back
+    from syncrelay.top.app import EndedError
+
+    seen_enough = Event()
+    with ThreadPoolExecutor(1) as thread, held_back():
+        relay.evaluate()
+        stepping = thread.submit(relay.look, math.inf, is_over=lambda: stop.requested or seen_enough.is_set())
+
+        def source(_url: str) -> "Answer":
+            if stepping.done():
+                raise EndedError("it ended")
+            return _answer(relay)
+
+        try:
+            show([_answer(relay)], source)
+        finally:
+            seen_enough.set()
+            relay.wake()
+        stepping.result()
+
+
+def _answer(relay: "Relay") -> "Answer":
+    from syncrelay.status import document
+    from syncrelay.top.client import Answer
+    from syncrelay.top.state import state_of
+
+    return Answer("", b"", state_of(document(relay.state())))
+
+
+def _as_json(observed: Observed) -> object:
+    """Return the state as /status has it, for how long was observed, and what is suggested for each group."""
+    from syncrelay.cli.analysis_json import suggestion_as_json
+    from syncrelay.status import document
+
+    suggestions = [{"group": each.group.name, **suggestion_as_json(each.suggestion)} for each in observed.analyses]
+    return {**document(observed.state), "seconds": round(observed.seconds, 1), "suggestions": suggestions}
+
+
+def _lines(observed: Observed) -> Iterator[str]:
+    from syncrelay.cli.analysis_text import suggestion_lines
+    from syncrelay.explain import words
+    from syncrelay.status import document
+    from syncrelay.top.plain import group_lines
+    from syncrelay.top.state import state_of
+
+    state = observed.state
+    yield f"observed for {words.seconds(round(observed.seconds * 1e9))} with {state.config}; nothing was published"
+    analyses = {each.group.name: each for each in observed.analyses}
+    shown = state_of(document(state)).groups
+    for report, group in zip(state.groups, shown, strict=True):
+        yield ""
+        yield from group_lines(group)
+        yield f"  {_would_have_left(report)}"
+        if (analysis := analyses.get(group.name)) is not None:
+            yield from suggestion_lines(analysis)
+
+
+def _would_have_left(report: "GroupReport") -> str:
+    """Say how many sets there were, and the share of the messages that set the pace that are in them."""
+    from syncrelay.config.wording import counted
+
+    pace, sets = report.facts.pacemaker, counted(report.facts.figures.sets, "set")
+    came = pace.counts.fed - pace.counts.buffered
+    if not came:
+        return f"would have left: {sets}"
+    share = round(100 * pace.counts.matched / came)
+    return (
+        f"would have left: {sets}, with {pace.counts.matched} of {counted(came, 'message')} of {pace.name} ({share} %)"
+    )
+
+
+def conclude(
+    reports: "Sequence[GroupReport]", looked_s: float, *, unjudged: Sequence[str] = (), tell: bool = True
+) -> int:
+    """Return 0 if all groups are healthy, else 1; `tell` what decided that in a last line.
+
+    `unjudged` are groups of which there is no report.
+    """
+    faults = [f"{report.facts.name} {fault}" for report in reports if (fault := _fault(report, looked_s))]
+    faults += [f"{name} could not be evaluated: see the log" for name in unjudged]
+    if faults and tell:
+        put(f"\nexit code 1: {'; '.join(faults)}")
+    return AT_FAULT if faults else DONE
+
+
+def _fault(report: "GroupReport", looked_s: float) -> str | None:
+    """Say why a group is not healthy, None if it is."""
+    from syncrelay.config.wording import counted
+    from syncrelay.explain import Severity
+
+    for severity, word in ((Severity.ERROR, "error"), (Severity.WARN, "warning")):
+        if count := sum(finding.severity is severity for finding in report.findings):
+            return f"has {counted(count, word)}"
+    if report.facts.figures.last_set is None:
+        return f"produced no set in {looked_s:.0f} s, which is too short to tell why: observe it for longer"
+    return None
