@@ -1,4 +1,4 @@
-"""The relay's HTTP: /status, /metrics, /livez and /readyz, on threads of its own.
+"""The relay's HTTP: /status, /tap, /metrics, /livez and /readyz, on threads of its own.
 
 waitress reads and writes without blocking, so a client that stalls or never ends its request takes a place among
 the connections for a while, and nothing else.
@@ -24,6 +24,7 @@ from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
 from syncrelay.status.hosts import Hosts
 from syncrelay.status.state import RelayState, is_ready
+from syncrelay.status.taps import TapRefusedError, Taps
 
 # An idle loop turns once a second; what has not turned for this long hangs.
 _STALLED_S: Final = 5.0
@@ -68,10 +69,10 @@ class Server:
             self._server.task_dispatcher.shutdown()
         self._socket.close()
 
-    def serve(self, state: Callable[[], RelayState]) -> None:
+    def serve(self, state: Callable[[], RelayState], taps: Taps) -> None:
         """Answer from now on; `state` is called on other threads."""
         self._server = create_server(
-            _application(state, self._hosts),
+            _application(state, taps, self._hosts),
             sockets=[self._socket],
             threads=2,
             connection_limit=_CONNECTIONS,
@@ -111,7 +112,7 @@ def _bound(listen: Listen) -> socket.socket:
     )
 
 
-def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
+def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _Answer:
     @cache
     def metrics() -> Any:
         # Its library takes as long to import as all else here, and most relays are never scraped.
@@ -126,9 +127,10 @@ def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
         return answer
 
     answers: dict[str, _Answer] = {
-        "/": lambda _, start: _text(start, "200 OK", "syncrelay: /status /metrics /livez /readyz"),
+        "/": lambda _, start: _text(start, "200 OK", "syncrelay: /status /tap /metrics /livez /readyz"),
         "/metrics": answer_metrics,
         "/status": lambda _, start: _json(start, document(state())),
+        "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"]),
         "/livez": lambda _, start: _liveness(start, state()),
         "/readyz": lambda _, start: _readiness(start, state()),
     }
@@ -142,7 +144,7 @@ def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
             return _text(start, *refusal)
         answer = answers.get(path)
         if answer is None:
-            return _text(start, "404 Not Found", "there are /status, /metrics, /livez and /readyz")
+            return _text(start, "404 Not Found", "there are /status, /tap, /metrics, /livez and /readyz")
         body = answer(environ, start)
         return [] if environ["REQUEST_METHOD"] == "HEAD" else body
 
@@ -159,6 +161,13 @@ def _readiness(start: _Start, state: RelayState) -> list[bytes]:
     if is_ready(state):
         return _text(start, "200 OK", "ready")
     return _text(start, "503 Service Unavailable", f"not ready: {state.phase.value}, see /status")
+
+
+def _tapped(start: _Start, taps: Taps, query: str) -> list[bytes]:
+    try:
+        return _json(start, taps.answer(query))
+    except TapRefusedError as error:
+        return _text(start, error.status, str(error))
 
 
 def _json(start: _Start, value: object) -> list[bytes]:

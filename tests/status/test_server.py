@@ -12,8 +12,8 @@ from states import CAMERA, relay, started, working
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
-from syncrelay.explain import Endpoint, Mismatch, Refusal
-from syncrelay.status import Phase
+from syncrelay.explain import Endpoint, Mismatch, Refusal, Tape
+from syncrelay.status import Phase, Taps
 from syncrelay.status.server import Server
 
 HEALTHY = relay(working())
@@ -49,7 +49,7 @@ def test_metrics_are_prometheus_text():
 
 def test_the_root_names_all_pages():
     with serving(HEALTHY) as address:
-        assert asked(address, "/") == (200, "syncrelay: /status /metrics /livez /readyz\n")
+        assert asked(address, "/") == (200, "syncrelay: /status /tap /metrics /livez /readyz\n")
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_a_relay_is_ready_while_every_required_input_is_served(state, answer):
 
 def test_what_is_not_there_is_answered_with_what_is():
     with serving(HEALTHY) as address:
-        assert asked(address, "/statsu") == (404, "there are /status, /metrics, /livez and /readyz\n")
+        assert asked(address, "/statsu") == (404, "there are /status, /tap, /metrics, /livez and /readyz\n")
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])
@@ -170,7 +170,7 @@ def test_an_exception_of_ours_is_a_500_and_the_server_lives_on():
         raise KeyError("no such group")
 
     with Server(ANY) as server:
-        server.serve(broken)
+        server.serve(broken, Taps(Tape(), str))
         address = server.place.host, server.place.port
         assert asked(address, "/status")[0] == 500
         assert asked(address, "/nowhere")[0] == 404
