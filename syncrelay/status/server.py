@@ -1,4 +1,4 @@
-"""The relay's HTTP: /status, /tap, /metrics, /livez and /readyz, on threads of its own.
+"""The relay's HTTP: a page, /status, /tap, /metrics, /livez and /readyz, on threads of its own.
 
 waitress reads and writes without blocking, so a client that stalls or never ends its request takes a place among
 the connections for a while, and nothing else.
@@ -23,6 +23,7 @@ from syncrelay.errors import ListenError
 from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
 from syncrelay.status.hosts import Hosts
+from syncrelay.status.page import HEADERS, PATHS, page_file
 from syncrelay.status.state import RelayState, is_ready
 from syncrelay.status.taps import TapRefusedError, Taps
 
@@ -127,7 +128,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         return answer
 
     answers: dict[str, _Answer] = {
-        "/": lambda _, start: _text(start, "200 OK", "syncrelay: /status /tap /metrics /livez /readyz"),
+        **{path: _of_page(path) for path in PATHS},
         "/metrics": answer_metrics,
         "/status": lambda _, start: _json(start, document(state())),
         "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"]),
@@ -144,7 +145,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
             return _text(start, *refusal)
         answer = answers.get(path)
         if answer is None:
-            return _text(start, "404 Not Found", "there are /status, /tap, /metrics, /livez and /readyz")
+            return _text(start, "404 Not Found", "there are /, /status, /tap, /metrics, /livez and /readyz")
         body = answer(environ, start)
         return [] if environ["REQUEST_METHOD"] == "HEAD" else body
 
@@ -163,6 +164,14 @@ def _readiness(start: _Start, state: RelayState) -> list[bytes]:
     return _text(start, "503 Service Unavailable", f"not ready: {state.phase.value}, see /status")
 
 
+def _of_page(path: str) -> _Answer:
+    def answer(_environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
+        content_type, content = page_file(path)
+        return _answer(start, "200 OK", content, content_type, *HEADERS)
+
+    return answer
+
+
 def _tapped(start: _Start, taps: Taps, query: str) -> list[bytes]:
     try:
         return _json(start, taps.answer(query))
@@ -178,6 +187,7 @@ def _text(start: _Start, status: str, text: str) -> list[bytes]:
     return _answer(start, status, f"{text}\n".encode(), "text/plain; charset=utf-8")
 
 
-def _answer(start: _Start, status: str, body: bytes, content_type: str) -> list[bytes]:
-    start(status, [("Content-Type", content_type), ("Content-Length", str(len(body))), ("Cache-Control", "no-store")])
+def _answer(start: _Start, status: str, body: bytes, content_type: str, *more: tuple[str, str]) -> list[bytes]:
+    told = [("Content-Type", content_type), ("Content-Length", str(len(body))), ("Cache-Control", "no-store")]
+    start(status, [*told, *more])
     return [body]
