@@ -35,6 +35,8 @@ _CLIENT_TIMEOUT_S: Final = 5
 _CONNECTIONS: Final = 256
 _HEADER_BYTES: Final = 16_384
 
+_JSON: Final = "application/json"
+
 # Probes ask by whatever name they have for the relay, and a refusal would have it restarted. They tell nothing more.
 _PROBES: Final = ("/livez", "/readyz")
 
@@ -174,13 +176,13 @@ def _of_page(path: str) -> _Answer:
 
 def _tapped(start: _Start, taps: Taps, query: str) -> list[bytes]:
     try:
-        return _json(start, taps.answer(query))
+        return _answer(start, "200 OK", taps.answer(query), _JSON)
     except TapRefusedError as error:
         return _text(start, error.status, str(error))
 
 
 def _json(start: _Start, value: object) -> list[bytes]:
-    return _answer(start, "200 OK", json.dumps(value).encode(), "application/json")
+    return _answer(start, "200 OK", json.dumps(value).encode(), _JSON)
 
 
 def _text(start: _Start, status: str, text: str) -> list[bytes]:

@@ -4,9 +4,10 @@ A tap asks again and again, by a name of its own choice, and each answer is shor
 the server, and of one that stalls there is nothing but a connection, which ends as that of any client does.
 """
 
+import json
 import re
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Final, Self
@@ -18,6 +19,9 @@ from syncrelay.explain.tape import UNHEARD_S
 from syncrelay.sync import DropReason
 
 MOST_TAPS: Final = 64
+# All taps together take at most such a share of a core, as the receive thread needs the interpreter too; it may be
+# saved up for a second.
+_SHARE: Final = 0.2
 # Written in some milliseconds, as long as the receive thread may wait for the interpreter.
 _MOST_LINES: Final = 500
 _KEYS: Final = ("tap", "after", "group", "drops", "input", "reason")
@@ -96,27 +100,45 @@ def _bad(sentence: str) -> TapRefusedError:
 class Taps:
     """Answers taps. Any thread. `full_name` gives a topic's name in the graph."""
 
-    def __init__(self, tape: Tape, full_name: Callable[[str], str]) -> None:
+    def __init__(
+        self, tape: Tape, full_name: Callable[[str], str], *, processor_s: Callable[[], float] = time.thread_time
+    ) -> None:
         self.tape = tape
         self._full_name = full_name
+        self._processor_s = processor_s
+        self._left_s, self._refilled = _SHARE, time.monotonic()
         self._asked: dict[str, float] = {}
         self._lock = Lock()
 
-    def answer(self, text: str) -> dict[str, Any]:
-        """Return what has left since, as what json.dumps takes. Raises TapRefusedError.
+    def answer(self, text: str) -> bytes:
+        """Return what has left since, as JSON. Raises TapRefusedError.
 
         `after` is what to ask with next, `more` says that there is more at once. `lost` counts sets and drops of all
-        groups that were too old to be given; it is null where nobody counted.
+        groups that were too old to be given; it is null where nobody counted. While taps have taken more than their
+        share of the processor, nothing is given.
         """
         query = Query.of(text)
         was_there = self._enter(query.name)
         last = self.tape.last
         if query.after is None or not was_there or query.after > last:
-            return {"after": last, "more": False, "lost": 0 if query.after is None else None, "lines": []}
+            return _told(last, lost=0 if query.after is None else None)
+        if not self._may_go_on():
+            return _told(query.after)
+        began = self._processor_s()
         left, lost = self.tape.after(query.after, most=_MOST_LINES)
         after = left[-1].number if left else query.after
         lines = [line for each in left if (line := self._line(each, query.wanted)) is not None]
-        return {"after": after, "more": after < last, "lost": lost, "lines": lines}
+        told = _told(after, more=after < last, lost=lost, lines=lines)
+        with self._lock:
+            self._left_s -= self._processor_s() - began
+        return told
+
+    def _may_go_on(self) -> bool:
+        now = time.monotonic()
+        with self._lock:
+            self._left_s = min(_SHARE, self._left_s + _SHARE * (now - self._refilled))
+            self._refilled = now
+            return self._left_s > 0
 
     def _enter(self, name: str) -> bool:
         """Have the tape kept for a tap; whether it has been all the while since that one last asked."""
@@ -139,3 +161,7 @@ class Taps:
         if isinstance(each.outcome, RecentDrop):
             return drop_line(each.group, topics, each.outcome, left=each.left, received=each.received)
         return set_line(each.group, topics, each.outcome, left=each.left, received=each.received)
+
+
+def _told(after: int, *, more: bool = False, lost: int | None = 0, lines: Sequence[dict[str, Any]] = ()) -> bytes:
+    return json.dumps({"after": after, "more": more, "lost": lost, "lines": lines}).encode()

@@ -1,5 +1,6 @@
 """What a tap is told, over real sockets: each line once, in order, or how many it has missed."""
 
+import itertools
 import json
 import threading
 from contextlib import ExitStack
@@ -27,11 +28,11 @@ class Reader:
 
     def __init__(self, taps: Taps, name: str = "a", wanted: str = "") -> None:
         self._taps, self._query = taps, f"tap={name}{wanted}"
-        self.after = self._taps.answer(self._query)["after"]
+        self.after = json.loads(taps.answer(self._query))["after"]
         self.lost: int | None = 0
 
     def told(self) -> dict:
-        return self._taps.answer(f"{self._query}&after={self.after}")
+        return json.loads(self._taps.answer(f"{self._query}&after={self.after}"))
 
     def read(self) -> list[dict]:
         """All lines up to now."""
@@ -46,7 +47,8 @@ class Reader:
 
 @pytest.fixture
 def taps() -> Taps:
-    return Taps(Tape(), lambda topic: f"/robot{topic}")
+    """Taps that may take all of the processor, as long as a test lasts."""
+    return Taps(Tape(), lambda topic: f"/robot{topic}", processor_s=lambda: 0.0)
 
 
 def note(taps: Taps, count: int, *, begin: int = 0) -> None:
@@ -144,12 +146,22 @@ def test_a_tap_that_was_away_for_long_is_told_that_nobody_counted(taps):
     reader = Reader(taps)
     note(taps, 3)
     other = Taps(taps.tape, str)
-    assert other.answer(f"tap=a&after={reader.after}") == {"after": 3, "more": False, "lost": None, "lines": []}
+    told = json.loads(other.answer(f"tap=a&after={reader.after}"))
+    assert told == {"after": 3, "more": False, "lost": None, "lines": []}
 
 
 def test_a_number_of_another_run_is_no_number_of_this_one(taps):
     Reader(taps)
-    assert taps.answer("tap=a&after=99999")["lost"] is None
+    assert json.loads(taps.answer("tap=a&after=99999"))["lost"] is None
+
+
+def test_taps_that_take_too_much_of_the_processor_are_given_nothing_for_a_while():
+    taken = itertools.count(step=60)
+    taps = Taps(Tape(), str, processor_s=lambda: next(taken))
+    reader, other = Reader(taps), Reader(taps, "b")
+    note(taps, 2)
+    assert len(reader.read()) == 2
+    assert (other.read(), other.after, other.lost) == ([], 0, 0)
 
 
 def test_so_many_taps_are_answered_and_not_one_more(taps):
@@ -184,7 +196,7 @@ def test_a_query_that_makes_no_sense_is_a_bad_request(query, text):
 
 
 def test_a_tap_is_answered_over_http():
-    taps = Taps(Tape(), str)
+    taps = Taps(Tape(), str, processor_s=lambda: 0.0)
     with serving(relay(working()), taps=taps) as address:
         assert asked(address, "/tap?tap=a")[0] == 200
         note(taps, 2)
@@ -195,7 +207,7 @@ def test_a_tap_is_answered_over_http():
 
 
 def test_fifty_taps_that_stall_keep_nobody_from_an_answer_and_hold_back_no_set():
-    taps = Taps(Tape(), str)
+    taps = Taps(Tape(), str, processor_s=lambda: 0.0)
     with serving(relay(working()), taps=taps) as address, ExitStack() as stack:
         reader = Reader(taps)
         for number in range(50):
