@@ -32,8 +32,9 @@ function figure(number) {
 function duration(ms) {
   if (ms === null || ms === undefined) return "–";
   const size = Math.abs(ms);
-  if (size >= 999.5) return seconds(ms / 1000);
-  return size >= 0.9995 || size === 0 ? `${figure(ms)} ms` : `${figure(ms * 1000)} µs`;
+  if (size >= 999.5) return ms < 0 ? `-${seconds(size / 1000)}` : seconds(size / 1000);
+  if (size === 0) return "0 s";
+  return size >= 0.9995 ? `${figure(ms)} ms` : `${figure(ms * 1000)} us`;
 }
 
 function seconds(count) {

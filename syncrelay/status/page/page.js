@@ -122,7 +122,9 @@ function figuresOf(group) {
   const meter = element("meter", {min: 0, max: 1, value: share, "aria-label": "share of the possible sets"});
   const line = element("p", {}, element("strong", {}, `${ofPossible(group)} `), "possible sets a second ", meter, ` ${last}`);
   if (!group.last_sets.length || !group.span_ms) return [line];
-  return [line, element("div", {class: "sparks"},
+  const shifted = group.span_without_offsets_ms === null ? []
+    : [element("p", {}, `without offsets, span p50 would be ${duration(group.span_without_offsets_ms)}`)];
+  return [line, ...shifted, element("div", {class: "sparks"},
     sparkline("span", group.last_sets.map((each) => each.span_ms), group.span_ms),
     sparkline("latency", group.last_sets.map((each) => each.latency_ms), group.latency_ms))];
 }
