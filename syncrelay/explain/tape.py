@@ -6,6 +6,7 @@ one and for many, and one that stalls holds nothing.
 
 import time
 from collections import deque
+from collections.abc import Callable
 from itertools import islice
 from typing import Final, NamedTuple, TypeAlias
 
@@ -37,27 +38,31 @@ class Left(NamedTuple):
 
 
 class Tape:
-    """Keeps what leaves while somebody reads it. `note` is the receive thread's; all else may be called on any."""
+    """Keeps what leaves while somebody reads it. `note` is the receive thread's; all else may be called on any.
 
-    def __init__(self) -> None:
+    `now_s` is a clock of seconds.
+    """
+
+    def __init__(self, *, now_s: Callable[[], float] = time.monotonic) -> None:
         self.is_on = False
         """Whether anyone reads: whoever notes asks first."""
         self.last = 0
         """The number of what left last."""
         self._kept: deque[Left] = deque(maxlen=KEPT)
+        self._now_s = now_s
         self._asked = 0.0
 
     def note(self, group: GroupConfig, outcome: Stamps | RecentDrop, left: int, received: int) -> None:
         """Keep what has just left, in place of the oldest."""
         self.last = number = self.last + 1
         self._kept.append(Left(number, group, outcome, left, received))
-        if not number % _LOOKS_EVERY and time.monotonic() - self._asked > UNHEARD_S:
+        if not number % _LOOKS_EVERY and self._now_s() - self._asked > UNHEARD_S:
             self.is_on = False
             self._kept.clear()
 
     def listen(self) -> None:
         """Keep what leaves from now on, until nobody has called this for some time."""
-        self._asked = time.monotonic()
+        self._asked = self._now_s()
         self.is_on = True
 
     def after(self, number: int, *, most: int) -> tuple[list[Left], int]:

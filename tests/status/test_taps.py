@@ -13,7 +13,7 @@ from states import BEGAN, MS, TEXT, relay, working
 from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.explain import RecentDrop, Tape
-from syncrelay.explain.tape import KEPT
+from syncrelay.explain.tape import KEPT, UNHEARD_S
 from syncrelay.status import Taps
 from syncrelay.status.taps import MOST_TAPS, TapRefusedError
 from syncrelay.sync import DropReason
@@ -148,6 +148,19 @@ def test_a_tap_that_was_away_for_long_is_told_that_nobody_counted(taps):
     other = Taps(taps.tape, str)
     told = json.loads(other.answer(f"tap=a&after={reader.after}"))
     assert told == {"after": 3, "more": False, "lost": None, "lines": []}
+
+
+def test_what_leaves_is_noted_no_more_once_nobody_asks():
+    seconds = [0.0]
+    taps = Taps(Tape(now_s=lambda: seconds[0]), str)
+    Reader(taps)
+    seconds[0] = UNHEARD_S
+    note(taps, 1024)
+    assert taps.tape.is_on
+    seconds[0] += 1
+    note(taps, 1024)
+    assert not taps.tape.is_on
+    assert taps.tape.after(0, most=9999) == ([], 0)
 
 
 def test_a_number_of_another_run_is_no_number_of_this_one(taps):
