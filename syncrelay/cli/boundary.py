@@ -81,6 +81,11 @@ def put(text: str) -> None:
     _to_stdout(lambda: sys.stdout.write(f"{_safe(text, sys.stdout)}\n"))
 
 
+def flush() -> None:
+    """Have what was put seen at once, also by who reads it through a pipe."""
+    _to_stdout(sys.stdout.flush)
+
+
 def pass_on(output: bytes, talk: bytes) -> None:
     """Print what another process of ours printed on its stdout and its stderr."""
     sys.stderr.flush()

@@ -40,6 +40,7 @@ COMMANDS: Final = {
         Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),
         Command("observe", "try a file beside a running robot; publishes nothing", parsers.observe, "observe"),
         Command("top", "watch a running relay, here or on another machine", parsers.top, "top"),
+        Command("tap [GROUP]", "print each set and drop of a running relay", parsers.tap, "tap"),
         Command("reload", "make a running relay read its file again", parsers.reload, "reload"),
         Command("healthcheck", "check that the relay is receiving", parsers.healthcheck, "heartbeat"),
         Command("schema", "print the JSON Schema of the file, for editors", parsers.schema, "schema"),

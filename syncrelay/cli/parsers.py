@@ -291,6 +291,38 @@ def top() -> Parser:
     return parser
 
 
+def tap() -> Parser:
+    """Return the parser of `syncrelay tap`."""
+    from syncrelay.sync.messages import DropReason
+
+    parser = Parser(
+        "syncrelay tap",
+        description="Prints each set and each dropped message of a running relay as it leaves, a line each, until "
+        "Ctrl-C. It subscribes to nothing: the relay tells it over HTTP. A set shows how far each stamp is "
+        "behind the earliest of the set. The relay waits for nobody: who reads too slowly loses lines, and is told "
+        "how many.",
+    )
+    parser.add_argument("group", metavar="GROUP", nargs="?", help="print this group only")
+    parser.add_argument(
+        "--url", metavar="URL", help="which relay, if there are several: its host, host:port or URL, as for top"
+    )
+    parser.add_argument("--json", action="store_true", help="print lines of JSON, as replay does")
+    parser.add_argument("--drops", action="store_true", help="print dropped messages only")
+    parser.add_argument(
+        "--input", metavar="TOPIC", action="append", default=[], help="print what has to do with TOPIC; may be repeated"
+    )
+    parser.add_argument(
+        "--reason",
+        metavar="REASON",
+        action="append",
+        default=[],
+        choices=tuple(each.value for each in DropReason),
+        help="print messages dropped for this reason, such as late or overflow; may be repeated",
+    )
+    parser.add_argument("-n", "--number", metavar="N", type=count, help="end after N lines")
+    return parser
+
+
 def reload() -> Parser:
     """Return the parser of `syncrelay reload`."""
     parser = Parser(

@@ -26,6 +26,19 @@ def find_one(named: str | None, *, otherwise: str) -> Answer:
     return found[0]
 
 
+def otherwise(named: str | None) -> str:
+    """Say what to do where no relay answers."""
+    if named is None:
+        return (
+            "  Start one with `syncrelay --config FILE` (not with `metrics: null` in it),\n"
+            "  or say where it is: `--url robot:9464`."
+        )
+    return (
+        "  A relay on another machine answers only if its file says\n"
+        "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between."
+    )
+
+
 def _others(found: Search) -> str:
     # Of a machine whose name is not known, or that is off, all ports say the same.
     reasons = {text.partition(": ")[2]: text for text in reversed(found.others)}

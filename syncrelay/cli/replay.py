@@ -1,5 +1,6 @@
 """`syncrelay replay BAG...`: what a file makes of a recording."""
 
+import json
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -8,9 +9,8 @@ from pathlib import Path
 
 from syncrelay.bag import Encoding, open_recording
 from syncrelay.bag.bindings import GroupBinding, bind
-from syncrelay.bag.lines import drop_line, set_line
 from syncrelay.bag.mcap_output import McapOutput
-from syncrelay.bag.replay import Listener
+from syncrelay.bag.replay import Listener, received
 from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.what_if import Disturbed
 from syncrelay.bag.writing import SetWriter
@@ -21,6 +21,7 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
 from syncrelay.config import load
 from syncrelay.config.wording import counted
+from syncrelay.explain import RecentDrop, drop_line, set_line
 from syncrelay.printable import printable
 from syncrelay.rig.what_if import Fault, parse_fault
 from syncrelay.sync import Match, Outcome
@@ -90,16 +91,25 @@ def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:
 def _printing(wanted: Wanted) -> Iterator[Listener]:
     def print_set(binding: GroupBinding, outcome: Outcome, now: int) -> None:
         if isinstance(outcome, Match):
-            put(set_line(binding, outcome, now))
+            last = max(received(message) for message in outcome.messages if message is not None)
+            line = set_line(binding.group, _topics(binding), outcome.stamps, left=now, received=last)
+            put(json.dumps(line))
 
     def print_drop(binding: GroupBinding, outcome: Outcome, now: int) -> None:
         if not isinstance(outcome, Match):
-            put(drop_line(binding, outcome, now))
+            message = outcome.message
+            drop = RecentDrop(message.input, message.stamp, outcome.reason)
+            line = drop_line(binding.group, _topics(binding), drop, left=now, received=received(message))
+            put(json.dumps(line))
 
     if wanted.sets:
         yield print_set
     if wanted.drops:
         yield print_drop
+
+
+def _topics(binding: GroupBinding) -> list[str]:
+    return [each.topic for each in binding.inputs]
 
 
 def _written(output: str | None, bindings: Sequence[GroupBinding], opened: ExitStack) -> SetWriter | None:

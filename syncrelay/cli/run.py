@@ -107,7 +107,7 @@ def run(
         stop.wake_with(relay.wake)
         files.call_when_read(relay.wake)
         if server is not None:
-            server.serve(relay.state)
+            server.serve(relay.state, relay.taps)
             LOGGER.info(
                 "status and metrics: http://%s/; watch with `syncrelay top --url %s`", server.place, server.place.url
             )

@@ -9,7 +9,7 @@ from enum import Enum
 
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.parser import Parser
-from syncrelay.cli.relays import find, find_one
+from syncrelay.cli.relays import find, find_one, otherwise
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
 from syncrelay.top.client import Answer, ask, base_urls
@@ -39,9 +39,9 @@ def top(named: str | None, output: Output) -> int:
         # What is no name of a relay is said with or without a terminal.
         base_urls(named)
         _require_terminal()
-        show(find(named, otherwise=_otherwise(named)))
+        show(find(named, otherwise=otherwise(named)))
         return DONE
-    answer = find_one(named, otherwise=_otherwise(named))
+    answer = find_one(named, otherwise=otherwise(named))
     # Made anew: JSON may hold as they are what a terminal must not see.
     put(json.dumps(json.loads(answer.document)) if output is Output.JSON else _as_text(answer))
     return DONE
@@ -76,15 +76,3 @@ def why_no_screen() -> str | None:
     if os.environ.get("TERM", "dumb") in {"dumb", "unknown"} or not sys.stderr.encoding.lower().startswith("utf"):
         return "top cannot draw on this terminal: check TERM and LANG"
     return None
-
-
-def _otherwise(named: str | None) -> str:
-    if named is None:
-        return (
-            "  Start one with `syncrelay --config FILE` (not with `metrics: null` in it),\n"
-            "  or say where it is: `syncrelay top --url robot:9464`."
-        )
-    return (
-        "  A relay on another machine answers only if its file says\n"
-        "  `metrics: {listen: 0.0.0.0:9464}` and no firewall is in between."
-    )

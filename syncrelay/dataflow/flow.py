@@ -6,15 +6,14 @@ from collections.abc import Callable, Hashable, Sequence
 from typing import Final, NamedTuple, Self, TypeAlias
 
 from syncrelay.cdr import read_stamp
+from syncrelay.config import GroupConfig
 from syncrelay.dataflow.backend import Deliver, Outlet, Payload, PublishError
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.refusals import Refusals
-from syncrelay.explain import RecentDrop
+from syncrelay.explain import RecentDrop, Stamps, Tape
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 
 Engine: TypeAlias = SyncGroup | PausedEngine | StoppedEngine
-Stamps: TypeAlias = tuple[int | None, ...]
-"""Stamps of a set in input order, in nanoseconds; None where a message was missing."""
 
 # Enough for the widest terminal's strip of recent sets.
 RECENT: Final = 256
@@ -40,8 +39,9 @@ class Flow:
     It knows nothing of its group: in a circle, what ended would keep its messages until the collector came by.
     """
 
-    def __init__(self, engine: Engine, *, n_inputs: int, now: Callable[[], int], refusals: Refusals) -> None:
-        self.engine = engine
+    def __init__(self, config: GroupConfig, *, now: Callable[[], int], refusals: Refusals, tape: Tape) -> None:
+        n_inputs = len(config.topics)
+        self.engine: Engine = config.engine()
         self.outlets: list[Outlet | None] = [None] * n_inputs
         self.restamped = [False] * n_inputs
         """Which inputs' payloads begin with a Header, whose stamp the set's common stamp replaces."""
@@ -55,8 +55,10 @@ class Flow:
         """The inputs of which the last message could not be published."""
         self.tell: Callable[[Flow, Match, int], None] | None = None
         """Hears of each set that left, and of its latency in nanoseconds."""
+        self._config = config
         self._now = now
         self._refusals = refusals
+        self._tape = tape
         self._watched = Watched.none_of(n_inputs)
 
     def watched(self) -> Watched:
@@ -90,18 +92,25 @@ class Flow:
 
     def conclude(self, outcomes: Sequence[Match | Drop]) -> None:
         """Publish the sets among these, and note what left."""
+        is_tapped = self._tape.is_on
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 newest = self._send(outcome)
-                stamps, latency = outcome.stamps, time.time_ns() - newest
+                stamps, left = outcome.stamps, time.time_ns()
+                latency = left - newest
                 self._watched.sets.append((stamps, latency))
                 self.last.append(stamps)
                 self.n_sets += 1
                 if self.tell is not None:
                     self.tell(self, outcome, latency)
+                if is_tapped:
+                    self._tape.note(self._config, stamps, left, newest)
             else:
                 message = outcome.message
-                self.last.append(RecentDrop(message.input, message.stamp, outcome.reason))
+                drop = RecentDrop(message.input, message.stamp, outcome.reason)
+                self.last.append(drop)
+                if is_tapped:
+                    self._tape.note(self._config, drop, time.time_ns(), message.payload.received)
 
     def _send(self, match: Match) -> int:
         """Publish a set; when its newest message was received."""

@@ -10,10 +10,10 @@ from typing import Final, NamedTuple, TypeVar
 from syncrelay.config import GroupConfig
 from syncrelay.dataflow.backend import Outlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
-from syncrelay.dataflow.flow import Engine, Flow, Stamps
+from syncrelay.dataflow.flow import Engine, Flow
 from syncrelay.dataflow.manifest_queue import GroupManifests
 from syncrelay.dataflow.refusals import Refusals, Unpublished
-from syncrelay.explain import Code, RecentDrop
+from syncrelay.explain import Code, RecentDrop, Stamps, Tape
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
 
@@ -47,10 +47,12 @@ class GroupRelay:
     An exception stops this group and no other: who feeds the flow calls `fail`, all else does so itself.
     """
 
-    def __init__(self, config: GroupConfig, *, now: Callable[[], int], flow: type[Flow] = Flow) -> None:
+    def __init__(
+        self, config: GroupConfig, *, now: Callable[[], int], flow: type[Flow] = Flow, tape: Tape | None = None
+    ) -> None:
         self.config = config
         self._n_inputs = len(config.topics)
-        self.flow = flow(config.engine(), n_inputs=self._n_inputs, now=now, refusals=Refusals(config.name))
+        self.flow = flow(config, now=now, refusals=Refusals(config.name), tape=tape or Tape())
         self.failure: str | None = None
         """What stopped it; None of one that works."""
         self.paused_since: int | None = None

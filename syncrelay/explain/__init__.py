@@ -24,9 +24,11 @@ from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
+from syncrelay.explain.lines import drop_line, set_line
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
 from syncrelay.explain.rules_graph import no_other_node
+from syncrelay.explain.tape import Left, Stamps, Tape
 from syncrelay.explain.try_budget import TryBudget
 from syncrelay.explain.watch import GroupWatch
 
@@ -53,6 +55,7 @@ __all__ = [
     "InputFigures",
     "InputGraph",
     "Judge",
+    "Left",
     "Mismatch",
     "Observation",
     "Pause",
@@ -61,15 +64,19 @@ __all__ = [
     "Refusal",
     "SentSets",
     "Severity",
+    "Stamps",
     "Standstill",
     "Step",
+    "Tape",
     "Tolerance",
     "TryBudget",
+    "drop_line",
     "dry_run",
     "explanation",
     "in_words",
     "judge",
     "no_other_node",
     "recent",
+    "set_line",
     "with_ok",
 ]

@@ -11,6 +11,7 @@ from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
+from syncrelay.explain import Tape
 from syncrelay.ros.bindings import GroupBindings
 from syncrelay.ros.clock import WaitingClock
 from syncrelay.ros.manifests import Manifests
@@ -37,6 +38,7 @@ class Groups:
         loop: ReceiveLoop,
         clock: WaitingClock,
         flow: type[Flow],
+        tape: Tape,
         changed: Callable[[Config], None],
     ) -> None:
         """Run the groups with the names `chosen`, None for all.
@@ -56,6 +58,7 @@ class Groups:
         self._loop = loop
         self._clock = clock
         self._flow = flow
+        self._tape = tape
         self._changed = changed
         # What each group was last said to wait for; None of one that runs.
         self._announced: dict[str, str | None] = {}
@@ -165,7 +168,7 @@ class Groups:
         self.manifests.begin(groups)
 
     def _begun(self, config: GroupConfig) -> GroupRelay:
-        group = GroupRelay(config, now=self._clock.now, flow=self._flow)
+        group = GroupRelay(config, now=self._clock.now, flow=self._flow, tape=self._tape)
         if self.is_paused:
             group.pause()
         return group

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import suppress
+from functools import cache
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
@@ -20,7 +21,7 @@ from syncrelay.dataflow.calls import Calls
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.environment.transport import apply_transport
 from syncrelay.errors import ReloadError, SyncRelayError
-from syncrelay.explain import GroupReport
+from syncrelay.explain import GroupReport, Tape
 from syncrelay.logs import name_after
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.bindings import GroupBindings
@@ -35,7 +36,7 @@ from syncrelay.ros.parameters import Parameters
 from syncrelay.ros.services import Offered, Services
 from syncrelay.ros.start import RosoutHandler, make_node, resolver, start
 from syncrelay.ros.surroundings import Surroundings
-from syncrelay.status import Phase, RelayState, advice
+from syncrelay.status import Phase, RelayState, Taps, advice
 from syncrelay.sync import DropReason
 from syncrelay.wakeup import Wakeup
 
@@ -100,7 +101,8 @@ class Relay:
                 make=rclpy.create_node if manage is None else manage(self),
             )
             relay_name = self.node.get_fully_qualified_name()
-        resolve = resolver(self.node, ros_args)
+        # Of any thread, and after the node: all names are asked for here.
+        resolve = cache(resolver(self.node, ros_args))
         try:
             require_distinct_names(config, groups, resolve)
         except SyncRelayError:
@@ -137,6 +139,8 @@ class Relay:
         )
         manifests = Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop, bugs=self._bugs)
         self._manifest_queue = manifests.queue
+        self.taps = Taps(Tape(), resolve)
+        """Those who follow what leaves."""
         self._groups = Groups(
             config,
             chosen=groups,
@@ -147,6 +151,7 @@ class Relay:
             loop=self._loop,
             clock=self._clock,
             flow=backend.flow,
+            tape=self.taps.tape,
             changed=lambda config: self._report_on(bindings, config),
         )
         self._is_managed = manage is not None

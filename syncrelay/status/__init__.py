@@ -2,11 +2,13 @@
 
 from syncrelay.status.document import document, group_document
 from syncrelay.status.state import Level, Phase, RelayState, advice, is_ready, level
+from syncrelay.status.taps import Taps
 
 __all__ = [
     "Level",
     "Phase",
     "RelayState",
+    "Taps",
     "advice",
     "document",
     "group_document",

@@ -1,4 +1,4 @@
-"""The relay's HTTP: /status, /metrics, /livez and /readyz, on threads of its own.
+"""The relay's HTTP: a page, /status, /tap, /metrics, /livez and /readyz, on threads of its own.
 
 waitress reads and writes without blocking, so a client that stalls or never ends its request takes a place among
 the connections for a while, and nothing else.
@@ -23,7 +23,9 @@ from syncrelay.errors import ListenError
 from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
 from syncrelay.status.hosts import Hosts
+from syncrelay.status.page import HEADERS, PATHS, page_file
 from syncrelay.status.state import RelayState, is_ready
+from syncrelay.status.taps import TapRefusedError, Taps
 
 # An idle loop turns once a second; what has not turned for this long hangs.
 _STALLED_S: Final = 5.0
@@ -32,6 +34,8 @@ _CLIENT_TIMEOUT_S: Final = 5
 # Beyond them a client waits until one that idles has timed out. Each takes a file descriptor, of a usual 1024.
 _CONNECTIONS: Final = 256
 _HEADER_BYTES: Final = 16_384
+
+_JSON: Final = "application/json"
 
 # Probes ask by whatever name they have for the relay, and a refusal would have it restarted. They tell nothing more.
 _PROBES: Final = ("/livez", "/readyz")
@@ -68,10 +72,10 @@ class Server:
             self._server.task_dispatcher.shutdown()
         self._socket.close()
 
-    def serve(self, state: Callable[[], RelayState]) -> None:
+    def serve(self, state: Callable[[], RelayState], taps: Taps) -> None:
         """Answer from now on; `state` is called on other threads."""
         self._server = create_server(
-            _application(state, self._hosts),
+            _application(state, taps, self._hosts),
             sockets=[self._socket],
             threads=2,
             connection_limit=_CONNECTIONS,
@@ -111,7 +115,7 @@ def _bound(listen: Listen) -> socket.socket:
     )
 
 
-def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
+def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _Answer:
     @cache
     def metrics() -> Any:
         # Its library takes as long to import as all else here, and most relays are never scraped.
@@ -126,9 +130,10 @@ def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
         return answer
 
     answers: dict[str, _Answer] = {
-        "/": lambda _, start: _text(start, "200 OK", "syncrelay: /status /metrics /livez /readyz"),
+        **{path: _of_page(path) for path in PATHS},
         "/metrics": answer_metrics,
         "/status": lambda _, start: _json(start, document(state())),
+        "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"]),
         "/livez": lambda _, start: _liveness(start, state()),
         "/readyz": lambda _, start: _readiness(start, state()),
     }
@@ -142,7 +147,7 @@ def _application(state: Callable[[], RelayState], hosts: Hosts) -> _Answer:
             return _text(start, *refusal)
         answer = answers.get(path)
         if answer is None:
-            return _text(start, "404 Not Found", "there are /status, /metrics, /livez and /readyz")
+            return _text(start, "404 Not Found", "there are /, /status, /tap, /metrics, /livez and /readyz")
         body = answer(environ, start)
         return [] if environ["REQUEST_METHOD"] == "HEAD" else body
 
@@ -161,14 +166,30 @@ def _readiness(start: _Start, state: RelayState) -> list[bytes]:
     return _text(start, "503 Service Unavailable", f"not ready: {state.phase.value}, see /status")
 
 
+def _of_page(path: str) -> _Answer:
+    def answer(_environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
+        content_type, content = page_file(path)
+        return _answer(start, "200 OK", content, content_type, *HEADERS)
+
+    return answer
+
+
+def _tapped(start: _Start, taps: Taps, query: str) -> list[bytes]:
+    try:
+        return _answer(start, "200 OK", taps.answer(query), _JSON)
+    except TapRefusedError as error:
+        return _text(start, error.status, str(error))
+
+
 def _json(start: _Start, value: object) -> list[bytes]:
-    return _answer(start, "200 OK", json.dumps(value).encode(), "application/json")
+    return _answer(start, "200 OK", json.dumps(value).encode(), _JSON)
 
 
 def _text(start: _Start, status: str, text: str) -> list[bytes]:
     return _answer(start, status, f"{text}\n".encode(), "text/plain; charset=utf-8")
 
 
-def _answer(start: _Start, status: str, body: bytes, content_type: str) -> list[bytes]:
-    start(status, [("Content-Type", content_type), ("Content-Length", str(len(body))), ("Cache-Control", "no-store")])
+def _answer(start: _Start, status: str, body: bytes, content_type: str, *more: tuple[str, str]) -> list[bytes]:
+    told = [("Content-Type", content_type), ("Content-Length", str(len(body))), ("Cache-Control", "no-store")]
+    start(status, [*told, *more])
     return [body]

@@ -63,14 +63,8 @@ def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -
     Raises NoAnswerError where nothing more comes for `timeout_s`, or not all of it in `whole_s`, and OtherServerError
     where something else answers.
     """
-    try:
-        status, reason, body = _get(url, timeout_s, whole_s)
-    except (OSError, IncompleteRead, UnicodeError) as error:
-        raise _no_answer(error, timeout_s) from error
-    except HTTPException as error:
-        raise OtherServerError("what listens there is not a relay: its answer is not HTTP") from error
-    if status != HTTPStatus.OK:
-        raise OtherServerError(_refused(f"{status} {reason}", body))
+    with closing(connection_to(url, timeout_s)) as connection:
+        body = get(connection, f"{urlsplit(url).path}/status", whole_s=whole_s)
     try:
         return Answer(url, body, read_state(body))
     except NotAStateError as error:
@@ -79,16 +73,28 @@ def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -
         ) from error
 
 
-def _get(url: str, timeout_s: float, whole_s: float) -> tuple[int, str, bytes]:
-    """Return code, reason and body. No proxy that the environment names is asked: a robot is near."""
+def connection_to(url: str, timeout_s: float = _TIMEOUT_S) -> HTTPConnection:
+    """Return a connection that is made when it is first used. No proxy that the environment names is asked."""
     parts = urlsplit(url)
-    connection = (HTTPSConnection if parts.scheme == "https" else HTTPConnection)(parts.netloc, timeout=timeout_s)
-    with closing(connection):
-        connection.connect()
+    return (HTTPSConnection if parts.scheme == "https" else HTTPConnection)(parts.netloc, timeout=timeout_s)
+
+
+def get(connection: HTTPConnection, target: str, *, whole_s: float = _WHOLE_S) -> bytes:
+    """Get what is at a path. Raises as `ask` does; what had been said over the connection may be why."""
+    try:
+        if connection.sock is None:
+            connection.connect()
         with _ended_after(connection.sock, whole_s):
-            connection.request("GET", f"{parts.path}/status")
+            connection.request("GET", target)
             with connection.getresponse() as response:
-                return response.status, response.reason, _body(response)
+                status, reason, body = response.status, response.reason, _body(response)
+    except (OSError, IncompleteRead, UnicodeError) as error:
+        raise _no_answer(error, connection.timeout or 0) from error
+    except HTTPException as error:
+        raise OtherServerError("what listens there is not a relay: its answer is not HTTP") from error
+    if status != HTTPStatus.OK:
+        raise OtherServerError(_refused(f"{status} {reason}", body))
+    return body
 
 
 def _body(response: HTTPResponse) -> bytes:

@@ -1,7 +1,6 @@
 """The page of an analysis in a real Chromium, without screen or network: what it draws, and what one can do there."""
 
 import json
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,15 +10,10 @@ import pytest
 from syncrelay.bag.analysis import Analysis
 from syncrelay.cli.analysis_html import as_html
 from syncrelay.cli.analysis_json import as_json
+from tests.browser import launched, needs_chromium, opened
 from tests.cli.html_reports import HOSTILE, TOPICS, analyzed, drive, renamed
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install '.[test]'")
-
-_CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-# Two tests may share one core with as many others; none takes a second alone.
-_PATIENCE_MS = 120_000
-
-pytestmark = pytest.mark.skipif(_CHROMIUM is None, reason="there is no chromium: apt-get install chromium")
+pytestmark = needs_chromium
 
 _DRAWN = """() => [...document.querySelectorAll(".chart")].map((chart) => {
   const canvas = chart.querySelector("canvas");
@@ -40,15 +34,10 @@ _SHOWN = '() => { const {x} = plots.find((plot) => plot.root.closest(".lanes")).
 
 
 class Opened:
-    """A page, what it asked for, and what it complained of."""
+    """A report that is open."""
 
-    def __init__(self, page) -> None:
-        self.page = page
-        self.requests: list[str] = []
-        self.complaints: list[str] = []
-        page.on("request", lambda request: self.requests.append(request.url))
-        page.on("console", lambda message: self.complaints.append(message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+    def __init__(self, opened) -> None:
+        self.page, self.requests, self.complaints = opened.page, opened.requests, opened.complaints
 
     def shown(self) -> list[float]:
         """The part of the recording that the lanes show, in seconds."""
@@ -61,10 +50,8 @@ class Opened:
 
 @pytest.fixture(scope="module")
 def browser():
-    with sync_api.sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=_CHROMIUM, timeout=_PATIENCE_MS)
+    with launched() as running:
         yield running
-        running.close()
 
 
 @pytest.fixture(scope="module")
@@ -86,13 +73,11 @@ def report(folder, analysis) -> Path:
 
 @contextmanager
 def _opened(browser, path: Path, *, scheme: str = "light", width: int = 1200) -> Iterator[Opened]:
-    context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}, offline=True)
-    context.set_default_timeout(_PATIENCE_MS)
-    opened = Opened(context.new_page())
-    opened.page.goto(path.as_uri())
-    opened.page.wait_for_selector("html[data-drawn]", state="attached")
-    yield opened
-    context.close()
+    with opened(browser, scheme=scheme, width=width, offline=True) as page:
+        report = Opened(page)
+        report.page.goto(path.as_uri())
+        report.page.wait_for_selector("html[data-drawn]", state="attached")
+        yield report
 
 
 @pytest.mark.parametrize("width", [360, 1200])

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.cli.analysis_html import as_html
-from syncrelay.cli.analysis_html.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.cli.analysis_html.lanes import Lanes, lanes_of
 from syncrelay.cli.analysis_html.packing import pack
+from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 from tests.bag.making import rig, write_mcap
 from tests.cli.command import run

@@ -6,7 +6,8 @@ from contextlib import ExitStack
 import pytest
 
 from syncrelay.config import Listen
-from syncrelay.status import document
+from syncrelay.explain import Tape
+from syncrelay.status import Taps, document
 from syncrelay.status.server import Server
 from tests.cli.command import run
 from tests.top import states
@@ -32,7 +33,7 @@ def test_of_several_relays_none_is_taken_for_the_one_that_is_meant(tmp_path, wor
     with ExitStack() as stack:
         servers = [stack.enter_context(Server(Listen("127.0.0.1", range(1)))) for _ in range(2)]
         for server in servers:
-            server.serve(lambda: state)
+            server.serve(lambda: state, Taps(Tape(), str))
         asked = run(*words, folder=tmp_path)
     assert (asked.returncode, asked.stdout) == (1, "")
     first, *lines = asked.stderr.splitlines()

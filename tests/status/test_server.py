@@ -1,6 +1,7 @@
 """The relay's HTTP over real sockets: what it answers, and whom it does not wait for."""
 
 import json
+import re
 import socket
 import threading
 from contextlib import ExitStack, suppress
@@ -12,8 +13,8 @@ from states import CAMERA, relay, started, working
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
-from syncrelay.explain import Endpoint, Mismatch, Refusal
-from syncrelay.status import Phase
+from syncrelay.explain import Endpoint, Mismatch, Refusal, Tape
+from syncrelay.status import Phase, Taps
 from syncrelay.status.server import Server
 
 HEALTHY = relay(working())
@@ -47,9 +48,17 @@ def test_metrics_are_prometheus_text():
     assert 'syncrelay_sets_total{group="front"} 30.0\n' in body
 
 
-def test_the_root_names_all_pages():
+def test_the_root_is_a_page_of_files_that_are_all_there_and_of_nothing_else():
     with serving(HEALTHY) as address:
-        assert asked(address, "/") == (200, "syncrelay: /status /metrics /livez /readyz\n")
+        code, page = asked(address, "/")
+        assert code == 200
+        links = set(re.findall(r'(?:src|href)="([^"]+)"', page)) - {"data:,"}
+        assert links == {"colours.css", "page.css", "draw.js", "page.js", "status", "metrics"}
+        assert {link: asked(address, f"/{link}")[0] for link in links} == dict.fromkeys(links, 200)
+        head = sent(address, b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").partition(b"\r\n\r\n")[
+            0
+        ]
+    assert b"Content-Security-Policy: default-src 'none'; script-src 'self';" in head
 
 
 @pytest.mark.parametrize(
@@ -92,7 +101,7 @@ def test_a_relay_is_ready_while_every_required_input_is_served(state, answer):
 
 def test_what_is_not_there_is_answered_with_what_is():
     with serving(HEALTHY) as address:
-        assert asked(address, "/statsu") == (404, "there are /status, /metrics, /livez and /readyz\n")
+        assert asked(address, "/statsu") == (404, "there are /, /status, /tap, /metrics, /livez and /readyz\n")
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])
@@ -170,7 +179,7 @@ def test_an_exception_of_ours_is_a_500_and_the_server_lives_on():
         raise KeyError("no such group")
 
     with Server(ANY) as server:
-        server.serve(broken)
+        server.serve(broken, Taps(Tape(), str))
         address = server.place.host, server.place.port
         assert asked(address, "/status")[0] == 500
         assert asked(address, "/nowhere")[0] == 404

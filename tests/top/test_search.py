@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config import Listen
-from syncrelay.status import document
+from syncrelay.explain import Tape
+from syncrelay.status import Taps, document
 from syncrelay.status.announcement import Place, announce, announced, places_in
 from syncrelay.status.server import Server
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask, base_urls, search
@@ -36,7 +37,7 @@ def test_a_relay_is_found_at_whatever_port_until_it_ends(listen, reached_at):
     with Server(Listen(listen, range(1))) as server:
         url = f"http://{reached_at}:{server.place.port}"
         assert server.place not in announced()
-        server.serve(lambda: state)
+        server.serve(lambda: state, Taps(Tape(), str))
         # Others of this machine may be there too.
         assert base_urls(None).count(url) == 1
         assert [answer.url for answer in search([url], **PATIENT).relays] == [url]
@@ -51,7 +52,7 @@ def test_a_relay_is_found_at_addresses_of_ip_6(listen):
         pytest.skip("this machine has no IPv6")
     state = states.healthy()
     with server:
-        server.serve(lambda: state)
+        server.serve(lambda: state, Taps(Tape(), str))
         url = f"http://[::1]:{server.place.port}"
         assert base_urls(None).count(url) == 1
         assert [answer.url for answer in search([url], **PATIENT).relays] == [url]
@@ -190,7 +191,7 @@ def test_relays_are_found_among_fifty_that_hang_or_never_end():
 def test_a_relay_that_is_asked_by_a_name_that_it_does_not_go_by_says_what_to_write():
     state = states.healthy()
     with Server(Listen("127.0.0.1", range(1))) as server:
-        server.serve(lambda: state)
+        server.serve(lambda: state, Taps(Tape(), str))
         # To the kernel it is this machine; to the relay it is not one of its own.
         with pytest.raises(OtherServerError) as caught:
             ask(f"http://0.0.0.0:{server.place.port}")

@@ -11,17 +11,17 @@ from markupsafe import Markup, escape
 
 from syncrelay.bag.analysis import Analysis, file_with_changes
 from syncrelay.cli.analysis_html.drawings import drawings_of
-from syncrelay.cli.analysis_html.fates import FATES, Fate
 from syncrelay.cli.analysis_html.words import TopicRow, group_words, topic_row
 from syncrelay.errors import BagError
 from syncrelay.explain import words
 from syncrelay.printable import printable, printable_lines
+from syncrelay.status.fates import FATES, Fate
 
 MARK: Final = '<meta name="generator" content="syncrelay">'
 """Stands near the begin of every page, and in no other file."""
 
 _FOLDER: Final = files("syncrelay.cli.analysis_html")
-_STYLES: Final = ("uplot/uPlot.min.css", "page/report.css")
+_STYLES: Final = ("uplot/uPlot.min.css", "../../status/page/colours.css", "page/report.css")
 _SCRIPTS: Final = ("uplot/uPlot.iife.min.js", "page/unpack.js", "page/plots.js", "page/lanes.js", "page/report.js")
 # Up to 10 characters each: below 6 MB, however long the recording.
 _MOST_MESSAGES: Final = 500_000

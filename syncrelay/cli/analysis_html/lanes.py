@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from syncrelay.bag.analysis import GroupAnalysis
 from syncrelay.bag.columns import Nanoseconds
-from syncrelay.cli.analysis_html.fates import CODES, MATCHED, UNNEEDED
 from syncrelay.explain import UNREADABLE
+from syncrelay.status.fates import CODES, MATCHED, UNNEEDED
 
 _SECOND: Final = 1_000_000_000
 _STRETCH: Final = 10 * _SECOND

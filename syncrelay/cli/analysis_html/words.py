@@ -10,7 +10,6 @@ from syncrelay.bag.analysis.topics import TopicFigures
 from syncrelay.bag.analysis.unneeded import InputFates
 from syncrelay.bag.analysis.watching import LastingFinding
 from syncrelay.cli.analysis_html.drawings import Drawings
-from syncrelay.cli.analysis_html.fates import FATES, MATCHED, UNNEEDED
 from syncrelay.cli.analysis_text import (
     delay_line,
     faults_of,
@@ -24,6 +23,7 @@ from syncrelay.cli.analysis_text import (
 )
 from syncrelay.config.wording import counted
 from syncrelay.explain import Severity, in_words, words
+from syncrelay.status.fates import FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 
 _GOOD = 0.99

@@ -673,11 +673,13 @@ cdef class Flow:
     cdef readonly object last
     cdef readonly int64_t n_sets
     cdef readonly dict unpublished
-    cdef object _now, _refusals, _watched, _note_left, _note_set
+    cdef object _config, _now, _refusals, _tape, _watched, _note_left, _note_set
     cdef list _note_arrival
 
-    def __init__(self, engine, *, n_inputs, now, refusals):
-        self.engine, self.tell, self.n_sets = engine, None, 0
+    def __init__(self, config, *, now, refusals, tape):
+        n_inputs = len(config.topics)
+        self.engine, self.tell, self.n_sets = config.engine(), None, 0
+        self._config, self._tape = config, tape
         self._refusals, self.unpublished = refusals, refusals.unpublished
         self.outlets, self.restamped, self.keys = [None] * n_inputs, [False] * n_inputs, [None] * n_inputs
         self.last = deque(maxlen=RECENT)
@@ -726,19 +728,27 @@ cdef class Flow:
     cpdef conclude(self, outcomes):
         """Publish the sets among these, and note what left."""
         cdef object latency
+        cdef int64_t left
+        cdef bint is_tapped = self._tape.is_on
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 newest = self._send(outcome)
                 stamps = tuple([None if message is None else message.stamp for message in outcome.messages])
-                latency = sr_clock(CLOCK_REALTIME) - newest
+                left = sr_clock(CLOCK_REALTIME)
+                latency = left - newest
                 self._note_set((stamps, latency))
                 self._note_left(stamps)
                 self.n_sets += 1
                 if self.tell is not None:
                     self.tell(self, outcome, latency)
+                if is_tapped:
+                    self._tape.note(self._config, stamps, left, newest)
             else:
                 message = outcome.message
-                self._note_left(RecentDrop(message.input, message.stamp, outcome.reason))
+                drop = RecentDrop(message.input, message.stamp, outcome.reason)
+                self._note_left(drop)
+                if is_tapped:
+                    self._tape.note(self._config, drop, sr_clock(CLOCK_REALTIME), message.payload.received)
 
     cdef object _send(self, match):
         """Publish a set; when its newest message was received."""

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from syncrelay.config.listen import Listen
-from syncrelay.status import RelayState
+from syncrelay.explain import Tape
+from syncrelay.status import RelayState, Taps
 from syncrelay.status.server import Server
 
 ANY = Listen("127.0.0.1", range(1))
@@ -13,10 +14,10 @@ _PATIENCE_S = 60
 
 
 @contextmanager
-def serving(state: RelayState, listen: Listen = ANY) -> Iterator[tuple[str, int]]:
+def serving(state: RelayState, listen: Listen = ANY, taps: Taps | None = None) -> Iterator[tuple[str, int]]:
     """The address of a server that answers with one state."""
     with Server(listen) as server:
-        server.serve(lambda: state)
+        server.serve(lambda: state, taps or Taps(Tape(), str))
         yield server.place.host, server.place.port
 
 

@@ -1,0 +1,109 @@
+"""`syncrelay tap [GROUP]`: each set and drop of a running relay, as it leaves."""
+
+import json
+import time
+from argparse import Namespace
+from collections.abc import Collection
+from contextlib import closing
+from typing import Any, Final
+
+from syncrelay.cli.boundary import DONE, flush, put, remark
+from syncrelay.cli.parser import Parser
+from syncrelay.cli.relays import find_one, otherwise
+from syncrelay.cli.stop import StopRequest
+from syncrelay.config.wording import counted, did_you_mean, quoted
+from syncrelay.errors import SyncRelayError, UsageError
+from syncrelay.explain import words
+from syncrelay.printable import printable
+from syncrelay.sync import DropReason
+from syncrelay.top.client import Answer, NoAnswerError, OtherServerError
+from syncrelay.top.tap import DropLine, SetLine, Tap, Told, read_line
+from syncrelay.wakeup import Wakeup
+
+# Seldom enough that to be asked costs the relay about a percent of a core.
+_ASKS_EVERY_S: Final = 0.1
+_NS_PER_S: Final = 1_000_000_000
+
+
+def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
+    """Run `syncrelay tap`."""
+    relay = find_one(arguments.url, otherwise=otherwise(arguments.url))
+    groups = [] if arguments.group is None else [arguments.group]
+    _require_names(relay, groups, arguments.input)
+    tap = Tap(relay.url, groups=groups, inputs=arguments.input, reasons=arguments.reason, drops=arguments.drops)
+    woken = Wakeup()
+    stop.defer()
+    stop.wake_with(woken.set)
+    with closing(tap):
+        return follow(tap, relay.url, as_json=arguments.json, most=arguments.number, woken=woken, stop=stop)
+
+
+def follow(tap: Tap, url: str, *, as_json: bool, most: int | None, woken: Wakeup, stop: StopRequest) -> int:
+    """Print lines until so many are printed or a stop is requested. Raises SyncRelayError when the relay is gone."""
+    printed = 0
+    while not stop.requested:
+        told = _read(tap, url)
+        _say_lost(told)
+        lines = told.lines if most is None else told.lines[: most - printed]
+        for line in lines:
+            put(json.dumps(line) if as_json else plain_line(line))
+        flush()
+        printed += len(lines)
+        if printed == most:
+            break
+        if not told.more:
+            woken.wait(_ASKS_EVERY_S)
+    return DONE
+
+
+def _read(tap: Tap, url: str) -> Told:
+    try:
+        return tap.read()
+    except (NoAnswerError, OtherServerError) as error:
+        raise SyncRelayError(f"the relay at {url} cannot be followed any more: {error}") from error
+
+
+def _say_lost(told: Told) -> None:
+    if told.lost is None:
+        remark("sets and drops may be missing here: the relay was not asked for long, or has started anew")
+    elif told.lost:
+        # Which of them were wanted is not known any more.
+        remark(f"lost {counted(told.lost, 'line')}: sets and drops of all groups left faster than they were read")
+
+
+def plain_line(line: dict[str, Any]) -> str:
+    """Say a line in words: of a set how far the stamp of each input is behind the earliest."""
+    read = read_line(line)
+    seconds, rest = divmod(read.time, _NS_PER_S)
+    when = f"{time.strftime('%H:%M:%S', time.localtime(seconds))}.{rest // 1_000_000:03}"
+    return f"{when} {read.group}: {_of_set(read) if isinstance(read, SetLine) else _of_drop(read)}"
+
+
+def _of_set(line: SetLine) -> str:
+    first = min((stamp for stamp in line.stamps.values() if stamp is not None), default=0)
+    offsets = ", ".join(f"{topic} {_offset(stamp, first)}" for topic, stamp in line.stamps.items())
+    return f"set, span {words.duration(line.span)}, latency {words.duration(line.latency)}: {offsets}"
+
+
+def _offset(stamp: int | None, first: int) -> str:
+    return "missing" if stamp is None else f"+{words.duration(stamp - first)}"
+
+
+def _of_drop(line: DropLine) -> str:
+    meaning = {each.value: f" ({each.meaning})" for each in DropReason}.get(line.reason, "")
+    waited = words.duration(line.time - line.received)
+    return f"drop, {line.topic} {line.reason}{meaning}, {waited} after it was received"
+
+
+def _require_names(relay: Answer, groups: Collection[str], inputs: Collection[str]) -> None:
+    """Refuse what the relay does not have; one that is just starting may not have told yet. Raises UsageError."""
+    chosen = [group for group in relay.state.groups if not groups or group.name in groups]
+    _require(groups, [group.name for group in relay.state.groups], "group")
+    _require(inputs, dict.fromkeys(each.topic for group in chosen for each in group.inputs), "input")
+
+
+def _require(asked: Collection[str], there: Collection[str], what: str) -> None:
+    for name in asked:
+        if there and name not in there:
+            hint = did_you_mean(name, there) or f"; it has {', '.join(there)}"
+            raise UsageError(printable(f"the relay has no {what} {quoted(name)}{hint}"))

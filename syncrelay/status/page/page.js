@@ -1,0 +1,209 @@
+"use strict";
+// Asks the relay once a second, as `syncrelay top` does, and shows what it says. Nothing is kept but the last answer.
+
+const ASKS_EVERY_MS = 1000, PATIENCE_MS = 4000;
+const LEVELS = ["error", "stale", "warn", "ok"];
+const ORDERS = {
+  file: (groups) => groups,
+  worst: (groups) => [...groups].sort((one, other) => LEVELS.indexOf(one.level) - LEVELS.indexOf(other.level)),
+  name: (groups) => [...groups].sort((one, other) => (one.name < other.name ? -1 : one.name > other.name ? 1 : 0)),
+};
+const place = (id) => document.getElementById(id);
+const keys = new WeakMap();
+let state = null, order = "file", paused = false, answered = performance.now(), trouble = null;
+let chosen = hashed();
+
+function hashed() {
+  try {
+    return decodeURIComponent(location.hash.slice(1));
+  } catch {
+    return "";
+  }
+}
+
+// What has not changed stays, so that text can be selected and copied.
+function fill(where, content, make) {
+  const key = JSON.stringify(content);
+  if (keys.get(where) === key) return;
+  keys.set(where, key);
+  where.replaceChildren(...make());
+}
+
+async function ask() {
+  if (!document.hidden && !paused) {
+    try {
+      const answer = await fetch("status", {cache: "no-store", signal: AbortSignal.timeout(PATIENCE_MS)});
+      if (!answer.ok) throw new Error((await answer.text()).slice(0, 500));
+      state = await answer.json();
+      [answered, trouble] = [performance.now(), null];
+    } catch (error) {
+      trouble = error.name === "TimeoutError" ? "it takes too long" : error instanceof TypeError ? "nothing answers there" : error.message;
+    }
+    show();
+  }
+  setTimeout(ask, ASKS_EVERY_MS);
+}
+
+function show() {
+  const quiet = (performance.now() - answered) / 1000;
+  place("trouble").hidden = trouble === null;
+  if (trouble !== null) fill(place("trouble"), [trouble, Math.round(quiet)], () => [printable(`STALE: no answer for ${seconds(quiet)}: ${trouble}; still trying`)]);
+  if (state === null) return;
+  const {relay} = state;
+  document.title = `${printable(relay.node)} · syncrelay`;
+  place("node").textContent = printable(relay.node);
+  const failed = relay.reload_error ? `; the last reload failed: ${relay.reload_error}` : "";
+  place("relay").textContent = `${relay.phase}, ${relay.ready ? "ready" : "not ready"}, up ${seconds(relay.uptime_s)}, syncrelay ${printable(relay.version)}, ${printable(relay.config + failed)}`;
+  const groups = ORDERS[order](state.groups);
+  const group = groups.find((each) => each.name === chosen) ?? groups[0];
+  showList(groups, group);
+  showGroup(group);
+  document.documentElement.dataset.shown = String(Number(document.documentElement.dataset.shown ?? 0) + 1);
+}
+
+function showList(groups, current) {
+  fill(place("groups"), groups.map((group) => group.name), () => groups.map((group) => {
+    const row = element("button", {type: "button", class: "group"}, element("strong", {}, group.name),
+      element("span", {class: "level"}), element("span", {class: "figures"}), element("span", {class: "why"}));
+    row.addEventListener("click", () => choose(group.name, true));
+    return row;
+  }));
+  if (!groups.length) fill(place("groups"), "none", () => [element("p", {}, "no group is running yet")]);
+  groups.forEach((group, at) => {
+    const row = place("groups").children[at], [, level, figures, why] = row.children;
+    row.setAttribute("aria-current", String(group === current));
+    level.className = `level ${group.level}`;
+    level.textContent = group.level.toUpperCase();
+    figures.textContent = `${ofPossible(group)} sets/s, span p95 ${duration(group.span_ms?.p95)}, latency p95 ${duration(group.latency_ms?.p95)}`;
+    const [finding] = group.findings;
+    why.textContent = finding && group.level !== "ok" ? printable(finding.text) : "";
+  });
+}
+
+const BLOCKS = ["head", "findings", "figures", "lanes", "inputs"];
+
+function showGroup(group) {
+  const section = place("group");
+  if (!group) return fill(section, null, () => []);
+  fill(section, group.name, () => BLOCKS.map((name) => element("div", {class: name})));
+  const [head, findings, figures, recent, inputs] = section.children;
+  fill(head, [group.name, options(group)], () => [element("h2", {}, group.name), element("p", {class: "faint"}, options(group))]);
+  fill(findings, group.findings, () => group.findings.map(finding));
+  fill(figures, [group.sets, group.rate_hz, group.possible_hz, group.since_last_set_ms, group.last_sets], () => figuresOf(group));
+  const width = Math.floor(recent.clientWidth);
+  fill(recent, [width, group.sets, group.recent], () => (group.recent.length ? recentOf(group, width) : []));
+  fill(inputs, group.inputs, () => [element("h3", {}, "Inputs"), element("div", {class: "cards"}, ...group.inputs.map((each) => input(group, each)))]);
+}
+
+function options(group) {
+  const tolerance = group.tolerance ? [`${group.tolerance.key} ${duration(group.tolerance.ms)}`] : [];
+  const waits = group.max_wait_ms === null ? [] : [`max_wait ${duration(group.max_wait_ms)}`];
+  return [group.policy, ...tolerance, `queue_size ${group.queue_size}`, ...waits].join(", ");
+}
+
+function ofPossible(group) {
+  return `${figure(group.rate_hz)} of ${figure(Math.max(group.possible_hz, group.rate_hz))}`;
+}
+
+function finding(each) {
+  const level = each.severity === "ok" ? [] : [element("strong", {class: `level ${each.severity}`}, `${each.severity.toUpperCase()} `)];
+  const fix = each.suggestion ? [element("p", {class: "fix"}, ...withCode(each.suggestion))] : [];
+  return element("div", {class: `note ${each.severity}`}, element("p", {}, ...level, each.text), ...fix);
+}
+
+function withCode(text) {
+  return text.split("`").map((part, at) => (at % 2 ? element("code", {}, part) : printable(part)));
+}
+
+function figuresOf(group) {
+  const share = group.possible_hz ? Math.min(1, group.rate_hz / group.possible_hz) : 0;
+  const last = group.since_last_set_ms === null ? "no set yet"
+    : `${group.sets} ${group.sets === 1 ? "set" : "sets"}, last ${group.since_last_set_ms < 1500 ? "just now" : `${seconds(group.since_last_set_ms / 1000)} ago`}`;
+  const meter = element("meter", {min: 0, max: 1, value: share, "aria-label": "share of the possible sets"});
+  const line = element("p", {}, element("strong", {}, `${ofPossible(group)} `), "possible sets a second ", meter, ` ${last}`);
+  if (!group.last_sets.length || !group.span_ms) return [line];
+  const shifted = group.span_without_offsets_ms === null ? []
+    : [element("p", {}, `without offsets, span p50 would be ${duration(group.span_without_offsets_ms)}`)];
+  return [line, ...shifted, element("div", {class: "sparks"},
+    sparkline("span", group.last_sets.map((each) => each.span_ms), group.span_ms),
+    sparkline("latency", group.last_sets.map((each) => each.latency_ms), group.latency_ms))];
+}
+
+function recentOf(group, width) {
+  const {picture, reasons, hasSets, shown} = lanes(group, width);
+  return [element("h3", {}, `Recent sets: the last ${duration(shown)}, the newest on the right`), picture, legend(reasons, hasSets)];
+}
+
+function input(group, each) {
+  const problem = group.findings.find((one) => one.topic === each.topic && one.severity !== "ok");
+  const notes = [each.required ? [] : ["optional"], problem ? [problem.code.replaceAll("_", " ")] : []].flat();
+  const lost = each.lost ? `; ${each.lost} lost on the way` : "";
+  const rows = {
+    rate: `${each.rate_hz ? `${figure(each.rate_hz)} Hz` : "–"}, lag ${duration(each.lag_ms)}, jitter ${duration(each.jitter_ms)}`,
+    type: each.type ?? "not known yet",
+    offset: each.offset_ms ? duration(each.offset_ms) : null,
+    "dropped in 10 s": counts(each.dropped_lately),
+    "in all": `${each.received} received, ${each.matched} in sets, ${each.buffered} waiting, dropped: ${counts(each.dropped)}${lost}`,
+    from: nodes(each.publishers),
+    to: `${each.output}: ${nodes(each.subscribers)}`,
+  };
+  const list = element("dl");
+  for (const [name, value] of Object.entries(rows)) if (value !== null) list.append(element("dt", {}, name), element("dd", {}, value));
+  return element("article", {class: "input"}, element("h4", {}, each.topic,
+    ...notes.map((note) => element("span", {class: `level ${note === "optional" ? "" : problem.severity}`}, ` ${note}`))), list);
+}
+
+function counts(dropped) {
+  return Object.entries(dropped).sort(([, one], [, other]) => other - one).map(([reason, count]) => `${count} ${reason}`).join(", ") || "none";
+}
+
+function nodes(endpoints) {
+  const why = ({mismatch}) => (mismatch ? ` (${mismatch.policy}: ${mismatch.offered} offered, ${mismatch.requested} requested)` : "");
+  return endpoints.map((each) => each.node + why(each)).join(", ") || "nobody";
+}
+
+function choose(name, isClicked) {
+  chosen = name;
+  history.replaceState(null, "", `#${encodeURIComponent(name.toWellFormed?.() ?? name)}`);
+  show();
+  // On a phone the group is below the list.
+  if (isClicked && place("group").getBoundingClientRect().top > innerHeight * 0.6) place("group").scrollIntoView();
+}
+
+function step(by) {
+  const groups = state ? ORDERS[order](state.groups) : [];
+  if (!groups.length) return;
+  const at = Math.max(0, groups.findIndex((group) => group.name === chosen));
+  const next = Math.min(groups.length - 1, Math.max(0, at + by));
+  choose(groups[next].name, false);
+  place("groups").children[next].focus();
+}
+
+function pause() {
+  paused = !paused;
+  place("pause").setAttribute("aria-pressed", String(paused));
+  place("pause").textContent = paused ? "Paused: resume" : "Pause";
+}
+
+function sort() {
+  const names = Object.keys(ORDERS);
+  order = names[(names.indexOf(order) + 1) % names.length];
+  place("sort").textContent = `Order: ${order}`;
+  show();
+}
+
+const KEYS = {j: () => step(1), ArrowDown: () => step(1), k: () => step(-1), ArrowUp: () => step(-1), " ": pause, s: sort};
+
+addEventListener("keydown", (event) => {
+  const act = KEYS[event.key];
+  // What is focused has the space for itself, and the arrows scroll where no group is chosen by them.
+  if (!act || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest(".controls, a"))) return;
+  if (event.key.startsWith("Arrow") && !event.target.closest("#groups")) return;
+  event.preventDefault();
+  act();
+});
+addEventListener("hashchange", () => { chosen = hashed(); show(); });
+addEventListener("resize", () => show());
+place("pause").addEventListener("click", pause);
+place("sort").addEventListener("click", sort);
+ask();

@@ -1,0 +1,167 @@
+"""Those who tap the relay: each asks for what has left since it last asked, and whatever it does not fetch is lost.
+
+A tap asks again and again, by a name of its own choice, and each answer is short and complete. None holds a thread of
+the server, and of one that stalls there is nothing but a connection, which ends as that of any client does.
+"""
+
+import json
+import re
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any, Final, Self
+from urllib.parse import parse_qs
+
+from syncrelay.errors import SyncRelayError
+from syncrelay.explain import Left, RecentDrop, Tape, drop_line, set_line
+from syncrelay.explain.tape import UNHEARD_S
+from syncrelay.sync import DropReason
+
+MOST_TAPS: Final = 64
+# All taps together take at most such a share of a core, as the receive thread needs the interpreter too; it may be
+# saved up for a second.
+_SHARE: Final = 0.2
+# Written in some milliseconds, as long as the receive thread may wait for the interpreter.
+_MOST_LINES: Final = 500
+_KEYS: Final = ("tap", "after", "group", "drops", "input", "reason")
+_MOST_FIELDS: Final = 64
+_NAME: Final = re.compile(r"[0-9A-Za-z]{1,32}")
+_NUMBER: Final = re.compile(r"[0-9]{1,18}")
+
+
+class TapRefusedError(SyncRelayError):
+    """The HTTP status and the sentence for a tap that is not answered."""
+
+    def __init__(self, status: str, sentence: str) -> None:
+        super().__init__(sentence)
+        self.status = status
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a tap wants of what leaves; empty is all. Reasons and `drops` leave out the sets."""
+
+    groups: Collection[str]
+    inputs: Collection[str]
+    reasons: Collection[str]
+    drops: bool
+
+    def holds(self, each: Left, topics: Collection[str]) -> bool:
+        """Whether a set or drop of a group with these inputs is wanted."""
+        outcome = each.outcome
+        if self.groups and each.group.name not in self.groups:
+            return False
+        if isinstance(outcome, RecentDrop):
+            named = [topic for index, topic in enumerate(topics) if index == outcome.input]
+            return self._wants_input(named) and (not self.reasons or outcome.reason.value in self.reasons)
+        there = [topic for topic, stamp in zip(topics, outcome, strict=True) if stamp is not None]
+        return not self.reasons and not self.drops and self._wants_input(there)
+
+    def _wants_input(self, topics: Collection[str]) -> bool:
+        return not self.inputs or any(topic in self.inputs for topic in topics)
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """What a tap asks: under which name, after which number, None at first, and for what."""
+
+    name: str
+    after: int | None
+    wanted: Wanted
+
+    @classmethod
+    def of(cls, text: str) -> Self:
+        """Read the query of a URL. Raises TapRefusedError."""
+        try:
+            fields = parse_qs(text, max_num_fields=_MOST_FIELDS, errors="strict")
+        except ValueError as error:
+            raise _bad("that is no query of a tap") from error
+        for key in fields:
+            if key not in _KEYS:
+                raise _bad(f"there is no {key!a}: expected {', '.join(_KEYS)}")
+        name, after = fields.get("tap", [""])[-1], fields.get("after", [None])[-1]
+        if not _NAME.fullmatch(name):
+            raise _bad("expected `tap`: a name of your choice, of up to 32 letters and digits")
+        if after is not None and not _NUMBER.fullmatch(after):
+            raise _bad("expected `after`: the number that the last answer gave")
+        reasons = frozenset(fields.get("reason", ()))
+        if not reasons <= {each.value for each in DropReason}:
+            raise _bad(f"expected as `reason` one of {', '.join(each.value for each in DropReason)}")
+        groups, inputs = frozenset(fields.get("group", ())), frozenset(fields.get("input", ()))
+        wanted = Wanted(groups, inputs, reasons, drops=fields.get("drops", ["0"])[-1] != "0")
+        return cls(name, None if after is None else int(after), wanted)
+
+
+def _bad(sentence: str) -> TapRefusedError:
+    return TapRefusedError("400 Bad Request", sentence)
+
+
+class Taps:
+    """Answers taps. Any thread. `full_name` gives a topic's name in the graph."""
+
+    def __init__(
+        self, tape: Tape, full_name: Callable[[str], str], *, processor_s: Callable[[], float] = time.thread_time
+    ) -> None:
+        self.tape = tape
+        self._full_name = full_name
+        self._processor_s = processor_s
+        self._left_s, self._refilled = _SHARE, time.monotonic()
+        self._asked: dict[str, float] = {}
+        self._lock = Lock()
+
+    def answer(self, text: str) -> bytes:
+        """Return what has left since, as JSON. Raises TapRefusedError.
+
+        `after` is what to ask with next, `more` says that there is more at once. `lost` counts sets and drops of all
+        groups that were too old to be given; it is null where nobody counted. While taps have taken more than their
+        share of the processor, nothing is given.
+        """
+        query = Query.of(text)
+        was_there = self._enter(query.name)
+        last = self.tape.last
+        if query.after is None or not was_there or query.after > last:
+            return _told(last, lost=0 if query.after is None else None)
+        if not self._may_go_on():
+            return _told(query.after)
+        began = self._processor_s()
+        left, lost = self.tape.after(query.after, most=_MOST_LINES)
+        after = left[-1].number if left else query.after
+        lines = [line for each in left if (line := self._line(each, query.wanted)) is not None]
+        told = _told(after, more=after < last, lost=lost, lines=lines)
+        with self._lock:
+            self._left_s -= self._processor_s() - began
+        return told
+
+    def _may_go_on(self) -> bool:
+        now = time.monotonic()
+        with self._lock:
+            self._left_s = min(_SHARE, self._left_s + _SHARE * (now - self._refilled))
+            self._refilled = now
+            return self._left_s > 0
+
+    def _enter(self, name: str) -> bool:
+        """Have the tape kept for a tap; whether it has been all the while since that one last asked."""
+        now = time.monotonic()
+        with self._lock:
+            self._asked = {each: asked for each, asked in self._asked.items() if now - asked < UNHEARD_S}
+            was_there = name in self._asked and self.tape.is_on
+            if name not in self._asked and len(self._asked) >= MOST_TAPS:
+                raise TapRefusedError(
+                    "503 Service Unavailable", f"{MOST_TAPS} taps follow this relay already: end one of them first"
+                )
+            self._asked[name] = now
+            self.tape.listen()
+        return was_there
+
+    def _line(self, each: Left, wanted: Wanted) -> dict[str, Any] | None:
+        topics = [self._full_name(topic.topic) for topic in each.group.topics]
+        if not wanted.holds(each, topics):
+            return None
+        if isinstance(each.outcome, RecentDrop):
+            return drop_line(each.group, topics, each.outcome, left=each.left, received=each.received)
+        return set_line(each.group, topics, each.outcome, left=each.left, received=each.received)
+
+
+def _told(after: int, *, more: bool = False, lost: int | None = 0, lines: Sequence[dict[str, Any]] = ()) -> bytes:
+    return json.dumps({"after": after, "more": more, "lost": lost, "lines": lines}).encode()

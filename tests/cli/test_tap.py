@@ -1,0 +1,121 @@
+"""`syncrelay tap` as a user starts it, on the relay's own server."""
+
+import json
+import random
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+
+import pytest
+
+from syncrelay.cli.tap import plain_line
+from syncrelay.config import Listen, load_text
+from syncrelay.explain import RecentDrop, Tape, drop_line, set_line
+from syncrelay.status import RelayState, Taps
+from syncrelay.status.server import Server
+from syncrelay.sync import DropReason
+from tests.cli.command import run
+from tests.hostile_names import assert_shown_safely, hostile_name
+from tests.top import states
+
+_MS = 1_000_000
+_AT = 1_700_000_000 * 1000 * _MS
+(GROUP,) = load_text(
+    """
+version: 1
+groups:
+  front:
+    policy: approximate_time
+    slop: 20ms
+    max_wait: 100ms
+    topics:
+      - {topic: /camera, type: sensor_msgs/msg/Image}
+      - {topic: /lidar, type: sensor_msgs/msg/Image}
+      - {topic: /imu, type: sensor_msgs/msg/Imu, required: false}
+"""
+).groups
+_TOPICS = [topic.topic for topic in GROUP.topics]
+A_SET = (_AT, _AT + 5 * _MS, None)
+A_DROP = RecentDrop(1, _AT, DropReason.OVERFLOW)
+
+
+@contextmanager
+def leaving(*outcomes, state: RelayState | None = None) -> Iterator[str]:
+    """The URL of a relay from which these leave, again and again while somebody taps it."""
+    taps, is_over = Taps(Tape(), str), Event()
+
+    def leave() -> None:
+        while not is_over.wait(0.01):
+            for each in outcomes if taps.tape.is_on else ():
+                taps.tape.note(GROUP, each, _AT + 9 * _MS, _AT + 7 * _MS)
+
+    with Server(Listen("127.0.0.1", range(1))) as server:
+        server.serve(lambda: state or states.healthy(), taps)
+        thread = Thread(target=leave)
+        thread.start()
+        yield server.place.url
+        is_over.set()
+        thread.join()
+
+
+def test_each_set_and_drop_is_a_line_with_the_offset_of_each_input(tmp_path):
+    with leaving(A_SET, A_DROP) as url:
+        done = run("tap", "--url", url, "-n", "4", folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = sorted(re.sub(r"^\d\d:\d\d:\d\d\.009 ", "", line) for line in done.stdout.splitlines())
+    drop = "front: drop, /lidar overflow (its queue was full), 2 ms after it was received"
+    a_set = "front: set, span 5 ms, latency 2 ms: /camera +0 s, /lidar +5 ms, /imu missing"
+    assert lines == [drop, drop, a_set, a_set]
+
+
+def test_json_lines_are_those_of_replay(tmp_path):
+    with leaving(A_SET, A_DROP) as url:
+        done = run("tap", "front", "--json", "--url", url, "-n", "2", folder=tmp_path)
+    assert done.returncode == 0
+    times = {"left": _AT + 9 * _MS, "received": _AT + 7 * _MS}
+    expected = [set_line(GROUP, _TOPICS, A_SET, **times), drop_line(GROUP, _TOPICS, A_DROP, **times)]
+    lines = done.stdout.splitlines()
+    assert sorted(lines) == sorted(map(json.dumps, expected))
+
+
+@pytest.mark.parametrize("words", [["--drops"], ["--reason", "overflow"]])
+def test_only_drops_are_printed_where_they_are_asked_for(tmp_path, words):
+    with leaving(A_SET, A_DROP) as url:
+        done = run("tap", *words, "--url", url, "-n", "2", folder=tmp_path)
+    assert [line.split()[2] for line in done.stdout.splitlines()] == ["drop,", "drop,"]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["frnt"], "the relay has no group `frnt`, did you mean `front`?"),
+        (["--input", "/nothing"], "the relay has no input `/nothing`"),
+        (["--reason", "lat"], "invalid choice: 'lat'"),
+        (["-n", "0"], "expected a whole number above 0, found 0"),
+        (["--drop"], "unknown argument --drop, did you mean `--drops`?"),
+    ],
+)
+def test_what_the_relay_does_not_have_is_wrong_usage(tmp_path, words, text):
+    with leaving() as url:
+        done = run("tap", *words, "--url", url, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert text in done.stderr
+
+
+def test_without_a_relay_it_says_what_to_do(tmp_path):
+    with leaving() as url:
+        pass
+    done = run("tap", "--url", url, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert f"no relay answers at {url}\n  {url}: nothing listens there\n" in done.stderr
+
+
+def test_names_are_shown_safely_whatever_they_are():
+    chance = random.Random(18)
+    for _ in range(50):
+        line = {**set_line(GROUP, _TOPICS, A_SET, left=_AT, received=_AT), "group": hostile_name(chance)}
+        line["stamps"] = {hostile_name(chance): _AT, hostile_name(chance): None}
+        shown = plain_line(line)
+        assert "\n" not in shown
+        assert_shown_safely(shown)

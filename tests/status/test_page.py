@@ -1,0 +1,167 @@
+"""The page at the relay's root in a real Chromium: what it shows, and what one can do there."""
+
+import random
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import pytest
+from serving import ANY
+
+from syncrelay.config import Listen
+from syncrelay.explain import Tape
+from syncrelay.status import RelayState, Taps
+from syncrelay.status.server import Server
+from tests.browser import Opened, launched, needs_chromium, opened
+from tests.hostile_names import FORGED, hostile_name
+from tests.top import states
+
+pytestmark = needs_chromium
+
+_STATES = {"light": "rgb(255, 255, 255)", "dark": "rgb(18, 22, 27)"}
+_SHOWN = "html[data-shown]"
+
+
+class Relay:
+    """A relay's server whose state can change, and that can go and come back."""
+
+    def __init__(self, state: RelayState) -> None:
+        self.state, self._listen = state, ANY
+        self.start()
+
+    def start(self) -> None:
+        self._server = Server(self._listen)
+        self._server.serve(lambda: self.state, Taps(Tape(), str))
+        self._listen = Listen("127.0.0.1", range(self._server.place.port, self._server.place.port + 1))
+        self.url = self._server.place.url
+
+    def stop(self) -> None:
+        self._server.__exit__(None, None, None)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with launched() as running:
+        yield running
+
+
+@contextmanager
+def watching(browser, state: RelayState, *, at: str = "", **options) -> Iterator[tuple[Opened, Relay]]:
+    relay = Relay(state)
+    try:
+        with opened(browser, **options) as page:
+            page.page.goto(f"{relay.url}/{at}")
+            page.page.wait_for_selector(_SHOWN, state="attached")
+            yield page, relay
+    finally:
+        relay.stop()
+
+
+def chosen(page) -> str:
+    return page.locator("#groups [aria-current=true] strong").text_content()
+
+
+@pytest.mark.parametrize("width", [390, 1600])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_everything_is_shown_without_a_complaint_or_a_request_elsewhere(scheme, width, browser):
+    with watching(browser, states.rig(), scheme=scheme, width=width) as (opened_page, relay):
+        page = opened_page.page
+        assert page.locator("#node").text_content() == "/syncrelay"
+        assert page.locator("#groups strong").all_text_contents() == ["front", "rear", "inertial", "radar"]
+        assert page.locator("#groups .level").all_text_contents() == ["OK", "ERROR", "ERROR", "ERROR"]
+        assert "10 of 10 sets/s" in page.locator("#groups .figures").first.text_content()
+        assert page.locator("#group .spark").all_inner_texts()[1].startswith("latency: p50 2.56 ms, p95 9.01 ms")
+        assert page.locator("#group .lanes .joint").count() > 5
+        assert page.locator("#group .lanes .fate-too_far").count() > 5
+        assert "too_far: nothing within slop" in page.locator("#group .keys").text_content()
+        assert page.locator("#group h4").all_text_contents() == ["/camera/image_raw", "/lidar/points"]
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == _STATES[scheme]
+        assert opened_page.complaints == []
+        assert {request.removeprefix(relay.url) for request in opened_page.requests} - {"data:,"} == {
+            *("/", "/colours.css", "/page.css", "/draw.js", "/page.js", "/status")
+        }
+
+
+def test_a_group_is_chosen_by_keys_and_by_the_address_and_says_what_to_write(browser):
+    with watching(browser, states.rig(), at="#inertial") as (opened_page, _):
+        page = opened_page.page
+        assert chosen(page) == "inertial"
+        page.keyboard.press("k")
+        assert chosen(page) == "rear"
+        assert page.url.endswith("#rear")
+        shown = page.locator("#group .findings").text_content()
+        assert "stamps of /rear/image_raw are 37.2 s behind those of /lidar/points" in shown
+        assert page.locator("#group .fix code").first.text_content() == "offset: 37.156s"
+        page.keyboard.press("ArrowDown")
+        assert chosen(page) == "inertial"
+        page.keyboard.press("s")
+        assert page.locator("#groups strong").all_text_contents()[-1] == "front"
+        page.locator("#groups button", has_text="radar").click()
+        assert page.locator("#group h2").text_content() == "radar"
+
+
+def test_it_is_live_and_asks_for_nothing_while_it_is_paused(browser):
+    with watching(browser, states.healthy()) as (opened_page, relay):
+        page = opened_page.page
+        page.clock.install()
+        page.reload()
+        relay.state = states.rig()
+        page.wait_for_selector("#groups .group:nth-child(4)")
+        page.keyboard.press(" ")
+        assert page.locator("#pause").get_attribute("aria-pressed") == "true"
+        asked = len(opened_page.requests)
+        page.clock.run_for(10_000)
+        assert len(opened_page.requests) == asked
+        relay.state = states.healthy()
+        page.keyboard.press(" ")
+        page.wait_for_selector("#groups .group:nth-child(2)", state="detached")
+
+
+def test_what_has_not_changed_stays_so_that_it_can_be_copied(browser):
+    with watching(browser, states.rig(), at="#rear") as (opened_page, _):
+        page = opened_page.page
+        page.evaluate("document.querySelector('#group .fix').id = 'marked'")
+        shown = int(page.locator("html").get_attribute("data-shown"))
+        page.wait_for_selector(f"html[data-shown='{shown + 2}']", state="attached")
+        assert page.locator("#marked").count() == 1
+
+
+def test_when_the_relay_goes_its_last_state_stays_and_is_said_to_be_stale(browser):
+    with watching(browser, states.rig()) as (opened_page, relay):
+        page = opened_page.page
+        relay.stop()
+        page.wait_for_selector("#trouble:not([hidden])")
+        assert "STALE: no answer for " in page.locator("#trouble").text_content()
+        assert page.locator("#groups .group").count() == 4
+        relay.start()
+        page.wait_for_selector("#trouble", state="hidden")
+
+
+def test_a_relay_without_groups_has_a_page_too(browser):
+    with watching(browser, replace(states.rig(), groups=())) as (opened_page, _):
+        assert opened_page.page.locator("#groups").text_content() == "no group is running yet"
+        assert opened_page.complaints == []
+
+
+def test_names_from_strangers_run_nothing_and_hide_nothing(browser):
+    chance = random.Random(18)
+    told = states.rig()
+    report = told.groups[1]
+    facts = report.facts
+    inputs = tuple(
+        replace(each, graph=replace(each.graph, name=hostile_name(chance), output=hostile_name(chance)))
+        for each in facts.inputs
+    )
+    named = replace(report, facts=replace(facts, name=hostile_name(chance), inputs=inputs))
+    state = replace(told, node=hostile_name(chance), config=hostile_name(chance), groups=(named,))
+    with watching(browser, state) as (opened_page, _):
+        page = opened_page.page
+        assert page.locator("img").count() == 0
+        assert page.locator("script").count() == 3
+        for text in page.locator("h1, h2, h4, strong, dd, #relay, text, title").all_text_contents():
+            assert text.isprintable(), text
+        lines = page.locator("body").inner_text().split("\n")
+        assert [line for line in lines if line.startswith(FORGED)] == []
+        page.keyboard.press("j")
+        assert opened_page.complaints == []
