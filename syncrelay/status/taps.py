@@ -9,6 +9,7 @@ import re
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from threading import Lock
 from typing import Any, Final, Self
 from urllib.parse import parse_qs
@@ -26,6 +27,7 @@ _SHARE: Final = 0.2
 _MOST_LINES: Final = 500
 _KEYS: Final = ("tap", "after", "group", "drops", "input", "reason")
 _MOST_FIELDS: Final = 64
+_NAMES_KEPT: Final = 10_000
 _NAME: Final = re.compile(r"[0-9A-Za-z]{1,32}")
 _NUMBER: Final = re.compile(r"[0-9]{1,18}")
 
@@ -104,7 +106,8 @@ class Taps:
         self, tape: Tape, full_name: Callable[[str], str], *, processor_s: Callable[[], float] = time.thread_time
     ) -> None:
         self.tape = tape
-        self._full_name = full_name
+        # It asks rcl, and each line of a tap names all topics of its group.
+        self._full_name = lru_cache(_NAMES_KEPT)(full_name)
         self._processor_s = processor_s
         self._left_s, self._refilled = _SHARE, time.monotonic()
         self._asked: dict[str, float] = {}
