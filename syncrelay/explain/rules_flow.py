@@ -12,6 +12,8 @@ _TOO_SLOW: Final = 500_000_000
 # What would not have brought so many messages in the time of a burst cannot show one.
 _SHOWN_BY: Final = 5
 _PAUSE_PERIODS: Final = 3
+# What reliable publishers sent while the relay stood still, they send again this much later at most.
+_SENT_AGAIN: Final = 4 * SECOND
 
 
 def bursts(facts: GroupFacts) -> Found:
@@ -94,7 +96,7 @@ def too_slow(facts: GroupFacts) -> Found:
 def waited_for_relay(facts: GroupFacts) -> tuple[int, int]:
     """Return for how long messages waited for the relay, and for how long none came as it stood still."""
     held_up = _overlapped(facts, [each.figures.held_up for each in facts.inputs])
-    return max(facts.waited, held_up), _overlapped(facts, map(_pauses, facts.inputs))
+    return max(facts.waited, held_up), _overlapped(facts, [_pauses(facts, each) for each in facts.inputs])
 
 
 def _overlapped(facts: GroupFacts, inputs: Iterable[Iterable[tuple[int, int]]]) -> int:
@@ -107,11 +109,15 @@ def _overlapped(facts: GroupFacts, inputs: Iterable[Iterable[tuple[int, int]]]) 
     return max(overlaps, default=0)
 
 
-def _pauses(an_input: InputFacts) -> Iterator[tuple[int, int]]:
+def _pauses(facts: GroupFacts, an_input: InputFacts) -> Iterator[tuple[int, int]]:
     """Yield when an input paused for longer than its rate explains."""
-    figures = an_input.figures
-    usual = SECOND / figures.usual_hz if figures.usual_hz else SECOND
-    return ((one, other) for one, other in pairwise(figures.received) if other - one > _PAUSE_PERIODS * usual)
+    now, figures = facts.figures.now, an_input.figures
+    longest = _PAUSE_PERIODS * (round(SECOND / figures.usual_hz) if figures.usual_hz else SECOND)
+    yield from ((one, other) for one, other in pairwise(figures.received) if other - one > longest)
+    if (last := figures.last_received) is not None and any(
+        until - ns - longest <= last <= until < now <= until + _SENT_AGAIN for until, ns in facts.standstills
+    ):
+        yield last, now
 
 
 def paused(facts: GroupFacts) -> Found:

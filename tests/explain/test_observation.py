@@ -373,3 +373,11 @@ def test_looks_that_are_far_apart_are_no_silences():
     assert resumed == BEGAN + 5 * S + 10 * MS
     stage.second(stage.stream(10), sets=[a_set(stage)] * 10, length=5 * S + 10 * MS)
     assert stage.group.resumed == stage.now
+
+
+def test_inputs_whose_stamps_fall_are_observed_as_others():
+    stage = Stage()
+    for _ in range(3):
+        falling = [(stage.now - nth * 50 * MS, stage.now + nth * 100 * MS) for nth in range(10)]
+        stage.second(falling, falling)
+    assert stage.observation.figures(now=stage.now)[1][0].out_of_order == 27

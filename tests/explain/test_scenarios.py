@@ -420,3 +420,27 @@ def test_what_comes_in_batches_has_the_pace_of_its_stamps(slower):
     texts = [each.text for _, each in told.findings("slowed")]
     assert bool(texts) == (slower < 1)
     assert all(re.match(r"/[ab] has slowed from (9\.\d+|10(\.\d+)?) Hz to [4-6]", text) for text in texts), texts
+
+
+@pytest.mark.parametrize("again_s", [20.4, 21.5, 23.2])
+def test_what_is_sent_again_after_a_standstill_is_missed_because_of_it(again_s):
+    sent_again = {"received": lambda at: again_s if 17 < at < again_s else at}
+    told = run(
+        *(Source(topic, 10, **REAL, **sent_again) for topic in ("/a", "/b")),
+        seconds=60,
+        options=SLOP,
+        stops=[(17.1, 20.1)],
+    )
+    assert told.ever_found <= {"too_slow"}
+    assert told.codes == {"too_slow"}
+
+
+def test_who_fell_silent_before_a_standstill_is_told_to_be_silent():
+    told = run(
+        Source("/a", 10, **REAL),
+        Source("/b", 10, sends=lambda at: at < 15, **REAL),
+        seconds=40,
+        options=SLOP,
+        stops=[(17.1, 20.1)],
+    )
+    assert "silent" in told.codes

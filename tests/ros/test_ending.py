@@ -183,4 +183,5 @@ def test_a_bug_in_the_end_of_one_group_is_told_and_leaves_the_others_theirs(stag
     summary = read_summary(relay.stderr)
     assert summary["rear"].inputs["/camera"].received == 3
     assert set(summary) == {"front", "rear"}
-    assert relay.stderr.count("ZeroDivisionError: at the end") == 1
+    # The judge may name the error a second time, where the group had no set for some seconds.
+    assert relay.stderr.count("stopped this group; other groups keep running. Please report") == 1
