@@ -137,9 +137,9 @@ class InputObservation:
 
     @property
     def period(self) -> float:
-        """The median of its last periods, by its stamps; 0 of too few to tell."""
+        """The median of its last periods, by its stamps; 0 of too few to tell, or where they fall more than rise."""
         last = self._stamps[-_PERIODS:]
-        return median(map(sub, last[1:], last)) if len(last) > 1 else 0.0
+        return max(0.0, median(map(sub, last[1:], last))) if len(last) > 1 else 0.0
 
     def add_nearest(self, spans: Sequence[int]) -> None:
         """Take the spans of the tightest sets with this input."""

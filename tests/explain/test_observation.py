@@ -373,3 +373,11 @@ def test_looks_that_are_far_apart_are_no_silences():
     assert resumed == BEGAN + 5 * S + 10 * MS
     stage.second(stage.stream(10), sets=[a_set(stage)] * 10, length=5 * S + 10 * MS)
     assert stage.group.resumed == stage.now
+
+
+def test_stamps_that_fall_more_than_they_rise_stop_no_measurement():
+    stage = Stage()
+    for _ in range(3):
+        fallen = [(stage.now - n * S, stage.now + n) for n in range(1, 6)]
+        stage.second(fallen, fallen)
+    assert [each.period for each in stage.observation._inputs] == [0, 0]
