@@ -70,7 +70,7 @@ WhatIf = Annotated[
 """A fault, as `--what-if` takes it."""
 
 Loss = Annotated[
-    int, BeforeValidator(_loss), WithJsonSchema({"type": "string", "pattern": r"^[0-9]{1,3}(\.[0-9]{1,9})?\s*%$"})
+    int, BeforeValidator(_loss), WithJsonSchema({"type": "string", "pattern": r"^[0-9]{1,3}(\.[0-9]{1,4})?\s*%$"})
 ]
 """A share of messages in millionths."""
 
