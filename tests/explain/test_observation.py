@@ -378,6 +378,6 @@ def test_looks_that_are_far_apart_are_no_silences():
 def test_stamps_that_fall_more_than_they_rise_stop_no_measurement():
     stage = Stage()
     for _ in range(3):
-        fallen = [(stage.now - n * S, stage.now + n) for n in range(1, 6)]
+        fallen = [(stage.now - n * 100 * MS, stage.now + n) for n in range(1, 6)]
         stage.second(fallen, fallen)
     assert [each.out_of_order > 0 for each in stage.inputs] == [True, True]
