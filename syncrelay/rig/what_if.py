@@ -44,8 +44,8 @@ class Kind(Enum):
 class Fault:
     """A fault of a topic, as it was `written`.
 
-    `amount` is nanoseconds of `late` and `offset`, millionths of `drop`, billionths of `drift`. It holds from `begin` to
-    before `end`, in nanoseconds after the first message of all; an `end` of None is never.
+    `amount` is nanoseconds of `late` and `offset`, millionths of `drop`, billionths of `drift`. It holds from `begin`
+    to before `end`, in nanoseconds after the first message of all; an `end` of None is never.
     """
 
     kind: Kind
