@@ -38,7 +38,7 @@ def updated(
         if _comparable(plain(read.root), renewed) == _comparable(wanted, renewed):
             return text
     raise SyncRelayError(
-        f"{source.name}: cannot be updated without a change to what is not to change: where cases share values by"
+        f"{source.name}: cannot be updated without changing more than was found: where cases share values by"
         " anchors or merge keys, write the new ones by hand"
     )
 
