@@ -11,7 +11,7 @@ from syncrelay.bag.payloads import read_ros1_stamp, with_ros1_stamp
 from syncrelay.bag.recording import LATEST, Channel, Encoding, RawMessage, Recording
 from syncrelay.cdr import LATEST_STAMP, patch_stamp, read_stamp
 from syncrelay.errors import UsageError
-from syncrelay.rig.what_if import Disturbance, Fault, disturbances
+from syncrelay.rig.what_if import MOST_LATE, Disturbance, Fault, disturbances
 
 
 class Disturbed:
@@ -37,6 +37,8 @@ class Disturbed:
                     " clock could have set: `offset` and `drift` are for stamped topics"
                 )
         self._most_late = max((each.most_late for each in self._disturbances.values()), default=0)
+        if self._most_late > MOST_LATE:
+            raise UsageError(f"messages would be late by {self._most_late / 1e9:g}s in all, at most 60s: they are held")
         self.channels: Final = recording.channels
         self.size: Final = recording.size
         self.begin: Final = recording.begin

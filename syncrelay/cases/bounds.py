@@ -50,7 +50,9 @@ class Bound:
     value: Decimal
 
     def holds(self, found: Decimal) -> bool:
-        """Tell whether what was found is as it shall be."""
+        """Tell whether what was found is as it shall be. Of a share, so many digits are equal as are told."""
+        if self.quantity is Quantity.SHARE and _COMPARE[self.comparison] is operator.eq:
+            return found.quantize(_DIGITS) == self.value.quantize(_DIGITS)
         return _COMPARE[self.comparison](found, self.value)
 
     def __str__(self) -> str:

@@ -14,9 +14,11 @@ one stamp, that of A; a drop is a letter and its reason. `keys: aA bB` gives let
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from itertools import chain
+from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.config.wording import did_you_mean, one_of, quoted
 from syncrelay.sync import DropReason
@@ -67,20 +69,17 @@ class Drawing:
         return list(self.label_lines)
 
 
-def parse(text: str) -> Drawing:
+DidYouMean: TypeAlias = Callable[[str, Iterable[str]], str]
+
+
+def parse(text: str, *, did_you_mean: DidYouMean = did_you_mean) -> Drawing:
     """Return what a text draws, and what is wrong with it."""
     drawing = Drawing()
     told: list[tuple[int, str]] = []
     for number, line in enumerate(text.splitlines()):
         stripped = line.strip()
-        if stripped.startswith(_ARROW):
+        if stripped.startswith((_ARROW, _ARRIVE, _KEYS)):
             told.append((number, line))
-        elif stripped.startswith(_ARRIVE):
-            drawing.order = stripped.removeprefix(_ARRIVE).split()
-            drawing.faults += _faults_of_order(drawing, number, line)
-        elif stripped.startswith(_KEYS):
-            words = stripped.removeprefix(_KEYS).split()
-            drawing.keys = {letter: word for word in words for letter in word}
         elif "|" in stripped:
             drawing.faults += _add_lane(drawing, number, line)
         elif stripped:
@@ -88,9 +87,34 @@ def parse(text: str) -> Drawing:
                 _fault(number, line, stripped, "expected a lane such as `lidar |a.bc`, or `-> b: aA`")
             )
     for number, line in told:
-        drawing.expected.append(_normal(line))
-        drawing.faults += _faults_of_line(drawing, number, line)
+        # They speak of letters, which may be drawn below them.
+        drawing.faults += _add_line(drawing, number, line, did_you_mean)
     return drawing
+
+
+def _add_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean) -> Iterator[Fault]:
+    """Take what is said of the letters that are drawn: what leaves, the order of arrival, their keys."""
+    stripped = line.strip()
+    if stripped.startswith(_ARROW):
+        drawing.expected.append(_normal(line))
+        yield from _faults_of_line(drawing, number, line, did_you_mean)
+        return
+    word = _ARRIVE if stripped.startswith(_ARRIVE) else _KEYS
+    if drawing.order is not None if word == _ARRIVE else drawing.keys:
+        yield _fault(number, line, word, f"`{word}` stands above already: expected one such line")
+        return
+    words = stripped.removeprefix(word).split()
+    if word == _ARRIVE:
+        drawing.order = words
+        if sorted(words) != sorted(drawing.marks):
+            text = "expected each letter of the lanes once, in the order of arrival"
+            yield _fault(number, line, stripped, text)
+        return
+    drawing.keys = {letter: word for word in words for letter in word}
+    # A key may be told by more than the letters that have it: `a1 A1`.
+    of_words = [[letter for letter in word if letter in drawing.marks] for word in words]
+    if not all(of_words) or any(count > 1 for count in Counter(chain(*of_words)).values()):
+        yield _fault(number, line, stripped, "expected words of drawn letters, each letter in one: those of one key")
 
 
 def with_expected(text: str, lines: Sequence[str]) -> str:
@@ -138,14 +162,7 @@ def _add_lane(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
             drawing.marks[letter] = Mark(label, column)
 
 
-def _faults_of_order(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
-    order = drawing.order or ()
-    if sorted(order) != sorted(drawing.marks):
-        text = "expected each letter of the lanes above once, in the order of arrival"
-        yield _fault(number, line, line.strip(), text)
-
-
-def _faults_of_line(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
+def _faults_of_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean) -> Iterator[Fault]:
     moment, colon, left = line.strip().removeprefix(_ARROW).partition(":")
     moment = moment.strip()
     if not colon or not left.strip():
@@ -155,12 +172,12 @@ def _faults_of_line(drawing: Drawing, number: int, line: str) -> Iterator[Fault]
         text = f"{quoted(moment)} is no moment, expected a letter that is drawn, or a column such as `@7`"
         yield _fault(number, line, moment or _ARROW, text)
     for each in left.split(","):
-        wrong = _wrong(drawing, each.split())
+        wrong = _wrong(drawing, each.split(), did_you_mean)
         if wrong:
             yield _fault(number, line, each.strip() or ",", wrong)
 
 
-def _wrong(drawing: Drawing, words: Sequence[str]) -> str | None:
+def _wrong(drawing: Drawing, words: Sequence[str], did_you_mean: DidYouMean) -> str | None:
     """Return what is wrong with a set or a drop, in words."""
     match words:
         case [letters]:

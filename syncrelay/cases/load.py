@@ -1,7 +1,7 @@
 """From a test file to its cases, or to everything that is wrong with it at once."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -14,12 +14,12 @@ from syncrelay.cases.form import CasesForm
 from syncrelay.cases.models import LONGEST, MOST_SECONDS, Case, CasesFile, InputSource
 from syncrelay.cases.names import input_named
 from syncrelay.config import Config, ConfigError, GroupConfig, Problem, Severity, Span, load
-from syncrelay.config.document import Document, ScalarNode, plain
+from syncrelay.config.document import Document, plain
 from syncrelay.config.problems import Path as Place
-from syncrelay.config.source import Source, check_text, read_source
+from syncrelay.config.source import STDIN, Source, check_text, read_source
 from syncrelay.config.translate import translate
-from syncrelay.config.wording import one_of, quoted
-from syncrelay.config.yaml_tree import compose
+from syncrelay.config.wording import describe, one_of, quoted
+from syncrelay.config.yaml_tree import MOST_PROBLEMS, compose, too_many
 from syncrelay.rig.what_if import Fault
 
 _LEAST: Final = "at least `version: 1`, `config:` and `cases:`"
@@ -87,6 +87,10 @@ def _refusal(problems: list[Problem]) -> ConfigError:
 
 def _tested(name: str, folder: Path, document: Document, environ: Mapping[str, str]) -> Config:
     """Return the file that is tested. That there is none is told where it is named."""
+    if name in ("", STDIN):
+        raise ConfigError(
+            [document.problem(("config",), f"expected a file name, found {describe(name)}", code="bad_value")]
+        )
     path = str(folder / name)
     try:
         return load(path, environ=environ)
@@ -107,7 +111,10 @@ class _Reader:
         self._folder = folder
 
     def report(self, path: Place, text: str, *, code: str = "bad_value", span: Span | None = None) -> None:
-        self.problems.append(self._document.problem(path, text, code=code, span=span))
+        problem = self._document.problem(path, text, code=code, span=span)
+        self.problems.append(problem)
+        if len(self.problems) == MOST_PROBLEMS:
+            raise _refusal([*self.problems, too_many(self._document.sources[0], problem.span)])
 
     def read(self, name: str, case: Case) -> LoadedCase | None:
         path: Place = ("cases", name)
@@ -116,10 +123,12 @@ class _Reader:
             return None
         drawing = self._drawing((*path, "drawing"), case)
         places: dict[str, int] = {}
+        lines = (case.drawing or "").splitlines()
         labels = {} if drawing is None else drawing.label_lines
         for label, line in labels.items():
             if label:
-                self._place(label, group, places, (*path, "drawing"), self._span_in(path, line, label))
+                fault = drawings.Fault(line, max(0, lines[line].find(label)), len(label), "")
+                self._place(label, group, places, (*path, "drawing"), self._span((*path, "drawing"), lines, fault))
         for section, names in (("inputs", case.inputs), ("expect", case.expect.inputs)):
             for each in names:
                 at = (*path, section, *(("inputs",) if section == "expect" else ()), each)
@@ -152,32 +161,28 @@ class _Reader:
     def _drawing(self, path: Place, case: Case) -> Drawing | None:
         if case.drawing is None:
             return None
-        drawing = drawings.parse(case.drawing)
+        drawing = drawings.parse(case.drawing, did_you_mean=self._document.did_you_mean)
+        lines = case.drawing.splitlines()
         for fault in drawing.faults:
-            self.report(path, fault.text, span=self._span(path, fault.line, fault.column, fault.width))
+            self.report(path, fault.text, span=self._span(path, lines, fault))
         if not drawing.labels and not drawing.faults:
             self.report(path, "nothing is drawn, expected lanes such as `lidar |a.bc`")
         if drawing.width * case.period > LONGEST:
             self.report(path, f"is drawn longer than {MOST_SECONDS}s, with a period of {case.period / 1e9:g}s")
         return drawing
 
-    def _span_in(self, path: Place, line: int, token: str) -> Span:
-        text = str(self._document.node((*path, "drawing")).value).splitlines()[line]  # type: ignore[union-attr]
-        return self._span((*path, "drawing"), line, max(0, text.find(token)), len(token))
-
-    def _span(self, path: Place, line: int, column: int, width: int) -> Span:
+    def _span(self, path: Place, lines: Sequence[str], fault: drawings.Fault) -> Span:
         """Return where a token of a block of text stands in the file; the whole value, where it is no block."""
-        node = self._document.node(path)
-        assert isinstance(node, ScalarNode)  # noqa: S101  it was read as a text
-        written = self._document.sources[node.span.source].line(node.span.line + 1 + line)
-        shown = str(node.value).splitlines()[line]
+        span, shown = self._document.value_span(path), lines[fault.line]
+        at = span.line + 1 + fault.line
+        written = self._document.sources[span.source].line(at)
         if not shown or not written.endswith(shown):
-            return node.span
-        return Span(node.span.line + 1 + line, len(written) - len(shown) + column + 1, width, node.span.source)
+            return span
+        return Span(at, len(written) - len(shown) + fault.column + 1, fault.width, span.source)
 
     def _place(self, name: str, group: GroupConfig, places: dict[str, int], path: Place, span: Span) -> None:
         try:
-            places[name] = input_named(name, group)
+            places[name] = input_named(name, group, did_you_mean=self._document.did_you_mean)
         except ValueError as error:
             self.report(path, str(error), code="unknown_input", span=span)
 
@@ -197,8 +202,13 @@ class _Reader:
             self.report((*path, "lasts"), text, code="missing_key", span=self._document.key_span((*path, "inputs")))
         if case.lasts is not None and sum(case.lasts // rate for rate in rates) > _MOST_MESSAGES:
             self.report((*path, "lasts"), f"more than {_MOST_MESSAGES} messages would come: expected less time or rate")
+        first: dict[int, str] = {}
         for name, source in case.inputs.items():
-            self._check_source((*path, "inputs", name), source, is_drawn=places.get(name) in drawn)
+            at = (*path, "inputs", name)
+            if name in places and first.setdefault(places[name], name) != name:
+                text = f"is the input that {quoted(first[places[name]])} is, expected it once"
+                self.report(at, text, span=self._document.key_span(at))
+            self._check_source(at, source, is_drawn=places.get(name) in drawn)
 
     def _check_source(self, path: Place, source: InputSource, *, is_drawn: bool) -> None:
         if source.rate is not None:
@@ -217,7 +227,7 @@ class _Reader:
                 yield fault
                 continue
             try:
-                place = input_named(fault.topic, group)
+                place = input_named(fault.topic, group, did_you_mean=self._document.did_you_mean)
             except ValueError as error:
                 self.report((*path, "what_if", index), str(error), code="unknown_input")
             else:

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
 
-from pydantic import BeforeValidator, Field, InstanceOf, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, WithJsonSchema
 
 from syncrelay.cases.bounds import Count, Share, Time
 from syncrelay.config.file import Version
@@ -41,6 +41,21 @@ Length = Annotated[
     int, BeforeValidator(_short), WithJsonSchema(duration_schema(sign=r"\+?", minimum=0, maximum=MOST_SECONDS))
 ]
 """A duration of 0 to an hour, in nanoseconds."""
+
+
+def _not_zero(duration: int) -> int:
+    if not duration:
+        raise ValueError("expected a duration above 0: a column of the drawing is as long")
+    return duration
+
+
+Period = Annotated[
+    int,
+    BeforeValidator(_short),
+    AfterValidator(_not_zero),
+    WithJsonSchema(duration_schema(sign=r"\+?", exclusiveMinimum=0, maximum=MOST_SECONDS)),
+]
+"""The time of a column: above 0, to an hour, in nanoseconds."""
 if TYPE_CHECKING:
     Reason: TypeAlias = str
     CodeName: TypeAlias = str
@@ -55,7 +70,7 @@ WhatIf = Annotated[
 """A fault, as `--what-if` takes it."""
 
 Loss = Annotated[
-    int, BeforeValidator(_loss), WithJsonSchema({"type": "string", "pattern": r"^[0-9]{1,3}(\.[0-9]{1,9})?\s*%$"})
+    int, BeforeValidator(_loss), WithJsonSchema({"type": "string", "pattern": r"^[0-9]{1,3}(\.[0-9]{1,4})?\s*%$"})
 ]
 """A share of messages in millionths."""
 
@@ -181,7 +196,7 @@ class Case(Keys):
         " which message: `-> b: aA`. Default: nothing is drawn.",
         examples=["lidar  |a...b\ncamera |.A...\n-> b: aA\n"],
     )
-    period: Length = Field(
+    period: Period = Field(
         default=10_000_000, description=f"Time from column to column. {_DURATION} Default: 10ms.", examples=["10ms"]
     )
     recording: Annotated[str | None, NOT_NULL] = Field(

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 
+from syncrelay.cases.drawing import DidYouMean
 from syncrelay.config import GroupConfig
-from syncrelay.config.wording import all_of, did_you_mean, one_of, quoted
+from syncrelay.config.wording import all_of, one_of, quoted
 
 
-def input_named(name: str, group: GroupConfig) -> int:
+def input_named(name: str, group: GroupConfig, *, did_you_mean: DidYouMean) -> int:
     """Return the index of the input that is called so: `/left/image_raw` also `left`, where no other has that part.
 
     Raises ValueError where none is, or more than one.

@@ -13,7 +13,7 @@ from syncrelay.cli.boundary import put, remark, say, wants_colour
 from syncrelay.cli.problems import inert, problem_as_json, problem_command, workflow_command
 from syncrelay.config import Problem, render
 from syncrelay.config.problems import dotted
-from syncrelay.printable import printable, printable_lines
+from syncrelay.printable import one_entry, printable, printable_lines
 
 _BOLD, _RED, _RESET = "\033[1m", "\033[31m", "\033[0m"
 
@@ -150,7 +150,7 @@ def summary(results: Sequence[FileResult]) -> str:
 def what_differs(result: Result) -> Iterator[str]:
     """Yield what is not as it shall be, in lines: `-` is expected, `+` is what came."""
     if result.error is not None:
-        yield from result.error.splitlines()
+        yield from one_entry(result.error).split("\n")
     for mismatch in result.mismatches:
         if isinstance(mismatch.renewed, tuple):
             yield from lanes(result.case.case.drawing or "")

@@ -149,7 +149,7 @@ def group_names(text: bytes) -> Iterator[str]:
         for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
             if isinstance(event, yaml.NodeEvent) and opened:
                 key = opened[-1].take(event.value if isinstance(event, yaml.ScalarEvent) else "")
-                if key and [each.key for each in opened[:-1]] == ["groups"]:
+                if key not in ("", "<<") and [each.key for each in opened[:-1]] == ["groups"]:
                     yield key
             if isinstance(event, yaml.CollectionStartEvent):
                 opened.append(_Opened(isinstance(event, yaml.MappingStartEvent)))

@@ -9,13 +9,14 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from threading import Event
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
 from syncrelay.cli.new_file import require_new, write_new
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
+from syncrelay.errors import UsageError
 
 if TYPE_CHECKING:
     from syncrelay.bag.analysis import GroupAnalysis
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from syncrelay.ros.relay import Relay
     from syncrelay.status import RelayState
     from syncrelay.top.client import Answer
+
+
+_ONE_FILE: Final = "--write goes with one --config FILE"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +59,7 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     parser.refuse_repeated(arguments.config)
     if arguments.write is not None:
         if len(arguments.config) > 1:
-            parser.error("--write goes with one --config FILE")
+            parser.error(_ONE_FILE)
         require_new(arguments.write)
     asked = Asked(
         files=tuple(arguments.config),
@@ -80,6 +84,8 @@ def observe(asked: Asked, *, stop: StopRequest) -> int:
 
     configure("warning", "text")
     config = loaded(asked.files, asked.groups)
+    if asked.write is not None and len(config.sources) > 1:
+        raise UsageError(f"{_ONE_FILE}: {asked.files[0]} has {len(config.sources)}")
     require_rclpy()
     observed = _observed(asked, config, stop)
     if asked.json:

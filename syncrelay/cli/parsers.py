@@ -7,13 +7,10 @@ from typing import Final
 
 from syncrelay.cli.parser import Parser, count, positive, seed
 
-_RELAY_USAGE: Final = """\
-syncrelay --config FILE [option ...] [--ros-args ...]
-       syncrelay COMMAND ..."""
+_RELAY_USAGE: Final = "syncrelay --config FILE [option ...] | syncrelay COMMAND ..."
 _EXIT_CODES: Final = """\
-exit codes: 0 done, 1 the file or data has a problem, 2 wrong usage,
-  69 ROS or a needed package cannot be used here, 70 a bug in syncrelay,
-  130 interrupted"""
+exit codes: 0 done, 1 a problem in a file or data, 2 wrong usage, 69 ROS or a
+  package cannot be used here, 70 a bug in syncrelay, 130 interrupted"""
 
 
 def relay() -> Parser:
@@ -22,7 +19,7 @@ def relay() -> Parser:
 
     parser = Parser(
         "syncrelay",
-        description="Matches ROS 2 messages by time, as a YAML file describes, and republishes each matched set.",
+        description="Matches ROS 2 messages by time, as a YAML file says, and republishes the sets.",
         usage=_RELAY_USAGE,
         epilog=f"commands:\n{commands_help()}\n\n{_EXIT_CODES}",
     )
@@ -32,13 +29,13 @@ def relay() -> Parser:
         metavar="FILE",
         action="append",
         default=[],
-        help="run the groups of FILE, or of all YAML files in a directory; may be repeated",
+        help="run groups of FILE, or a directory; may be repeated",
     )
     add("--group", metavar="NAME", action="append", default=[], help="run this group only; may be repeated")
     add(
         "--watch",
         action="store_true",
-        help="read FILE again when it changes, or a file comes to or goes from a directory; not only at SIGHUP",
+        help="read FILE again when it changes, not only at SIGHUP",
     )
     add(
         "--log-level",

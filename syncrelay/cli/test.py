@@ -5,7 +5,6 @@ import stat
 import tempfile
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from syncrelay.cases import Result, Suite, check, load_suite, updated
@@ -65,7 +64,7 @@ def _updated(suite: Suite | None, result: FileResult) -> FileResult:
     renewed = [each for each in mismatches if each.renewed is not None]
     if renewed:
         (source,) = suite.document.sources.values()
-        _replace(suite.name, updated(suite.document, source.text, renewed))
+        _replace(suite.name, updated(suite.document, source, renewed))
         remark(f"{result.name}: {counted(len(renewed), 'expectation')} updated")
     cases = (case for case in result.cases if case.error or any(each.renewed is None for each in case.mismatches))
     return FileResult(result.name, result.problems, tuple(cases))
@@ -75,14 +74,10 @@ def _replace(file: str, text: str) -> None:
     """Write a file as a whole or not at all; it keeps its mode, and a link to it stays a link."""
     path = Path(os.path.realpath(file))
     try:
-        with tempfile.NamedTemporaryFile(
-            "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
-        ) as new:
-            written = Path(new.name)
-            new.write(text)
-        written.chmod(stat.S_IMODE(path.stat().st_mode))
-        written.replace(path)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".syncrelay-") as folder:
+            written = Path(folder, path.name)
+            written.write_bytes(text.encode())
+            written.chmod(stat.S_IMODE(path.stat().st_mode))
+            written.replace(path)
     except OSError as error:
-        with suppress(OSError, UnboundLocalError):
-            written.unlink()
         raise SyncRelayError(f"{file}: cannot be written: {error.strerror}") from error

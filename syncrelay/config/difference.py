@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Final
 
-from syncrelay.config.document import MappingNode
+from syncrelay.config.document import EXTENSION, MappingNode
 from syncrelay.config.load import Config
 from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
 from syncrelay.config.problems import Path
@@ -100,7 +100,7 @@ def _section(name: str, old: Config, new: Config) -> Iterator[KeyChange]:
         return
     for key in dict.fromkeys(key for node in nodes if isinstance(node, MappingNode) for key in node.entries):
         change = _change(old, new, (name, key))
-        if change.old != change.new:
+        if change.old != change.new and not key.startswith(EXTENSION):
             yield change
 
 

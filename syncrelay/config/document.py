@@ -11,6 +11,9 @@ from syncrelay.printable import printable
 
 Scalar: TypeAlias = str | int | float | bool | None
 
+EXTENSION: Final = "x-"
+"""What a key begins with that is the user's own, as in Compose files: for anchors, notes and other programs."""
+
 MOST_VALUES: Final = 200_000
 """In a file, after following every alias and filling in defaults: a thousand groups are a tenth of it."""
 
@@ -138,10 +141,11 @@ class Document:
 
 
 def flow(value: Any) -> str:
-    """Return a plain value on one line, as a file has it."""
+    """Return a plain value on one line, as a file has it, without the user's own keys."""
     match value:
         case dict():
-            return "{" + ", ".join(f"{key}: {flow(each)}" for key, each in value.items()) + "}"
+            known = {key: each for key, each in value.items() if not key.startswith(EXTENSION)}
+            return "{" + ", ".join(f"{key}: {flow(each)}" for key, each in known.items()) + "}"
         case tuple():
             return "[" + ", ".join(map(flow, value)) + "]"
         case bool():
@@ -149,7 +153,7 @@ def flow(value: Any) -> str:
         case None:
             return "null"
         case _:
-            return str(value) or '""'
+            return printable(str(value)) or '""'
 
 
 def _step(node: Node, step: str | int) -> Node | None:

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema, model_validator
 
+from syncrelay.config.document import EXTENSION
 from syncrelay.config.listen import check_listen, parse_host
 from syncrelay.config.names import (
     LONGEST_TOPIC,
@@ -16,9 +17,6 @@ from syncrelay.config.names import (
 )
 from syncrelay.config.units import parse_duration, parse_rate
 from syncrelay.config.wording import describe
-
-EXTENSION: Final = "x-"
-"""What a key begins with that is the user's own, as in Compose files: for anchors, notes and other programs."""
 
 
 class Keys(BaseModel):

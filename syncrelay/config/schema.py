@@ -7,8 +7,8 @@ pydantic's own schema is of a later draft, picks a group's model by OpenAPI's `d
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, TypeAlias
 
+from syncrelay.config.document import EXTENSION
 from syncrelay.config.file import FileFormat, file_format
-from syncrelay.config.keys import EXTENSION
 
 Schema: TypeAlias = dict[str, Any]
 

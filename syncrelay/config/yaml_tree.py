@@ -30,8 +30,8 @@ from syncrelay.config.yaml_errors import in_words
 LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 # A file that uses every key is 7 levels deep.
 _DEEPEST: Final = 50
-# Of those with single keys and values, which may be at the end of a long path.
-_MOST_PROBLEMS: Final = 1_000
+MOST_PROBLEMS: Final = 1_000
+"""Of a file with single keys and values, which may be at the end of a long path."""
 # No name of ROS is as long, and every problem below a key tells the key.
 _LONGEST_KEY: Final = 255
 # A text of so many characters counts as one value more.
@@ -233,9 +233,8 @@ class _Composer:
             raise self._refusal(f"tags such as {quoted(written)} are not supported", self._span(event))
 
     def _report(self, text: str, span: Span, *, code: str) -> None:
-        if len(self.problems) == _MOST_PROBLEMS:
-            text = "too many errors: the file was not read beyond this line"
-            raise ConfigError([*self.problems, self._source.problem(text, span=span, code="yaml")])
+        if len(self.problems) == MOST_PROBLEMS:
+            raise ConfigError([*self.problems, too_many(self._source, span)])
         self.problems.append(self._source.problem(text, path=dotted(self._path()), span=span, code=code))
 
     def _refusal(self, text: str, span: Span) -> ConfigError:
@@ -250,6 +249,11 @@ class _Composer:
         if width < 1 or isinstance(event, yaml.CollectionStartEvent):
             width = len(self._source.line(start.line + 1)) - start.column
         return Span(start.line + 1, start.column + 1, max(1, width), self._source.index)
+
+
+def too_many(source: Source, span: Span | None) -> Problem:
+    """Return what is said of a file, at the place of its last problem that is told."""
+    return source.problem("too many errors: the file was not read beyond this line", span=span, code="yaml")
 
 
 def read_plain(text: str) -> Scalar:

@@ -20,9 +20,13 @@ from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import did_you_mean, one_of, quoted
 
 _MILLION: Final = 1_000_000
-_SHARE: Final = re.compile(r"([0-9]{1,3}(?:\.[0-9]{1,9})?)\s*%")
-_PARTS: Final = re.compile(r"([+-]?[0-9]{1,7}(?:\.[0-9]{1,6})?)\s*ppm")
-_LATEST: Final = 60 * 1_000_000_000
+_BILLION: Final = 1_000_000_000
+# No more digits than an amount holds: one that is less would be none, in silence.
+_SHARE: Final = re.compile(r"([0-9]{1,3}(?:\.[0-9]{1,4})?)\s*%")
+_PARTS: Final = re.compile(r"([+-]?[0-9]{1,7}(?:\.[0-9]{1,3})?)\s*ppm")
+MOST_LATE: Final = 60 * _BILLION
+"""Of a topic, in nanoseconds: late messages are held in memory."""
+
 _MOST_PARTS: Final = 100_000
 
 
@@ -40,8 +44,8 @@ class Kind(Enum):
 class Fault:
     """A fault of a topic, as it was `written`.
 
-    `amount` is nanoseconds of `late` and `offset`, millionths of `drop` and `drift`. It holds from `begin` to before
-    `end`, in nanoseconds after the first message of all; an `end` of None is never.
+    `amount` is nanoseconds of `late` and `offset`, millionths of `drop`, billionths of `drift`. It holds from `begin`
+    to before `end`, in nanoseconds after the first message of all; an `end` of None is never.
     """
 
     kind: Kind
@@ -93,7 +97,7 @@ _EXAMPLES: Final[Mapping[Kind, str]] = MappingProxyType(
 
 def _late(word: str) -> int:
     delay = parse_duration(word)
-    if not 0 <= delay <= _LATEST:
+    if not 0 <= delay <= MOST_LATE:
         raise ValueError(f"{quoted(word)} is out of range, expected 0 to 60s: so long messages are held in memory")
     return delay
 
@@ -102,15 +106,17 @@ def parse_share(word: str) -> int:
     """Return the millionths of a text such as 10%; raises ValueError for another."""
     found = _SHARE.fullmatch(word)
     if found is None or float(found[1]) > 100:  # noqa: PLR2004  all there is
-        raise ValueError(f"expected a share of 0% to 100%, found {quoted(word)}")
+        raise ValueError(f"expected a share of 0% to 100%, 4 decimals at most, found {quoted(word)}")
     return round(float(found[1]) * _MILLION / 100)
 
 
 def _drift(word: str) -> int:
     found = _PARTS.fullmatch(word)
     if found is None or abs(float(found[1])) > _MOST_PARTS:
-        raise ValueError(f"expected a drift such as 100ppm, {_MOST_PARTS}ppm at most, found {quoted(word)}")
-    return round(float(found[1]))
+        raise ValueError(
+            f"expected a drift such as 100ppm, {_MOST_PARTS}ppm and 3 decimals at most, found {quoted(word)}"
+        )
+    return round(float(found[1]) * 1000)
 
 
 _READERS: Final[Mapping[Kind, Callable[[str], int]]] = MappingProxyType(
@@ -181,7 +187,7 @@ class Disturbance:
             elif fault.kind is Kind.DRIFT and since >= fault.begin:
                 # What a clock has gained it keeps.
                 until = since if fault.end is None else min(since, fault.end)
-                shift += (until - fault.begin) * fault.amount // _MILLION
+                shift += (until - fault.begin) * fault.amount // _BILLION
         return stamp + shift if stamp else stamp
 
 

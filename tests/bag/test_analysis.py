@@ -455,6 +455,11 @@ def test_changes_keep_comments_quotes_and_order():
     ).replace("type: x/msg/Y}", "type: x/msg/Y, min_period: 8ms}")
 
 
+def test_changes_keep_the_line_breaks_of_a_file():
+    changed = with_changes(_FILE.replace("\n", "\r\n"), [Change("front", None, "slop", "25ms", "")])
+    assert changed == _FILE.replace("slop: 10ms", "slop: 25ms").replace("\n", "\r\n")
+
+
 def test_a_new_policy_takes_with_it_what_it_does_not_have():
     changed = with_changes(_FILE, [Change("front", None, "policy", "exact_time", "")])
     for gone in ("slop", "age_penalty", "min_period"):

@@ -1,7 +1,7 @@
 """What is observed live is measured as a recording is."""
 
 from syncrelay.bag.analysis.live import LiveStreams, analyze_live
-from syncrelay.config import load_text
+from syncrelay.config import load, load_text
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.streams import BEGIN, MS
@@ -56,3 +56,14 @@ def test_a_group_that_goes_by_keys_is_left_out():
     read = load_text(config({"front": _GROUP, "keyed": keyed}))
     found = list(analyze_live(read, read.groups, LiveStreams(read.groups)))
     assert [each.group.name for each in found] == ["front"]
+
+
+def test_a_group_is_measured_by_its_own_file_of_a_directory(tmp_path):
+    (tmp_path / "front.yaml").write_text(config({"front": _GROUP}))
+    (tmp_path / "node.yaml").write_text("version: 1\nnode: {name: rig}\n")
+    (tmp_path / "rear.yaml").write_text(config({"rear": _GROUP}))
+    read = load(str(tmp_path))
+    live = LiveStreams(read.groups)
+    _heard(live, "rear", first=0, count=50)
+    _, rear = analyze_live(read, read.groups, live)
+    assert (rear.group.name, rear.suggestion.now, rear.suggestion.then) == ("rear", 0, 50)

@@ -97,6 +97,11 @@ def test_the_stamps_of_a_ros_1_bag_are_changed_too(tmp_path):
         assert seconds == (2 if topic == "/lidar" else 0)
 
 
+def test_no_more_is_held_than_comes_in_a_minute(bag):
+    with pytest.raises(UsageError, match="late by 61s in all, at most 60s"):
+        _read(bag, "late: /lidar 60s", "late: /lidar 1s", "late: /camera 1s")
+
+
 @pytest.mark.parametrize(
     ("fault", "error"),
     [

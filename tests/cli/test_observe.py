@@ -5,7 +5,7 @@ import pytest
 from syncrelay.cli.boundary import AT_FAULT, DONE
 from syncrelay.cli.observe import conclude
 from syncrelay.explain import GroupReport, judge
-from tests.cli.command import run
+from tests.cli.command import GOOD, run
 from tests.explain.support.groups import NOW, S, a_group, an_input
 
 
@@ -48,6 +48,15 @@ def test_of_two_files_none_is_written(tmp_path):
     done = run("observe", "--config", "a.yaml", "--config", "b.yaml", "--write", "new.yaml", folder=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("syncrelay: --write goes with one --config FILE\n")
+
+
+def test_of_a_directory_of_two_files_none_is_written(tmp_path):
+    (tmp_path / "conf").mkdir()
+    (tmp_path / "conf" / "front.yaml").write_text(GOOD)
+    (tmp_path / "conf" / "node.yaml").write_text("version: 1\nnode: {name: rig}\n")
+    done = run("observe", "--config", "conf", "--write", "new.yaml", folder=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("syncrelay: --write goes with one --config FILE: conf has 2\n")
 
 
 def test_a_file_that_has_no_folder_is_said_at_once(tmp_path):

@@ -2,6 +2,7 @@
 
 import io
 import json
+import random
 import sys
 from xml.etree import ElementTree as ET
 
@@ -11,6 +12,7 @@ from syncrelay.cli import parsers
 from syncrelay.cli.test import command
 from syncrelay.errors import UsageError
 from tests.cases.suites import write
+from tests.hostile_names import assert_shown_safely, hostile_name
 
 SUITE = """\
 version: 1
@@ -162,6 +164,33 @@ def test_a_file_may_come_from_standard_input_but_is_not_written_there(monkeypatc
     assert capsys.readouterr().out.startswith("<stdin>\n  ok    they meet\n")
     with pytest.raises(UsageError, match="--update cannot write standard input"):
         run("-", "--update")
+
+
+@pytest.mark.parametrize("output_format", ["text", "junit", "json", "github"])
+@pytest.mark.parametrize("seed", range(5))
+def test_names_are_text_alone_in_every_report(folder, output_format, seed, capsys):
+    chance = random.Random(seed)
+
+    def name():
+        return json.dumps(hostile_name(chance))
+
+    (folder / "::error::tests, 100%0A.yaml").write_text(
+        f"version: 1\nconfig: fusion.yaml\ncases:\n"
+        f"  {name()}: {{drawing: 'lidar |ab', expect: {{received: 3}}, x-note: {name()}}}\n"
+        f"  {name()}: {{recording: {name()}, what_if: ['drop: /lidar 1%'], expect: {{sets: 3}}}}\n"
+    )
+    (folder / "faulty.yaml").write_text(f"version: 1\nconfig: fusion.yaml\ncases: {{{name()}: {{group: {name()}}}}}")
+    assert run("::error::tests, 100%0A.yaml", "faulty.yaml", "--format", output_format) == 1
+    told = capsys.readouterr()
+    assert_shown_safely(told.out)
+    assert_shown_safely(told.err)
+    if output_format == "junit":
+        assert len(list(ET.fromstring(told.out).iter("testcase"))) == 3  # noqa: S314  our own
+    elif output_format == "json":
+        assert json.loads(told.out)["failed"] == 2
+    elif output_format == "github":
+        commands = [line for line in (told.out + told.err).splitlines() if "::" in line or "##[" in line]
+        assert [line.split(" ")[0] for line in commands] == ["::error"] * 3
 
 
 def test_names_reach_a_terminal_as_text_alone(folder, capsys):

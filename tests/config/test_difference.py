@@ -141,3 +141,18 @@ def test_what_is_no_group_is_told_and_whether_it_needs_a_restart(top, restart, s
     assert (found.restart, list(found.sections), found.is_empty) == (restart, sections, False)
     back = between(file(FRONT, top=f"{top}\n"), file(FRONT), environ)
     assert list(back.sections) == [replace(each, old=each.new, new=each.old) for each in sections]
+
+
+def test_keys_of_the_users_own_are_not_told_and_values_stay_on_one_line(environ):
+    def of(slop, depth, note):
+        return file(
+            f"  front:\n    policy: approximate_time\n    slop: {slop}\n    topics:\n"
+            f'    - {{topic: /a, type: sensor_msgs/msg/Imu, qos: {{depth: {depth}, x-note: "{note}"}}}}\n'
+            "    - {topic: /b, type: sensor_msgs/msg/Imu}\n"
+        )
+
+    assert keys(of('"\\n20ms"', 4, "\\e[2J"), of('"\\r\\n30ms"', 5, "\\nforged"), environ) == [
+        ("slop", "\\n20ms", "\\r\\n30ms"),
+        ("/a qos", "{depth: 4}", "{depth: 5}"),
+    ]
+    assert between(of("20ms", 4, "one"), of("20ms", 4, "other"), environ).is_empty

@@ -1,6 +1,6 @@
 """Better values, put into the text of a file: comments and the order of keys stay."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
@@ -33,14 +33,15 @@ def with_changes(text: str, changes: Sequence[Change]) -> str:
 
     A new policy takes keys with it that it does not have.
     """
-    yaml = editor()
-    document = yaml.load(text)
-    for change in changes:
-        group = document["groups"][change.group]
-        if change.key == _POLICY:
-            _fit(group, str(change.value))
-        _set(group if change.topic is None else group["topics"][change.topic], change)
-    return dumped(yaml, document)
+
+    def change_all(document: Any) -> None:
+        for change in changes:
+            group = document["groups"][change.group]
+            if change.key == _POLICY:
+                _fit(group, str(change.value))
+            _set(group if change.topic is None else group["topics"][change.topic], change)
+
+    return edited(text, change_all)
 
 
 def file_with_changes(text: str, changes: Sequence[Change]) -> str:
@@ -62,11 +63,12 @@ def file_with_changes(text: str, changes: Sequence[Change]) -> str:
 
 def with_evidence(text: str, group: str, evidence: Sequence[str]) -> str:
     """Return the text of a file with a comment at each topic of a group."""
-    yaml = editor()
-    document = yaml.load(text)
-    for topic, comment in zip(document["groups"][group]["topics"], evidence, strict=True):
-        _comment(topic, "topic", comment)
-    return dumped(yaml, document)
+
+    def comment_all(document: Any) -> None:
+        for topic, comment in zip(document["groups"][group]["topics"], evidence, strict=True):
+            _comment(topic, "topic", comment)
+
+    return edited(text, comment_all)
 
 
 def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
@@ -83,7 +85,7 @@ def patch(changes: Sequence[Change], names: dict[str, Sequence[str]]) -> str:
         if "topics" in group:
             # Those keys first that stand first in a file.
             group["topics"] = [each for _, each in sorted(group.pop("topics").items())]
-    return dumped(editor(), {"groups": groups})
+    return _dumped(_editor(), {"groups": groups})
 
 
 def _set(mapping: Any, change: Change) -> None:
@@ -109,8 +111,17 @@ def _fit(group: Any, policy: str) -> None:
             del topic[key]
 
 
-def editor() -> YAML:
-    """Return what reads and writes files with their comments."""
+def edited(text: str, edit: Callable[[Any], None]) -> str:
+    """Return the text of a file as an edit of its mappings leaves it: with its comments, and its line breaks."""
+    yaml = _editor()
+    # Of comments alone it would keep the CR.
+    document = yaml.load(text.replace("\r\n", "\n"))
+    edit(document)
+    written = _dumped(yaml, document)
+    return written.replace("\n", "\r\n") if "\r\n" in text else written
+
+
+def _editor() -> YAML:
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.width = _WIDEST
@@ -118,8 +129,7 @@ def editor() -> YAML:
     return yaml
 
 
-def dumped(yaml: YAML, document: Any) -> str:
-    """Return the text of a document that an editor read."""
+def _dumped(yaml: YAML, document: Any) -> str:
     out = StringIO()
     yaml.dump(document, out)
     return out.getvalue()

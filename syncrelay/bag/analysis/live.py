@@ -6,7 +6,7 @@ from typing import Final
 
 from syncrelay.bag.analysis.analysis import GroupAnalysis, analyze_group, group_of
 from syncrelay.bag.analysis.streams import Stream
-from syncrelay.config import Config, GroupConfig, load_text
+from syncrelay.config import Config, GroupConfig
 from syncrelay.explain import Arrivals
 
 # Of all groups together, and of each one at least: the analysis takes some seconds for so many.
@@ -41,9 +41,9 @@ def analyze_live(config: Config, groups: Sequence[GroupConfig], live: LiveStream
 
     Not of a group that goes by other than stamps, as only these are observed.
     """
-    texts = {group.name: each.text for each in config.sources for group in load_text(each.text).groups}
+    document = config.names.document
     for group in groups:
         if not group.options.matched_by:
-            text = texts[group.name]
+            text = document.sources[document.key_span(group.path).source].text
             of_text = group_of(text, group.name)
             yield analyze_group(of_text, live.streams(of_text), text)

@@ -72,7 +72,8 @@ def layout_of(drawing: Drawing) -> Layout:
     labels = max((len(link.label) for group in drawing.groups for link in group.links), default=0)
     left = MARGIN
     middle = left + _width(drawing.inputs) + _BETWEEN_COLUMNS + labels * _SMALL
-    right = middle + _width([group.box for group in drawing.groups]) + _BETWEEN_COLUMNS
+    groups_width = _width([group.box for group in drawing.groups])
+    right = middle + groups_width + _BETWEEN_COLUMNS
     outputs_width = _width([output for group in drawing.groups for output in group.outputs])
     groups: list[Placed] = []
     outputs: list[Placed] = []
@@ -82,7 +83,7 @@ def layout_of(drawing: Drawing) -> Layout:
     for group in drawing.groups:
         stack = list(_stack(group.outputs, x=right, y=y, width=outputs_width))
         least = (len(group.links) + 1) * LINE
-        box = _placed(group.box, x=middle, y=y, width=_width([each.box for each in drawing.groups]), least=least)
+        box = _placed(group.box, x=middle, y=y, width=groups_width, least=least)
         block = max(box.height, stack[-1].y + stack[-1].height - y if stack else 0.0)
         box = _moved(box, y + (block - box.height) / 2)
         stack = [_moved(each, each.y + (block - (stack[-1].y + stack[-1].height - y)) / 2) for each in stack]
