@@ -25,15 +25,14 @@ _ROOT = Path(__file__).parents[1]
 _README = (_ROOT / "README.md").read_text()
 _PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *sorted((_ROOT / "docs").glob("*.md"))]}
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-_BLOCKS = _BLOCK.findall(_README)
-_ALL_BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
-_YAML = [text for kind, text in _ALL_BLOCKS if kind == "yaml"]
+_BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
+_YAML = [text for kind, text in _BLOCKS if kind == "yaml"]
 _FILES = [text for text in _YAML if text.startswith("version:")]
 _SUITES = [text for text in _YAML if "\ncases:" in text]
-_SHOWN = [line.removeprefix("$ ") for kind, text in _ALL_BLOCKS if kind == "console" for line in text.splitlines()]
+_SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
 _WORKSPACE = _ROOT / "docs" / "workspace.md"
-_SHELL = [line.split("  #")[0] for kind, text in _ALL_BLOCKS if kind == "sh" for line in text.splitlines()]
+_SHELL = [line.split("  #")[0] for kind, text in _BLOCKS if kind == "sh" for line in text.splitlines()]
 _SHOWN += [line.removeprefix("ros2 run syncrelay ") for line in _SHELL if line.startswith("ros2 run syncrelay ")]
 _LAUNCHED = [line.split(maxsplit=3)[3] for line in _SHELL if line.startswith("ros2 launch syncrelay ")]
 _COMMANDS = sorted({command for command in [*_SHOWN, *_INLINE] if command})
@@ -110,8 +109,8 @@ def test_a_command_that_does_not_exist_would_be_noticed():
     assert not _is_make_target(["demos"])
 
 
-def test_the_error_that_the_readme_shows_is_the_one_that_comes(tmp_path):
-    shown = next(text for kind, text in _BLOCKS if kind == "text" and "slopp" in text)
+def test_the_error_that_a_page_shows_is_the_one_that_comes(tmp_path):
+    (shown,) = [text for kind, text in _BLOCKS if kind == "text" and "slopp" in text]
     (tmp_path / "fusion.yaml").write_text(_FILES[0].replace("slop:", "slopp:"))
     run = subprocess.run(
         [sys.executable, "-m", "syncrelay", "validate", "fusion.yaml"],
@@ -124,7 +123,7 @@ def test_the_error_that_the_readme_shows_is_the_one_that_comes(tmp_path):
     assert shown.strip() in run.stdout + run.stderr
 
 
-def test_the_drawing_and_the_difference_that_the_readme_shows_are_those_that_come():
+def test_the_drawing_and_the_difference_that_a_page_shows_are_those_that_come():
     old = load_text(_FILES[0])
     (shown,) = [text for kind, text in _BLOCKS if kind == "mermaid"]
     assert as_mermaid(drawing_of(old, title="fusion.yaml")) == shown.rstrip()
@@ -134,10 +133,33 @@ def test_the_drawing_and_the_difference_that_the_readme_shows_are_those_that_com
 
 
 @pytest.mark.parametrize("page", _PAGES, ids=lambda page: page.name)
-def test_every_link_to_a_file_of_ours_leads_somewhere(page):
-    prose = re.sub(r"^```.*?^```", "", _PAGES[page], flags=re.MULTILINE | re.DOTALL)
-    targets = [target for target in re.findall(r"\]\(([^)#]+)\)", prose) if "://" not in target]
-    assert [target for target in targets if not (page.parent / target).exists()] == []
+def test_every_link_to_a_file_or_heading_of_ours_leads_somewhere(page):
+    targets = [target for target in re.findall(r"\]\(([^)]+)\)", _prose(_PAGES[page])) if "://" not in target]
+    assert [target for target in targets if not _leads_somewhere(page, target)] == []
+
+
+def _prose(text):
+    return re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def _leads_somewhere(page, target):
+    path, _, anchor = target.partition("#")
+    found = page.parent / path if path else page
+    return found.exists() and (not anchor or anchor in _anchors(found.read_text()))
+
+
+def _anchors(text):
+    """Those that GitHub gives to headings."""
+    headings = re.findall(r"^#+ (.+)$", _prose(text), re.MULTILINE)
+    return [re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings]
+
+
+def test_a_link_that_leads_nowhere_would_be_noticed():
+    readme = _ROOT / "README.md"
+    assert _leads_somewhere(readme, "#which-queue_size")
+    assert not _leads_somewhere(readme, "#which-depth")
+    assert not _leads_somewhere(readme, "docs/none.md")
+    assert not _leads_somewhere(readme, "docs/node.md#which-queue_size")
 
 
 _TIMELINES = [text for kind, text in _BLOCKS if kind == "timeline"]
@@ -166,7 +188,8 @@ def test_every_reason_that_a_message_can_leave_for_is_explained():
     assert [reason.value for reason in DropReason if f"| `{reason.value}` |" not in _README] == []
 
 
-def test_the_launch_file_that_the_readme_shows_is_python():
-    for kind, text in _BLOCKS:
-        if kind == "python":
-            compile(text, "README.md", "exec")
+def test_every_python_block_that_a_page_shows_is_python():
+    shown = [text for kind, text in _BLOCKS if kind == "python"]
+    for text in shown:
+        compile(text, "page", "exec")
+    assert shown

@@ -5,6 +5,7 @@ import random
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from threading import Event, Thread
 
 import pytest
@@ -119,3 +120,26 @@ def test_names_are_shown_safely_whatever_they_are():
         shown = plain_line(line)
         assert "\n" not in shown
         assert_shown_safely(shown)
+
+
+def test_the_pages_show_what_is_printed():
+    (group,) = load_text(
+        """
+version: 1
+groups:
+  front:
+    policy: approximate_time
+    slop: 20ms
+    topics:
+      - {topic: /camera/image_raw, type: sensor_msgs/msg/Image}
+      - {topic: /lidar/points, type: sensor_msgs/msg/PointCloud2}
+"""
+    ).groups
+    topics = [topic.topic for topic in group.topics]
+    a_set = set_line(group, topics, (_AT, _AT + 7 * _MS), left=_AT + 9_200_000, received=_AT + 8 * _MS)
+    a_drop = drop_line(
+        group, topics, RecentDrop(0, _AT, DropReason.TOO_FAR), left=_AT + 63 * _MS, received=_AT + 2 * _MS
+    )
+    page = (Path(__file__).parents[2] / "docs" / "observe.md").read_text()
+    for line in (a_set, a_drop):
+        assert plain_line(line).split(maxsplit=1)[1] in page
