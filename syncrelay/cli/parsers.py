@@ -295,9 +295,9 @@ def tap() -> Parser:
     parser = Parser(
         "syncrelay tap",
         description="Prints each set and each dropped message of a running relay as it leaves, a line each, until "
-        "Ctrl-C. It subscribes to nothing: the relay tells it over HTTP. A set shows how far each stamp is "
-        "behind the earliest of the set. The relay waits for nobody: who reads too slowly loses lines, and is told "
-        "how many.",
+        "Ctrl-C. It subscribes to nothing: the relay tells it over HTTP. For each set it shows how much later "
+        "than the earliest stamp each input's stamp is, offsets included. The relay never waits: a reader that is too "
+        "slow loses lines and is told how many.",
     )
     parser.add_argument("group", metavar="GROUP", nargs="?", help="print this group only")
     parser.add_argument(
@@ -306,7 +306,11 @@ def tap() -> Parser:
     parser.add_argument("--json", action="store_true", help="print lines of JSON, as replay does")
     parser.add_argument("--drops", action="store_true", help="print dropped messages only")
     parser.add_argument(
-        "--input", metavar="TOPIC", action="append", default=[], help="print what has to do with TOPIC; may be repeated"
+        "--input",
+        metavar="TOPIC",
+        action="append",
+        default=[],
+        help="print only sets and drops of TOPIC; may be repeated",
     )
     parser.add_argument(
         "--reason",
