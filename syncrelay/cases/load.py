@@ -23,6 +23,10 @@ from syncrelay.config.yaml_tree import MOST_PROBLEMS, compose, too_many
 from syncrelay.rig.what_if import Fault
 
 _LEAST: Final = "at least `version: 1`, `config:` and `cases:`"
+_GROUPS: Final = (
+    "this looks like a file of groups, which `syncrelay validate` checks: expected a test file with `config:` and"
+    " `cases:`"
+)
 _MOST_MESSAGES: Final = 1_000_000
 _ONLY_WITH_RATE: Final = ("phase", "jitter", "latency_jitter", "drop")
 
@@ -66,6 +70,7 @@ def load_suite_text(text: str, *, name: str, environ: Mapping[str, str] = os.env
 
 def _suite(source: Source, folder: Path, environ: Mapping[str, str]) -> Suite:
     document, problems = compose(source, environ, expected=_LEAST)
+    document.refuse_other_kind("groups", own="cases", text=_GROUPS)
     try:
         file = CasesFile.model_validate(plain(document.root))
     except ValidationError as error:
@@ -138,7 +143,7 @@ class _Reader:
         if case.recording is not None and not case.expect.model_fields_set:
             self.report(
                 path,
-                "missing, expected what shall come of the recording, for example `expect: {sets: 100}`",
+                "missing, expected what should come of the recording, for example `expect: {sets: 100}`",
                 code="missing_key",
                 span=self._document.key_span(path),
             )
@@ -191,11 +196,11 @@ class _Reader:
             for key in ("drawing", "inputs", "lasts", "period"):
                 if key in case.model_fields_set:
                     at = (*path, key)
-                    self.report(at, "has no place beside a recording", span=self._document.key_span(at))
+                    self.report(at, "cannot be used with a recording", span=self._document.key_span(at))
             return
         rates = [source.rate for source in case.inputs.values() if source.rate is not None]
         if case.drawing is None and not rates:
-            text = "nothing comes, expected a `drawing`, a `recording`, or `inputs` with a `rate`"
+            text = "no messages: expected a `drawing`, a `recording`, or `inputs` with a `rate`"
             self.report(path, text, code="missing_key", span=self._document.key_span(path))
         if rates and case.lasts is None:
             text = "missing, expected how long the inputs with a rate send, for example `lasts: 30s`"
@@ -213,12 +218,12 @@ class _Reader:
     def _check_source(self, path: Place, source: InputSource, *, is_drawn: bool) -> None:
         if source.rate is not None:
             if is_drawn:
-                self.report((*path, "rate"), "this input is drawn already, expected one or the other")
+                self.report((*path, "rate"), "this input is drawn: use a drawing or a `rate`, not both")
             return
         for key in _ONLY_WITH_RATE:
             if key in source.model_fields_set:
                 at = (*path, key)
-                self.report(at, "is for an input with a `rate`", span=self._document.key_span(at))
+                self.report(at, "works only on an input with a `rate`", span=self._document.key_span(at))
 
     def _faults(self, path: Place, case: Case, group: GroupConfig) -> Iterator[Fault]:
         """Yield faults of messages that are not recorded, by the full names of their inputs."""

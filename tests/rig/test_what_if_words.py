@@ -31,14 +31,16 @@ def test_a_fault_is_read(text, meaning):
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("", "`` is no fault, expected one such as `late: /lidar/points 80ms`"),
-        ("late /x 3ms", "`late /x 3ms` is no fault, expected one such as `late: /lidar/points 80ms`"),
-        ("lat: /x 3ms", "`lat: /x 3ms` is no fault, did you mean `late`?"),
-        ("quiet: /x", "`quiet: /x` is no fault, expected late, drop, offset, drift or dead, as in"),
+        ("", "`` is not a fault, expected one such as `late: /lidar/points 80ms`"),
+        ("late /x 3ms", "`late /x 3ms` is not a fault, expected one such as `late: /lidar/points 80ms`"),
+        ("lat: /x 3ms", "`lat: /x 3ms` is not a fault, did you mean `late`?"),
+        ("quiet: /x", "`quiet: /x` is not a fault, expected late, drop, offset, drift or dead, as in"),
         ("late:", "`late:` names no topic, expected `late: /lidar/points 80ms`"),
         ("late: /x", "`late: /x` does not say how much, expected `late: /lidar/points 80ms`"),
         ("late: x//y 3ms", "a topic name has one `/` between its parts"),
-        ("late: /x 3", "the string `3` has no unit"),
+        ("late: /x 3", "`3` has no unit, expected one such as `3ms`"),
+        ("offset: /x -3", "`-3` has no unit, expected one such as `-3ms`"),
+        ("dead: /x from 3", "`3` has no unit, expected one such as `3ms`"),
         ("late: /x 61s", "`61s` is out of range, expected 0 to 60s"),
         ("late: /x -1s", "`-1s` is out of range"),
         ("drop: /x 10", "expected a share of 0% to 100%, 4 decimals at most, found `10`"),
@@ -49,7 +51,7 @@ def test_a_fault_is_read(text, meaning):
         ("dead: /x after 5s", "`after` in `dead: /x after 5s`: expected `from 12s`, `until 20s` or both"),
         ("dead: /x from 1s from 2s", "`from` in `dead: /x from 1s from 2s`: expected"),
         ("dead: /x from", "expected a duration such as 20ms, found an empty string"),
-        ("dead: /x from 5s until 5s", "never holds: expected 0s or more, and an end after the begin"),
+        ("dead: /x from 5s until 5s", "never applies: `from` must be 0s or later, and `until` later than `from`"),
     ],
 )
 def test_what_is_no_fault_is_told_with_what_to_write(text, error):
