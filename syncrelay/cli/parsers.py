@@ -190,10 +190,12 @@ def test() -> Parser:
     parser = Parser(
         "syncrelay test",
         description="Runs the tests of a configuration, without ROS: messages that are drawn, simulated or recorded go "
-        "through the engine, and what comes of them is compared to what the test file expects. Exit code 1 if a case "
+        "through the engine, and what comes of them is compared with what the test file expects. Exit code 1 if a case "
         "fails.",
     )
-    parser.add_argument("files", metavar="FILE", nargs="+", help="a test file, or - for standard input")
+    parser.add_argument(
+        "files", metavar="FILE", nargs="+", help="a test file, a directory of them, or - for standard input"
+    )
     parser.add_argument(
         "--format",
         choices=("text", "junit", "json", "github"),
@@ -202,7 +204,9 @@ def test() -> Parser:
         help="text (default), junit, json, or github: annotations for a workflow",
     )
     parser.add_argument(
-        "--update", action="store_true", help="write what came into the test files, in place of what was expected"
+        "--update",
+        action="store_true",
+        help="replace the expectations in the test files with what was found",
     )
     return parser
 
@@ -260,7 +264,11 @@ def observe() -> Parser:
         "fit. Exit code 1 unless all groups are healthy.",
     )
     parser.add_argument(
-        "--config", metavar="FILE", action="append", required=True, help="the file to try; may be repeated"
+        "--config",
+        metavar="FILE",
+        action="append",
+        required=True,
+        help="the file to try, or a directory of files; may be repeated",
     )
     parser.add_argument(
         "--group", metavar="NAME", action="append", default=[], help="try this group only; may be repeated"
