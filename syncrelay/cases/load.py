@@ -8,6 +8,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from syncrelay.bag.bindings import full_name
 from syncrelay.cases import drawing as drawings
 from syncrelay.cases.drawing import Drawing
 from syncrelay.cases.form import CasesForm
@@ -112,6 +113,7 @@ class _Reader:
     def __init__(self, document: Document, config: Config, folder: Path) -> None:
         self.problems: list[Problem] = []
         self._document = document
+        self._config = config
         self._groups = {group.name: group for group in config.groups}
         self._folder = folder
 
@@ -226,9 +228,9 @@ class _Reader:
                 self.report(at, "works only on an input with a `rate`", span=self._document.key_span(at))
 
     def _faults(self, path: Place, case: Case, group: GroupConfig) -> Iterator[Fault]:
-        """Yield faults of messages that are not recorded, by the full names of their inputs."""
+        """Yield faults by the full names of their inputs; of a recording they may be of any of its topics."""
         for index, fault in enumerate(case.what_if):
-            if case.recording is not None:
+            if case.recording is not None and fault.topic.startswith("/"):
                 yield fault
                 continue
             try:
@@ -236,4 +238,5 @@ class _Reader:
             except ValueError as error:
                 self.report((*path, "what_if", index), str(error), code="unknown_input")
             else:
-                yield fault.of_topic(group.inputs.names[place])
+                recorded = full_name(group.topics[place].topic, self._config)
+                yield fault.of_topic(group.inputs.names[place] if case.recording is None else recorded)

@@ -248,12 +248,15 @@ def _junit_case(file: str, result: Result) -> Iterator[str]:
         f"    <testcase classname={_attribute(file)} name={_attribute(result.case.name)}"
         f' file={_attribute(file)} line="{result.case.span.line}" time="{result.seconds:.3f}"'
     )
-    if not result.failed:
+    if not result.failed and not result.remarks:
         yield f"{head}/>"
         return
-    lines = "\n".join(what_differs(result))
     yield f"{head}>"
-    yield f"      <failure message={_attribute(_headline(result))}>{_text(lines)}</failure>"
+    if result.failed:
+        lines = "\n".join(what_differs(result))
+        yield f"      <failure message={_attribute(_headline(result))}>{_text(lines)}</failure>"
+    if result.remarks:
+        yield f"      <system-err>{_text(chr(10).join(map(printable, result.remarks)))}</system-err>"
     yield "    </testcase>"
 
 

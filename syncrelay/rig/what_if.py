@@ -112,7 +112,7 @@ def parse_share(word: str) -> int:
     """Return the millionths of a text such as 10%; raises ValueError for another."""
     found = _SHARE.fullmatch(word)
     if found is None or float(found[1]) > 100:  # noqa: PLR2004  all there is
-        raise ValueError(f"expected a share of 0% to 100%, 4 decimals at most, found {quoted(word)}")
+        raise ValueError(f"expected a share such as 10% (0% to 100%, at most 4 decimals), found {quoted(word)}")
     return round(float(found[1]) * _MILLION / 100)
 
 
@@ -120,7 +120,7 @@ def _drift(word: str) -> int:
     found = _PARTS.fullmatch(word)
     if found is None or abs(float(found[1])) > _MOST_PARTS:
         raise ValueError(
-            f"expected a drift such as 100ppm, {_MOST_PARTS}ppm and 3 decimals at most, found {quoted(word)}"
+            f"expected a drift such as 100ppm (at most {_MOST_PARTS}ppm, 3 decimals), found {quoted(word)}"
         )
     return round(float(found[1]) * 1000)
 
@@ -233,6 +233,6 @@ def disturbances(faults: Sequence[Fault], topics: Sequence[str], *, seed: int, b
     for fault in faults:
         if fault.topic not in topics:
             there = did_you_mean(fault.topic, topics) or f", expected {one_of(dict.fromkeys(topics))}"
-            raise ValueError(f"{quoted(fault.written)}: there is no {fault.topic}{there}")
+            raise ValueError(f"{quoted(fault.written)}: there is no topic {quoted(fault.topic)}{there}")
     of = {topic: [fault for fault in faults if fault.topic == topic] for topic in topics}
     return {topic: Disturbance(each, topic=topic, seed=seed, began=began) for topic, each in of.items() if each}

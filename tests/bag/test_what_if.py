@@ -114,7 +114,7 @@ def test_no_more_is_held_than_comes_in_a_minute(bag):
 @pytest.mark.parametrize(
     ("fault", "error"),
     [
-        ("late: /lida 1ms", "there is no /lida, did you mean `/lidar`?"),
+        ("late: /lida 1ms", "there is no topic `/lida`, did you mean `/lidar`?"),
         ("offset: /note 1ms", "rig_msgs/msg/Note does not begin with a std_msgs/msg/Header"),
     ],
 )

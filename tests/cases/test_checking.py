@@ -153,15 +153,16 @@ def test_a_recording_is_run_as_replay_runs_it(tmp_path):
         "received": "40",
         "findings": "healthy",
     }
-    late = {"recording": "rig.mcap", "what_if": ["dead: /lidar from 2s"]}
-    assert found(tmp_path, {"sets": 1}, late, **RECORDED) == {"sets": "20"}
+    for name in ("/lidar", "lidar"):
+        dead = {"recording": "rig.mcap", "what_if": [f"dead: {name} from 2s"]}
+        assert found(tmp_path, {"sets": 1}, dead, **RECORDED) == {"sets": "20"}
 
 
 @pytest.mark.parametrize(
     ("case", "error"),
     [
         ({"recording": "rg.mcap"}, "did you mean `rig.mcap`?"),
-        ({"recording": "rig.mcap", "what_if": ["drop: /lidr 3%"]}, "there is no /lidr, did you mean `/lidar`?"),
+        ({"recording": "rig.mcap", "what_if": ["drop: /lidr 3%"]}, "there is no topic `/lidr`, did you mean `/lidar`?"),
     ],
 )
 def test_what_cannot_be_run_fails_and_says_why(tmp_path, case, error):

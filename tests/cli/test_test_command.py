@@ -161,6 +161,9 @@ def test_a_remark_says_of_which_case_it_is(capsys):
         "syncrelay: tests.yaml: they meet: `dead: lidar from 9s` changed nothing: the first message of /lidar came"
         " after 0.01 s, the last after 0.01 s\n"
     )
+    assert run("tests.yaml", "--format", "junit") == 0
+    (told,) = ET.fromstring(capsys.readouterr().out).iter("system-err")  # noqa: S314  our own
+    assert told.text.startswith("`dead: lidar from 9s` changed nothing: ")
 
 
 def test_a_case_with_the_name_of_a_number_is_updated_too(folder):

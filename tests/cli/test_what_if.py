@@ -54,7 +54,7 @@ def test_a_seed_decides_what_is_lost(replayed):
             ("--what-if", "lat: /lidar 3ms"),
             "argument --what-if: `lat: /lidar 3ms` is not a fault, did you mean `late`?",
         ),
-        (("--what-if", "dead: /lida"), "`dead: /lida`: there is no /lida, did you mean `/lidar`?"),
+        (("--what-if", "dead: /lida"), "`dead: /lida`: there is no topic `/lida`, did you mean `/lidar`?"),
         (("--seed", "-1"), "expected a whole number of 0 or more, found -1"),
     ],
 )
