@@ -33,12 +33,15 @@ class Disturbed:
             disturbance = self._disturbances.get(channel.topic)
             if disturbance is not None and disturbance.changes_stamps and not begins_with_header(channel):
                 raise UsageError(
-                    f"{channel.topic}: {channel.type} has no std_msgs/msg/Header at its begin, so no stamp that a"
-                    " clock could have set: `offset` and `drift` are for stamped topics"
+                    f"{channel.topic}: {channel.type} does not begin with a std_msgs/msg/Header, so it has no stamp"
+                    " that a clock could have set: `offset` and `drift` are for stamped topics"
                 )
         self._most_late = max((each.most_late for each in self._disturbances.values()), default=0)
         if self._most_late > MOST_LATE:
-            raise UsageError(f"messages would be late by {self._most_late / 1e9:g}s in all, at most 60s: they are held")
+            raise UsageError(
+                f"messages would be late by {self._most_late / 1e9:g}s in all, expected 60s at most, because they are"
+                " held in memory for that long"
+            )
         self.channels: Final = recording.channels
         self.size: Final = recording.size
         self.begin: Final = recording.begin
@@ -48,6 +51,10 @@ class Disturbed:
     def faults(self) -> list[str]:
         """See Recording."""
         return self._recording.faults
+
+    def idle(self) -> list[str]:
+        """Return a sentence for each fault that has changed no message of those read so far."""
+        return [sentence for each in self._disturbances.values() for sentence in each.idle()]
 
     @property
     def position(self) -> int:

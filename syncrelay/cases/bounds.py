@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, InstanceOf, WithJsonSchema
 
-from syncrelay.config.units import parse_duration
+from syncrelay.config.units import NS_PER_UNIT, parse_duration, parse_duration_text
 from syncrelay.config.wording import describe, quoted
 
 _WRITTEN: Final = re.compile(r"\s*(<=|>=|==|<|>|=)?\s*(.*?)\s*", re.DOTALL)
@@ -28,9 +28,15 @@ _COMPARE: Final[Mapping[str, Callable[[Any, Any], bool]]] = MappingProxyType(
         ">=": operator.ge,
     }
 )
-_MS: Final = 1_000_000
-# So many digits of a share are told, and those of a duration in milliseconds.
+# So many digits of a share are told, and those of a duration in its unit.
 _DIGITS: Final = Decimal("0.0001")
+_ROUNDED: Final[Mapping[str, str]] = MappingProxyType({"<=": ROUND_CEILING, ">=": ROUND_FLOOR})
+_SIZES: Final[Mapping[str, Decimal]] = MappingProxyType(
+    {"": Decimal(1), "%": Decimal("0.01"), **{unit: Decimal(size) for unit, size in NS_PER_UNIT.items()}}
+)
+# A duration is told in the first of these that is no longer than it, where it is far shorter than the file's own unit.
+_UNITS: Final = ("s", "ms", "us", "ns")
+_FAR_SHORTER: Final = Decimal("0.1")
 
 
 class Quantity(Enum):
@@ -43,11 +49,15 @@ class Quantity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """A number and how what is found shall compare to it; an empty `comparison` is equality."""
+    """A number and how what is found shall compare to it; an empty `comparison` is equality.
+
+    `unit` is that of the file: `%` or none of a share, one of NS_PER_UNIT of a duration.
+    """
 
     quantity: Quantity
     comparison: str
     value: Decimal
+    unit: str = ""
 
     def holds(self, found: Decimal) -> bool:
         """Tell whether what was found is as it shall be. Of a share, so many digits are equal as are told."""
@@ -56,33 +66,37 @@ class Bound:
         return _COMPARE[self.comparison](found, self.value)
 
     def __str__(self) -> str:
-        return f"{self.comparison} {told(self.quantity, self.value)}".strip()
+        return f"{self.comparison} {_written(self.value, self.unit)}".strip()
 
     def told(self, found: Decimal) -> str:
         """Return what was found as a file would have it, rounded so that it is seen to differ."""
-        return told(self.quantity, found, {"<": "<=", ">": ">="}.get(self.comparison, self.comparison))
+        unit, step = self.unit, _DIGITS
+        if self.quantity is Quantity.DURATION:
+            unit = _fitting(self.unit, found)
+            # What is to be equal is compared to the nanosecond.
+            step = _DIGITS * _SIZES[unit] if self._inclusive in _ROUNDED else Decimal(1)
+        rounding = _ROUNDED.get(self._inclusive, ROUND_HALF_EVEN)
+        return _written((found / step).to_integral_value(rounding) * step, unit)
 
     def renewed(self, found: Decimal) -> str | int:
         """Return how a file says that what was found is as it shall be, compared as before."""
-        comparison = {"<": "<=", ">": ">="}.get(self.comparison, self.comparison)
-        text = told(self.quantity, found, comparison)
-        if comparison:
-            return f"{comparison} {text}"
-        return int(found) if self.quantity is Quantity.COUNT else text
+        if self.comparison:
+            return f"{self._inclusive} {self.told(found)}"
+        return int(found) if self.quantity is Quantity.COUNT else self.told(found)
+
+    @property
+    def _inclusive(self) -> str:
+        return {"<": "<=", ">": ">="}.get(self.comparison, self.comparison)
 
 
-def told(quantity: Quantity, number: Decimal, comparison: str = "") -> str:
-    """Return a number as a file would have it; rounded so that it compares so to what it was."""
-    rounding = {"<=": ROUND_CEILING, ">=": ROUND_FLOOR}.get(comparison, ROUND_HALF_EVEN)
-    match quantity:
-        case Quantity.COUNT:
-            return str(int(number))
-        case Quantity.SHARE:
-            return f"{number.quantize(_DIGITS, rounding).normalize():f}"
-        case Quantity.DURATION:
-            # Alone, it is compared to the nanosecond.
-            exact = number / _MS
-            return f"{(exact.quantize(_DIGITS, rounding) if comparison else exact).normalize():f}ms"
+def _written(number: Decimal, unit: str) -> str:
+    return f"{(number / _SIZES[unit]).normalize():f}{unit}"
+
+
+def _fitting(unit: str, nanoseconds: Decimal) -> str:
+    if not nanoseconds or nanoseconds >= NS_PER_UNIT[unit] * _FAR_SHORTER:
+        return unit
+    return next((each for each in _UNITS if nanoseconds >= NS_PER_UNIT[each]), _UNITS[-1])
 
 
 def _bound(quantity: Quantity) -> Callable[[object], Bound]:
@@ -90,27 +104,35 @@ def _bound(quantity: Quantity) -> Callable[[object], Bound]:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError(f"expected {quantity.value}, found {describe(value)}")  # noqa: TRY004
         if isinstance(value, float | int) and quantity is Quantity.DURATION:
-            return Bound(quantity, "", Decimal(parse_duration(value)))
+            return Bound(quantity, "", Decimal(parse_duration(value)), "ms")
         matched = _WRITTEN.fullmatch(value if isinstance(value, str) else repr(value))
         assert matched is not None  # noqa: S101  it matches anything
-        return Bound(quantity, matched[1] or "", _number(quantity, matched[2], value))
+        comparison = matched[1] or ""
+        if quantity is Quantity.DURATION:
+            return Bound(quantity, comparison, *_duration(matched[2], is_alone=not comparison))
+        return Bound(quantity, comparison, *_number(quantity, matched[2], value))
 
     return parse
 
 
-def _number(quantity: Quantity, text: str, value: object) -> Decimal:
-    if quantity is Quantity.DURATION:
-        number = parse_duration(text)
-        if number < 0:
-            raise ValueError(f"expected a duration of 0 or more, found {quoted(text)}")
-        return Decimal(number)
+def _duration(text: str, *, is_alone: bool) -> tuple[Decimal, str]:
+    if is_alone:
+        # What has no unit could be a number of seconds then: its error says so.
+        parse_duration(text)
+    number, unit = parse_duration_text(text)
+    if number < 0:
+        raise ValueError(f"expected a duration of 0 or more, found {quoted(text)}")
+    return Decimal(number), unit
+
+
+def _number(quantity: Quantity, text: str, value: object) -> tuple[Decimal, str]:
     if quantity is Quantity.COUNT and _COUNT.fullmatch(text):
-        return Decimal(text)
+        return Decimal(text), ""
     share = _SHARE.fullmatch(text)
     if quantity is Quantity.SHARE and share is not None:
         number_of = Decimal(share[1]) / (100 if share[2] else 1)
         if number_of <= 1:
-            return number_of
+            return number_of, share[2]
     raise ValueError(f"expected {quantity.value}, found {describe(value)}")
 
 

@@ -47,7 +47,8 @@ class Mismatch:
 class Result:
     """What came of a case, and in how many seconds. `error` says why it could not be run, None where it was.
 
-    `remarks` are what could not be read of a recording.
+    `remarks` are what could not be read of a recording, and faults that changed nothing. `updated` is whether its file
+    has been made to expect what was found.
     """
 
     case: LoadedCase
@@ -55,11 +56,17 @@ class Result:
     seconds: float
     error: str | None = None
     remarks: tuple[str, ...] = ()
+    updated: bool = False
 
     @property
     def passed(self) -> bool:
         """Whether all was as it shall be."""
         return self.error is None and not self.mismatches
+
+    @property
+    def failed(self) -> bool:
+        """Whether something is not as it shall be by now."""
+        return not self.passed and not self.updated
 
 
 def check(suite: Suite) -> Iterator[Result]:
@@ -78,7 +85,8 @@ def _mismatches(loaded: LoadedCase, suite: Suite, remarks: list[str]) -> Iterato
     if loaded.recording is not None:
         yield from _compared(loaded, *_recorded(loaded, loaded.recording, suite, remarks))
         return
-    received = arrivals(loaded.case, loaded.drawing, loaded.group, loaded.places, loaded.what_if)
+    received, idle = arrivals(loaded.case, loaded.drawing, loaded.group, loaded.places, loaded.what_if)
+    remarks += idle
     drawing = loaded.drawing
     # A drawing beside which only figures are expected says nothing of when they come.
     if drawing is not None and (drawing.expected or not loaded.case.expect.model_fields_set):
@@ -95,12 +103,13 @@ def _recorded(loaded: LoadedCase, path: str, suite: Suite, remarks: list[str]) -
     Raises BagError where it cannot be read, and UsageError for a fault of a topic that it lacks.
     """
     with closing(open_recording([path])) as opened:
-        recording = Disturbed(opened, loaded.what_if, seed=loaded.case.seed) if loaded.what_if else opened
+        disturbed = Disturbed(opened, loaded.what_if, seed=loaded.case.seed) if loaded.what_if else None
+        recording = opened if disturbed is None else disturbed
         binding = next(each for each in bind(suite.config, recording) if each.group.name == loaded.group.name)
         if not binding.is_complete:
             raise SyncRelayError("; ".join(binding.problems))
         (found,) = read_streams(recording, [binding])
-        remarks += [*binding.problems, *recording.faults]
+        remarks += [*binding.problems, *recording.faults, *(() if disturbed is None else disturbed.idle())]
     return binding.group, found
 
 

@@ -154,7 +154,7 @@ def _add_lane(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
         if letter == ".":
             continue
         if not letter.isalnum():
-            text = f"{quoted(letter)} is no message, expected a letter or digit, and `.` where nothing comes"
+            text = f"{quoted(letter)} is not a message, expected a letter or digit, and `.` where nothing comes"
             yield Fault(number, begin + column, 1, text)
         elif letter in drawing.marks:
             yield Fault(number, begin + column, 1, f"`{letter}` is drawn twice: each message has a letter of its own")
@@ -169,7 +169,7 @@ def _faults_of_line(drawing: Drawing, number: int, line: str, did_you_mean: DidY
         yield _fault(number, line, line.strip(), "expected what leaves at which message, such as `-> b: aA, c late`")
         return
     if moment not in drawing.marks and not _MOMENT.fullmatch(moment):
-        text = f"{quoted(moment)} is no moment, expected a letter that is drawn, or a column such as `@7`"
+        text = f"{quoted(moment)} is not a moment, expected a letter that is drawn, or a column such as `@7`"
         yield _fault(number, line, moment or _ARROW, text)
     for each in left.split(","):
         wrong = _wrong(drawing, each.split(), did_you_mean)
@@ -187,7 +187,7 @@ def _wrong(drawing: Drawing, words: Sequence[str], did_you_mean: DidYouMean) -> 
         case [letter, reason]:
             hint = did_you_mean(reason, _REASONS) or f", expected {one_of(_REASONS)}"
             is_reason = reason in _REASONS
-            return _undrawn(drawing, letter) if is_reason else f"{quoted(reason)} is no reason{hint}"
+            return _undrawn(drawing, letter) if is_reason else f"{quoted(reason)} is not a reason{hint}"
         case _:
             return "expected a set such as `aA`, or a drop such as `a late`"
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from syncrelay.bag.bindings import full_name
 from syncrelay.cases import drawing as drawings
 from syncrelay.cases.drawing import Drawing
 from syncrelay.cases.form import CasesForm
@@ -23,6 +24,10 @@ from syncrelay.config.yaml_tree import MOST_PROBLEMS, compose, too_many
 from syncrelay.rig.what_if import Fault
 
 _LEAST: Final = "at least `version: 1`, `config:` and `cases:`"
+_GROUPS: Final = (
+    "this looks like a file of groups, which `syncrelay validate` checks: expected a test file with `config:` and"
+    " `cases:`"
+)
 _MOST_MESSAGES: Final = 1_000_000
 _ONLY_WITH_RATE: Final = ("phase", "jitter", "latency_jitter", "drop")
 
@@ -66,6 +71,7 @@ def load_suite_text(text: str, *, name: str, environ: Mapping[str, str] = os.env
 
 def _suite(source: Source, folder: Path, environ: Mapping[str, str]) -> Suite:
     document, problems = compose(source, environ, expected=_LEAST)
+    document.refuse_other_kind("groups", own="cases", text=_GROUPS)
     try:
         file = CasesFile.model_validate(plain(document.root))
     except ValidationError as error:
@@ -107,6 +113,7 @@ class _Reader:
     def __init__(self, document: Document, config: Config, folder: Path) -> None:
         self.problems: list[Problem] = []
         self._document = document
+        self._config = config
         self._groups = {group.name: group for group in config.groups}
         self._folder = folder
 
@@ -138,7 +145,7 @@ class _Reader:
         if case.recording is not None and not case.expect.model_fields_set:
             self.report(
                 path,
-                "missing, expected what shall come of the recording, for example `expect: {sets: 100}`",
+                "missing, expected what should come of the recording, for example `expect: {sets: 100}`",
                 code="missing_key",
                 span=self._document.key_span(path),
             )
@@ -191,11 +198,11 @@ class _Reader:
             for key in ("drawing", "inputs", "lasts", "period"):
                 if key in case.model_fields_set:
                     at = (*path, key)
-                    self.report(at, "has no place beside a recording", span=self._document.key_span(at))
+                    self.report(at, "cannot be used with a recording", span=self._document.key_span(at))
             return
         rates = [source.rate for source in case.inputs.values() if source.rate is not None]
         if case.drawing is None and not rates:
-            text = "nothing comes, expected a `drawing`, a `recording`, or `inputs` with a `rate`"
+            text = "no messages: expected a `drawing`, a `recording`, or `inputs` with a `rate`"
             self.report(path, text, code="missing_key", span=self._document.key_span(path))
         if rates and case.lasts is None:
             text = "missing, expected how long the inputs with a rate send, for example `lasts: 30s`"
@@ -213,17 +220,17 @@ class _Reader:
     def _check_source(self, path: Place, source: InputSource, *, is_drawn: bool) -> None:
         if source.rate is not None:
             if is_drawn:
-                self.report((*path, "rate"), "this input is drawn already, expected one or the other")
+                self.report((*path, "rate"), "this input is drawn: use a drawing or a `rate`, not both")
             return
         for key in _ONLY_WITH_RATE:
             if key in source.model_fields_set:
                 at = (*path, key)
-                self.report(at, "is for an input with a `rate`", span=self._document.key_span(at))
+                self.report(at, "works only on an input with a `rate`", span=self._document.key_span(at))
 
     def _faults(self, path: Place, case: Case, group: GroupConfig) -> Iterator[Fault]:
-        """Yield faults of messages that are not recorded, by the full names of their inputs."""
+        """Yield faults by the full names of their inputs; of a recording they may be of any of its topics."""
         for index, fault in enumerate(case.what_if):
-            if case.recording is not None:
+            if case.recording is not None and fault.topic.startswith("/"):
                 yield fault
                 continue
             try:
@@ -231,4 +238,5 @@ class _Reader:
             except ValueError as error:
                 self.report((*path, "what_if", index), str(error), code="unknown_input")
             else:
-                yield fault.of_topic(group.inputs.names[place])
+                recorded = full_name(group.topics[place].topic, self._config)
+                yield fault.of_topic(group.inputs.names[place] if case.recording is None else recorded)

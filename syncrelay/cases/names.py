@@ -25,7 +25,7 @@ def input_named(name: str, group: GroupConfig, *, did_you_mean: DidYouMean) -> i
     hint = did_you_mean(
         name, [*topics, *(_parts(topic)[-1] for topic in topics), *(_parts(topic)[0] for topic in topics)]
     )
-    raise ValueError(f"{quoted(name)} is no input of {group.name}{hint or f', expected {one_of(topics)}'}")
+    raise ValueError(f"{quoted(name)} is not an input of {group.name}{hint or f', expected {one_of(topics)}'}")
 
 
 def _parts(name: str) -> Sequence[str]:

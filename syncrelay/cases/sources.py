@@ -34,8 +34,11 @@ class Arrival(NamedTuple):
 
 def arrivals(
     case: Case, drawing: Drawing | None, group: GroupConfig, places: Mapping[str, int], what_if: Sequence[Fault]
-) -> list[Arrival]:
-    """Return what is received. `places` has the input of each name that the case calls one by."""
+) -> tuple[list[Arrival], list[str]]:
+    """Return what is received, and a sentence for each fault that has changed nothing.
+
+    `places` has the input of each name that the case calls one by.
+    """
     sources = {places[name]: source for name, source in case.inputs.items()}
     found: list[Arrival] = [] if drawing is None else list(_drawn(drawing, case.period, sources, places, group))
     for index, source in sources.items():
@@ -121,7 +124,7 @@ def _readable(arrival: Arrival, sources: Mapping[int, InputSource], group: Group
 
 def _disturbed(
     received: Sequence[Arrival], group: GroupConfig, what_if: Sequence[Fault], *, seed: int, is_ordered: bool
-) -> list[Arrival]:
+) -> tuple[list[Arrival], list[str]]:
     names = group.inputs.names
     at_work = disturbances(what_if, names, seed=seed, began=START)
     found: list[Arrival] = []
@@ -136,7 +139,8 @@ def _disturbed(
         else:
             found.append(each)
     by_receipt = sorted(found, key=lambda each: each.received)
-    return [_stamped(each, group) for each in by_receipt]
+    idle = [sentence for each in at_work.values() for sentence in each.idle()]
+    return [_stamped(each, group) for each in by_receipt], idle
 
 
 def _stamped(arrival: Arrival, group: GroupConfig) -> Arrival:

@@ -15,7 +15,7 @@ from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.inventory import put_inventory
-from syncrelay.cli.new_file import write_again, write_new
+from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.side_by_side import Work, side_by_side
@@ -129,8 +129,10 @@ def _print(bag: str, analysis: Analysis, asked: Asked) -> None:
             put(line)
         if asked.config is None:
             put(f"\nA file that gives these sets:\n\n{analysis.text.rstrip()}")
-    if asked.write is not None:
+    if asked.write is not None and asked.config is None:
         write_new(asked.write, file_with_changes(analysis.text, analysis.changes))
+    elif asked.write is not None:
+        write_suggested(asked.write, analysis.text, analysis.changes)
     if asked.html is not None:
         from syncrelay.cli.analysis_html import MARK, as_html
 

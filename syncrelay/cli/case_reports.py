@@ -27,9 +27,9 @@ class FileResult:
     cases: Sequence[Result]
 
     @property
-    def passed(self) -> bool:
-        """Whether all is as it shall be."""
-        return not self.problems and all(case.passed for case in self.cases)
+    def failed(self) -> bool:
+        """Whether something is not as it shall be."""
+        return bool(self.problems) or any(case.failed for case in self.cases)
 
 
 class Report(Protocol):
@@ -53,7 +53,7 @@ class Report(Protocol):
 
 
 class Text:
-    """For people: a line a case, of those that fail what differs, and a closing line."""
+    """For people: a line a case, of those that fail or are updated what differs, and a closing line."""
 
     def __init__(self) -> None:
         is_coloured = wants_colour(sys.stdout.isatty())
@@ -67,14 +67,18 @@ class Text:
         """See Report."""
         say(render(result.problems, colour=wants_colour(sys.stderr.isatty())))
 
-    def case(self, _name: str, result: Result) -> None:
+    def case(self, name: str, result: Result) -> None:
         """See Report."""
-        name = printable(result.case.name)
-        put(f"  ok    {name}" if result.passed else f"  {self._red}FAIL{self._reset}  {name}")
+        put(f"  {self._status(result)}  {printable(result.case.name)}")
         for line in what_differs(result):
             put(f"        {printable(line)}")
-        for sentence in result.remarks:
-            remark(printable(sentence))
+        for sentence in _remarks(name, result):
+            remark(sentence)
+
+    def _status(self, result: Result) -> str:
+        if result.failed:
+            return f"{self._red}FAIL{self._reset}"
+        return "updated" if result.updated else "ok  "
 
     def end(self, results: Sequence[FileResult]) -> None:
         """See Report."""
@@ -95,13 +99,19 @@ class Github(Text):
 
     def case(self, name: str, result: Result) -> None:
         """See Report."""
-        if result.passed:
-            put(inert(f"  ok    {printable(result.case.name)}"))
-        else:
+        if result.failed:
             text = "\n".join([result.case.name, *what_differs(result)])
             put(workflow_command("error", text, file=name, span=result.case.span))
-        for sentence in result.remarks:
-            remark(printable(sentence))
+        else:
+            put(inert(f"  {self._status(result)}  {printable(result.case.name)}"))
+        for sentence in _remarks(name, result):
+            remark(inert(sentence))
+
+
+def _remarks(name: str, result: Result) -> Iterator[str]:
+    """Yield what there is to remark on a case, with where that is: what people read of it stands on stderr."""
+    for sentence in result.remarks:
+        yield printable(f"{name}: {result.case.name}: {sentence}")
 
 
 class Json:
@@ -118,8 +128,9 @@ class Json:
 
     def end(self, results: Sequence[FileResult]) -> None:
         """See Report."""
-        passed, failed = counts(results)
-        put(json.dumps({"passed": passed, "failed": failed, "files": [_file(each) for each in results]}, indent=2))
+        passed, updated, failed = counts(results)
+        figures = {"passed": passed, "updated": updated, "failed": failed}
+        put(json.dumps({**figures, "files": [_file(each) for each in results]}, indent=2))
 
 
 class Junit(Json):
@@ -133,18 +144,20 @@ class Junit(Json):
 REPORTS: Final[dict[str, Callable[[], Report]]] = {"text": Text, "junit": Junit, "json": Json, "github": Github}
 
 
-def counts(results: Sequence[FileResult]) -> tuple[int, int]:
-    """Return how many cases passed and failed."""
-    cases = [case.passed for result in results for case in result.cases]
-    return sum(cases), len(cases) - sum(cases)
+def counts(results: Sequence[FileResult]) -> tuple[int, int, int]:
+    """Return how many cases passed, were updated and failed."""
+    cases = [case for result in results for case in result.cases]
+    updated, failed = sum(case.updated for case in cases), sum(case.failed for case in cases)
+    return len(cases) - updated - failed, updated, failed
 
 
 def summary(results: Sequence[FileResult]) -> str:
     """Return the closing line."""
-    passed, failed = counts(results)
+    passed, updated, failed = counts(results)
     faulty = sum(bool(result.problems) for result in results)
     errors = f", {faulty} {'file' if faulty == 1 else 'files'} with errors" if faulty else ""
-    return f"{passed} passed, {failed} failed{errors}"
+    renewed = f"{updated} updated, " if updated else ""
+    return f"{passed} passed, {renewed}{failed} failed{errors}"
 
 
 def what_differs(result: Result) -> Iterator[str]:
@@ -196,6 +209,7 @@ def _case(result: Result) -> dict[str, Any]:
         "line": result.case.span.line,
         "group": result.case.group.name,
         "passed": result.passed,
+        "updated": result.updated,
         "seconds": round(result.seconds, 6),
         "error": result.error,
         "mismatches": [
@@ -207,15 +221,16 @@ def _case(result: Result) -> dict[str, Any]:
 
 def _junit(results: Sequence[FileResult]) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
-    passed, failed = counts(results)
+    *others, failed = counts(results)
     errors = sum(bool(result.problems) for result in results)
-    yield f'<testsuites name="syncrelay test" tests="{passed + failed + errors}" failures="{failed}" errors="{errors}">'
+    tests = sum(others) + failed + errors
+    yield f'<testsuites name="syncrelay test" tests="{tests}" failures="{failed}" errors="{errors}">'
     for result in results:
         of_file = counts([result])
         faulty = bool(result.problems)
         seconds = sum(case.seconds for case in result.cases)
         yield (
-            f'  <testsuite name={_attribute(result.name)} tests="{sum(of_file) + faulty}" failures="{of_file[1]}"'
+            f'  <testsuite name={_attribute(result.name)} tests="{sum(of_file) + faulty}" failures="{of_file[-1]}"'
             f' errors="{int(faulty)}" time="{seconds:.3f}">'
         )
         if faulty:
@@ -233,12 +248,15 @@ def _junit_case(file: str, result: Result) -> Iterator[str]:
         f"    <testcase classname={_attribute(file)} name={_attribute(result.case.name)}"
         f' file={_attribute(file)} line="{result.case.span.line}" time="{result.seconds:.3f}"'
     )
-    if result.passed:
+    if not result.failed and not result.remarks:
         yield f"{head}/>"
         return
-    lines = "\n".join(what_differs(result))
     yield f"{head}>"
-    yield f"      <failure message={_attribute(_headline(result))}>{_text(lines)}</failure>"
+    if result.failed:
+        lines = "\n".join(what_differs(result))
+        yield f"      <failure message={_attribute(_headline(result))}>{_text(lines)}</failure>"
+    if result.remarks:
+        yield f"      <system-err>{_text(chr(10).join(map(printable, result.remarks)))}</system-err>"
     yield "    </testcase>"
 
 

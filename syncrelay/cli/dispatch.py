@@ -35,7 +35,7 @@ COMMANDS: Final = {
         Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", parsers.init, "init"),
         Command("analyze BAG...", "measure recordings, and suggest values that fit", parsers.analyze, "analyze"),
         Command("replay BAG...", "run a file's groups on a recording, without ROS", parsers.replay, "replay"),
-        Command("test FILE...", "check what files do against what they shall do", parsers.test, "test"),
+        Command("test FILE...", "run the tests of a configuration, without ROS", parsers.test, "test"),
         Command("demo", "try it on simulated sensors; needs no robot", parsers.demo, "demo"),
         Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),
         Command("observe", "try a file beside a running robot; publishes nothing", parsers.observe, "observe"),

@@ -2,10 +2,15 @@
 
 import os
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import remark
 from syncrelay.errors import BagError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from syncrelay.bag.analysis.changes import Change
 
 _HEAD: Final = 500
 
@@ -30,6 +35,16 @@ def write_new(name: str, text: str) -> None:
     except OSError as error:
         raise BagError(f"{path}: cannot be written: {error.strerror}") from error
     remark(f"wrote {path}")
+
+
+def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
+    """Write a file's text with suggested values as write_new does; where there are none, say so instead."""
+    if not changes:
+        remark(f"no values to change: {name} was not written")
+        return
+    from syncrelay.bag.analysis import file_with_changes
+
+    write_new(name, file_with_changes(text, changes))
 
 
 def write_again(name: str, text: str, *, mark: str) -> None:

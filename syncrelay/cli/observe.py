@@ -12,7 +12,7 @@ from threading import Event
 from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
-from syncrelay.cli.new_file import require_new, write_new
+from syncrelay.cli.new_file import require_new, write_suggested
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
@@ -94,10 +94,8 @@ def observe(asked: Asked, *, stop: StopRequest) -> int:
         for line in _lines(observed):
             put(line)
     if asked.write is not None:
-        from syncrelay.bag.analysis import file_with_changes
-
         changes = [change for each in observed.analyses for change in each.suggestion.changes]
-        write_new(asked.write, file_with_changes(config.sources[0].text, changes))
+        write_suggested(asked.write, config.sources[0].text, changes)
     return conclude(observed.state.groups, observed.seconds, unjudged=observed.state.unjudged, tell=not asked.json)
 
 

@@ -190,10 +190,12 @@ def test() -> Parser:
     parser = Parser(
         "syncrelay test",
         description="Runs the tests of a configuration, without ROS: messages that are drawn, simulated or recorded go "
-        "through the engine, and what comes of them is compared to what the test file expects. Exit code 1 if a case "
+        "through the engine, and what comes of them is compared with what the test file expects. Exit code 1 if a case "
         "fails.",
     )
-    parser.add_argument("files", metavar="FILE", nargs="+", help="a test file, or - for standard input")
+    parser.add_argument(
+        "files", metavar="FILE", nargs="+", help="a test file, a directory of them, or - for standard input"
+    )
     parser.add_argument(
         "--format",
         choices=("text", "junit", "json", "github"),
@@ -202,7 +204,9 @@ def test() -> Parser:
         help="text (default), junit, json, or github: annotations for a workflow",
     )
     parser.add_argument(
-        "--update", action="store_true", help="write what came into the test files, in place of what was expected"
+        "--update",
+        action="store_true",
+        help="replace the expectations in the test files with what was found",
     )
     return parser
 
@@ -260,7 +264,11 @@ def observe() -> Parser:
         "fit. Exit code 1 unless all groups are healthy.",
     )
     parser.add_argument(
-        "--config", metavar="FILE", action="append", required=True, help="the file to try; may be repeated"
+        "--config",
+        metavar="FILE",
+        action="append",
+        required=True,
+        help="the file to try, or a directory of files; may be repeated",
     )
     parser.add_argument(
         "--group", metavar="NAME", action="append", default=[], help="try this group only; may be repeated"
@@ -295,9 +303,9 @@ def tap() -> Parser:
     parser = Parser(
         "syncrelay tap",
         description="Prints each set and each dropped message of a running relay as it leaves, a line each, until "
-        "Ctrl-C. It subscribes to nothing: the relay tells it over HTTP. A set shows how far each stamp is "
-        "behind the earliest of the set. The relay waits for nobody: who reads too slowly loses lines, and is told "
-        "how many.",
+        "Ctrl-C. It subscribes to nothing: the relay tells it over HTTP. For each set it shows how much later "
+        "than the earliest stamp each input's stamp is, offsets included. The relay never waits: a reader that is too "
+        "slow loses lines and is told how many.",
     )
     parser.add_argument("group", metavar="GROUP", nargs="?", help="print this group only")
     parser.add_argument(
@@ -306,7 +314,11 @@ def tap() -> Parser:
     parser.add_argument("--json", action="store_true", help="print lines of JSON, as replay does")
     parser.add_argument("--drops", action="store_true", help="print dropped messages only")
     parser.add_argument(
-        "--input", metavar="TOPIC", action="append", default=[], help="print what has to do with TOPIC; may be repeated"
+        "--input",
+        metavar="TOPIC",
+        action="append",
+        default=[],
+        help="print only sets and drops of TOPIC; may be repeated",
     )
     parser.add_argument(
         "--reason",

@@ -62,10 +62,11 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     with ExitStack() as opened:
         recording = open_recording(bags)
         opened.callback(recording.close)
-        if wanted.what_if:
-            recording = Disturbed(recording, wanted.what_if, seed=wanted.seed)
+        disturbed = Disturbed(recording, wanted.what_if, seed=wanted.seed) if wanted.what_if else None
+        if disturbed is not None:
+            recording = disturbed
             faults = ", ".join(f"`{fault.written}`" for fault in wanted.what_if)
-            remark(printable(f"laid over the recording, with seed {wanted.seed}: {faults}"))
+            remark(printable(f"faults laid over the recording (seed {wanted.seed}): {faults}"))
         bindings = bind(config, recording)
         _say_all(problem for binding in bindings for problem in binding.problems)
         written = _written(wanted.output, bindings, opened)
@@ -73,6 +74,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         with reading(recording):
             results = replay_groups(recording, bindings, listeners=listeners)
         _say_all(recording.faults)
+        _say_all(disturbed.idle() if disturbed is not None else ())
     if written is not None:
         sets = sum(result.sets for result in results)
         remark(f"wrote {wanted.output}: {counted(written.messages, 'message')} of {counted(sets, 'set')}")

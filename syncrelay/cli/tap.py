@@ -72,7 +72,7 @@ def _say_lost(told: Told) -> None:
 
 
 def plain_line(line: dict[str, Any]) -> str:
-    """Say a line in words: of a set how far the stamp of each input is behind the earliest."""
+    """Say a line in words: of a set how much later than the earliest each stamp is, with the inputs' offsets."""
     read = read_line(line)
     seconds, rest = divmod(read.time, _NS_PER_S)
     when = f"{time.strftime('%H:%M:%S', time.localtime(seconds))}.{rest // 1_000_000:03}"
@@ -80,12 +80,15 @@ def plain_line(line: dict[str, Any]) -> str:
 
 
 def _of_set(line: SetLine) -> str:
-    first = min((stamp for stamp in line.stamps.values() if stamp is not None), default=0)
-    offsets = ", ".join(f"{topic} {_offset(stamp, first)}" for topic, stamp in line.stamps.items())
-    return f"set, span {words.duration(line.span)}, latency {words.duration(line.latency)}: {offsets}"
+    matched = {
+        topic: None if stamp is None else stamp + line.offsets.get(topic, 0) for topic, stamp in line.stamps.items()
+    }
+    first = min((stamp for stamp in matched.values() if stamp is not None), default=0)
+    inputs = ", ".join(f"{topic} {_after(stamp, first)}" for topic, stamp in matched.items())
+    return f"set, span {words.duration(line.span)}, latency {words.duration(line.latency)}: {inputs}"
 
 
-def _offset(stamp: int | None, first: int) -> str:
+def _after(stamp: int | None, first: int) -> str:
     return "missing" if stamp is None else f"+{words.duration(stamp - first)}"
 
 

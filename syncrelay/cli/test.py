@@ -4,7 +4,8 @@ import os
 import stat
 import tempfile
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from syncrelay.cases import Result, Suite, check, load_suite, updated
@@ -13,7 +14,7 @@ from syncrelay.cli.case_reports import REPORTS, FileResult, Report
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import ConfigError
-from syncrelay.config.source import STDIN, shown_name
+from syncrelay.config.source import STDIN, listed, shown_name
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
 
@@ -26,48 +27,69 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     return test(arguments.files, arguments.format, update=arguments.update)
 
 
-def test(files: Sequence[str], output_format: str, *, update: bool) -> int:
-    """Run the cases of test files and print what came of them as `text`, `junit`, `json` or `github`.
+def test(paths: Sequence[str], output_format: str, *, update: bool) -> int:
+    """Run the cases of test files, or of all files of a directory, and print what came of them.
 
-    1 if a case fails or a file has an error. `update` has the files expect what is, where they can.
+    That is `text`, `junit`, `json` or `github`; 1 if a case fails or a file has an error. `update` has the files expect
+    what was found, where they can.
     """
     report = REPORTS[output_format]()
-    runs = [_run(file, report) for file in files]
-    report.end([result for _, result in runs])
-    results = [_updated(*run) if update else run[1] for run in runs]
-    return DONE if all(result.passed for result in results) else AT_FAULT
+    results = [result for path in paths for result in _run_all(path, report, update=update)]
+    report.end(results)
+    return AT_FAULT if any(result.failed for result in results) else DONE
 
 
-def _run(file: str, report: Report) -> tuple[Suite | None, FileResult]:
-    name = shown_name(file)
+def _run_all(path: str, report: Report, *, update: bool) -> Iterator[FileResult]:
+    try:
+        files = listed(path)
+    except ConfigError as error:
+        yield _faulty(path, error, report)
+        return
+    for file in files:
+        yield _run(file, report, update=update)
+
+
+def _run(file: str, report: Report, *, update: bool) -> FileResult:
     try:
         suite = load_suite(file)
     except ConfigError as error:
-        result = FileResult(name, error.problems, ())
-        report.fault(result)
-        return None, result
+        return _faulty(file, error, report)
+    name = shown_name(file)
     report.begin(name)
-    return suite, FileResult(name, (), tuple(_told(check(suite), report, name)))
+    results = _updated(suite, tuple(check(suite))) if update else check(suite)
+    return FileResult(name, (), tuple(_told(results, report, name)))
 
 
-def _told(results: Iterator[Result], report: Report, name: str) -> Iterator[Result]:
+def _faulty(file: str, error: ConfigError, report: Report) -> FileResult:
+    result = FileResult(shown_name(file), error.problems, ())
+    report.fault(result)
+    return result
+
+
+def _told(results: Iterable[Result], report: Report, name: str) -> Iterator[Result]:
     for result in results:
         report.case(name, result)
         yield result
 
 
-def _updated(suite: Suite | None, result: FileResult) -> FileResult:
-    """Write what was found into a test file; return what is still not as it shall be."""
-    if suite is None:
-        return result
-    mismatches = [each for case in result.cases for each in case.mismatches]
-    renewed = [each for each in mismatches if each.renewed is not None]
-    if renewed:
-        (source,) = suite.document.sources.values()
+def _updated(suite: Suite, results: Sequence[Result]) -> Sequence[Result]:
+    """Write what was found into a test file, and return the results with what is still not as it shall be."""
+    renewed = [each for result in results for each in result.mismatches if each.renewed is not None]
+    if not renewed:
+        return results
+    (source,) = suite.document.sources.values()
+    try:
         _replace(suite.name, updated(suite.document, source, renewed))
-        remark(f"{result.name}: {counted(len(renewed), 'expectation')} updated")
-    cases = (case for case in result.cases if case.error or any(each.renewed is None for each in case.mismatches))
-    return FileResult(result.name, result.problems, tuple(cases))
+    except SyncRelayError as error:
+        remark(str(error))
+        return results
+    remark(f"{suite.name}: {counted(len(renewed), 'expectation')} updated")
+    return [_as_updated(result) for result in results]
+
+
+def _as_updated(result: Result) -> Result:
+    left = tuple(each for each in result.mismatches if each.renewed is None)
+    return replace(result, mismatches=left or result.mismatches, updated=bool(result.mismatches) and not left)
 
 
 def _replace(file: str, text: str) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple, TypeAlias
 
-from syncrelay.config.problems import Path, Problem, Severity, Span, dotted
+from syncrelay.config.problems import ConfigError, Path, Problem, Severity, Span, dotted
 from syncrelay.config.source import Source
 from syncrelay.config.wording import LIKENESS, nearest, or_nearest
 from syncrelay.printable import printable
@@ -97,6 +97,11 @@ class Document:
         return self.sources[span.source].problem(
             text, code=code, span=span, path=dotted(path), severity=severity, subject=subject
         )
+
+    def refuse_other_kind(self, key: str, *, own: str, text: str) -> None:
+        """Raise ConfigError for a file of another kind: it has this key and not the one of its own kind."""
+        if self.has((key,)) and not self.has((own,)):
+            raise ConfigError([self.problem((key,), text, code="other_kind", span=self.key_span((key,)))])
 
     def line(self, path: Path, *, beside: Path) -> str:
         """Return the line of a value, and its file where that is another than the one of the value beside it."""

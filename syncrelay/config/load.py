@@ -27,6 +27,7 @@ from syncrelay.config.typechecks import check_types
 from syncrelay.config.yaml_tree import compose
 
 _LEAST: Final = "at least `version: 1` and `groups:`"
+_TESTS: Final = "this looks like a test file, which `syncrelay test` runs: expected a file with `groups:`"
 _NO_INDEX = "message types were not checked: there is no ament index here (source ROS 2, or install with '.[ros]')"
 
 
@@ -141,6 +142,7 @@ def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) ->
 
 def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Part:
     document, problems = compose(source, environ, expected=_LEAST)
+    document.refuse_other_kind("cases", own="groups", text=_TESTS)
     document = with_defaults(document)
     keys = plain(document.root)
     if isinstance(keys, dict) and not is_alone:

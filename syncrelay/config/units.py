@@ -45,11 +45,27 @@ def parse_duration(value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a duration such as 20ms, found {describe(value)}")  # noqa: TRY004
     if isinstance(value, str):
-        return _whole_ns(*_number_and_unit(value), found=value)
+        number, unit = _number_and_unit(value)
+        if not unit:
+            raise ValueError(
+                f"the string {quoted(value)} has no unit: write {number}ms, or {number} without quotes for seconds"
+            )
+        return _whole_ns(Decimal(number), _unit_ns(number, unit), found=value)
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"expected a duration such as 20ms, found {describe(value)}")
     # repr gives the digits that were written, where the float itself is a little off.
     return _whole_ns(Decimal(repr(value)), NS_PER_UNIT["s"], found=f"{value} s")
+
+
+def parse_duration_text(text: str) -> tuple[int, str]:
+    """Return the nanoseconds of a text that cannot be a number of seconds, as in a command line, and its unit.
+
+    Raises ValueError as `parse_duration` does.
+    """
+    number, unit = _number_and_unit(text)
+    if not unit:
+        raise ValueError(f"{quoted(text)} has no unit, expected one such as `{number}ms`")
+    return _whole_ns(Decimal(number), _unit_ns(number, unit), found=text), unit.replace("μ", "µ")
 
 
 def parse_rate(value: object) -> int:
@@ -82,22 +98,23 @@ def _hertz(text: str) -> Decimal:
     return Decimal(number) * _HERTZ[unit]
 
 
-def _number_and_unit(text: str) -> tuple[Decimal, int]:
+def _number_and_unit(text: str) -> tuple[str, str]:
     matched = _DURATION.fullmatch(text.strip())
     if matched is None:
         raise ValueError(f"expected a duration such as 20ms, found {describe(text)}")
     number, unit = matched.groups()
-    if not unit:
-        raise ValueError(
-            f"the string {quoted(text)} has no unit: write {number}ms, or {number} without quotes for seconds"
-        )
+    return number, unit
+
+
+def _unit_ns(number: str, unit: str) -> int:
+    """Return the nanoseconds of a unit; raises ValueError saying how the number is written with one that is known."""
     known = NS_PER_UNIT.get(unit.replace("μ", "µ"))
     if known is None:
         lowered = unit.lower()
         meant = lowered if lowered in NS_PER_UNIT else _MEANT.get(lowered)
         hint = f", did you mean `{number}{meant}`?" if meant else f", expected {_UNITS}"
         raise ValueError(f"unknown unit {quoted(unit)}{hint}")
-    return Decimal(number), known
+    return known
 
 
 def _whole_ns(number: Decimal, unit_ns: int, *, found: str) -> int:

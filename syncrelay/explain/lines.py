@@ -12,8 +12,9 @@ def set_line(
 ) -> dict[str, Any]:
     """Return the line of a set, as what json.dumps takes; `received` is when its last message was.
 
-    `span` is that of the stamps as they are matched, with the inputs' offsets. `latency` is how long the set waited
-    since its last message was received. `topics` are the inputs' full names.
+    `stamps` are as they came; they are matched with the `offsets` of the inputs that have one, and `span` is that of
+    the sums. `latency` is how long the set waited since its last message was received. `topics` are the inputs' full
+    names.
     """
     pairs = zip(stamps, group.topics, strict=True)
     matched = [stamp + topic.offset_ns for stamp, topic in pairs if stamp is not None]
@@ -22,6 +23,7 @@ def set_line(
         "group": group.name,
         "time": left,
         "stamps": named,
+        "offsets": {name: topic.offset_ns for name, topic in zip(topics, group.topics, strict=True) if topic.offset_ns},
         "span": max(matched) - min(matched),
         "latency": left - received,
         "missing": [topic for topic, stamp in named.items() if stamp is None],

@@ -9,15 +9,15 @@ The same faults, seed and messages give the same messages.
 
 import random
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
 from syncrelay.config.names import check_topic_name
-from syncrelay.config.units import parse_duration
-from syncrelay.config.wording import did_you_mean, one_of, quoted
+from syncrelay.config.units import parse_duration_text
+from syncrelay.config.wording import counted, did_you_mean, one_of, quoted
 
 _MILLION: Final = 1_000_000
 _BILLION: Final = 1_000_000_000
@@ -70,10 +70,10 @@ def parse_fault(text: str) -> Fault:
     kinds = {kind.value: kind for kind in Kind}
     kind = kinds.get(name.strip())
     if not colon:
-        raise ValueError(f"{quoted(text)} is no fault, expected one such as {quoted(_EXAMPLES[Kind.LATE])}")
+        raise ValueError(f"{quoted(text)} is not a fault, expected one such as {quoted(_EXAMPLES[Kind.LATE])}")
     if kind is None:
         hint = did_you_mean(name.strip(), kinds) or f", expected {one_of(kinds)}, as in `late: /lidar/points 80ms`"
-        raise ValueError(f"{quoted(text)} is no fault{hint}")
+        raise ValueError(f"{quoted(text)} is not a fault{hint}")
     words: Sequence[str]
     topic, *words = rest.split() or [""]
     if not topic:
@@ -95,10 +95,16 @@ _EXAMPLES: Final[Mapping[Kind, str]] = MappingProxyType(
 )
 
 
+def _duration(word: str) -> int:
+    return parse_duration_text(word)[0]
+
+
 def _late(word: str) -> int:
-    delay = parse_duration(word)
+    delay = _duration(word)
     if not 0 <= delay <= MOST_LATE:
-        raise ValueError(f"{quoted(word)} is out of range, expected 0 to 60s: so long messages are held in memory")
+        raise ValueError(
+            f"{quoted(word)} is out of range, expected 0 to 60s, because messages are held in memory for that long"
+        )
     return delay
 
 
@@ -106,7 +112,7 @@ def parse_share(word: str) -> int:
     """Return the millionths of a text such as 10%; raises ValueError for another."""
     found = _SHARE.fullmatch(word)
     if found is None or float(found[1]) > 100:  # noqa: PLR2004  all there is
-        raise ValueError(f"expected a share of 0% to 100%, 4 decimals at most, found {quoted(word)}")
+        raise ValueError(f"expected a share such as 10% (0% to 100%, at most 4 decimals), found {quoted(word)}")
     return round(float(found[1]) * _MILLION / 100)
 
 
@@ -114,13 +120,13 @@ def _drift(word: str) -> int:
     found = _PARTS.fullmatch(word)
     if found is None or abs(float(found[1])) > _MOST_PARTS:
         raise ValueError(
-            f"expected a drift such as 100ppm, {_MOST_PARTS}ppm and 3 decimals at most, found {quoted(word)}"
+            f"expected a drift such as 100ppm (at most {_MOST_PARTS}ppm, 3 decimals), found {quoted(word)}"
         )
     return round(float(found[1]) * 1000)
 
 
 _READERS: Final[Mapping[Kind, Callable[[str], int]]] = MappingProxyType(
-    {Kind.LATE: _late, Kind.DROP: parse_share, Kind.OFFSET: parse_duration, Kind.DRIFT: _drift}
+    {Kind.LATE: _late, Kind.DROP: parse_share, Kind.OFFSET: _duration, Kind.DRIFT: _drift}
 )
 
 
@@ -140,10 +146,10 @@ def _window(words: Sequence[str], text: str) -> tuple[int, int | None]:
     for word, moment in zip(words[::2], [*words[1::2], ""], strict=False):
         if word not in ("from", "until") or word in found:
             raise ValueError(f"{quoted(word)} in {quoted(text)}: expected `from 12s`, `until 20s` or both")
-        found[word] = parse_duration(moment)
+        found[word] = _duration(moment)
     begin, end = found.get("from", 0), found.get("until")
     if begin < 0 or (end is not None and end <= begin):
-        raise ValueError(f"{quoted(text)} never holds: expected 0s or more, and an end after the begin")
+        raise ValueError(f"{quoted(text)} never applies: `from` must be 0s or later, and `until` later than `from`")
     return begin, end
 
 
@@ -159,36 +165,67 @@ class Disturbance:
             for each in faults
             if each.kind is Kind.DROP
         ]
+        self._topic = topic
+        self._of_all = faults
+        self._at_work: set[Fault] = set()
         self._began = began
         self._last = began
+        # When messages came, after the begin: of all how many, the first and the last.
+        self._came, self._first, self._latest = 0, 0, 0
         self.most_late: Final = sum(each.amount for each in faults if each.kind is Kind.LATE)
         self.changes_stamps: Final = any(each.kind in (Kind.OFFSET, Kind.DRIFT) for each in faults)
 
     def received(self, received: int) -> int | None:
         """Return when a message comes that would have come at a time; None if it is lost. All keep their order."""
         since = received - self._began
+        self._first = since if not self._came else self._first
+        self._latest = since
+        self._came += 1
         # Each is asked for each message: what one lost changes nothing of what another loses.
         lost = [
             fault for fault, chance in self._drops if chance.random() * _MILLION < fault.amount and fault.holds(since)
         ]
-        if lost or any(fault.kind is Kind.DEAD and fault.holds(since) for fault in self._faults):
+        lost += [fault for fault in self._faults if fault.kind is Kind.DEAD and fault.holds(since)]
+        if lost:
+            self._at_work.update(lost)
             return None
-        late = sum(fault.amount for fault in self._faults if fault.kind is Kind.LATE and fault.holds(since))
-        self._last = max(self._last, received + late)
+        late = [fault for fault in self._faults if fault.kind is Kind.LATE and fault.amount and fault.holds(since)]
+        self._at_work.update(late)
+        self._last = max(self._last, received + sum(fault.amount for fault in late))
         return self._last
 
     def stamp(self, stamp: int, received: int) -> int:
         """Return the stamp of a message that was received at a time, by the clock that is off; 0 stays unset."""
-        since = received - self._began
-        shift = 0
-        for fault in self._faults:
-            if fault.kind is Kind.OFFSET and fault.holds(since):
-                shift += fault.amount
-            elif fault.kind is Kind.DRIFT and since >= fault.begin:
-                # What a clock has gained it keeps.
-                until = since if fault.end is None else min(since, fault.end)
-                shift += (until - fault.begin) * fault.amount // _BILLION
-        return stamp + shift if stamp else stamp
+        if not stamp:
+            return stamp
+        shifts = {fault: _shift(fault, received - self._began) for fault in self._faults}
+        self._at_work.update(fault for fault, shift in shifts.items() if shift)
+        return stamp + sum(shifts.values())
+
+    def idle(self) -> Iterator[str]:
+        """Yield a sentence for each fault that has changed no message so far."""
+        for fault in self._of_all:
+            if fault not in self._at_work:
+                yield f"{quoted(fault.written)} changed nothing: {self._why_idle(fault)}"
+
+    def _why_idle(self, fault: Fault) -> str:
+        if not self._came:
+            return f"no group received a message of {self._topic}"
+        if fault.begin > self._latest or (fault.end is not None and fault.end <= self._first):
+            first, last = (f"{since / _BILLION:.3g} s" for since in (self._first, self._latest))
+            return f"the first message of {self._topic} came after {first}, the last after {last}"
+        return f"all {counted(self._came, 'message')} of {self._topic} are as they were"
+
+
+def _shift(fault: Fault, since: int) -> int:
+    """Return how far a clock is off so many nanoseconds after the begin."""
+    if fault.kind is Kind.OFFSET and fault.holds(since):
+        return fault.amount
+    if fault.kind is Kind.DRIFT and since >= fault.begin:
+        # What a clock has gained it keeps.
+        until = since if fault.end is None else min(since, fault.end)
+        return (until - fault.begin) * fault.amount // _BILLION
+    return 0
 
 
 def disturbances(faults: Sequence[Fault], topics: Sequence[str], *, seed: int, began: int) -> dict[str, Disturbance]:
@@ -196,6 +233,6 @@ def disturbances(faults: Sequence[Fault], topics: Sequence[str], *, seed: int, b
     for fault in faults:
         if fault.topic not in topics:
             there = did_you_mean(fault.topic, topics) or f", expected {one_of(dict.fromkeys(topics))}"
-            raise ValueError(f"{quoted(fault.written)}: there is no {fault.topic}{there}")
+            raise ValueError(f"{quoted(fault.written)}: there is no topic {quoted(fault.topic)}{there}")
     of = {topic: [fault for fault in faults if fault.topic == topic] for topic in topics}
     return {topic: Disturbance(each, topic=topic, seed=seed, began=began) for topic, each in of.items() if each}

@@ -1,6 +1,7 @@
 """What the graph shows: its nodes and topics, and of a topic's endpoints why they do not connect to us."""
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -11,6 +12,7 @@ from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 
 from syncrelay.config.names import is_topic_name
+from syncrelay.config.names_in_graph import DIAGNOSTICS, MANIFEST_TYPE
 from syncrelay.environment.domain import range_of
 from syncrelay.explain import Endpoint, GraphSnapshot, Mismatch
 from syncrelay.printable import printable
@@ -149,6 +151,27 @@ def _topics_by_node(node: Any) -> Iterator[tuple[str, Sequence[str]]]:
     for name, namespace in node.get_node_names_and_namespaces():
         with suppress(NodeNameNonExistentError, UnicodeDecodeError):
             yield from node.get_publisher_names_and_types_by_node(name, namespace)
+
+
+def is_relayed(node: Any, publisher: Any, name: str) -> bool:
+    """Tell whether a topic is a relay's output: its publisher subscribes what its name ends with, as that type.
+
+    While a lazy group sleeps, nothing is subscribed: who publishes manifests is a relay too, and they are no input.
+    """
+    named = publisher.node_name, publisher.node_namespace
+    try:
+        subscribed = node.get_subscriber_names_and_types_by_node(*named)
+        published = node.get_publisher_names_and_types_by_node(*named)
+    except (NodeNameNonExistentError, UnicodeDecodeError):
+        return False
+    tells_sets = re.compile(re.escape(f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}") + "/[^/]+/sets")
+    return any(
+        name != original and name.endswith(original) and publisher.topic_type in types for original, types in subscribed
+    ) or (
+        # Others publish that too.
+        name != DIAGNOSTICS
+        and any(MANIFEST_TYPE in types and tells_sets.fullmatch(topic) for topic, types in published)
+    )
 
 
 def topics_alike(name: str, type_name: str | None, topics: Iterable[tuple[str, Sequence[str]]]) -> tuple[str, ...]:

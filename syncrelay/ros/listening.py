@@ -1,7 +1,6 @@
 """The graph listened to for a while: of every topic that is stamped, when its messages were made and received."""
 
 import os
-import re
 import time
 from array import array
 from collections.abc import Mapping
@@ -10,20 +9,18 @@ from typing import Any, Final
 
 from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSReliabilityPolicy
 
 from syncrelay.cdr import read_stamp
 from syncrelay.config import QosOverrides
 from syncrelay.config.interfaces import Interfaces
-from syncrelay.config.names_in_graph import DIAGNOSTICS, MANIFEST_TYPE
 from syncrelay.dataflow.backend import Payload, RclBackend, Source
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import RosUnavailableError, TypeImportError
 from syncrelay.printable import printable
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.entities import never_called
-from syncrelay.ros.graph import is_nameless, published_topics
+from syncrelay.ros.graph import is_nameless, is_relayed, published_topics
 from syncrelay.ros.hidden_node import join
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.types import begins_with_header, import_type
@@ -163,27 +160,6 @@ class _Listener:
         source = self._backend.source(subscription, take)
         self._subscribed.append((subscription, source))
         self._loop.add(source, _give_up)
-
-
-def is_relayed(node: Any, publisher: Any, name: str) -> bool:
-    """Tell whether a topic is a relay's output: its publisher subscribes what its name ends with, as that type.
-
-    While a lazy group sleeps, nothing is subscribed: who publishes manifests is a relay too, and they are no input.
-    """
-    named = publisher.node_name, publisher.node_namespace
-    try:
-        subscribed = node.get_subscriber_names_and_types_by_node(*named)
-        published = node.get_publisher_names_and_types_by_node(*named)
-    except (NodeNameNonExistentError, UnicodeDecodeError):
-        return False
-    tells_sets = re.compile(re.escape(f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}") + "/[^/]+/sets")
-    return any(
-        name != original and name.endswith(original) and publisher.topic_type in types for original, types in subscribed
-    ) or (
-        # Others publish that too.
-        name != DIAGNOSTICS
-        and any(MANIFEST_TYPE in types and tells_sets.fullmatch(topic) for topic, types in published)
-    )
 
 
 def _is_reliable(profile: Any) -> bool:

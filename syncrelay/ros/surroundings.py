@@ -31,16 +31,18 @@ class Surroundings:
         self._bindings: frozenset[InputBinding] = frozenset()
         self._around: dict[InputBinding, _Around] = {}
         self._rivals_since: dict[InputBinding, int] = {}
+        self._relayed: dict[str, bool] = {}
 
     def watch(self, bindings: Iterable[InputBinding]) -> None:
         """Forget all but these."""
         self._bindings = frozenset(bindings)
-        self._around.clear()
+        self.forget()
         self._rivals_since = {each: since for each, since in self._rivals_since.items() if each in self._bindings}
 
     def forget(self) -> None:
         """Poll the graph again for each, as it has changed."""
         self._around.clear()
+        self._relayed.clear()
 
     def empty_graph(self) -> GraphSnapshot | None:
         """Return the graph if no other node is in it. It is asked only while a topic has no publisher."""
@@ -90,10 +92,17 @@ class Surroundings:
         )
 
     def _alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
-        """Find what may have been meant: our own outputs are not it."""
+        """Find what may have been meant: our own outputs, and those of other relays, are not it."""
         outputs = {self._node.resolve_topic_name(binding.output) for binding in self._bindings}
         published = graph.published_topics(self._node).items()
-        return graph.topics_alike(name, type_name, [each for each in published if each[0] not in outputs])
+        of_type = [each for each in published if type_name in (None, *each[1]) and each[0] not in outputs]
+        return graph.topics_alike(name, type_name, [each for each in of_type if not self._is_relayed(each[0])])
+
+    def _is_relayed(self, name: str) -> bool:
+        if name not in self._relayed:
+            publishers = self._node.get_publishers_info_by_topic(name)
+            self._relayed[name] = any(graph.is_relayed(self._node, each, name) for each in publishers)
+        return self._relayed[name]
 
 
 def _unpublished(binding: InputBinding, output: str) -> Refusal | None:

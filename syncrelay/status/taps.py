@@ -78,7 +78,7 @@ class Query:
         try:
             fields = parse_qs(text, max_num_fields=_MOST_FIELDS, errors="strict")
         except ValueError as error:
-            raise _bad("that is no query of a tap") from error
+            raise _bad("this is not a valid /tap query") from error
         for key in fields:
             if key not in _KEYS:
                 raise _bad(f"there is no {key!a}: expected {', '.join(_KEYS)}")

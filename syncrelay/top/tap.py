@@ -17,11 +17,12 @@ _NAME_BYTES: Final = 8
 
 @dataclass(frozen=True, slots=True)
 class SetLine:
-    """A set; times and durations in nanoseconds."""
+    """A set; times and durations in nanoseconds. Stamps are as they came, without the `offsets` of their inputs."""
 
     group: Text
     time: int
     stamps: Mapping[Text, int | None]
+    offsets: Mapping[Text, int]
     span: int
     latency: int
 

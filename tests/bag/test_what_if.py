@@ -26,6 +26,15 @@ def _read(path, *faults, seed=0):
         return [(channel.topic, received, payload) for batch in batches for channel, received, payload in batch]
 
 
+def _idle(path, *faults):
+    """What is said of faults that changed nothing, once all that a group wants is read."""
+    with closing(open_recording([str(path)])) as recording:
+        disturbed = Disturbed(recording, [parse_fault(fault) for fault in faults], seed=0)
+        wanted = [channel for channel in disturbed.channels if channel.topic == "/lidar"]
+        assert sum(map(len, disturbed.batches(wanted)))
+        return disturbed.idle()
+
+
 def _as_recorded(change=lambda frame: frame):
     changed = [change(frame) for frame in FRAMES]
     return [(each.topic, each.time, each.payload) for each in changed if each is not None]
@@ -98,15 +107,15 @@ def test_the_stamps_of_a_ros_1_bag_are_changed_too(tmp_path):
 
 
 def test_no_more_is_held_than_comes_in_a_minute(bag):
-    with pytest.raises(UsageError, match="late by 61s in all, at most 60s"):
+    with pytest.raises(UsageError, match="late by 61s in all, expected 60s at most"):
         _read(bag, "late: /lidar 60s", "late: /lidar 1s", "late: /camera 1s")
 
 
 @pytest.mark.parametrize(
     ("fault", "error"),
     [
-        ("late: /lida 1ms", "there is no /lida, did you mean `/lidar`?"),
-        ("offset: /note 1ms", "rig_msgs/msg/Note has no std_msgs/msg/Header at its begin"),
+        ("late: /lida 1ms", "there is no topic `/lida`, did you mean `/lidar`?"),
+        ("offset: /note 1ms", "rig_msgs/msg/Note does not begin with a std_msgs/msg/Header"),
     ],
 )
 def test_a_fault_that_cannot_be_is_refused(fault, error, tmp_path):
@@ -118,3 +127,25 @@ def test_a_fault_that_cannot_be_is_refused(fault, error, tmp_path):
     paths = [str(tmp_path / "notes.mcap"), str(tmp_path / "rig.mcap")]
     with closing(open_recording(paths)) as recording, pytest.raises(UsageError, match=error):
         Disturbed(recording, [parse_fault(fault)], seed=0)
+
+
+@pytest.mark.parametrize(
+    ("fault", "why"),
+    [
+        ("dead: /lidar from 10s", "the first message of /lidar came after 0 s, the last after 3.9 s"),
+        ("late: /lidar 3ms from 10s until 11s", "the first message of /lidar came after 0 s, the last after 3.9 s"),
+        ("drop: /lidar 0%", "all 40 messages of /lidar are as they were"),
+        ("late: /lidar 0s", "all 40 messages of /lidar are as they were"),
+        ("offset: /lidar 0s", "all 40 messages of /lidar are as they were"),
+        ("dead: /camera", "no group received a message of /camera"),
+    ],
+)
+def test_a_fault_that_changes_nothing_is_told_with_the_reason(bag, fault, why):
+    assert _idle(bag, fault, "late: /lidar 3ms") == [f"`{fault}` changed nothing: {why}"]
+
+
+@pytest.mark.parametrize(
+    "fault", ["dead: /lidar from 3.9s", "drop: /lidar 50%", "offset: /lidar 1ns", "drift: /lidar 1ppm from 1s until 2s"]
+)
+def test_of_a_fault_that_changes_something_nothing_is_told(bag, fault):
+    assert _idle(bag, fault) == []

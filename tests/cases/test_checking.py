@@ -91,6 +91,42 @@ def test_findings_are_those_of_the_judge(tmp_path, what_if, code):
     assert found(tmp_path, {"findings": ["alone"]}, {**RATES, "what_if": what_if}) == {"findings": code}
 
 
+@pytest.mark.parametrize(
+    ("expected", "told"),
+    [
+        ({"match_rate": "< 98.765%"}, ("< 98.765%", "100%", "<= 100%")),
+        ({"match_rate": "< 0.9"}, ("< 0.9", "1", "<= 1")),
+        ({"match_rate": "50%"}, ("50%", "100%", "100%")),
+        ({"span_max": "> 1s"}, ("> 1s", "5ms", ">= 5ms")),
+        ({"span_max": "< 4500us"}, ("< 4500us", "5000us", "<= 5000us")),
+        ({"span_max": "> 0.02s"}, ("> 0.02s", "5ms", ">= 5ms")),
+        ({"span_max": "== 0.02s"}, ("== 0.02s", "5ms", "== 5ms")),
+        ({"span_max": "< 0.004 s"}, ("< 0.004s", "5ms", "<= 5ms")),
+        ({"span_max": "6ms"}, ("6ms", "5ms", "5ms")),
+        ({"span_max": 0.006}, ("6ms", "5ms", "5ms")),
+        ({"latency_max": "> 1min"}, ("> 1min", "0min", ">= 0min")),
+    ],
+)
+def test_figures_are_told_in_the_unit_that_the_file_has(tmp_path, expected, told):
+    (mismatch,) = run(tmp_path, {**RATES, "expect": expected}).mismatches
+    assert (*mismatch.expected, *mismatch.found, mismatch.renewed) == told
+
+
+def test_of_a_share_in_percent_as_many_digits_are_told_as_of_one(tmp_path):
+    case = {"drawing": "camera |abc\nlidar  |A..\n"}
+    assert found(tmp_path, {"match_rate": "> 98%"}, {**case, "inputs": {"lidar": {"latency": "1ms"}}}) == {}
+    thirds = {"drawing": "camera |abc\nlidar  |A.........BC\n"}
+    assert found(tmp_path, {"match_rate": "> 98%"}, thirds) == {"match_rate": "33.33%"}
+
+
+def test_a_fault_that_changes_nothing_is_remarked_on(tmp_path):
+    result = run(tmp_path, {**RATES, "what_if": ["dead: lidar from 30s"], "expect": {"sets": 200}})
+    assert result.passed
+    assert result.remarks == (
+        "`dead: lidar from 30s` changed nothing: the first message of /lidar came after 0.005 s, the last after 19.9 s",
+    )
+
+
 def test_without_a_set_there_is_no_span_to_expect(tmp_path):
     result = run(tmp_path, {**RATES, "what_if": ["dead: /lidar"], "expect": {"span_p95": "< 1ms"}})
     assert [(each.found, each.renewed) for each in result.mismatches] == [(("no set left",), None)]
@@ -117,15 +153,16 @@ def test_a_recording_is_run_as_replay_runs_it(tmp_path):
         "received": "40",
         "findings": "healthy",
     }
-    late = {"recording": "rig.mcap", "what_if": ["dead: /lidar from 2s"]}
-    assert found(tmp_path, {"sets": 1}, late, **RECORDED) == {"sets": "20"}
+    for name in ("/lidar", "lidar"):
+        dead = {"recording": "rig.mcap", "what_if": [f"dead: {name} from 2s"]}
+        assert found(tmp_path, {"sets": 1}, dead, **RECORDED) == {"sets": "20"}
 
 
 @pytest.mark.parametrize(
     ("case", "error"),
     [
         ({"recording": "rg.mcap"}, "did you mean `rig.mcap`?"),
-        ({"recording": "rig.mcap", "what_if": ["drop: /lidr 3%"]}, "there is no /lidr, did you mean `/lidar`?"),
+        ({"recording": "rig.mcap", "what_if": ["drop: /lidr 3%"]}, "there is no topic `/lidr`, did you mean `/lidar`?"),
     ],
 )
 def test_what_cannot_be_run_fails_and_says_why(tmp_path, case, error):

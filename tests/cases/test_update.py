@@ -104,3 +104,15 @@ def test_a_share_that_no_digits_say_is_what_an_update_says(tmp_path):
     text = SHARED.replace("sets: 3", "match_rate: 0.5").replace("'lidar |ab'", '"lidar |abc\\ncamera |A..B..C"')
     new = updated_text(tmp_path, text)
     assert updated_text(tmp_path, new) == new
+
+
+@pytest.mark.parametrize("expected", ['"== 1s"', '"= 1us"', "1s", '"< 1ns"', '"> 1min"'])
+def test_a_duration_of_many_digits_holds_once_it_is_updated(tmp_path, expected):
+    write(tmp_path, {})
+    text = (
+        "version: 1\nconfig: fusion.yaml\ncases:\n  it:\n    inputs:\n      camera: {rate: 10 Hz}\n"
+        f"      lidar: {{rate: 10 Hz, phase: 1.23456789ms}}\n    lasts: 5s\n    expect: {{span_max: {expected}}}\n"
+    )
+    new = updated_text(tmp_path, text)
+    assert new != text
+    assert updated_text(tmp_path, new) == new

@@ -97,6 +97,14 @@ def test_comments_of_the_file_stay(folder, tmp_path):
     assert run("validate", str(written), folder=folder).returncode == 0
 
 
+def test_where_there_is_nothing_to_change_no_file_is_written(folder, tmp_path):
+    run("analyze", "rig.mcap", "--config", "f.yaml", "--write", "fits.yaml", folder=folder)
+    written = tmp_path / "new.yaml"
+    done = run("analyze", "rig.mcap", "--config", "fits.yaml", "--write", str(written), folder=folder)
+    assert (done.returncode, done.stderr) == (0, f"syncrelay: no values to change: {written} was not written\n")
+    assert not written.exists()
+
+
 def test_topics_without_a_file_get_one(folder, tmp_path):
     written = tmp_path / "new.yaml"
     done = run("analyze", "rig.mcap", *_TOPICS, "--write", str(written), folder=folder)

@@ -52,6 +52,7 @@ def test_with_json_there_is_a_line_a_set_and_the_summary_is_talk(folder):
         "group": "front",
         "time": rig()[2].time,
         "stamps": {"/camera": camera, "/lidar": lidar},
+        "offsets": {},
         "span": 3_000_000,
         "latency": 97_000_000,
         "missing": [],

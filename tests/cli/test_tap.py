@@ -22,8 +22,7 @@ from tests.top import states
 
 _MS = 1_000_000
 _AT = 1_700_000_000 * 1000 * _MS
-(GROUP,) = load_text(
-    """
+FILE = """
 version: 1
 groups:
   front:
@@ -35,7 +34,7 @@ groups:
       - {topic: /lidar, type: sensor_msgs/msg/Image}
       - {topic: /imu, type: sensor_msgs/msg/Imu, required: false}
 """
-).groups
+(GROUP,) = load_text(FILE).groups
 _TOPICS = [topic.topic for topic in GROUP.topics]
 A_SET = (_AT, _AT + 5 * _MS, None)
 A_DROP = RecentDrop(1, _AT, DropReason.OVERFLOW)
@@ -68,6 +67,13 @@ def test_each_set_and_drop_is_a_line_with_the_offset_of_each_input(tmp_path):
     drop = "front: drop, /lidar overflow (its queue was full), 2 ms after it was received"
     a_set = "front: set, span 5 ms, latency 2 ms: /camera +0 s, /lidar +5 ms, /imu missing"
     assert lines == [drop, drop, a_set, a_set]
+
+
+def test_a_set_is_shown_as_it_was_matched_with_the_offsets_of_the_file():
+    (group,) = load_text(FILE.replace("/lidar, ", "/lidar, offset: -5ms, ")).groups
+    line = set_line(group, _TOPICS, A_SET, left=_AT + 9 * _MS, received=_AT + 7 * _MS)
+    assert (line["stamps"]["/lidar"], line["offsets"]) == (_AT + 5 * _MS, {"/lidar": -5 * _MS})
+    assert plain_line(line).endswith("set, span 0 s, latency 2 ms: /camera +0 s, /lidar +0 s, /imu missing")
 
 
 def test_json_lines_are_those_of_replay(tmp_path):

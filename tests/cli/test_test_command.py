@@ -4,6 +4,7 @@ import io
 import json
 import random
 import sys
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -81,7 +82,8 @@ def test_people_read_a_line_a_case_and_what_differs(capsys):
 def test_what_is_can_be_what_shall_be_and_comments_stay(folder, capsys):
     (folder / "tests.yaml").chmod(0o640)
     assert run("tests.yaml", "--update") == 0
-    assert capsys.readouterr().err == "syncrelay: tests.yaml: 4 expectations updated\n"
+    shown = SHOWN.replace("FAIL", "updated").replace("1 passed, 2 failed", "1 passed, 2 updated, 0 failed")
+    assert capsys.readouterr() == (shown, "syncrelay: tests.yaml: 4 expectations updated\n")
     assert [line.split() for line in (folder / "tests.yaml").read_text().splitlines()] == [
         line.split() for line in UPDATED.splitlines()
     ]
@@ -101,7 +103,67 @@ def test_what_no_file_can_expect_still_fails_after_an_update(folder, capsys):
     case = {"inputs": {"camera": {"rate": "9 Hz"}}, "lasts": "1s", "expect": {"span_p95": "< 1ms", "sets": 1}}
     write(folder, case)
     assert run("tests.yaml", "--update") == 1
-    assert "span_p95: expected < 1ms, found no set left" in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert told.out == (
+        "tests.yaml\n  FAIL  it\n        span_p95: expected < 1ms, found no set left\n0 passed, 1 failed\n"
+    )
+    assert told.err == "syncrelay: tests.yaml: 1 expectation updated\n"
+
+
+def test_where_one_file_cannot_be_updated_the_others_are(folder, capsys):
+    (folder / "shared.yaml").write_text(
+        "version: 1\nconfig: fusion.yaml\nx-both: &both {received: 9}\ncases:\n"
+        "  one: {drawing: 'lidar |a', expect: *both}\n  two: {drawing: 'lidar |ab', expect: *both}\n"
+    )
+    assert run("shared.yaml", "tests.yaml", "--update") == 1
+    told = capsys.readouterr()
+    assert told.out.endswith("\n1 passed, 2 updated, 2 failed\n")
+    assert "syncrelay: shared.yaml: cannot be updated without changing more than was found" in told.err
+    assert run("tests.yaml") == 0
+
+
+@pytest.mark.usefixtures("folder")
+def test_programs_are_told_what_was_updated(capsys):
+    assert run("tests.yaml", "--update", "--format", "json") == 0
+    report = json.loads(capsys.readouterr().out)
+    assert (report["passed"], report["updated"], report["failed"]) == (1, 2, 0)
+    states = [(case["passed"], case["updated"]) for case in report["files"][0]["cases"]]
+    assert states == [(True, False), (False, True), (False, True)]
+
+
+@pytest.mark.parametrize(("output_format", "failures"), [("junit", "<failure"), ("github", "::error")])
+@pytest.mark.usefixtures("folder")
+def test_what_is_updated_fails_in_no_report(capsys, output_format, failures):
+    assert run("tests.yaml", "--update", "--format", output_format) == 0
+    assert failures not in capsys.readouterr().out
+
+
+def test_a_directory_stands_for_its_test_files(folder, capsys):
+    (folder / "tests").mkdir()
+    for name in ("b.yaml", "a.yml", "notes.txt"):
+        (folder / "tests" / name).write_text(UPDATED.replace("fusion.yaml", "../fusion.yaml"))
+    assert run("tests") == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert (shown[0], shown[4], shown[-1]) == ("tests/a.yml", "tests/b.yaml", "6 passed, 0 failed")
+    (folder / "empty").mkdir()
+    assert run("empty", "tests") == 1
+    told = capsys.readouterr()
+    assert told.err == "empty: no *.yaml or *.yml file in this directory\n"
+    assert told.out.endswith("6 passed, 0 failed, 1 file with errors\n")
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_remark_says_of_which_case_it_is(capsys):
+    text = SUITE.partition("  they never")[0] + "    what_if: ['dead: lidar from 9s']\n"
+    Path("tests.yaml").write_text(text)
+    assert run("tests.yaml") == 0
+    assert capsys.readouterr().err == (
+        "syncrelay: tests.yaml: they meet: `dead: lidar from 9s` changed nothing: the first message of /lidar came"
+        " after 0.01 s, the last after 0.01 s\n"
+    )
+    assert run("tests.yaml", "--format", "junit") == 0
+    (told,) = ET.fromstring(capsys.readouterr().out).iter("system-err")  # noqa: S314  our own
+    assert told.text.startswith("`dead: lidar from 9s` changed nothing: ")
 
 
 def test_a_case_with_the_name_of_a_number_is_updated_too(folder):

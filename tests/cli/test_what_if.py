@@ -32,7 +32,14 @@ def test_a_fault_changes_what_comes_and_is_named(replayed):
     assert (code, sets, said) == (0, "front: 40 sets", "")
     code, (sets, _, lidar), said = replayed("--what-if", "dead: /lidar from 2s", "--what-if", "offset: /lidar 5ms")
     assert (code, sets, lidar) == (0, "front: 20 sets", "front:   /lidar: 20 received, 20 in sets, 0 dropped")
-    assert said == "syncrelay: laid over the recording, with seed 0: `dead: /lidar from 2s`, `offset: /lidar 5ms`\n"
+    assert said == "syncrelay: faults laid over the recording (seed 0): `dead: /lidar from 2s`, `offset: /lidar 5ms`\n"
+
+
+def test_a_fault_that_changes_nothing_is_told(replayed):
+    code, (sets, *_), said = replayed("--what-if", "dead: /lidar from 30s")
+    assert (code, sets) == (0, "front: 40 sets")
+    why = "the first message of /lidar came after 0 s, the last after 3.9 s"
+    assert said.splitlines()[1] == f"syncrelay: `dead: /lidar from 30s` changed nothing: {why}"
 
 
 def test_a_seed_decides_what_is_lost(replayed):
@@ -43,8 +50,11 @@ def test_a_seed_decides_what_is_lost(replayed):
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        (("--what-if", "lat: /lidar 3ms"), "argument --what-if: `lat: /lidar 3ms` is no fault, did you mean `late`?"),
-        (("--what-if", "dead: /lida"), "`dead: /lida`: there is no /lida, did you mean `/lidar`?"),
+        (
+            ("--what-if", "lat: /lidar 3ms"),
+            "argument --what-if: `lat: /lidar 3ms` is not a fault, did you mean `late`?",
+        ),
+        (("--what-if", "dead: /lida"), "`dead: /lida`: there is no topic `/lida`, did you mean `/lidar`?"),
         (("--seed", "-1"), "expected a whole number of 0 or more, found -1"),
     ],
 )

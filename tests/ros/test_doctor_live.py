@@ -256,14 +256,15 @@ def test_names_are_those_after_remaps_also_of_remaps_for_the_relays_node(stage: 
     assert [topic["topic"] for topic in topics_of(report)] == ["/robot1/camera", "/points"]
 
 
-def test_several_topics_in_another_namespace_are_named_with_it(stage: Stage):
+def test_several_topics_in_another_namespace_are_named_with_it_and_not_the_outputs_of_a_relay(stage: Stage):
     player = stage.player({"/robot1/camera": VECTOR, "/robot1/imu": VECTOR})
     player.is_up()
     player.start(merged(now("/robot1/camera"), now("/robot1/imu")), speed=1)
+    stage.relay(config({"front": group("/robot1/camera", "/robot1/imu")}, diagnostics=None))
     _, problems, *_ = examine(
         stage,
         config({"front": group("/camera", "/imu")}),
-        until=lambda seen: seen.report["graph"]["n_topics"] == 2 and len(seen.problems) == 1,
+        until=lambda seen: seen.report["graph"]["n_topics"] == 4 and len(seen.problems) == 1,
     )
     (found,) = problems
     assert found["what"] == "front: nobody publishes /camera or /imu"

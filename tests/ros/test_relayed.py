@@ -1,10 +1,10 @@
-"""Which topics `init --from-graph` takes for a running relay's own."""
+"""Which topics are a running relay's own: nobody is to match those."""
 
 from types import SimpleNamespace
 
 import pytest
 
-listening = pytest.importorskip("syncrelay.ros.listening", reason="rclpy is not installed")
+graph = pytest.importorskip("syncrelay.ros.graph", reason="rclpy is not installed")
 
 _IMAGE, _MANIFEST = "sensor_msgs/msg/Image", "diagnostic_msgs/msg/DiagnosticArray"
 
@@ -23,7 +23,7 @@ def _graph(subscribed: dict[str, str], published: dict[str, str]) -> SimpleNames
 
 def _is_relayed(name: str, subscribed: dict[str, str], published: dict[str, str]) -> bool:
     publisher = SimpleNamespace(node_name="fusion", node_namespace="/robot", topic_type=published[name])
-    return listening.is_relayed(_graph(subscribed, published), publisher, name)
+    return graph.is_relayed(_graph(subscribed, published), publisher, name)
 
 
 _RELAY = {"/front/camera": _IMAGE, "/robot/fusion/front/sets": _MANIFEST, "/diagnostics": _MANIFEST}

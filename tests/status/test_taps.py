@@ -77,6 +77,7 @@ def test_sets_and_drops_are_told_in_the_order_in_which_they_left(taps, flow):
         "group": "front",
         "time": a_set["time"],
         "stamps": {"/robot/camera": BEGAN, "/robot/lidar": BEGAN + 5 * MS},
+        "offsets": {},
         "span": 5 * MS,
         "latency": a_set["time"] - BEGAN,
         "missing": [],
