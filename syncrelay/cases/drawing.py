@@ -165,7 +165,7 @@ def _add_lane(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
 def _faults_of_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean) -> Iterator[Fault]:
     moment, colon, left = line.strip().removeprefix(_ARROW).partition(":")
     moment = moment.strip()
-    if not colon or not left.strip():
+    if not colon or not moment or not left.strip():
         yield _fault(number, line, line.strip(), "expected what leaves at which message, such as `-> b: aA, c late`")
         return
     if moment not in drawing.marks and not _MOMENT.fullmatch(moment):

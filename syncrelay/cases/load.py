@@ -213,7 +213,7 @@ class _Reader:
         for name, source in case.inputs.items():
             at = (*path, "inputs", name)
             if name in places and first.setdefault(places[name], name) != name:
-                text = f"is the input that {quoted(first[places[name]])} is, expected it once"
+                text = f"is the same input as {quoted(first[places[name]])}: name it once"
                 self.report(at, text, span=self._document.key_span(at))
             self._check_source(at, source, is_drawn=places.get(name) in drawn)
 
