@@ -45,7 +45,7 @@ Length = Annotated[
 
 def _not_zero(duration: int) -> int:
     if not duration:
-        raise ValueError("expected a duration above 0: a column of the drawing is as long")
+        raise ValueError("expected a duration above 0: that of a column of the drawing")
     return duration
 
 
