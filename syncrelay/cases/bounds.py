@@ -12,9 +12,10 @@ from typing import Annotated, Any, Final
 from pydantic import BeforeValidator, InstanceOf, WithJsonSchema
 
 from syncrelay.config.units import NS_PER_UNIT, parse_duration, parse_duration_text
-from syncrelay.config.wording import describe, quoted
+from syncrelay.config.wording import describe
 
 _WRITTEN: Final = re.compile(r"\s*(<=|>=|==|<|>|=)?\s*(.*?)\s*", re.DOTALL)
+_BEGINS_NUMBER: Final = tuple("+-.0123456789")
 _COUNT: Final = re.compile("[0-9]{1,15}")
 _SHARE: Final = re.compile(r"([0-9]{1,3}(?:\.[0-9]{0,9})?|\.[0-9]{1,9})\s*(%?)")
 _COMPARE: Final[Mapping[str, Callable[[Any, Any], bool]]] = MappingProxyType(
@@ -104,25 +105,31 @@ def _bound(quantity: Quantity) -> Callable[[object], Bound]:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError(f"expected {quantity.value}, found {describe(value)}")  # noqa: TRY004
         if isinstance(value, float | int) and quantity is Quantity.DURATION:
-            return Bound(quantity, "", Decimal(parse_duration(value)), "ms")
+            return Bound(quantity, "", _not_negative(parse_duration(value), value), "ms")
         matched = _WRITTEN.fullmatch(value if isinstance(value, str) else repr(value))
         assert matched is not None  # noqa: S101  it matches anything
         comparison = matched[1] or ""
         if quantity is Quantity.DURATION:
-            return Bound(quantity, comparison, *_duration(matched[2], is_alone=not comparison))
+            return Bound(quantity, comparison, *_duration(comparison, matched[2], value))
         return Bound(quantity, comparison, *_number(quantity, matched[2], value))
 
     return parse
 
 
-def _duration(text: str, *, is_alone: bool) -> tuple[Decimal, str]:
-    if is_alone:
+def _duration(comparison: str, text: str, value: object) -> tuple[Decimal, str]:
+    if not text.startswith(_BEGINS_NUMBER):
+        raise ValueError(f"expected {Quantity.DURATION.value}, found {describe(value)}")
+    if not comparison:
         # What has no unit could be a number of seconds then: its error says so.
         parse_duration(text)
     number, unit = parse_duration_text(text)
-    if number < 0:
-        raise ValueError(f"expected a duration of 0 or more, found {quoted(text)}")
-    return Decimal(number), unit
+    return _not_negative(number, value), unit
+
+
+def _not_negative(nanoseconds: int, value: object) -> Decimal:
+    if nanoseconds < 0:
+        raise ValueError(f"expected a duration of 0 or more, found {describe(value)}")
+    return Decimal(nanoseconds)
 
 
 def _number(quantity: Quantity, text: str, value: object) -> tuple[Decimal, str]:

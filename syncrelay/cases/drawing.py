@@ -101,20 +101,25 @@ def _add_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean
         return
     word = _ARRIVE if stripped.startswith(_ARRIVE) else _KEYS
     if drawing.order is not None if word == _ARRIVE else drawing.keys:
-        yield _fault(number, line, word, f"`{word}` stands above already: expected one such line")
+        yield _fault(number, line, word, f"there is a `{word}` line above already")
         return
     words = stripped.removeprefix(word).split()
     if word == _ARRIVE:
         drawing.order = words
         if sorted(words) != sorted(drawing.marks):
-            text = "expected each letter of the lanes once, in the order of arrival"
+            text = "expected each drawn letter once, in the order of arrival"
             yield _fault(number, line, stripped, text)
         return
     drawing.keys = {letter: word for word in words for letter in word}
     # A key may be told by more than the letters that have it: `a1 A1`.
     of_words = [[letter for letter in word if letter in drawing.marks] for word in words]
     if not all(of_words) or any(count > 1 for count in Counter(chain(*of_words)).values()):
-        yield _fault(number, line, stripped, "expected words of drawn letters, each letter in one: those of one key")
+        yield _fault(
+            number,
+            line,
+            stripped,
+            "expected the drawn letters that share a key as one word each, such as `keys: aA bB`",
+        )
 
 
 def with_expected(text: str, lines: Sequence[str]) -> str:
@@ -157,7 +162,7 @@ def _add_lane(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
             text = f"{quoted(letter)} is not a message, expected a letter or digit, and `.` where nothing comes"
             yield Fault(number, begin + column, 1, text)
         elif letter in drawing.marks:
-            yield Fault(number, begin + column, 1, f"`{letter}` is drawn twice: each message has a letter of its own")
+            yield Fault(number, begin + column, 1, f"`{letter}` is drawn twice: each message needs a letter of its own")
         else:
             drawing.marks[letter] = Mark(label, column)
 
@@ -165,7 +170,7 @@ def _add_lane(drawing: Drawing, number: int, line: str) -> Iterator[Fault]:
 def _faults_of_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean) -> Iterator[Fault]:
     moment, colon, left = line.strip().removeprefix(_ARROW).partition(":")
     moment = moment.strip()
-    if not colon or not left.strip():
+    if not colon or not moment or not left.strip():
         yield _fault(number, line, line.strip(), "expected what leaves at which message, such as `-> b: aA, c late`")
         return
     if moment not in drawing.marks and not _MOMENT.fullmatch(moment):

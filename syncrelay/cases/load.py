@@ -175,7 +175,7 @@ class _Reader:
         if not drawing.labels and not drawing.faults:
             self.report(path, "nothing is drawn, expected lanes such as `lidar |a.bc`")
         if drawing.width * case.period > LONGEST:
-            self.report(path, f"is drawn longer than {MOST_SECONDS}s, with a period of {case.period / 1e9:g}s")
+            self.report(path, f"the drawing lasts longer than {MOST_SECONDS}s, at {case.period / 1e9:g}s a column")
         return drawing
 
     def _span(self, path: Place, lines: Sequence[str], fault: drawings.Fault) -> Span:
@@ -208,12 +208,12 @@ class _Reader:
             text = "missing, expected how long the inputs with a rate send, for example `lasts: 30s`"
             self.report((*path, "lasts"), text, code="missing_key", span=self._document.key_span((*path, "inputs")))
         if case.lasts is not None and sum(case.lasts // rate for rate in rates) > _MOST_MESSAGES:
-            self.report((*path, "lasts"), f"more than {_MOST_MESSAGES} messages would come: expected less time or rate")
+            self.report((*path, "lasts"), f"more than {_MOST_MESSAGES} messages: shorten `lasts` or lower a `rate`")
         first: dict[int, str] = {}
         for name, source in case.inputs.items():
             at = (*path, "inputs", name)
             if name in places and first.setdefault(places[name], name) != name:
-                text = f"is the input that {quoted(first[places[name]])} is, expected it once"
+                text = f"is the same input as {quoted(first[places[name]])}: name it once"
                 self.report(at, text, span=self._document.key_span(at))
             self._check_source(at, source, is_drawn=places.get(name) in drawn)
 

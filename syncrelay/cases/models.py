@@ -45,7 +45,7 @@ Length = Annotated[
 
 def _not_zero(duration: int) -> int:
     if not duration:
-        raise ValueError("expected a duration above 0: a column of the drawing is as long")
+        raise ValueError("expected a duration above 0: that of a column of the drawing")
     return duration
 
 
@@ -62,6 +62,17 @@ if TYPE_CHECKING:
 else:
     Reason = Literal[tuple(reason.value for reason in DropReason)]
     CodeName = Literal[tuple(code.value for code in Code)]
+
+
+def _one_or_more(codes: tuple[str, ...]) -> tuple[str, ...]:
+    if not codes:
+        raise ValueError("expected one code or more: `[healthy]` where nothing is wrong")
+    return codes
+
+
+Codes = Annotated[tuple[CodeName, ...], AfterValidator(_one_or_more), Field(json_schema_extra={"minItems": 1})]
+"""Codes of findings."""
+
 WhatIf = Annotated[
     InstanceOf[Fault],
     BeforeValidator(_fault),
@@ -173,7 +184,7 @@ class Expectation(InputExpectation):
     latency_max: Annotated[Time | None, NOT_NULL] = Field(
         default=None, description=f"The longest such wait. {_DURATION} Default: any.", examples=["<= 100ms"]
     )
-    findings: Annotated[tuple[CodeName, ...] | None, NOT_NULL] = Field(
+    findings: Annotated[Codes | None, NOT_NULL] = Field(
         default=None,
         description="What the relay would find for 3 s or longer, by code: exactly these. `healthy` alone is none."
         " Default: any.",

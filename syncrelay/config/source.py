@@ -179,7 +179,8 @@ def _reason(path: str, error: OSError) -> str:
 def _similar_file(path: Path) -> str:
     """Return a question for the YAML file beside a path whose name is most like it."""
     try:
-        by_stem = {file.stem: file for file in path.parent.iterdir() if file.suffix in (".yaml", ".yml")}
+        others = (file for file in path.parent.iterdir() if file != path)
+        by_stem = {file.stem: file for file in others if file.suffix in (".yaml", ".yml")}
     except OSError:
         return ""
     stem = nearest(path.stem, by_stem)

@@ -167,7 +167,8 @@ class Disturbance:
         ]
         self._topic = topic
         self._of_all = faults
-        self._at_work: set[Fault] = set()
+        # Those that have changed something, as they were written: a text is hashed once, a fault each time.
+        self._at_work: set[str] = set()
         self._began = began
         self._last = began
         # When messages came, after the begin: of all how many, the first and the last.
@@ -187,33 +188,37 @@ class Disturbance:
         ]
         lost += [fault for fault in self._faults if fault.kind is Kind.DEAD and fault.holds(since)]
         if lost:
-            self._at_work.update(lost)
+            self._at_work.update(fault.written for fault in lost)
             return None
         late = [fault for fault in self._faults if fault.kind is Kind.LATE and fault.amount and fault.holds(since)]
-        self._at_work.update(late)
-        self._last = max(self._last, received + sum(fault.amount for fault in late))
+        for fault in late:
+            self._at_work.add(fault.written)
+            received += fault.amount
+        self._last = max(self._last, received)
         return self._last
 
     def stamp(self, stamp: int, received: int) -> int:
         """Return the stamp of a message that was received at a time, by the clock that is off; 0 stays unset."""
         if not stamp:
             return stamp
-        shifts = {fault: _shift(fault, received - self._began) for fault in self._faults}
-        self._at_work.update(fault for fault, shift in shifts.items() if shift)
-        return stamp + sum(shifts.values())
+        for fault in self._faults:
+            if shift := _shift(fault, received - self._began):
+                self._at_work.add(fault.written)
+                stamp += shift
+        return stamp
 
     def idle(self) -> Iterator[str]:
         """Yield a sentence for each fault that has changed no message so far."""
         for fault in self._of_all:
-            if fault not in self._at_work:
+            if fault.written not in self._at_work:
                 yield f"{quoted(fault.written)} changed nothing: {self._why_idle(fault)}"
 
     def _why_idle(self, fault: Fault) -> str:
         if not self._came:
             return f"no group received a message of {self._topic}"
         if fault.begin > self._latest or (fault.end is not None and fault.end <= self._first):
-            first, last = (f"{since / _BILLION:.3g} s" for since in (self._first, self._latest))
-            return f"the first message of {self._topic} came after {first}, the last after {last}"
+            first, last = (f"{since / _BILLION:.3f}".rstrip("0").rstrip(".") for since in (self._first, self._latest))
+            return f"the first message of {self._topic} came after {first} s, the last after {last} s"
         return f"all {counted(self._came, 'message')} of {self._topic} are as they were"
 
 

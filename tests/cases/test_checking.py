@@ -122,9 +122,8 @@ def test_of_a_share_in_percent_as_many_digits_are_told_as_of_one(tmp_path):
 def test_a_fault_that_changes_nothing_is_remarked_on(tmp_path):
     result = run(tmp_path, {**RATES, "what_if": ["dead: lidar from 30s"], "expect": {"sets": 200}})
     assert result.passed
-    assert result.remarks == (
-        "`dead: lidar from 30s` changed nothing: the first message of /lidar came after 0.005 s, the last after 19.9 s",
-    )
+    why = "the first message of /lidar came after 0.005 s, the last after 19.905 s"
+    assert result.remarks == (f"`dead: lidar from 30s` changed nothing: {why}",)
 
 
 def test_without_a_set_there_is_no_span_to_expect(tmp_path):

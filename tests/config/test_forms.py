@@ -128,6 +128,8 @@ def test_a_file_that_is_not_there_is_named_with_one_that_is(tmp_path, monkeypatc
     assert text_of("fusion.yml") == "fusion.yml: no such file, did you mean `fusion.yaml`?"
     assert text_of("x/fusion.yaml") == "x/fusion.yaml: no such file"
     assert text_of("xyzzy") == "xyzzy: no such file"
+    (tmp_path / "link.yaml").symlink_to("nowhere")
+    assert text_of("link.yaml") == "link.yaml: no such file"
 
 
 def test_what_is_no_file_says_what_it_is(tmp_path):

@@ -198,8 +198,8 @@ def test_so_many_taps_are_answered_and_not_one_more(taps):
         (f"tap=a&after={'9' * 19}", "expected `after`"),
         ("tap=a&reason=lat", "expected as `reason` one of late"),
         ("tap=a&groups=front", "there is no 'groups'"),
-        ("tap=a&group=%ff", "no query of a tap"),
-        ("tap=a" + "&group=x" * 100, "no query of a tap"),
+        ("tap=a&group=%ff", "not a valid /tap query"),
+        ("tap=a" + "&group=x" * 100, "not a valid /tap query"),
     ],
 )
 def test_a_query_that_makes_no_sense_is_a_bad_request(query, text):
