@@ -116,8 +116,17 @@ def test_the_summary_accounts_for_every_message(stage: Stage):
     assert front.inputs["/lidar"].dropped["shutdown"] == 1
 
 
+# A busy machine may leave the collector no time for longer than the end waits for what was published last to be read.
+_PATIENT = """
+from syncrelay.ros import relay
+
+relay._ACKNOWLEDGE_NS *= 200
+"""
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
 def test_it_ends_in_order_while_messages_pour_in(stage: Stage, number: signal.Signals):
+    stage.before_each_relay(_PATIENT)
     recording = merged(
         jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1),
         jittery("/lidar", period_ms=5, jitter_ms=1, count=4000, seed=2),
