@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from tests.ros import relaying
-from tests.ros.cdr_messages import VECTOR
+from tests.ros.cdr_messages import VECTOR, stamp_of
 from tests.ros.configs import LOSSLESS, config, inputs
 from tests.ros.manifests import MANIFEST_TYPE, read
 from tests.ros.stage import Stage
@@ -100,7 +100,7 @@ def test_the_summary_accounts_for_every_message(stage: Stage):
     relay = stage.relay(config({"front": _FRONT}))
     player = stage.player(_PAIR)
     recording = merged(at("/camera", 0, 10, 20, 30, 40), at("/lidar", 0, 20, 40))
-    first_sets = relaying.connect(player, collector, recording, _PAIR_OUT)
+    relaying.connect(player, collector, recording, _PAIR_OUT)
     player.play(recording)
     relaying.conclude(player, collector, recording, _PAIR_OUT)
     player.play(at("/lidar", 10_000_000))
@@ -108,7 +108,7 @@ def test_the_summary_accounts_for_every_message(stage: Stage):
     relay.send(signal.SIGTERM)
     assert relay.wait() == 0
     front = read_summary(relay.stderr)["front"]
-    assert front.sets == first_sets + 4
+    assert len(relaying.sets_within(recording, collector, _PAIR_OUT)) == 3
     for topic in front.inputs.values():
         assert topic.received == topic.matched + sum(topic.dropped.values())
         assert topic.matched == front.sets
@@ -116,8 +116,17 @@ def test_the_summary_accounts_for_every_message(stage: Stage):
     assert front.inputs["/lidar"].dropped["shutdown"] == 1
 
 
+# A busy machine may leave the collector no time for longer than the end waits for what was published last to be read.
+_PATIENT = """
+from syncrelay.ros import relay
+
+relay._ACKNOWLEDGE_NS *= 200
+"""
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
 def test_it_ends_in_order_while_messages_pour_in(stage: Stage, number: signal.Signals):
+    stage.before_each_relay(_PATIENT)
     recording = merged(
         jittery("/camera", period_ms=5, jitter_ms=1, count=4000, seed=1),
         jittery("/lidar", period_ms=5, jitter_ms=1, count=4000, seed=2),
@@ -125,24 +134,28 @@ def test_it_ends_in_order_while_messages_pour_in(stage: Stage, number: signal.Si
     collector = stage.collector({**_PAIR_OUT, "/syncrelay/front/sets": MANIFEST_TYPE})
     relay = stage.relay(config({"front": _FRONT | {"policy": "approximate_time", "slop": "10ms"}}))
     player = stage.player(_PAIR)
-    first_sets = relaying.connect(player, collector, recording, [*_PAIR_OUT, "/syncrelay/front/sets"])
+    relaying.connect(player, collector, recording, [*_PAIR_OUT, "/syncrelay/front/sets"])
     player.start(recording, speed=1)
     collector.wait_for("/front/camera", 200)
     relay.send(number)
     assert relay.wait() == 0
-    sets = read_summary(relay.stderr)["front"].sets - first_sets
-    assert sets > 100
-    for output in _PAIR_OUT:
-        collector.process.wait_until(
-            lambda output=output: len(relaying.within(recording, collector.payloads(output))) == sets,
-            f"all {sets} sets of the summary on {output}",
-        )
+    last = read_summary(relay.stderr)["front"].sets
+    begin = min(stamp_of(frame.payload) for frame in recording)
 
     def told() -> list[int]:
-        return [read(payload).number for payload in collector.payloads("/syncrelay/front/sets")]
+        """The numbers of the recording's sets."""
+        manifests = map(read, collector.payloads("/syncrelay/front/sets"))
+        return [each.number for each in manifests if each.stamp >= begin]
 
-    due = [*range(first_sets + 1, first_sets + sets + 1)]
-    collector.process.wait_until(lambda: told()[-sets:] == due, "the manifests of all sets")
+    collector.process.wait_until(lambda: told()[-1:] == [last], "the manifest of the summary's last set")
+    numbers = told()
+    assert len(numbers) > 100
+    assert numbers == [*range(numbers[0], last + 1)]
+    for output in _PAIR_OUT:
+        collector.process.wait_until(
+            lambda output=output: len(relaying.within(recording, collector.payloads(output))) == len(numbers),
+            f"all {len(numbers)} sets of the summary on {output}",
+        )
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
