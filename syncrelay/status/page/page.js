@@ -131,7 +131,7 @@ function figuresOf(group) {
 
 function recentOf(group, width) {
   const {picture, reasons, hasSets, shown} = lanes(group, width);
-  return [element("h3", {}, `Recent sets: the last ${duration(shown)}, the newest on the right`), picture, legend(reasons, hasSets)];
+  return [element("h3", {}, `Recent ${hasSets ? "sets" : "messages"}: the last ${duration(shown)}, the newest on the right`), picture, legend(reasons, hasSets)];
 }
 
 function input(group, each) {
