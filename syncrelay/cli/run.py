@@ -109,7 +109,9 @@ def run(
         if server is not None:
             server.serve(relay.state, relay.taps)
             LOGGER.info(
-                "status and metrics: http://%s/; watch with `syncrelay top --url %s`", server.place, server.place.url
+                "status and metrics: http://%s/; open that in a browser, or watch with `syncrelay top --url %s`",
+                server.place,
+                server.place.url,
             )
         if config.node.services:
             relay.offer(services(relay, files))

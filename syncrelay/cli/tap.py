@@ -23,6 +23,7 @@ from syncrelay.wakeup import Wakeup
 # Seldom enough that to be asked costs the relay about a percent of a core.
 _ASKS_EVERY_S: Final = 0.1
 _NS_PER_S: Final = 1_000_000_000
+_WIDTH: Final = 120
 
 
 def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
@@ -76,7 +77,8 @@ def plain_line(line: dict[str, Any]) -> str:
     read = read_line(line)
     seconds, rest = divmod(read.time, _NS_PER_S)
     when = f"{time.strftime('%H:%M:%S', time.localtime(seconds))}.{rest // 1_000_000:03}"
-    return f"{when} {read.group}: {_of_set(read) if isinstance(read, SetLine) else _of_drop(read)}"
+    begin = f"{when} {read.group}:"
+    return f"{begin} {_of_set(read)}" if isinstance(read, SetLine) else _of_drop(begin, read)
 
 
 def _of_set(line: SetLine) -> str:
@@ -92,10 +94,11 @@ def _after(stamp: int | None, first: int) -> str:
     return "missing" if stamp is None else f"+{words.duration(stamp - first)}"
 
 
-def _of_drop(line: DropLine) -> str:
+def _of_drop(begin: str, line: DropLine) -> str:
+    """Say what the reason means where that fits."""
     meaning = {each.value: f" ({each.meaning})" for each in DropReason}.get(line.reason, "")
-    waited = words.duration(line.time - line.received)
-    return f"drop, {line.topic} {line.reason}{meaning}, {waited} after it was received"
+    what, waited = f"{begin} drop, {line.topic} {line.reason}", f" after {words.duration(line.time - line.received)}"
+    return f"{what}{meaning if len(what + meaning + waited) <= _WIDTH else ''}{waited}"
 
 
 def _require_names(relay: Answer, groups: Collection[str], inputs: Collection[str]) -> None:

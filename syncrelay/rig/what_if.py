@@ -138,7 +138,7 @@ def _amount(kind: Kind, words: Sequence[str], text: str) -> tuple[int, Sequence[
     until = next((at for at, word in enumerate(words) if word in ("from", "until")), len(words))
     if not until:
         raise ValueError(f"{quoted(text)} does not say how much, expected {quoted(_EXAMPLES[kind])}")
-    return reader("".join(words[:until])), words[until:]
+    return reader(" ".join(words[:until])), words[until:]
 
 
 def _window(words: Sequence[str], text: str) -> tuple[int, int | None]:

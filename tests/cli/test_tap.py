@@ -64,7 +64,7 @@ def test_each_set_and_drop_is_a_line_with_the_offset_of_each_input(tmp_path):
         done = run("tap", "--url", url, "-n", "4", folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     lines = sorted(re.sub(r"^\d\d:\d\d:\d\d\.009 ", "", line) for line in done.stdout.splitlines())
-    drop = "front: drop, /lidar overflow (its queue was full), 2 ms after it was received"
+    drop = "front: drop, /lidar overflow (its queue was full) after 2 ms"
     a_set = "front: set, span 5 ms, latency 2 ms: /camera +0 s, /lidar +5 ms, /imu missing"
     assert lines == [drop, drop, a_set, a_set]
 
@@ -149,3 +149,13 @@ groups:
     page = (Path(__file__).parents[2] / "docs" / "observe.md").read_text()
     for line in (a_set, a_drop):
         assert plain_line(line).split(maxsplit=1)[1] in page
+
+
+def test_what_a_reason_means_is_left_out_where_the_line_would_be_too_wide():
+    topic = f"/{'a' * 65}"
+    line = drop_line(GROUP, ["/camera", topic], A_DROP, left=_AT + 9 * _MS, received=_AT + 7 * _MS)
+    shown = plain_line(line | {"group": "front"})
+    assert shown.endswith(f" front: drop, {topic} overflow after 2 ms")
+    assert len(shown) <= 120
+    short = plain_line(line | {"topic": "/lidar"})
+    assert short.endswith(" overflow (its queue was full) after 2 ms")

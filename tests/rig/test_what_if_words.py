@@ -47,6 +47,7 @@ def test_a_fault_is_read(text, meaning):
         ("drop: /x 101%", "expected a share such as 10% (0% to 100%, at most 4 decimals), found `101%`"),
         ("drop: /x 0.00004%", "found `0.00004%`"),
         ("drift: /x 5", "expected a drift such as 100ppm (at most 100000ppm, 3 decimals), found `5`"),
+        ("drift: /x 100ppm 5", "found `100ppm 5`"),
         ("drift: /x 0.0004ppm", "found `0.0004ppm`"),
         ("dead: /x after 5s", "`after` in `dead: /x after 5s`: expected `from 12s`, `until 20s` or both"),
         ("dead: /x from 1s from 2s", "`from` in `dead: /x from 1s from 2s`: expected"),

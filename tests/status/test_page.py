@@ -165,3 +165,24 @@ def test_names_from_strangers_run_nothing_and_hide_nothing(browser):
         assert [line for line in lines if line.startswith(FORGED)] == []
         page.keyboard.press("j")
         assert opened_page.complaints == []
+
+
+def test_an_input_without_publishers_and_subscribers_says_so(browser):
+    told = states.nothing()
+    (report,) = told.groups
+    inputs = tuple(replace(each, graph=replace(each.graph, subscribers=())) for each in report.facts.inputs)
+    state = replace(told, groups=(replace(report, facts=replace(report.facts, inputs=inputs)),))
+    with watching(browser, state) as (opened_page, _):
+        shown = opened_page.page.locator("#group .input").first.inner_text()
+        assert "no publishers" in shown
+        assert "/front/camera/image_raw: no subscribers" in shown
+        assert "in total" in shown
+
+
+def test_without_sets_the_messages_of_the_slowest_input_are_apart(browser):
+    with watching(browser, states.rig(), at="#radar") as (opened_page, _):
+        places = opened_page.page.locator("#group .lanes .shape").evaluate_all(
+            "all => all.filter(each => each.closest('svg').getAttribute('role')).map(each => each.getCTM().e)"
+        )
+        assert len(places) > 10
+        assert max(places) - min(places) > 17 * (len(places) - 1)

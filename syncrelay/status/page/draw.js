@@ -54,7 +54,7 @@ function sparkline(label, values, sample) {
 }
 
 // The newest stamp is on the right; so much time is shown that sets are apart.
-const LANE = 34, APART = 18, LABEL = 150, LABEL_ON_A_PHONE = 92;
+const LANE = 34, APART = 18, LETTER = 7.2, LABEL_SHARE = 0.27;
 
 function lanes(group, width) {
   const shifts = group.inputs.map((input) => input.offset_ms * NS_PER_MS);
@@ -62,9 +62,10 @@ function lanes(group, width) {
     ? {stamps: each.set.map((stamp, at) => (stamp === null ? null : stamp + shifts[at]))}
     : {stamp: each.drop.stamp + shifts[each.drop.input], input: each.drop.input, reason: each.drop.reason});
   const times = recent.flatMap((each) => each.stamps ? each.stamps.filter((stamp) => stamp !== null) : [each.stamp]);
-  const label = width < 600 ? LABEL_ON_A_PHONE : LABEL;
+  const longest = Math.max(...group.inputs.map((input) => printable(input.topic).length));
+  const label = Math.min((longest + 1) * LETTER, width * LABEL_SHARE);
   const head = Math.max(...times), room = Math.max(1, width - label - 12);
-  const shown = windowOf(recent, times, head, room);
+  const shown = windowOf(recent, head - Math.min(...times), room);
   const x = (stamp) => width - 8 - (head - stamp) / shown * room;
   const isShown = (stamp) => stamp !== null && head - stamp <= shown;
   const y = (lane) => LANE / 2 + lane * LANE;
@@ -72,7 +73,7 @@ function lanes(group, width) {
   const picture = drawn("svg", {viewBox: `0 0 ${width} ${height}`, height, role: "img"});
   group.inputs.forEach((input, lane) => {
     picture.append(drawn("line", {class: "rail", x1: label, x2: width, y1: y(lane), y2: y(lane)}),
-      drawn("text", {x: 0, y: y(lane) + 4}, shortened(input.topic, Math.floor(label / 7.2)), drawn("title", {}, input.topic)));
+      drawn("text", {x: 0, y: y(lane) + 4}, shortened(input.topic, Math.floor(label / LETTER)), drawn("title", {}, input.topic)));
   });
   const reasons = new Map();
   for (const each of recent.filter((one) => !one.stamps && isShown(one.stamp))) {
@@ -104,12 +105,22 @@ function lanes(group, width) {
   return {picture, reasons: [...reasons.keys()], hasSets: drawnSets > 0, shown: shown / NS_PER_MS};
 }
 
-function windowOf(recent, times, head, room) {
-  const ends = recent.filter((each) => each.stamps).map((each) => Math.max(...each.stamps.filter((stamp) => stamp !== null))).sort((a, b) => a - b);
-  const gaps = ends.slice(1).map((end, at) => end - ends[at]).filter((gap) => gap > 0).sort((a, b) => a - b);
-  const oldest = head - Math.min(...times);
-  const wanted = gaps.length ? gaps[gaps.length >> 1] * room / APART : oldest;
-  return Math.max(NS_PER_MS, Math.min(wanted, 600e9, oldest * 1.02 || NS_PER_MS));
+// Without sets the slowest input sets the pace, as it does with them; what its clock shows is drawn nonetheless.
+function windowOf(recent, oldest, room) {
+  const sets = recent.filter((each) => each.stamps).map((each) => Math.max(...each.stamps.filter((stamp) => stamp !== null)));
+  const inputs = new Set(recent.filter((each) => !each.stamps).map((each) => each.input));
+  const drops = [...inputs].map((input) => recent.filter((each) => each.input === input).map((each) => each.stamp));
+  const heads = drops.map((stamps) => Math.max(...stamps));
+  const gap = sets.length ? medianGap(sets) : Math.max(0, ...drops.map(medianGap));
+  const wanted = gap ? gap * room / APART : oldest;
+  const reaching = sets.length ? 0 : (Math.max(...heads) - Math.min(...heads)) * 1.2;
+  return Math.max(NS_PER_MS, Math.min(Math.max(wanted, reaching), 600e9, oldest * 1.02 || NS_PER_MS));
+}
+
+function medianGap(stamps) {
+  const sorted = [...stamps].sort((one, other) => one - other);
+  const gaps = sorted.slice(1).map((stamp, at) => stamp - sorted[at]).filter((gap) => gap > 0).sort((one, other) => one - other);
+  return gaps[gaps.length >> 1] ?? 0;
 }
 
 function mark(name, x, y) {

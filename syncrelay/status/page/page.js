@@ -131,7 +131,7 @@ function figuresOf(group) {
 
 function recentOf(group, width) {
   const {picture, reasons, hasSets, shown} = lanes(group, width);
-  return [element("h3", {}, `Recent sets: the last ${duration(shown)}, the newest on the right`), picture, legend(reasons, hasSets)];
+  return [element("h3", {}, `Recent ${hasSets ? "sets" : "messages"}: the last ${duration(shown)}, the newest on the right`), picture, legend(reasons, hasSets)];
 }
 
 function input(group, each) {
@@ -142,10 +142,10 @@ function input(group, each) {
     rate: `${each.rate_hz ? `${figure(each.rate_hz)} Hz` : "–"}, lag ${duration(each.lag_ms)}, jitter ${duration(each.jitter_ms)}`,
     type: each.type ?? "not known yet",
     offset: each.offset_ms ? duration(each.offset_ms) : null,
-    "dropped in 10 s": counts(each.dropped_lately),
-    "in all": `${each.received} received, ${each.matched} in sets, ${each.buffered} waiting, dropped: ${counts(each.dropped)}${lost}`,
-    from: nodes(each.publishers),
-    to: `${each.output}: ${nodes(each.subscribers)}`,
+    "dropped in the last 10 s": counts(each.dropped_lately),
+    "in total": `${each.received} received, ${each.matched} in sets, ${each.buffered} waiting, dropped: ${counts(each.dropped)}${lost}`,
+    from: nodes(each.publishers) || "no publishers",
+    to: `${each.output}: ${nodes(each.subscribers) || "no subscribers"}`,
   };
   const list = element("dl");
   for (const [name, value] of Object.entries(rows)) if (value !== null) list.append(element("dt", {}, name), element("dd", {}, value));
@@ -159,7 +159,7 @@ function counts(dropped) {
 
 function nodes(endpoints) {
   const why = ({mismatch}) => (mismatch ? ` (${mismatch.policy}: ${mismatch.offered} offered, ${mismatch.requested} requested)` : "");
-  return endpoints.map((each) => each.node + why(each)).join(", ") || "nobody";
+  return endpoints.map((each) => each.node + why(each)).join(", ");
 }
 
 function choose(name, isClicked) {
