@@ -19,15 +19,25 @@ _CLOCK_STOPPED_NS: Final = 2_500_000_000
 
 
 class Standstills:
-    """How long the process got no turn, as a thread sees it that rested longer than it should."""
+    """How long the process got no turn, as a thread sees it that works in short steps and rests between them."""
 
     def __init__(self) -> None:
         self._recent: deque[Standstill | None] = deque(maxlen=_RECENT)
         self._longest_now: Standstill | None = None
+        self._began = time.monotonic_ns()
 
-    def overslept(self, ns: int, *, now: int) -> None:
-        """Note by how much a rest that ends now was too long."""
-        standstill = Standstill(now, ns)
+    def begin(self) -> None:
+        """Bear that a step begins now."""
+        self._began = time.monotonic_ns()
+
+    def end(self, *, rest: int = 0) -> None:
+        """Note how much longer a step took than it rested on purpose; the next one begins now."""
+        before = self._began
+        self.begin()
+        self.note(Standstill(time.time_ns(), self._began - before - rest, rest))
+
+    def note(self, standstill: Standstill) -> None:
+        """Take one that ends now."""
         if self._longest_now is None or standstill.ns > self._longest_now.ns:
             self._longest_now = standstill
 

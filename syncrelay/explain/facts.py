@@ -137,10 +137,20 @@ class InputFacts:
 
 
 class Standstill(NamedTuple):
-    """The process got no turn for so many nanoseconds, until a time."""
+    """The process got no turn for so many nanoseconds, until a time or for at most `rested` before that."""
 
     until: int
     ns: int
+    rested: int = 0
+
+    @property
+    def earliest(self) -> int:
+        """The earliest time at which it can have begun."""
+        return self.until - self.ns - self.rested
+
+    def overlap(self, begin: int, end: int) -> int:
+        """Return for how long of it something else can have been, that began and ended then; negative if never."""
+        return min(self.ns, min(end, self.until) - max(begin, self.earliest))
 
 
 class Pause(NamedTuple):

@@ -105,8 +105,7 @@ def _overlapped(facts: GroupFacts, inputs: Iterable[Iterable[tuple[int, int]]]) 
     if not long:
         return 0
     held_up = [span for each in inputs for span in each]
-    overlaps = (min(end, until) - max(begin, until - ns) for until, ns in long for begin, end in held_up)
-    return max(overlaps, default=0)
+    return max((each.overlap(begin, end) for each in long for begin, end in held_up), default=0)
 
 
 def _pauses(facts: GroupFacts, an_input: InputFacts) -> Iterator[tuple[int, int]]:
@@ -115,7 +114,7 @@ def _pauses(facts: GroupFacts, an_input: InputFacts) -> Iterator[tuple[int, int]
     longest = _PAUSE_PERIODS * (round(SECOND / figures.usual_hz) if figures.usual_hz else SECOND)
     yield from ((one, other) for one, other in pairwise(figures.received) if other - one > longest)
     if (last := figures.last_received) is not None and any(
-        until - ns - longest <= last <= until < now <= until + _SENT_AGAIN for until, ns in facts.standstills
+        each.earliest - longest <= last <= each.until < now <= each.until + _SENT_AGAIN for each in facts.standstills
     ):
         yield last, now
 

@@ -122,6 +122,7 @@ class Monitor:
         self._judge(self._bindings, *self._gather(self._bindings))
 
     def _judge(self, bindings: Sequence[GroupBinding], waits: Sequence[int], batches: Sequence[Batch]) -> None:
+        self.standstills.end()
         now = time.time_ns()
         self._try_budget.refill()
         # Messages are received by the system's clock: a step of it is no wait.

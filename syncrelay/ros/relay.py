@@ -290,6 +290,8 @@ class Relay:
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
         self._calls.carry_out()
+        # What is called may take long, and holds up no message.
+        self.monitor.standstills.begin()
         with self._bugs.contained("polling the graph"):
             self._poll_graph()
             self._groups.announce()
@@ -298,10 +300,10 @@ class Relay:
                 self._evaluate(self.monitor.evaluate if self._is_watched(now) else self.monitor.evaluate_in_turn)
         is_waiting = any(binding.waiting_for for binding in self._groups.bindings.all)
         until_evaluation = max(0.0, self._next_evaluation - time.monotonic())
-        rest_s, began = min(timeout_s, until_evaluation, _EAGER_POLL_S if is_waiting else _POLL_S), time.monotonic()
+        rest_s = min(timeout_s, until_evaluation, _EAGER_POLL_S if is_waiting else _POLL_S)
+        self.monitor.standstills.end()
         self._wake.wait(rest_s)
-        too_long_s = time.monotonic() - began - rest_s
-        self.monitor.standstills.overslept(round(too_long_s * 1e9), now=time.time_ns())
+        self.monitor.standstills.end(rest=round(rest_s * 1e9))
 
     def look(self, seconds: float, *, is_over: Callable[[], bool] = lambda: False) -> tuple[GroupReport, ...]:
         """Run for a time, and return how the groups fare.

@@ -13,9 +13,8 @@ _SECOND = 1_000_000_000
 
 def test_the_longest_standstill_is_told_for_ten_evaluations():
     standstills = Standstills()
-    standstills.overslept(3, now=100)
-    standstills.overslept(7, now=200)
-    standstills.overslept(5, now=300)
+    for until, ns in (100, 3), (200, 7), (300, 5):
+        standstills.note(Standstill(until, ns))
     assert standstills.recent == ()
     standstills.observe()
     for _ in range(9):
@@ -24,6 +23,18 @@ def test_the_longest_standstill_is_told_for_ten_evaluations():
     assert standstills.recent == (Standstill(200, 7),)
     standstills.observe()
     assert standstills.recent == ()
+
+
+def test_a_step_stands_still_for_longer_than_it_rested_on_purpose():
+    standstills = Standstills()
+    standstills.end(rest=_SECOND)
+    standstills.observe()
+    standstills.end()
+    standstills.observe()
+    rested, worked = standstills.recent
+    assert (rested.rested, worked.rested) == (_SECOND, 0)
+    assert rested.ns + _SECOND >= 0
+    assert rested.ns < worked.ns
 
 
 def test_the_longest_wait_is_told_for_ten_evaluations():

@@ -137,13 +137,14 @@ def run(
     publishers: Callable[[str, float], tuple[Endpoint, ...]] | None = None,
     facts: Callable[[float], dict[str, Any]] | None = None,
     looks: Sequence[float] | None = None,
+    rest_s: float = 0.0,
 ) -> Told:
     """Run a rig for so many seconds, and look at it at each, or at those that are given.
 
     `stops` are when the whole process stands still, as by SIGSTOP, each from one second to another: what comes
-    meanwhile is received at the end. `starved` is the same of the thread that takes messages: they are received in
-    time, and lie there. `sleeps` is when nobody listens to a lazy group: it receives nothing. `paused` is when the
-    relay is paused.
+    meanwhile is received at the end, and who looks rests for `rest_s` more, as a rest goes on behind it. `starved` is
+    the same of the thread that takes messages: they are received in time, and lie there. `sleeps` is when nobody
+    listens to a lazy group: it receives nothing. `paused` is when the relay is paused.
 
     `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of `GroupWatch.facts`.
     """
@@ -163,17 +164,17 @@ def run(
     before = 0.0
     for second in looks or range(1, seconds + 1):
         # Who polls asks the thread that takes messages, and waits for it.
-        if _until([*stops, *starved], float(second)) > second:
+        if _until([*((begin, end + rest_s) for begin, end in stops), *starved], float(second)) > second:
             continue
         while place < len(taken) and taken[place][0] <= second:
             at, received, index, stamp = taken[place]
             relay.take(index, stamp, _ns(received), now=_ns(at))
             place += 1
-        stop = next(((begin, end) for begin, end in stops if before <= end <= second), None)
+        stop = next(((begin, end) for begin, end in stops if before <= end + rest_s <= second), None)
         before = second
         relay.asleep = _until(sleeps, second) > second
         relay.woke = max((_ns(end) for _, end in sleeps if end <= second), default=None)
-        standstill = stop and Standstill(_ns(stop[1]), round((stop[1] - stop[0]) * S))
+        standstill = stop and Standstill(_ns(stop[1] + rest_s), round((stop[1] - stop[0]) * S), round(rest_s * S))
         relay.poll(
             second, [shown(name, float(second)) for name in names], standstill, (facts or (lambda _: {}))(second)
         )

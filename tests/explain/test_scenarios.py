@@ -422,16 +422,25 @@ def test_what_comes_in_batches_has_the_pace_of_its_stamps(slower):
     assert all(re.match(r"/[ab] has slowed from (9\.\d+|10(\.\d+)?) Hz to [4-6]", text) for text in texts), texts
 
 
+@pytest.mark.parametrize("rest_s", [0.0, 0.8])
 @pytest.mark.parametrize("again_s", [20.4, 21.5, 23.2])
-def test_what_is_sent_again_after_a_standstill_is_missed_because_of_it(again_s):
+def test_what_is_sent_again_after_a_standstill_is_missed_because_of_it(again_s, rest_s):
     sent_again = {"received": lambda at: again_s if 17 < at < again_s else at}
     told = run(
         *(Source(topic, 10, **REAL, **sent_again) for topic in ("/a", "/b")),
         seconds=60,
         options=SLOP,
         stops=[(17.1, 20.1)],
+        rest_s=rest_s,
     )
     assert told.ever_found <= {"too_slow"}
+    assert told.codes == {"too_slow"}
+
+
+@pytest.mark.parametrize("rest_s", [0.0, 0.9])
+def test_a_short_standstill_is_told_wherever_in_a_rest_it_came(rest_s):
+    sources = [Source(topic, 10, **REAL) for topic in ("/a", "/b")]
+    told = run(*sources, seconds=60, options=SLOP, stops=[(20.02, 20.92)], rest_s=rest_s)
     assert told.codes == {"too_slow"}
 
 

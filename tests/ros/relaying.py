@@ -18,14 +18,15 @@ def topics_of(recording: Iterable[Frame]) -> dict[str, str]:
     return {frame.topic: frame.type_name for frame in recording}
 
 
-def connect(player: Player, collector: Collector, recording: Sequence[Frame], outputs: Iterable[str]) -> None:
+def connect(player: Player, collector: Collector, recording: Sequence[Frame], outputs: Iterable[str]) -> int:
     """Send sets of equal stamps, older than the recording, until one has come out of every output.
 
-    How many of them come out depends on the machine.
+    Returns how many it sent. How many of them come out depends on the machine.
     """
     first = min(stamp_of(frame.payload) for frame in recording) - _APART
     stamps = itertools.count(first, NS_PER_SECOND)
     play_until_out(player, collector, (a_set(recording, stamp) for stamp in stamps), outputs)
+    return (next(stamps) - first) // NS_PER_SECOND
 
 
 def play_until_out(player: Player, collector: Collector, sets: Iterator[list[Frame]], outputs: Iterable[str]) -> None:
