@@ -7,7 +7,7 @@ from operator import mul, sub
 from statistics import fmean, median, median_low
 from typing import Final, NamedTuple
 
-_FEWEST = 4
+_FEWEST = 5
 _PARTS = 4
 # A slope from few points may be off by more than its standard error tells.
 _MORE_OF_FEW = 8
@@ -21,13 +21,15 @@ class Drift(NamedTuple):
 
     `bend_ns` is how far the delays strayed from the line, by the medians of the quarters of that time: a clock drifts
     along a line, what else makes delays grow, such as a load, a step or a pause, does not. `error` is that of the
-    slope, by how far single points are off the line: that of jitter is as great as its slope.
+    slope, by how far single points are off the line: that of jitter is as great as its slope. `points` is how many
+    there were: a few of them lie on some line by chance.
     """
 
     slope: float
     bend_ns: float
     watched_ns: int
     error: float = 0.0
+    points: int = 60
 
     @property
     def drifted_ns(self) -> float:
@@ -73,13 +75,14 @@ def _fit(points: Sequence[tuple[int, int]]) -> tuple[Drift, Sequence[float]] | N
     bend = max(abs(median(strayed[part * quarter : (part + 1) * quarter])) for part in range(_PARTS))
     variance = sum(map(mul, strayed, strayed)) / (len(points) - 2)
     error = (1 + _MORE_OF_FEW / len(points)) * sqrt(variance / spread)
-    return Drift(slope, bend, points[-1][0] - first_time, error), strayed
+    return Drift(slope, bend, points[-1][0] - first_time, error, len(points)), strayed
 
 
 def apart(one: Drift, other: Drift) -> Drift:
     """Return how fast two inputs drift apart."""
     watched = min(one.watched_ns, other.watched_ns)
-    return Drift(one.slope - other.slope, one.bend_ns + other.bend_ns, watched, hypot(one.error, other.error))
+    error, points = hypot(one.error, other.error), min(one.points, other.points)
+    return Drift(one.slope - other.slope, one.bend_ns + other.bend_ns, watched, error, points)
 
 
 _SECOND: Final = 1_000_000_000

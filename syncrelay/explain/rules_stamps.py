@@ -42,6 +42,8 @@ _DRIFTED_SOON: Final = 25_000_000
 _DRIFT_SOON: Final = 4 * SECOND
 # A slope of so many standard errors is no chance, one within so many may be all there is.
 _EVIDENT: Final = 5
+# As Student's distribution has it: of five points it takes ten times as many errors for that.
+_EVIDENT_OF_FEW: Final = 240
 _MAY_BE: Final = 2
 _USUAL: Final = 0.95
 # So long is waited for a drift to be proven, in a silence only so long unless it looks like one.
@@ -342,7 +344,8 @@ def clock_drift(facts: GroupFacts) -> Found:
     drifted = abs(found.drifted_ns)
     if found.watched_ns < _DRIFT_SOON or drifted < max(enough, _DRIFT_BENDS * found.bend_ns):
         return
-    if abs(found.slope) < _EVIDENT * found.error:
+    evident = _EVIDENT * (1 + _EVIDENT_OF_FEW / (found.points - 2) ** 3)
+    if abs(found.slope) < evident * found.error:
         return
     others = [index for index in known if index != odd]
     is_evident = len(others) > 1 or abs(known[others[0]].slope) < _EVIDENTLY * abs(known[odd].slope)

@@ -3,9 +3,11 @@
 import random
 
 import pytest
-from groups import BEGAN, MS, S
+from cases import STEADY
+from groups import BEGAN, MS, S, a_group, an_input
 
 from syncrelay.explain.clocks import Drift, apart, drift
+from syncrelay.explain.rules_stamps import clock_drift
 
 
 def points(delay, *, n=120, noise=0.0):
@@ -67,3 +69,23 @@ def test_noise_alone_is_no_line():
 def test_two_drifts_are_compared_over_the_shorter_time():
     one, other = Drift(0.5, 3.0, 60 * S), Drift(0.2, 1.0, 40 * S)
     assert apart(one, other) == Drift(pytest.approx(0.3), 4.0, 40 * S)
+
+
+def is_told(found):
+    """Whether a drift against a steady input is told."""
+    return bool(list(clock_drift(a_group(an_input("/gps", figures={"drift": found}), STEADY))))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_few_delays_of_a_slow_sensor_that_lie_on_a_line_by_chance_are_no_drift(seed):
+    chance = random.Random(seed)
+    delays = [round(chance.uniform(-30 * MS, 30 * MS)) for _ in range(400)]
+    # One of ten messages is lost.
+    came = [(BEGAN + n * S, delay) for n, delay in enumerate(delays) if chance.random() > 0.1]
+    parts = (came[begin:end] for begin in range(300) for end in range(begin + 5, begin + 12))
+    told = [part for part in parts if is_told(drift(part))]
+    assert not told
+
+
+def test_a_great_drift_is_told_of_few_points():
+    assert is_told(drift(points(lambda second: second * 10 * MS, n=6, noise=0.2 * MS)))
