@@ -29,6 +29,12 @@ def plotted() -> list[str]:
     return [topic for name, panel in _PANELS.items() if name.startswith("Plot!") for topic, _ in _paths(panel)]
 
 
+def detailed() -> tuple[str, str]:
+    """Hardware id and name of the status whose values are shown."""
+    (panel,) = (panel for panel in _PANELS.values() if "selectedName" in panel)
+    return panel["selectedHardwareId"], panel["selectedName"]
+
+
 def _leaves(node: Any) -> Iterator[str]:
     """The panels of a layout's tree, each node of which is split in two."""
     if isinstance(node, str):
@@ -62,7 +68,6 @@ def test_diagnostics_are_those_of_the_group_whose_numbers_are_drawn():
     assert others == []
     of_diagnostics = [panel for panel in _PANELS.values() if "topicToRender" in panel]
     assert {panel["topicToRender"] for panel in of_diagnostics} == {"/diagnostics"}
-    (detail,) = (panel for panel in of_diagnostics if "selectedName" in panel)
-    assert (detail["selectedHardwareId"], detail["selectedName"]) == (f"/{node}", f"{node}: {group}")
+    assert detailed() == (f"/{node}", f"{node}: {group}")
     (states,) = (panel for name, panel in _PANELS.items() if name.startswith("StateTransitions!"))
     assert _paths(states) == [("/diagnostics", f'status[:]{{name=="{node}: {group}"}}.level')]

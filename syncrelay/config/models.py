@@ -251,6 +251,11 @@ class Tolerance:
     ns: int
     wider_policy: str | None = None
 
+    @property
+    def is_key(self) -> bool:
+        """Whether the group's own policy has the key."""
+        return self.wider_policy is None
+
 
 class Group(Keys):
     """Keys that the groups of every policy have, and what the rest of the program asks of a policy."""

@@ -65,8 +65,8 @@ class Code(Enum):
 class Finding:
     """One thing that is so: a sentence with its figures, and what to do, None where nothing is to be done.
 
-    `input` is the index of the input that it is about, None where it is about the group. `explains` is False where it
-    is too small to explain other findings.
+    `input` is the index of the input that it is about, None where it is about the group, or about several: these are
+    `inputs`. `explains` is False where it is too small to explain other findings.
     """
 
     code: Code
@@ -75,6 +75,12 @@ class Finding:
     suggestion: str | None = None
     input: int | None = None
     explains: bool = True
+    inputs: tuple[int, ...] = ()
+
+    @property
+    def about(self) -> tuple[int, ...]:
+        """The indices of all inputs that it is about, none where it is about the group."""
+        return self.inputs if self.input is None else (self.input,)
 
 
 Found: TypeAlias = Iterator[Finding]

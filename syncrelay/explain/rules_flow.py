@@ -20,19 +20,20 @@ def bursts(facts: GroupFacts) -> Found:
     """Find messages that are held up on their way and then arrive at once; one finding for those held up together."""
     held_up = [(index, each) for index, each in enumerate(facts.inputs) if each.figures.bursts]
     if len(held_up) > 1 and _overlap([each.figures.held_up for _, each in held_up]):
-        yield _burst_together(facts, [each for _, each in held_up])
+        yield _burst_together(facts, dict(held_up))
         return
     for index, each in held_up:
         yield Finding(Code.BURSTS, Severity.WARN, _burst_text([each]), _burst_check(facts, each), index, explains=False)
 
 
-def _burst_together(facts: GroupFacts, held_up: Sequence[InputFacts]) -> Finding:
+def _burst_together(facts: GroupFacts, inputs: dict[int, InputFacts]) -> Finding:
+    held_up = list(inputs.values())
     others = [each for each in facts.inputs if each not in held_up]
     held = max(each.figures.held for each in held_up)
     are_all = all(each.figures.usual_hz * held < _SHOWN_BY * SECOND for each in others)
     what = "a player" if not facts.is_recorded else "the recorder"
     check = f"check whether this machine, {what} or what connects them stood still"
-    return Finding(Code.BURSTS, Severity.WARN, _burst_text(held_up, are_all=are_all), check)
+    return Finding(Code.BURSTS, Severity.WARN, _burst_text(held_up, are_all=are_all), check, inputs=tuple(inputs))
 
 
 def _burst_text(held_up: Sequence[InputFacts], *, are_all: bool = False) -> str:

@@ -160,7 +160,8 @@ def _is_past_grace(facts: GroupFacts) -> bool:
 
 def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: tuple[str, str]) -> Finding:
     severity = max(blocks(facts, facts.inputs[index]) for index in indices)
-    return Finding(Code.NO_PUBLISHER, severity, *words_of_it, indices[0] if len(indices) == 1 else None)
+    one = indices[0] if len(indices) == 1 else None
+    return Finding(Code.NO_PUBLISHER, severity, *words_of_it, one, inputs=tuple(indices))
 
 
 def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[str, str]:

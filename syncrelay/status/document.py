@@ -4,6 +4,7 @@ import os
 from typing import Any, Final
 
 from syncrelay import own_version
+from syncrelay.config import Tolerance
 from syncrelay.explain import (
     Distribution,
     Endpoint,
@@ -51,7 +52,7 @@ def group_document(report: GroupReport) -> dict[str, Any]:
         "policy": facts.policy,
         "level": level(report).value,
         "queue_size": facts.queue_size,
-        "tolerance": facts.tolerance and {"key": facts.tolerance.key, "ms": _ms(facts.tolerance.ns)},
+        "tolerance": _tolerance(facts.tolerance),
         "max_wait_ms": _ms(facts.max_wait),
         "sets": figures.sets,
         "rate_hz": round(figures.rate_hz, 3),
@@ -66,6 +67,12 @@ def group_document(report: GroupReport) -> dict[str, Any]:
         "findings": [_finding(facts, finding) for finding in _explanation_first(report.findings)],
         "recent": [_recent(outcome) for outcome in report.recent],
     }
+
+
+def _tolerance(tolerance: Tolerance | None) -> dict[str, Any] | None:
+    if tolerance is None or not tolerance.is_key:
+        return None
+    return {"key": tolerance.key, "ms": _ms(tolerance.ns)}
 
 
 def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
@@ -111,6 +118,7 @@ def _finding(facts: GroupFacts, finding: Finding) -> dict[str, Any]:
         "text": finding.text,
         "suggestion": finding.suggestion,
         "topic": None if finding.input is None else facts.inputs[finding.input].name,
+        "topics": [facts.inputs[index].name for index in finding.about],
     }
 
 

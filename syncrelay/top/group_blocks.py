@@ -46,9 +46,10 @@ def rate_line(group: Group, width: int) -> Text:
     """Draw how many of the possible sets leave."""
     share = phrases.share_of_possible(group)
     before = f"{phrases.sets_of_possible(group)} possible a second "
-    behind = f" {share:.0%}, {phrases.last_set(group)}"
-    room = width - _LABEL - len(before) - len(behind)
-    return line((f"{'sets':<{_LABEL}}", "bold"), before, bar(share, max(0, min(_BAR, room))), behind)
+    behind = f"{share:.0%}, {phrases.last_set(group)}"
+    room = min(_BAR, width - _LABEL - len(before) - len(behind) - 1)
+    drawn = (bar(share, room), " ") if room > 0 else ()
+    return line((f"{'sets':<{_LABEL}}", "bold"), before, *drawn, behind)
 
 
 def offsets(group: Group, width: int) -> Iterator[Text]:

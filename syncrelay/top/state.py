@@ -105,13 +105,17 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What the relay found; `topic` is the input that it is about, if it is about one. `severity` is never STALE."""
+    """What the relay found; `topics` are the inputs that it is about, `topic` the one if it is one.
+
+    `severity` is never STALE.
+    """
 
     code: Text
     severity: Level
     text: Text
     suggestion: Text | None
     topic: Text | None = None
+    topics: tuple[Text, ...] = ()
 
     @property
     def label(self) -> str:
@@ -163,7 +167,7 @@ class Group:
 
     def problem_of(self, an_input: Input) -> Finding | None:
         """What is wrong with one of its inputs, before all else; None if nothing is."""
-        return next((finding for finding in self.problems if finding.topic == an_input.topic), None)
+        return next((finding for finding in self.problems if an_input.topic in (finding.topic, *finding.topics)), None)
 
 
 @dataclass(frozen=True, slots=True)

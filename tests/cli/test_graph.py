@@ -158,7 +158,16 @@ def test_no_box_of_an_svg_stands_on_another_and_all_are_within_it(text: str):
     assert [(one.lines, other.lines) for one, other in combinations(placed, 2) if _overlap(one, other)] == []
     assert all(each.x > 0 and each.y > 0 and each.right < layout.width for each in placed)
     assert all(each.y + each.height < layout.height for each in placed)
-    assert all(line.start[0] < line.end[0] for line in layout.lines)
+    assert all(line.start[0] < line.end[0] - line.level for line in layout.lines)
+
+
+def test_a_line_of_an_svg_is_level_under_its_label_so_that_it_does_not_cross_it():
+    lines, svg = [line for line in layout_of(drawn()).lines if line.label], as_svg(drawn())
+    assert lines
+    for line in lines:
+        (x, y), level = line.end, line.level
+        assert level > 6.6 * len(line.label)
+        assert f' {x - level:.1f} {y:.1f}H{x:.1f}"' in svg
 
 
 _LABEL = r'"[A-Za-z0-9 _./,:~+#;()<>-]*"'

@@ -5,16 +5,18 @@ import socket
 import struct
 
 import pytest
+from prometheus_client.parser import text_string_to_metric_families
 from rosbags.typesys import Stores, get_typestore
 
+from tests.dashboard import EXPRESSIONS, series
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
 from tests.ros.sensors import PAIR, assert_looked_at_a_healthy_rig, front, play, stream
 from tests.ros.stage import Collector, Stage
-from tests.ros.status import findings
+from tests.ros.status import findings, get
 from tests.ros.streams import merged
-from tests.test_foxglove import plotted
+from tests.test_foxglove import detailed, plotted
 
 pytestmark = pytest.mark.ros
 
@@ -73,11 +75,11 @@ def test_diagnostics_have_a_status_for_each_group(stage: Stage):
     assert side[1].startswith("nobody publishes /a ")
 
 
-def test_figures_that_the_foxglove_layout_plots_are_published_if_they_are_asked_for(stage: Stage):
+def test_what_the_foxglove_layout_and_the_grafana_dashboard_draw_is_there_on_a_running_relay(stage: Stage):
     topics = dict.fromkeys(plotted(), FLOAT)
     assert set(topics) == {f"/syncrelay/front/{figure}" for figure in ("sets_hz", "span_ms", "latency_ms")}
-    collector = stage.collector(topics)
-    stage.relay(front(top={"diagnostics": {"scalars": True}}))
+    collector = stage.collector({**topics, "/diagnostics": DIAGNOSTICS})
+    relay = stage.relay(front(top={"diagnostics": {"scalars": True}}))
     play(stage, _RIG)
 
     def last_span() -> float:
@@ -87,6 +89,12 @@ def test_figures_that_the_foxglove_layout_plots_are_published_if_they_are_asked_
     collector.wait_for("/syncrelay/front/span_ms", 2)
     wait_until(lambda: last_span() == pytest.approx(7.0), "the span of all sets")
     assert all(collector.wait_for(topic, 2) for topic in topics)
+    (told,) = collector.wait_for("/diagnostics", 1)[-1:]
+    array = _STORE.deserialize_cdr(told, DIAGNOSTICS)
+    assert {detailed()} == {(each.hardware_id, each.name) for each in array.status}
+    families = [family.name for family in text_string_to_metric_families(get(relay, "/metrics"))]
+    there = {name + ending for name in families for ending in ("", "_total", "_bucket")}
+    assert {name for expression in EXPRESSIONS for name, _ in series(expression)} - there == set()
 
 
 def test_nothing_is_published_about_the_relay_if_that_is_asked_for(stage: Stage):

@@ -69,6 +69,7 @@ def test_what_is_said_of_a_group():
                 "text": "10 of 10 possible sets a second, span 5 ms and latency 2 ms at the 95th percentile",
                 "suggestion": None,
                 "topic": None,
+                "topics": [],
             }
         ],
         "recent": [{"set": [BEGAN, None]}, {"drop": {"input": 0, "stamp": BEGAN, "reason": "late"}}],

@@ -3,7 +3,6 @@
 import json
 import re
 from itertools import combinations
-from pathlib import Path
 
 import pytest
 from prometheus_client import generate_latest
@@ -11,23 +10,16 @@ from prometheus_client.parser import text_string_to_metric_families
 from states import relay, working
 
 from syncrelay.status.metrics import registry
+from tests.dashboard import DASHBOARD, EXPRESSIONS, MATCHERS, TARGETS, series
 
-_DASHBOARD = json.loads((Path(__file__).parents[2] / "configs" / "grafana.json").read_text())
-_PANELS = _DASHBOARD["panels"]
-_VARIABLES = {each["name"]: each for each in _DASHBOARD["templating"]["list"]}
-_TARGETS = [(panel, target) for panel in _PANELS for target in panel["targets"]]
-_EXPRESSIONS = [
-    *(target["expr"] for _, target in _TARGETS),
-    *(each["expr"] for each in _DASHBOARD["annotations"]["list"]),
-]
+_PANELS = DASHBOARD["panels"]
+_VARIABLES = {each["name"]: each for each in DASHBOARD["templating"]["list"]}
 _DATASOURCE = {"type": "prometheus", "uid": "${datasource}"}
 # What Prometheus itself gives each series, and what Grafana puts into a query.
 _OF_A_SCRAPE = {"job", "instance"}
 _BUILT_IN = {"__rate_interval", "__interval"}
 _FUNCTIONS = {"changes", "count", "histogram_quantile", "rate", "sum", "vector"}
 _GROUPING = re.compile(r"\b(?:by|without|on|ignoring) ?\(([^)]*)\)")
-_MATCHERS = re.compile(r"(\w+)\{([^}]*)\}")
-_MATCHER = re.compile(r"(\w+)(?:=|!=|=~|!~)\"[^\"]*\"")
 
 
 def _exported():
@@ -40,23 +32,15 @@ def _exported():
 _EXPORTED = _exported()
 
 
-def _series(expression):
-    """The name of each series that is asked for, with the labels that it is chosen by."""
-    for name, matchers in _MATCHERS.findall(expression):
-        labels = [_MATCHER.fullmatch(each) for each in matchers.split(",")]
-        assert all(labels), matchers
-        yield name, {each[1] for each in labels}
-
-
 def _left(expression):
     """The labels that a result has."""
     grouped = [set(re.split(r", ?", labels)) for labels in _GROUPING.findall(expression)]
-    return grouped[0] if grouped else set.intersection(*(_EXPORTED[name] for name, _ in _series(expression)))
+    return grouped[0] if grouped else set.intersection(*(_EXPORTED[name] for name, _ in series(expression)))
 
 
-@pytest.mark.parametrize("expression", _EXPRESSIONS)
+@pytest.mark.parametrize("expression", EXPRESSIONS)
 def test_a_query_asks_for_series_and_labels_that_there_are(expression):
-    asked = list(_series(expression))
+    asked = list(series(expression))
     assert asked
     for name, labels in asked:
         assert labels <= _EXPORTED[name]
@@ -65,9 +49,9 @@ def test_a_query_asks_for_series_and_labels_that_there_are(expression):
         assert set(re.split(r", ?", labels)) <= set.union(*(_EXPORTED[name] for name, _ in asked))
 
 
-@pytest.mark.parametrize("expression", _EXPRESSIONS)
+@pytest.mark.parametrize("expression", EXPRESSIONS)
 def test_a_query_has_no_word_that_is_not_known(expression):
-    rest = _GROUPING.sub(" ", _MATCHERS.sub(" ", expression))
+    rest = _GROUPING.sub(" ", MATCHERS.sub(" ", expression))
     assert rest.count("(") == rest.count(")")
     called = set(re.findall(r"(\w+) ?\(", rest))
     assert called - {"or"} <= _FUNCTIONS
@@ -80,7 +64,7 @@ def test_a_query_has_no_word_that_is_not_known(expression):
 
 
 def test_every_variable_that_is_used_is_declared_and_every_one_is_used():
-    told = json.dumps([_PANELS, _DASHBOARD["annotations"], _DASHBOARD["templating"]])
+    told = json.dumps([_PANELS, DASHBOARD["annotations"], DASHBOARD["templating"]])
     used = {first or second for first, second in re.findall(r"\$(?:\{(\w+)\}|(\w+))", told)}
     assert used - _BUILT_IN - {"__all"} == set(_VARIABLES)
 
@@ -91,12 +75,12 @@ def test_choices_are_labels_that_there_are():
         assert asked
         assert asked[3] == name
         assert {name} <= _EXPORTED[asked[1]]
-        for metric, labels in _series(asked[0]):
+        for metric, labels in series(asked[0]):
             assert labels <= _EXPORTED[metric]
 
 
 def test_legends_name_labels_that_a_result_has():
-    for _, target in _TARGETS:
+    for _, target in TARGETS:
         assert set(re.findall(r"\{\{(\w+)\}\}", target["legendFormat"])) <= _left(target["expr"])
 
 
@@ -121,13 +105,13 @@ def test_panels_are_in_order_and_do_not_overlap():
 
 
 def test_it_is_a_dashboard_of_its_own_that_changes_none():
-    assert "id" not in _DASHBOARD
-    assert (_DASHBOARD["title"], _DASHBOARD["uid"]) == ("syncrelay", "syncrelay")
-    assert _DASHBOARD["schemaVersion"] >= 36
+    assert "id" not in DASHBOARD
+    assert (DASHBOARD["title"], DASHBOARD["uid"]) == ("syncrelay", "syncrelay")
+    assert DASHBOARD["schemaVersion"] >= 36
     assert _VARIABLES["datasource"]["type"] == "datasource"
 
 
 def test_every_metric_is_on_it_or_is_read_off_another():
-    shown = {name for expression in _EXPRESSIONS for name, _ in _series(expression)}
+    shown = {name for expression in EXPRESSIONS for name, _ in series(expression)}
     others = {f"syncrelay_set_{what}_seconds_{part}" for what in ("span", "latency") for part in ("count", "sum")}
     assert set(_EXPORTED) == shown | others

@@ -167,6 +167,31 @@ def test_names_from_strangers_run_nothing_and_hide_nothing(browser):
         assert opened_page.complaints == []
 
 
+def test_a_finding_about_two_inputs_marks_both(browser):
+    with watching(browser, states.nothing()) as (opened_page, _):
+        notes = opened_page.page.locator("#group h4 .level")
+        assert [each.strip() for each in notes.all_text_contents()] == ["no publisher", "no publisher"]
+
+
+def test_a_row_of_the_list_has_the_colour_of_its_level_and_keeps_figures_and_units_together(browser):
+    with watching(browser, states.rig()) as (opened_page, _):
+        for colour, has in (("borderLeftColor", ".group"), ("color", ".level")):
+            found = opened_page.page.locator(f"#groups {has}").evaluate_all(
+                f"all => all.map(each => getComputedStyle(each).{colour})"
+            )
+            assert len(set(found)) == 2
+            assert found[1:] == [found[1]] * 3
+        figures = opened_page.page.locator("#groups .figures span")
+        assert figures.count() == 3 * 4
+        assert figures.evaluate_all("all => all.map(each => getComputedStyle(each).whiteSpace)") == ["nowrap"] * 12
+
+
+def test_a_policy_without_a_tolerance_shows_none(browser):
+    text = states.file(pair={"policy": "exact_time", "topics": states.FRONT["topics"]})
+    with watching(browser, states.simulated(text, {})) as (opened_page, _):
+        assert "exact_time, queue_size 10" in opened_page.page.locator("#group .head").text_content()
+
+
 def test_an_input_without_publishers_and_subscribers_says_so(browser):
     told = states.nothing()
     (report,) = told.groups

@@ -86,7 +86,7 @@ def curves_of(
 def slop_key(group: GroupConfig) -> str | None:
     """Return the key of the file that says how wide a group's sets may be, None where it has none."""
     tolerance = group.options.tolerance
-    return tolerance.key if tolerance is not None and hasattr(group.options, tolerance.key) else None
+    return tolerance.key if tolerance is not None and tolerance.is_key else None
 
 
 def _point(group: GroupConfig, option: str, value: int, used: Sequence[Message], pivot: int) -> Point:

@@ -48,10 +48,11 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line between two boxes, from left to right."""
+    """A line between two boxes, from left to right; level at its end for `level` pixels, where its label stands."""
 
     start: tuple[float, float]
     end: tuple[float, float]
+    level: float = 0.0
     label: str = ""
     is_dashed: bool = False
 
@@ -71,7 +72,8 @@ def layout_of(drawing: Drawing) -> Layout:
     """Return where everything stands. Inputs stand near the groups that use them."""
     labels = max((len(link.label) for group in drawing.groups for link in group.links), default=0)
     left = MARGIN
-    middle = left + _width(drawing.inputs) + _BETWEEN_COLUMNS + labels * _SMALL
+    level = labels * _SMALL
+    middle = left + _width(drawing.inputs) + _BETWEEN_COLUMNS + level
     groups_width = _width([group.box for group in drawing.groups])
     right = middle + groups_width + _BETWEEN_COLUMNS
     outputs_width = _width([output for group in drawing.groups for output in group.outputs])
@@ -102,7 +104,7 @@ def layout_of(drawing: Drawing) -> Layout:
         links = sorted(group.links, key=lambda link: inputs[link.input].y)
         for link, port in zip(links, _ports(box, len(links)), strict=True):
             start = inputs[link.input]
-            lines.append(Line((start.right, start.middle), (box.x, port), link.label, link.is_dashed))
+            lines.append(Line((start.right, start.middle), (box.x, port), level, link.label, link.is_dashed))
     boxes = (*inputs.values(), *outputs)
     bottom = max(each.y + each.height for each in (*boxes, *groups))
     return Layout(right + outputs_width + MARGIN, bottom + MARGIN, boxes, tuple(groups), tuple(lines))

@@ -74,11 +74,12 @@ def _description(drawing: Drawing) -> Iterator[str]:
 
 def _path(line: Line) -> str:
     (x, y), (to_x, to_y) = line.start, line.end
+    to_x -= line.level
     bend = max(_BEND, (to_x - x) / 2)
     dashed = ' class="dashed"' if line.is_dashed else ""
     return (
-        f'<path{dashed} d="M{x:.1f} {y:.1f}C{x + bend:.1f} {y:.1f} {to_x - bend:.1f} {to_y:.1f} {to_x:.1f} {to_y:.1f}"'
-        ' marker-end="url(#syncrelay-end)"/>'
+        f'<path{dashed} d="M{x:.1f} {y:.1f}C{x + bend:.1f} {y:.1f} {to_x - bend:.1f} {to_y:.1f} {to_x:.1f} {to_y:.1f}'
+        f'H{line.end[0]:.1f}" marker-end="url(#syncrelay-end)"/>'
     )
 
 

@@ -72,9 +72,11 @@ function showList(groups, current) {
   groups.forEach((group, at) => {
     const row = place("groups").children[at], [, level, figures, why] = row.children;
     row.setAttribute("aria-current", String(group === current));
+    row.className = `group ${group.level}`;
     level.className = `level ${group.level}`;
     level.textContent = group.level.toUpperCase();
-    figures.textContent = `${ofPossible(group)} sets/s, span p95 ${duration(group.span_ms?.p95)}, latency p95 ${duration(group.latency_ms?.p95)}`;
+    const shown = [`${ofPossible(group)} sets/s`, `span p95 ${duration(group.span_ms?.p95)}`, `latency p95 ${duration(group.latency_ms?.p95)}`];
+    fill(figures, shown, () => shown.flatMap((each, index) => [index ? ", " : "", element("span", {}, each)]));
     const [finding] = group.findings;
     why.textContent = finding && group.level !== "ok" ? printable(finding.text) : "";
   });
@@ -135,7 +137,7 @@ function recentOf(group, width) {
 }
 
 function input(group, each) {
-  const problem = group.findings.find((one) => one.topic === each.topic && one.severity !== "ok");
+  const problem = group.findings.find((one) => one.topics.includes(each.topic) && one.severity !== "ok");
   const notes = [each.required ? [] : ["optional"], problem ? [problem.code.replaceAll("_", " ")] : []].flat();
   const lost = each.lost ? `; ${each.lost} lost on the way` : "";
   const rows = {
