@@ -115,14 +115,16 @@ class Monitor:
         self._evaluate(now)
 
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
-        self._judge(bindings, *self._loop.call(lambda: self._gather(bindings)).result())
+        waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
+        # Not at the end, which takes its time on purpose.
+        self.standstills.end()
+        self._judge(bindings, waits, batches)
 
     def conclude(self) -> None:
         """Evaluate all groups a last time, after the receive loop has ended."""
         self._judge(self._bindings, *self._gather(self._bindings))
 
     def _judge(self, bindings: Sequence[GroupBinding], waits: Sequence[int], batches: Sequence[Batch]) -> None:
-        self.standstills.end()
         now = time.time_ns()
         self._try_budget.refill()
         # Messages are received by the system's clock: a step of it is no wait.

@@ -116,7 +116,7 @@ def test_the_summary_accounts_for_every_message(stage: Stage):
     assert front.inputs["/lidar"].dropped["shutdown"] == 1
 
 
-# A busy machine may leave the collector no time for longer than the end waits for what was published last to be read.
+# On a busy machine the collector may take longer to read what was published last than the relay waits for it.
 _PATIENT = """
 from syncrelay.ros import relay
 
