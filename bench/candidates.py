@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -58,7 +59,10 @@ LOADS = {
 
 @dataclass(frozen=True)
 class Candidate:
-    """A relay's command under a load, and where it is started; its environment; which of its manifests are heard."""
+    """A relay's command under a load, and where it is started; its environment; which of its manifests are heard.
+
+    `tap` is the command that taps it, once it is there.
+    """
 
     name: str
     load: Load
@@ -66,10 +70,11 @@ class Candidate:
     environ: Mapping[str, str] = field(default_factory=dict)
     folder: Path | None = None
     hear: Sequence[str] = ()
+    tap: Sequence[str] = ()
 
 
-# Scalars on /diagnostics; manifests that someone hears; neither watching nor telling.
-SWITCHES = {"scalars", "heard", "untold"}
+# Scalars on /diagnostics; manifests that someone hears; neither watching nor telling; sets and drops that are tapped.
+SWITCHES = {"scalars", "heard", "untold", "tapped"}
 
 
 class Workshop:
@@ -96,13 +101,19 @@ class Workshop:
         if wrong := switches - SWITCHES:
             raise ValueError(f"{word}: no setting is called {', '.join(sorted(wrong))}")
         environ = {"PYTHONPATH": str(checkout), **{name: value for name, value in asked.items() if value}}
-        command = [python, *self._entry(load, switches, coalesce)]
+        port = _free_port()
+        command = [python, *self._entry(load, switches, coalesce, port)]
+        # What it prints is read by nobody else.
+        follow = f'exec "$0" -m syncrelay tap --url http://127.0.0.1:{port} > /dev/null'
+        tap = ["sh", "-c", follow, python] if "tapped" in switches else []
         hear = [f"/syncrelay/g{group}/sets" for group in range(load.groups)] if "heard" in switches else []
         # `-m` looks where it is started first.
-        return Candidate(word, load, command, environ, checkout, hear)
+        return Candidate(word, load, command, environ, checkout, hear, tap)
 
-    def _entry(self, load, switches, coalesce):
-        keys = {"diagnostics": {"scalars": True}} if "scalars" in switches else {}
+    def _entry(self, load, switches, coalesce, port):
+        keys = {"metrics": {"listen": f"127.0.0.1:{port}"}}
+        if "scalars" in switches:
+            keys["diagnostics"] = {"scalars": True}
         if "untold" in switches:
             keys = {"metrics": None, "diagnostics": None}
         if coalesce:
@@ -162,6 +173,11 @@ def _compiled(library):
         check=True,
     )
     return library
+
+
+def _free_port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
 
 
 def clean_environment():

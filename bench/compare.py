@@ -3,7 +3,8 @@
 A candidate is a checkout of syncrelay (`.`, `/path/to/another`), `c` (bench/floor.c, bare C on rcl) or `typed`
 (bench/typed_relay.py). Settings follow an @, with commas between: environment variables (`.@SYNCRELAY_RECEIVE=rclpy`)
 and the interpreter (`.@PYTHON=/path/to/python`); for a checkout also `coalesce=300us` (as in the file), `heard` (its
-manifest has a subscriber), `scalars` (on /diagnostics) and `untold` (it neither watches itself nor tells of it).
+manifest has a subscriber), `scalars` (on /diagnostics), `tapped` (by `syncrelay tap`) and `untold` (it neither watches
+itself nor tells of it).
 
 Each is started once, between processes that publish and receive, and loaded in turns, for a second in each round, while
 the others are idle. CPU is what all threads of its process ran, by the scheduler's count, per message that came out.

@@ -57,6 +57,10 @@ class Tables:
         for load in (SMALL, "4 x 100 Hz Imu"):
             self._compare(load, [f"{CHECKOUT}@untold", CHECKOUT, f"{CHECKOUT}@scalars", f"{CHECKOUT}@heard"])
 
+    def tapped(self):
+        for load in (SMALL, "2 x 1 kHz x 1 kB"):
+            self._compare(load, [CHECKOUT, f"{CHECKOUT}@tapped"])
+
     def large(self):
         self._loads("large messages", LARGE_LOADS)
 
@@ -112,12 +116,15 @@ def cpu_s_of(process):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=30, help="rounds of a table at most (default: %(default)s)")
-    parser.add_argument("parts", nargs="*", metavar="PART", help="cost, telling, large, scale or rest (default: all)")
+    parser.add_argument(
+        "parts", nargs="*", metavar="PART", help="cost, telling, tapped, large, scale or rest (default: all)"
+    )
     asked = parser.parse_args()
     print(f"Python {sys.version.split()[0]}, {os.cpu_count()} cores\n")
     with tempfile.TemporaryDirectory() as folder:
         tables = Tables(Workshop(Path(folder)), asked.rounds)
-        parts = {each.__name__: each for each in (tables.cost, tables.telling, tables.large, tables.scale, tables.rest)}
+        there = (tables.cost, tables.telling, tables.tapped, tables.large, tables.scale, tables.rest)
+        parts = {each.__name__: each for each in there}
         if unknown := set(asked.parts) - set(parts):
             parser.error(f"no part is called {', '.join(sorted(unknown))}")
         for part in asked.parts or parts:

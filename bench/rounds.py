@@ -87,11 +87,14 @@ class Station:
         rig = [sys.executable, str(HERE / "rig.py")]
         pace = [f"--size={load.size}", f"--rate={load.rate}", f"--apart={load.apart_s}", f"--together={load.topics}"]
         hear = [f"--hear={topic}" for topic in candidate.hear]
-        self.relay = start(candidate.argv, {**environ, **candidate.environ}, candidate.folder)
+        relay_environ = {**environ, **candidate.environ}
+        self.relay = start(candidate.argv, relay_environ, candidate.folder)
         rig_environ = {**environ, "PYTHONPATH": str(HERE.parent)}
         self._publisher = start([*rig, "publish", load.type_name, *pace, *load.inputs], rig_environ)
         told = [*rig, "receive", load.type_name, f"--together={load.topics}", *hear, *load.outputs]
         self._receiver = start(told, rig_environ)
+        # Once the relay is there.
+        self._start_tap = lambda: start(candidate.tap, relay_environ, candidate.folder) if candidate.tap else None
         self._instructions = None
         self._before = None
         self._idle_share, self._loaded_ns, self._loaded_ran, self._slices = Counter(), 0, Counter(), []
@@ -99,6 +102,7 @@ class Station:
     def wait_ready(self):
         for child in (self._publisher, self._receiver):
             child.read(PATIENCE_S)
+        self._start_tap()
 
     def note_idle(self):
         """Note what the threads run by themselves, and count instructions from now on."""

@@ -1,6 +1,5 @@
 """`syncrelay replay BAG...`: what a file makes of a recording."""
 
-import json
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -21,7 +20,7 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
 from syncrelay.config import load
 from syncrelay.config.wording import counted
-from syncrelay.explain import RecentDrop, drop_line, set_line
+from syncrelay.explain import GroupLines, RecentDrop
 from syncrelay.printable import printable
 from syncrelay.rig.what_if import Fault, parse_fault
 from syncrelay.sync import Match, Outcome
@@ -70,7 +69,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         bindings = bind(config, recording)
         _say_all(problem for binding in bindings for problem in binding.problems)
         written = _written(wanted.output, bindings, opened)
-        listeners = [*_printing(wanted), *([] if written is None else [written.take])]
+        listeners = [*_printing(wanted, bindings), *([] if written is None else [written.take])]
         with reading(recording):
             results = replay_groups(recording, bindings, listeners=listeners)
         _say_all(recording.faults)
@@ -90,28 +89,24 @@ def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:
         remark(printable(sentence))
 
 
-def _printing(wanted: Wanted) -> Iterator[Listener]:
+def _printing(wanted: Wanted, bindings: Sequence[GroupBinding]) -> Iterator[Listener]:
+    lines = {each.group.name: GroupLines(each.group, [one.topic for one in each.inputs]) for each in bindings}
+
     def print_set(binding: GroupBinding, outcome: Outcome, now: int) -> None:
         if isinstance(outcome, Match):
             last = max(received(message) for message in outcome.messages if message is not None)
-            line = set_line(binding.group, _topics(binding), outcome.stamps, left=now, received=last)
-            put(json.dumps(line))
+            put(lines[binding.group.name].of_set(outcome.stamps, left=now, received=last))
 
     def print_drop(binding: GroupBinding, outcome: Outcome, now: int) -> None:
         if not isinstance(outcome, Match):
             message = outcome.message
             drop = RecentDrop(message.input, message.stamp, outcome.reason)
-            line = drop_line(binding.group, _topics(binding), drop, left=now, received=received(message))
-            put(json.dumps(line))
+            put(lines[binding.group.name].of_drop(drop, left=now, received=received(message)))
 
     if wanted.sets:
         yield print_set
     if wanted.drops:
         yield print_drop
-
-
-def _topics(binding: GroupBinding) -> list[str]:
-    return [each.topic for each in binding.inputs]
 
 
 def _written(output: str | None, bindings: Sequence[GroupBinding], opened: ExitStack) -> SetWriter | None:

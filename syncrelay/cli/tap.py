@@ -20,8 +20,8 @@ from syncrelay.top.client import Answer, NoAnswerError, OtherServerError
 from syncrelay.top.tap import DropLine, SetLine, Tap, Told, read_line
 from syncrelay.wakeup import Wakeup
 
-# Seldom enough that to be asked costs the relay about a percent of a core.
-_ASKS_EVERY_S: Final = 0.1
+# Each time costs the relay most of a millisecond, whatever it has to tell.
+_ASKS_EVERY_S: Final = 0.25
 _NS_PER_S: Final = 1_000_000_000
 _WIDTH: Final = 120
 

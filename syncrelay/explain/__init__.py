@@ -24,7 +24,7 @@ from syncrelay.explain.finding_log import FindingLog, in_words
 from syncrelay.explain.findings import Code, Finding, Severity
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
-from syncrelay.explain.lines import drop_line, set_line
+from syncrelay.explain.lines import GroupLines
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
 from syncrelay.explain.rules_graph import no_other_node
@@ -48,6 +48,7 @@ __all__ = [
     "GraphSnapshot",
     "GroupFacts",
     "GroupFigures",
+    "GroupLines",
     "GroupReport",
     "GroupWatch",
     "Histogram",
@@ -70,13 +71,11 @@ __all__ = [
     "Tape",
     "Tolerance",
     "TryBudget",
-    "drop_line",
     "dry_run",
     "explanation",
     "in_words",
     "judge",
     "no_other_node",
     "recent",
-    "set_line",
     "with_ok",
 ]

@@ -9,13 +9,13 @@ import re
 import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from threading import Lock
-from typing import Any, Final, Self
+from typing import Final, Self
 from urllib.parse import parse_qs
 
+from syncrelay.config import GroupConfig
 from syncrelay.errors import SyncRelayError
-from syncrelay.explain import Left, RecentDrop, Tape, drop_line, set_line
+from syncrelay.explain import GroupLines, Left, RecentDrop, Tape
 from syncrelay.explain.tape import UNHEARD_S
 from syncrelay.sync import DropReason
 
@@ -27,7 +27,8 @@ _SHARE: Final = 0.2
 _MOST_LINES: Final = 500
 _KEYS: Final = ("tap", "after", "group", "drops", "input", "reason")
 _MOST_FIELDS: Final = 64
-_NAMES_KEPT: Final = 10_000
+# Far more than a relay has at once; a reload brings others.
+_GROUPS_KEPT: Final = 1_000
 _NAME: Final = re.compile(r"[0-9A-Za-z]{1,32}")
 _NUMBER: Final = re.compile(r"[0-9]{1,18}")
 
@@ -49,8 +50,15 @@ class Wanted:
     reasons: Collection[str]
     drops: bool
 
+    @property
+    def is_all(self) -> bool:
+        """Whether nothing is left out."""
+        return not (self.groups or self.inputs or self.reasons or self.drops)
+
     def holds(self, each: Left, topics: Collection[str]) -> bool:
         """Whether a set or drop of a group with these inputs is wanted."""
+        if self.is_all:
+            return True
         outcome = each.outcome
         if self.groups and each.group.name not in self.groups:
             return False
@@ -106,8 +114,8 @@ class Taps:
         self, tape: Tape, full_name: Callable[[str], str], *, processor_s: Callable[[], float] = time.thread_time
     ) -> None:
         self.tape = tape
-        # It asks rcl, and each line of a tap names all topics of its group.
-        self._full_name = lru_cache(_NAMES_KEPT)(full_name)
+        self._full_name = full_name
+        self._lines: dict[int, GroupLines] = {}
         self._processor_s = processor_s
         self._left_s, self._refilled = _SHARE, time.monotonic()
         self._asked: dict[str, float] = {}
@@ -157,14 +165,24 @@ class Taps:
             self.tape.listen()
         return was_there
 
-    def _line(self, each: Left, wanted: Wanted) -> dict[str, Any] | None:
-        topics = [self._full_name(topic.topic) for topic in each.group.topics]
-        if not wanted.holds(each, topics):
+    def _line(self, each: Left, wanted: Wanted) -> str | None:
+        lines = self._lines_of(each.group)
+        if not wanted.holds(each, lines.topics):
             return None
         if isinstance(each.outcome, RecentDrop):
-            return drop_line(each.group, topics, each.outcome, left=each.left, received=each.received)
-        return set_line(each.group, topics, each.outcome, left=each.left, received=each.received)
+            return lines.of_drop(each.outcome, left=each.left, received=each.received)
+        return lines.of_set(each.outcome, left=each.left, received=each.received)
+
+    def _lines_of(self, group: GroupConfig) -> GroupLines:
+        # A group's hash is that of all it says.
+        lines = self._lines.get(id(group))
+        if lines is None or lines.group is not group:
+            if len(self._lines) >= _GROUPS_KEPT:
+                self._lines.clear()
+            lines = self._lines[id(group)] = GroupLines(group, [self._full_name(each.topic) for each in group.topics])
+        return lines
 
 
-def _told(after: int, *, more: bool = False, lost: int | None = 0, lines: Sequence[dict[str, Any]] = ()) -> bytes:
-    return json.dumps({"after": after, "more": more, "lost": lost, "lines": lines}).encode()
+def _told(after: int, *, more: bool = False, lost: int | None = 0, lines: Sequence[str] = ()) -> bytes:
+    told = json.dumps({"after": after, "more": more, "lost": lost})
+    return f'{told[:-1]}, "lines": [{", ".join(lines)}]}}'.encode()

@@ -12,7 +12,7 @@ import pytest
 
 from syncrelay.cli.tap import plain_line
 from syncrelay.config import Listen, load_text
-from syncrelay.explain import RecentDrop, Tape, drop_line, set_line
+from syncrelay.explain import GroupLines, RecentDrop, Tape
 from syncrelay.status import RelayState, Taps
 from syncrelay.status.server import Server
 from syncrelay.sync import DropReason
@@ -35,9 +35,13 @@ groups:
       - {topic: /imu, type: sensor_msgs/msg/Imu, required: false}
 """
 (GROUP,) = load_text(FILE).groups
-_TOPICS = [topic.topic for topic in GROUP.topics]
+_LEFT, _RECEIVED = _AT + 9 * _MS, _AT + 7 * _MS
 A_SET = (_AT, _AT + 5 * _MS, None)
 A_DROP = RecentDrop(1, _AT, DropReason.OVERFLOW)
+
+
+def lines_of(group, *, topics=None) -> GroupLines:
+    return GroupLines(group, topics or [topic.topic for topic in group.topics])
 
 
 @contextmanager
@@ -48,7 +52,7 @@ def leaving(*outcomes, state: RelayState | None = None) -> Iterator[str]:
     def leave() -> None:
         while not is_over.wait(0.01):
             for each in outcomes if taps.tape.is_on else ():
-                taps.tape.note(GROUP, each, _AT + 9 * _MS, _AT + 7 * _MS)
+                taps.tape.note(GROUP, each, _LEFT, _RECEIVED)
 
     with Server(Listen("127.0.0.1", range(1))) as server:
         server.serve(lambda: state or states.healthy(), taps)
@@ -71,7 +75,7 @@ def test_each_set_and_drop_is_a_line_with_the_offset_of_each_input(tmp_path):
 
 def test_a_set_is_shown_as_it_was_matched_with_the_offsets_of_the_file():
     (group,) = load_text(FILE.replace("/lidar, ", "/lidar, offset: -5ms, ")).groups
-    line = set_line(group, _TOPICS, A_SET, left=_AT + 9 * _MS, received=_AT + 7 * _MS)
+    line = json.loads(lines_of(group).of_set(A_SET, left=_LEFT, received=_RECEIVED))
     assert (line["stamps"]["/lidar"], line["offsets"]) == (_AT + 5 * _MS, {"/lidar": -5 * _MS})
     assert plain_line(line).endswith("set, span 0 s, latency 2 ms: /camera +0 s, /lidar +0 s, /imu missing")
 
@@ -80,10 +84,25 @@ def test_json_lines_are_those_of_replay(tmp_path):
     with leaving(A_SET, A_DROP) as url:
         done = run("tap", "front", "--json", "--url", url, "-n", "2", folder=tmp_path)
     assert done.returncode == 0
-    times = {"left": _AT + 9 * _MS, "received": _AT + 7 * _MS}
-    expected = [set_line(GROUP, _TOPICS, A_SET, **times), drop_line(GROUP, _TOPICS, A_DROP, **times)]
-    lines = done.stdout.splitlines()
-    assert sorted(lines) == sorted(map(json.dumps, expected))
+    assert sorted(map(json.loads, done.stdout.splitlines()), key=len) == [
+        {
+            "group": "front",
+            "time": _LEFT,
+            "topic": "/lidar",
+            "stamp": _AT,
+            "received": _RECEIVED,
+            "reason": "overflow",
+        },
+        {
+            "group": "front",
+            "time": _LEFT,
+            "stamps": {"/camera": _AT, "/lidar": _AT + 5 * _MS, "/imu": None},
+            "offsets": {},
+            "span": 5 * _MS,
+            "latency": 2 * _MS,
+            "missing": ["/imu"],
+        },
+    ]
 
 
 @pytest.mark.parametrize("words", [["--drops"], ["--reason", "overflow"]])
@@ -121,7 +140,8 @@ def test_without_a_relay_it_says_what_to_do(tmp_path):
 def test_names_are_shown_safely_whatever_they_are():
     chance = random.Random(18)
     for _ in range(50):
-        line = {**set_line(GROUP, _TOPICS, A_SET, left=_AT, received=_AT), "group": hostile_name(chance)}
+        line = json.loads(lines_of(GROUP).of_set(A_SET, left=_AT, received=_AT))
+        line["group"] = hostile_name(chance)
         line["stamps"] = {hostile_name(chance): _AT, hostile_name(chance): None}
         shown = plain_line(line)
         assert "\n" not in shown
@@ -141,21 +161,36 @@ groups:
       - {topic: /lidar/points, type: sensor_msgs/msg/PointCloud2}
 """
     ).groups
-    topics = [topic.topic for topic in group.topics]
-    a_set = set_line(group, topics, (_AT, _AT + 7 * _MS), left=_AT + 9_200_000, received=_AT + 8 * _MS)
-    a_drop = drop_line(
-        group, topics, RecentDrop(0, _AT, DropReason.TOO_FAR), left=_AT + 63 * _MS, received=_AT + 2 * _MS
-    )
+    lines = lines_of(group)
+    a_set = lines.of_set((_AT, _AT + 7 * _MS), left=_AT + 9_200_000, received=_AT + 8 * _MS)
+    a_drop = lines.of_drop(RecentDrop(0, _AT, DropReason.TOO_FAR), left=_AT + 63 * _MS, received=_AT + 2 * _MS)
     page = (Path(__file__).parents[2] / "docs" / "observe.md").read_text()
     for line in (a_set, a_drop):
-        assert plain_line(line).split(maxsplit=1)[1] in page
+        assert plain_line(json.loads(line)).split(maxsplit=1)[1] in page
 
 
 def test_what_a_reason_means_is_left_out_where_the_line_would_be_too_wide():
     topic = f"/{'a' * 65}"
-    line = drop_line(GROUP, ["/camera", topic], A_DROP, left=_AT + 9 * _MS, received=_AT + 7 * _MS)
+    lines = lines_of(GROUP, topics=["/camera", topic, "/imu"])
+    line = json.loads(lines.of_drop(A_DROP, left=_LEFT, received=_RECEIVED))
     shown = plain_line(line | {"group": "front"})
     assert shown.endswith(f" front: drop, {topic} overflow after 2 ms")
     assert len(shown) <= 120
     short = plain_line(line | {"topic": "/lidar"})
     assert short.endswith(" overflow (its queue was full) after 2 ms")
+
+
+def test_lines_are_json_whatever_names_and_numbers_are():
+    chance = random.Random(19)
+    for _ in range(200):
+        names = [
+            chance.choice([hostile_name(chance), "100%", "%d", '"\\u0000"', "\0x"]) + str(each) for each in range(3)
+        ]
+        stamps = [chance.choice([None, chance.randrange(2**70)]) for _ in range(2)] + [chance.randrange(2**63)]
+        lines = lines_of(GROUP, topics=names)
+        line = json.loads(lines.of_set(stamps, left=5, received=7))
+        matched = [stamp for stamp in stamps if stamp is not None]
+        assert line["stamps"] == dict(zip(names, stamps, strict=True))
+        assert line["missing"] == [name for name, stamp in line["stamps"].items() if stamp is None]
+        assert (line["span"], line["latency"], line["time"]) == (max(matched) - min(matched), -2, 5)
+        assert json.loads(lines.of_drop(A_DROP, left=5, received=7))["topic"] == names[1]
