@@ -36,6 +36,8 @@ _MISSING: Final = 0.05
 _BACK: Final = 3
 # It is away when so many of its messages did not come.
 _AWAY: Final = 3
+# Of an input that sent one message, no period is known; so long a one is not waited for.
+_UNKNOWN: Final = 2 * SECOND
 # Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
 _FEW: Final = 0.8
 # Nearly all sets that were possible: then what a queue dropped was not missed.
@@ -206,34 +208,37 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     missing = facts.figures.missing[index]
     if an_input.required or not facts.figures.rate_hz:
         return
+    away, rate_hz, pace_hz = _away(facts, an_input), facts.figures.rate_hz, _pace_hz(an_input)
+    if away is None and not pace_hz:
+        return
     # A slow optional input can be in no more sets than it has messages, and one may still be on its way.
-    could_hz = min(facts.figures.rate_hz, an_input.figures.usual_hz or facts.figures.rate_hz)
-    had_hz = (1 - missing) * facts.figures.rate_hz + 2 * SECOND / _WATCHED
+    could_hz = min(rate_hz, pace_hz or rate_hz)
+    had_hz = (1 - missing) * rate_hz + 2 * SECOND / _WATCHED
     if missing <= _MISSING or had_hz >= (1 - _MISSING) * could_hz:
         return
     if missing * facts.figures.sets_since_without[index] >= _BACK:
         return
     waits = f" after waiting {words.duration(facts.max_wait)} for it" if facts.max_wait else ""
-    why, what_helps = _why_without(facts, index, an_input)
+    must = 1 - could_hz / rate_hz
+    slow = f", {words.share(must)} because it comes at {words.rate(pace_hz)} only" if must > _MISSING else ""
+    why, what_helps = away or _why_without(facts, index, an_input)
     yield Finding(
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,
-        f"{words.share(missing)} of the sets leave without {an_input.name}{waits}{why}",
+        f"{words.share(missing)} of the sets leave without {an_input.name}{waits}{'' if away else slow}{why}",
         what_helps,
         index,
     )
 
 
 def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[str, str]:
-    """Tell an input that is away, stamps that fit no set, and messages that come after theirs has left."""
+    """Tell stamps that fit no set, and messages that come after theirs has left."""
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
-    if (away := _away(facts, an_input)) is not None:
-        return away
     about, behind = (Code.WAITING_FOR_OPTIONAL, index), _behind(facts, an_input)
     within = tolerance.ns if tolerance else None
     if tolerance is None or len(nearest) < _FEWEST:
         found = _tried(facts, about, lambda trials: _long_enough(None, trials), optional=index, within=within)
-        return "", _advice(facts, found, name) or f"check how late {name} arrives"
+        return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
     if abs(behind) > max(SECOND, tolerance.ns):
         offset = Change("offset", words.exactly(behind + an_input.offset), index)
         found = _tried(facts, about, lambda trials: filter(None, [trials.gives_enough((offset,))]), optional=index)
@@ -256,7 +261,7 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
             f"check what delays {name}{_or(_advice(facts, found, name))}",
         )
     found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=within)
-    return "", _advice(facts, found, name) or f"check how late {name} arrives"
+    return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
 
 
 def _waits_enough(index: int, trials: Trials) -> Iterator[Tried]:
@@ -277,10 +282,15 @@ def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
     if figures.last_received is None:
         return ": no message of it has arrived", look
     quiet = facts.figures.now - figures.last_received
-    usual = round(SECOND / figures.usual_hz) if figures.usual_hz else 0
-    if quiet > max(SECOND, _AWAY * usual):
+    pace_hz = _pace_hz(an_input)
+    if quiet > max(SECOND, _AWAY * (round(SECOND / pace_hz) if pace_hz else _UNKNOWN)):
         return f": it has been silent for {words.seconds(quiet)}", look
     return None
+
+
+def _pace_hz(an_input: InputFacts) -> float:
+    """Return the rate at which an input comes while it does, 0 of too few messages to tell."""
+    return an_input.figures.usual_hz or an_input.figures.rate_hz
 
 
 def _behind(facts: GroupFacts, an_input: InputFacts) -> int:

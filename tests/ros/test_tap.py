@@ -47,6 +47,8 @@ def test_every_set_that_leaves_is_a_line(stage: Stage):
         return told[-1:] == sets[-1:]
 
     tap.wait_until(has_all, "the last set")
-    assert told == sets[-len(told) :]
+    # A collector that stood still has missed some: the tap has not.
+    assert {stamp for stamp in sets if stamp >= told[0]} <= set(told)
+    assert told == sorted(set(told))
     assert len(told) >= len(recording) // 2
     assert tap.stderr == ""

@@ -43,7 +43,7 @@ FOUND = {
             camera(required=False), LIDAR, an_input("/imu"), figures={"missing": (1.0, 0.0, 0.0)}, max_wait=100 * MS
         ),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check how late /camera arrives",
+        "check whether messages of /camera arrive late or are lost",
     ),
     "an optional input whose stamps fit no set": (
         Code.WAITING_FOR_OPTIONAL,
@@ -94,7 +94,7 @@ FOUND = {
         Severity.WARN,
         without_camera(delay=104 * MS, nearest=Distribution([3 * MS] * 100)),
         "100 % of the sets leave without /camera after waiting 100 ms for it",
-        "check how late /camera arrives",
+        "check whether messages of /camera arrive late or are lost",
     ),
     "messages that were held up": (
         Code.BURSTS,
