@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from itertools import islice
 from math import hypot, sqrt
 from operator import mul, sub
 from statistics import fmean, median, median_low
@@ -98,6 +99,8 @@ _COMES_BACK: Final = 5 * _SECOND
 _ALIKE: Final = 0.25
 # A step stays if the delays of so many polls say so.
 _LEVELS: Final = 3
+# What was late and is in time again had the same delay before: the polls of the last minute.
+_USUAL: Final = 60
 # A live clock is this close to the machine's after the step. A looped recording is not.
 _LIVE: Final = 10 * _SECOND
 _WINDOW: Final = 10 * _SECOND
@@ -118,6 +121,7 @@ class StampSteps:
         self._newest: tuple[int, int] | None = None
         self._pending: tuple[Step, int] | None = None
         self._levels: list[int] = []
+        self._usual: deque[int] = deque(maxlen=_USUAL)
         self._stayed: Step | None = None
         self._swings: deque[Step] = deque(maxlen=100)
 
@@ -125,6 +129,7 @@ class StampSteps:
         """Start afresh: this machine's clock was set."""
         self._newest = self._pending = self._stayed = None
         self._swings.clear()
+        self._usual.clear()
 
     def add(
         self, received: Sequence[int], delays: Sequence[int], least: int, most: int, *, period: Callable[[], float]
@@ -136,6 +141,7 @@ class StampSteps:
         newest, self._newest = self._newest, (received[-1], delays[-1])
         if newest is not None and max(most, newest[1]) - min(least, newest[1]) >= STEP_NS:
             self._scan(newest, received, delays, period())
+        self._usual.append(least)
         if self._pending is not None:
             self._levels.append(least)
             if len(self._levels) > _LEVELS:
@@ -175,8 +181,14 @@ class StampSteps:
         (step, delay), self._pending = self._pending, None
         # What came with the step is of before it too.
         level = median_low(self._levels[1:])
-        if abs(level) < _LIVE and _is_alike(level - delay - step.by, -step.by):
+        if abs(level) < _LIVE and _is_alike(level - delay - step.by, -step.by) and not self._is_back(step, level):
             self._stayed = step
+
+    def _is_back(self, step: Step, level: int) -> bool:
+        """Whether messages that were late, though no clock had been set, come as they did before."""
+        was_set = self._stayed is not None and _is_alike(-step.by, self._stayed.by)
+        earlier = islice(self._usual, max(0, len(self._usual) - len(self._levels)))
+        return step.by > 0 and not was_set and any(abs(each - level) <= _ALIKE * step.by for each in earlier)
 
 
 def _is_alike(one: int, other: int) -> bool:

@@ -41,7 +41,7 @@ _MEANINGS: Final[Mapping[DropReason, str]] = MappingProxyType(
         DropReason.DUPLICATE: "its stamp came twice",
         DropReason.OVERFLOW: "its queue was full",
         DropReason.SUPERSEDED: "a newer set left",
-        DropReason.TOO_FAR: "nothing within slop",
+        DropReason.TOO_FAR: "no partner near enough",
         DropReason.EXPIRED: "waited too long",
         DropReason.TIME_JUMP: "timestamps jumped back",
         DropReason.UNSTAMPED: "its stamp is 0",

@@ -57,7 +57,7 @@ def test_two_groups_fill_an_80x24_terminal():
         "/demo/imu/data     100 Hz    2.21 ms   549 us    " + lines[19][49:],
         "",
         "A B C  each letter is a set: messages matched by time and sent on together",
-        "× too_far: nothing within slop   · superseded: a newer set left",
+        "× too_far: no partner near enough   · superseded: a newer set left",
         "a column is 20 ms; after 1.3 s it starts again on the left; Ctrl-C ends it",
     ]
 

@@ -73,7 +73,7 @@ def test_everything_is_shown_without_a_complaint_or_a_request_elsewhere(scheme, 
         assert page.locator("#group .spark").all_inner_texts()[1].startswith("latency: p50 2.56 ms, p95 9.01 ms")
         assert page.locator("#group .lanes .joint").count() > 5
         assert page.locator("#group .lanes .fate-too_far").count() > 5
-        assert "too_far: nothing within slop" in page.locator("#group .keys").text_content()
+        assert "too_far: no partner near enough" in page.locator("#group .keys").text_content()
         assert page.locator("#group h4").all_text_contents() == ["/camera/image_raw", "/lidar/points"]
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == _STATES[scheme]

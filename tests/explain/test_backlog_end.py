@@ -1,0 +1,34 @@
+"""What was late and is in time again: a backlog that ended, and no clock that was set."""
+
+import random
+
+import pytest
+
+from tests.explain.scenario import Source, run
+
+
+def told_of(*, lag: float, begin: float, end: float, lost: float, seconds: int = 60):
+    """A camera late by `lag` for a while, of which the last messages are lost."""
+
+    def received(second: float) -> float:
+        return second + lag if begin <= second < end else second
+
+    camera = Source("/camera", hz=15, received=received, sends=lambda second: not end - lost <= second < end)
+    slow = Source("/gps", hz=1, delay_jitter_ms=1)
+    return run(camera, slow, seconds=seconds, options={"slop": "40ms", "queue_size": 50})
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_messages_that_are_in_time_again_are_no_step_of_a_clock(seed):
+    chance = random.Random(seed)
+    lag, begin = chance.uniform(0.5, 3), chance.uniform(10, 20)
+    end, lost = begin + lag + chance.uniform(2, 15), lag + chance.uniform(0, 0.1)
+    assert "clock_step" not in told_of(lag=lag, begin=begin, end=end, lost=lost).ever_found
+
+
+def test_a_clock_that_is_set_back_and_forward_again_is_told_both_times():
+    camera = Source("/camera", hz=15, clock=lambda second: -2.0 if 20 <= second < 30 else 0.0)
+    told = run(camera, Source("/gps", hz=10), Source("/imu", hz=30), seconds=50, options={"slop": "40ms"})
+    steps = [finding.text for _, finding in told.findings("clock_step")]
+    assert "jumped back by 2 s" in steps[0]
+    assert "jumped forward by 2 s" in steps[-1]
