@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 import sys
 import time
 from argparse import Namespace
@@ -91,7 +92,7 @@ def observe(asked: Asked, *, stop: StopRequest) -> int:
     if asked.json:
         put(json.dumps(_as_json(observed)))
     else:
-        for line in _lines(observed):
+        for line in _lines(observed, _columns()):
             put(line)
     if asked.write is not None:
         changes = [change for each in observed.analyses for change in each.suggestion.changes]
@@ -179,23 +180,38 @@ def _as_json(observed: Observed) -> object:
     return {**document(observed.state), "seconds": round(observed.seconds, 1), "suggestions": suggestions}
 
 
-def _lines(observed: Observed) -> Iterator[str]:
+def _columns() -> float:
+    """Return how wide lines may be: what is piped is not broken."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else math.inf
+
+
+def _fitted(text: str, columns: float) -> list[str]:
+    from syncrelay.top.plain import wrapped
+
+    words = text.lstrip()
+    return [text] if len(text) <= columns else wrapped(words, indent=text.removesuffix(words), width=int(columns))
+
+
+def _lines(observed: Observed, columns: float) -> Iterator[str]:
     from syncrelay.cli.analysis_text import suggestion_lines
     from syncrelay.explain import words
     from syncrelay.status import document
-    from syncrelay.top.plain import group_lines
+    from syncrelay.top.plain import WIDTH, group_lines
     from syncrelay.top.state import state_of
 
     state = observed.state
-    yield f"observed for {words.seconds(round(observed.seconds * 1e9))} with {state.config}; nothing was published"
+    seconds = words.seconds(round(observed.seconds * 1e9))
+    yield from _fitted(f"observed for {seconds} with {state.config}; nothing was published", columns)
     analyses = {each.group.name: each for each in observed.analyses}
     shown = state_of(document(state)).groups
     for report, group in zip(state.groups, shown, strict=True):
         yield ""
-        yield from group_lines(group)
-        yield f"  {_would_have_left(report)}"
+        yield from group_lines(group, width=int(min(WIDTH, columns)))
+        yield from _fitted(f"  {_would_have_left(report)}", columns)
         if (analysis := analyses.get(group.name)) is not None:
-            yield from suggestion_lines(analysis)
+            for line in suggestion_lines(analysis):
+                # Lines of the file, which stand deeper, are for copying.
+                yield from [line] if line.startswith("    ") else _fitted(line, columns)
 
 
 def _would_have_left(report: "GroupReport") -> str:
@@ -222,7 +238,9 @@ def conclude(
     faults = [f"{report.facts.name} {fault}" for report in reports if (fault := _fault(report, looked_s))]
     faults += [f"{name} could not be evaluated: see the log" for name in unjudged]
     if faults and tell:
-        put(f"\nexit code 1: {'; '.join(faults)}")
+        put("")
+        for line in _fitted(f"exit code 1: {'; '.join(faults)}", _columns()):
+            put(line)
     return AT_FAULT if faults else DONE
 
 

@@ -126,8 +126,13 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         return make_wsgi_app(registry(state))
 
     def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
-        answer: Iterable[bytes] = metrics()(environ, start)
-        return answer
+        told: list[tuple[str, list[tuple[str, str]]]] = []
+        # It knows no HEAD, and no length.
+        asked = {**environ, "REQUEST_METHOD": "GET"}
+        body = b"".join(metrics()(asked, lambda status, headers: told.append((status, headers))))
+        status, headers = told[-1]
+        start(status, [*headers, ("Content-Length", str(len(body)))])
+        return [body]
 
     answers: dict[str, _Answer] = {
         **{path: _of_page(path) for path in PATHS},
@@ -138,7 +143,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         "/readyz": lambda _, start: _readiness(start, state()),
     }
 
-    def application(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
+    def answered(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
         if environ["REQUEST_METHOD"] not in ("GET", "HEAD"):
             return _text(start, "405 Method Not Allowed", "only GET")
         path = environ["PATH_INFO"]
@@ -148,7 +153,10 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         answer = answers.get(path)
         if answer is None:
             return _text(start, "404 Not Found", "there are /, /status, /tap, /metrics, /livez and /readyz")
-        body = answer(environ, start)
+        return answer(environ, start)
+
+    def application(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
+        body = answered(environ, start)
         return [] if environ["REQUEST_METHOD"] == "HEAD" else body
 
     return application

@@ -19,16 +19,20 @@ _FIGURE: Final = 10
 _SPARKLINE: Final = 20
 _FIXED: Final = _LEVEL + _SETS + 2 * _FIGURE
 _SORTED: Final = "▾"
-# What there should be left for the reason, in words, before names may grow and sparklines are drawn beside it.
+# What there should be left for the reason, in words, before names may grow, latencies stand and sparklines are drawn
+# beside it.
 _REASON: Final = 18
 _SENTENCE: Final = 40
+_LEAST_NAME: Final = 10
+_LAST: Final = "FINDING or SPANS"
 
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """How wide what varies is; no sparklines where their width is 0."""
+    """How wide what varies is; no latency, no sparklines where their width is 0."""
 
     name: int
+    latency: int
     sparkline: int
     reason: int
 
@@ -36,10 +40,12 @@ class Columns:
 def columns_of(groups: Sequence[Group], width: int) -> Columns:
     """Divide a line between the names, which are short, and the reasons, which are not."""
     longest = max((len(group.name) for group in groups), default=0)
-    name = min(max(8, longest) + 2, max(10, width - _FIXED - _REASON))
-    left = width - _FIXED - name
+    latency = _FIGURE if width >= _FIXED + _LEAST_NAME + _REASON else 0
+    fixed = _FIXED - _FIGURE + latency
+    name = min(max(8, longest) + 2, max(_LEAST_NAME, width - fixed - _REASON))
+    left = width - fixed - name
     drawn = _SPARKLINE if left >= 2 * (_SPARKLINE + 2) + _SENTENCE else 0
-    return Columns(name, drawn, max(0, left - 2 * (drawn + 2) if drawn else left))
+    return Columns(name, latency, drawn, max(0, left - 2 * (drawn + 2) if drawn else left))
 
 
 def heading(columns: Columns, order: Order) -> Text:
@@ -47,8 +53,9 @@ def heading(columns: Columns, order: Order) -> Text:
     name = "GROUP" + _SORTED * (order is Order.NAME)
     level = "STATE" + _SORTED * (order is Order.WORST)
     drawn = f"{'SPANS':<{columns.sparkline + 2}}{'LATENCIES':<{columns.sparkline + 2}}" if columns.sparkline else ""
-    last = "FINDING" if columns.sparkline else "FINDING or SPANS"
-    figures = f"{level:<{_LEVEL}}{'SETS/s':<{_SETS}}{'SPAN p95':<{_FIGURE}}{'LAT. p95':<{_FIGURE}}"
+    last = "FINDING" if columns.sparkline or columns.reason < len(_LAST) else _LAST
+    latency = f"{'LAT. p95':<{columns.latency}}" if columns.latency else ""
+    figures = f"{level:<{_LEVEL}}{'SETS/s':<{_SETS}}{'SPAN p95':<{_FIGURE}}{latency}"
     return line((f"{name:<{columns.name}}{figures}{drawn}{last}", "bold"))
 
 
@@ -59,7 +66,7 @@ def row(group: Group, columns: Columns) -> Text:
         (f"{phrases.LEVELS[group.level]:<{_LEVEL}}", STYLES[group.level]),
         f"{phrases.sets_of_possible(group):<{_SETS}}",
         f"{phrases.duration(group.span_ms.p95 if group.span_ms else None):<{_FIGURE}}",
-        f"{phrases.duration(group.latency_ms.p95 if group.latency_ms else None):<{_FIGURE}}",
+        f"{phrases.duration(group.latency_ms.p95 if group.latency_ms else None):<{_FIGURE}}" if columns.latency else "",
         *_drawn(group, columns),
         _reason(group, columns),
     )

@@ -8,11 +8,11 @@ from syncrelay.top import phrases
 from syncrelay.top.client import Answer
 from syncrelay.top.state import Finding, Group, Input, Relay, State
 
-_WIDTH = 80
+WIDTH = 80
 
 
 def plain_text(answer: Answer) -> str:
-    """Say all of it in lines of at most 80 columns, but for names and words that are longer."""
+    """Say all of it in lines of at most WIDTH columns, but for names and words that are longer."""
     return "\n".join(_lines(answer))
 
 
@@ -45,36 +45,42 @@ def _of_group(group: Group) -> str:
 
 def _lines(answer: Answer) -> Iterator[str]:
     relay = answer.state.relay
-    yield from _wrapped(f"{relay.node} {phrases.place(relay, answer.url)}: {_of_relay(relay)}", indent="")
+    yield from wrapped(f"{relay.node} {phrases.place(relay, answer.url)}: {_of_relay(relay)}")
     for group in answer.state.groups:
         yield ""
         yield from group_lines(group)
 
 
-def group_lines(group: Group) -> Iterator[str]:
-    """Say all of a group."""
-    yield from _wrapped(_of_group(group), indent="")
-    yield from _wrapped(phrases.options(group), indent="  ")
+def group_lines(group: Group, *, width: int = WIDTH) -> Iterator[str]:
+    """Say all of a group in lines of at most so many columns."""
+    for text, indent in _of_group_in_full(group):
+        yield from wrapped(text, indent=indent, width=width)
+
+
+def _of_group_in_full(group: Group) -> Iterator[tuple[str, str]]:
+    """Yield each sentence with its indent."""
+    yield _of_group(group), ""
+    yield phrases.options(group), "  "
     for name, sample in (("span", group.span_ms), ("latency", group.latency_ms)):
         if sample is not None:
             values = (("p50", sample.p50), ("p95", sample.p95), ("max", sample.max))
-            yield f"  {name}: {', '.join(f'{key} {phrases.duration(value)}' for key, value in values)}"
+            yield f"{name}: {', '.join(f'{key} {phrases.duration(value)}' for key, value in values)}", "  "
     if effect := phrases.offsets(group):
-        yield from _wrapped(f"offset: {effect}", indent="  ")
+        yield f"offset: {effect}", "  "
     for finding in group.findings:
         yield from _finding(finding)
     for each in group.inputs:
         yield from _input(each, group.problem_of(each))
 
 
-def _finding(finding: Finding) -> Iterator[str]:
+def _finding(finding: Finding) -> Iterator[tuple[str, str]]:
     level = "" if finding.severity is Level.OK else f"{phrases.LEVELS[finding.severity]}: "
-    yield from _wrapped(f"{level}{finding.text}", indent="  ")
+    yield f"{level}{finding.text}", "  "
     if finding.suggestion:
-        yield from _wrapped(f"fix: {finding.suggestion}", indent="    ")
+        yield f"fix: {finding.suggestion}", "    "
 
 
-def _input(each: Input, problem: Finding | None) -> Iterator[str]:
+def _input(each: Input, problem: Finding | None) -> Iterator[tuple[str, str]]:
     figures = [problem.label] if problem else []
     if each.rate_hz:
         figures.append(phrases.rate(each.rate_hz))
@@ -85,14 +91,15 @@ def _input(each: Input, problem: Finding | None) -> Iterator[str]:
     if each.dropped_lately:
         figures.append(f"dropped in the last 10 s: {phrases.drops(each.dropped_lately)}")
     optional = "" if each.required else " (optional)"
-    yield from _wrapped(f"{each.topic}{optional}: {', '.join(figures) or 'no message yet'}", indent="  ")
-    yield from _wrapped(phrases.fates(each), indent="    ")
+    yield f"{each.topic}{optional}: {', '.join(figures) or 'no message yet'}", "  "
+    yield phrases.fates(each), "    "
 
 
-def _wrapped(text: str, *, indent: str) -> list[str]:
+def wrapped(text: str, *, indent: str = "", width: int = WIDTH) -> list[str]:
+    """Return a text as lines of at most so many columns, but for words that are longer."""
     return wrap(
         text,
-        _WIDTH,
+        width,
         initial_indent=indent,
         subsequent_indent=f"{indent}  ",
         break_long_words=False,

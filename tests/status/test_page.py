@@ -138,6 +138,58 @@ def test_when_the_relay_goes_its_last_state_stays_and_is_said_to_be_stale(browse
         page.wait_for_selector("#trouble", state="hidden")
 
 
+def many() -> RelayState:
+    """Twenty groups."""
+    told = states.rig()
+    report = told.groups[0]
+    named = (replace(report, facts=replace(report.facts, name=f"group_{number}")) for number in range(20))
+    return replace(told, groups=tuple(named))
+
+
+def _is_seen(page, selector: str) -> bool:
+    seen = "each => (({top, bottom}) => top >= 0 && top < innerHeight - 40 && bottom > 0)(each.getBoundingClientRect())"
+    return page.locator(selector).first.evaluate(seen)
+
+
+def test_on_a_phone_one_gets_from_a_long_list_to_a_group_and_back(browser):
+    with watching(browser, many(), width=390) as (opened_page, _):
+        page = opened_page.page
+        page.locator("#groups button", has_text="group_7").click()
+        assert _is_seen(page, "#group h2")
+        page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")
+        page.locator("#back").click()
+        assert _is_seen(page, "#groups [aria-current=true]")
+        assert page.evaluate("document.activeElement.querySelector('strong').textContent") == "group_7"
+
+
+def test_the_chosen_group_stays_beside_a_long_list_and_where_the_focus_is_can_be_seen(browser):
+    with watching(browser, many(), width=1600) as (opened_page, _):
+        page = opened_page.page
+        assert page.locator("#back").is_hidden()
+        for _press in range(19):
+            page.keyboard.press("j")
+        assert page.evaluate("scrollY") > 0
+        assert _is_seen(page, "#group h2")
+        row = page.locator("#groups [aria-current=true]")
+        assert row.evaluate("each => getComputedStyle(each).outlineStyle") == "solid"
+        row.evaluate("each => each.blur()")
+        assert row.evaluate("each => getComputedStyle(each).outlineStyle") == "none"
+        assert row.evaluate("each => getComputedStyle(each).boxShadow") != "none"
+
+
+def test_an_answer_of_something_else_is_said_and_another_version_brings_its_own_page(browser):
+    with watching(browser, states.rig()) as (opened_page, _):
+        page = opened_page.page
+        page.route("**/status", lambda route: route.fulfill(json={"groups": 3}))
+        page.wait_for_selector("#trouble:has-text('what answers there is not a relay; still trying')")
+        page.unroute("**/status")
+        page.wait_for_selector("#trouble", state="hidden")
+        told = page.evaluate("({...state, relay: {...state.relay, version: '99'}})")
+        with page.expect_event("load"):
+            page.route("**/status", lambda route: route.fulfill(json=told))
+        page.wait_for_selector("#relay:has-text('syncrelay 99')")
+
+
 def test_a_relay_without_groups_has_a_page_too(browser):
     with watching(browser, replace(states.rig(), groups=())) as (opened_page, _):
         assert opened_page.page.locator("#groups").text_content() == "no group is running yet"

@@ -115,6 +115,19 @@ def test_head_is_answered_without_a_body():
         assert asked(address, "/livez", method="HEAD") == (200, "")
 
 
+@pytest.mark.parametrize("path", ["/", "/status", "/tap", "/metrics", "/livez", "/no"])
+def test_head_sends_what_get_says_of_the_body_and_nothing_after_it(path):
+    with serving(HEALTHY) as address:
+        whole, head = (
+            sent(address, f"{method} {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+            for method in ("GET", "HEAD")
+        )
+    assert head.endswith(b"\r\n\r\n")
+    assert head.count(b"\r\n\r\n") == 1
+    assert head.partition(b"\r\n")[0] == whole.partition(b"\r\n")[0]
+    assert b"Content-Length: " in head
+
+
 @pytest.mark.parametrize(
     "garbage",
     [

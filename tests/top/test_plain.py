@@ -6,8 +6,8 @@ import pytest
 
 from syncrelay.status import document
 from syncrelay.top.client import Answer
-from syncrelay.top.plain import plain_text
-from syncrelay.top.state import read_state
+from syncrelay.top.plain import group_lines, plain_text
+from syncrelay.top.state import read_state, state_of
 from tests.top import states
 
 
@@ -25,3 +25,12 @@ def test_all_that_is_found_is_said_in_lines_of_80_columns(state):
         for each in group.facts.inputs:
             assert f"{each.name}" in flowing
             assert f"{each.counts.fed} received, {each.counts.matched} in sets" in flowing
+
+
+@pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)
+def test_a_narrow_terminal_has_narrow_lines(state):
+    for group in state_of(document(state())).groups:
+        wide, narrow = list(group_lines(group)), list(group_lines(group, width=50))
+        assert all(len(line) <= 50 or len(line.split()) == 1 for line in narrow)
+        assert " ".join(wide).split() == " ".join(narrow).split()
+        assert " ".join(group_lines(group, width=1)).split() == " ".join(wide).split()

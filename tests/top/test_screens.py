@@ -54,6 +54,13 @@ def test_groups_are_listed_with_state_rates_and_reason_and_the_selected_one_belo
     assert "Quit" in lines[-1]
 
 
+def test_the_smallest_screen_has_room_for_the_finding_in_place_of_the_latency():
+    lines = at_terminal(states.rig(), size=(60, 15))
+    assert lines[1] == "  GROUP     STATE  SETS/s        SPAN p95  FINDING"
+    assert lines[3] == "  rear      ERROR  0 of 10       -         other clock"
+    assert lines[5] == "  radar     ERROR  0 of 0        -         no publisher"
+
+
 def test_one_that_only_observes_is_told_by_its_file():
     lines = at_terminal(replace(states.healthy(), phase=Phase.OBSERVING, config="fusion.yaml"))
     assert lines[0].startswith("/syncrelay with fusion.yaml ")

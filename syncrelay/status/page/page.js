@@ -34,14 +34,23 @@ async function ask() {
     try {
       const answer = await fetch("status", {cache: "no-store", signal: AbortSignal.timeout(PATIENCE_MS)});
       if (!answer.ok) throw new Error((await answer.text()).slice(0, 500));
-      state = await answer.json();
-      [answered, trouble] = [performance.now(), null];
+      take(await answer.json());
     } catch (error) {
       trouble = error.name === "TimeoutError" ? "it takes too long" : error instanceof TypeError ? "nothing answers there" : error.message;
     }
-    show();
-  }
-  setTimeout(ask, ASKS_EVERY_MS);
+    try {
+      show();
+    } finally {
+      setTimeout(ask, ASKS_EVERY_MS);
+    }
+  } else setTimeout(ask, ASKS_EVERY_MS);
+}
+
+// Where another version has been started, its own page is asked for.
+function take(told) {
+  if (!told?.relay || !Array.isArray(told.groups)) throw new Error("what answers there is not a relay");
+  if (state !== null && told.relay.version !== state.relay.version) location.reload();
+  [state, answered, trouble] = [told, performance.now(), null];
 }
 
 function show() {
@@ -87,14 +96,25 @@ const BLOCKS = ["head", "findings", "figures", "lanes", "inputs"];
 function showGroup(group) {
   const section = place("group");
   if (!group) return fill(section, null, () => []);
-  fill(section, group.name, () => BLOCKS.map((name) => element("div", {class: name})));
-  const [head, findings, figures, recent, inputs] = section.children;
+  fill(section, group.name, () => [backButton(), ...BLOCKS.map((name) => element("div", {class: name}))]);
+  const [, head, findings, figures, recent, inputs] = section.children;
   fill(head, [group.name, options(group)], () => [element("h2", {}, group.name), element("p", {class: "faint"}, options(group))]);
   fill(findings, group.findings, () => group.findings.map(finding));
   fill(figures, [group.sets, group.rate_hz, group.possible_hz, group.since_last_set_ms, group.last_sets], () => figuresOf(group));
   const width = Math.floor(recent.clientWidth);
   fill(recent, [width, group.sets, group.recent], () => (group.recent.length ? recentOf(group, width) : []));
   fill(inputs, group.inputs, () => [element("h3", {}, "Inputs"), element("div", {class: "cards"}, ...group.inputs.map((each) => input(group, each)))]);
+}
+
+// On a phone the list is above the group.
+function backButton() {
+  const button = element("button", {type: "button", id: "back"}, "All groups ↑");
+  button.addEventListener("click", () => {
+    const row = document.querySelector("#groups [aria-current=true]");
+    row.scrollIntoView({block: "center"});
+    row.focus({preventScroll: true});
+  });
+  return button;
 }
 
 function options(group) {
@@ -199,7 +219,7 @@ const KEYS = {j: () => step(1), ArrowDown: () => step(1), k: () => step(-1), Arr
 addEventListener("keydown", (event) => {
   const act = KEYS[event.key];
   // What is focused has the space for itself, and the arrows scroll where no group is chosen by them.
-  if (!act || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest(".controls, a"))) return;
+  if (!act || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest(".controls, #back, a"))) return;
   if (event.key.startsWith("Arrow") && !event.target.closest("#groups")) return;
   event.preventDefault();
   act();
