@@ -3,7 +3,7 @@
 import operator
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 from enum import Enum
 from types import MappingProxyType
@@ -29,6 +29,9 @@ _COMPARE: Final[Mapping[str, Callable[[Any, Any], bool]]] = MappingProxyType(
         ">=": operator.ge,
     }
 )
+# What no number is below, and no share above.
+_LEAST: Final = Decimal(0)
+_WHOLE: Final = Decimal(1)
 # So many digits of a share are told, and those of a duration in its unit.
 _DIGITS: Final = Decimal("0.0001")
 _ROUNDED: Final[Mapping[str, str]] = MappingProxyType({"<=": ROUND_CEILING, ">=": ROUND_FLOOR})
@@ -63,7 +66,7 @@ class Bound:
     def holds(self, found: Decimal) -> bool:
         """Tell whether what was found is as it shall be. Of a share, so many digits are equal as are told."""
         if self.quantity is Quantity.SHARE and _COMPARE[self.comparison] is operator.eq:
-            return found.quantize(_DIGITS) == self.value.quantize(_DIGITS)
+            return _share(found) == _share(self.value)
         return _COMPARE[self.comparison](found, self.value)
 
     def __str__(self) -> str:
@@ -71,19 +74,43 @@ class Bound:
 
     def told(self, found: Decimal) -> str:
         """Return what was found as a file would have it, rounded so that it is seen to differ."""
+        return _written(*self._rounded(found))
+
+    def _rounded(self, found: Decimal) -> tuple[Decimal, str]:
         unit, step = self.unit, _DIGITS
+        if self.quantity is Quantity.SHARE and self._inclusive not in _ROUNDED:
+            return _share(found), unit
         if self.quantity is Quantity.DURATION:
             unit = _fitting(self.unit, found)
             # What is to be equal is compared to the nanosecond.
             step = _DIGITS * _SIZES[unit] if self._inclusive in _ROUNDED else Decimal(1)
         rounding = _ROUNDED.get(self._inclusive, ROUND_HALF_EVEN)
-        return _written((found / step).to_integral_value(rounding) * step, unit)
+        return (found / step).to_integral_value(rounding) * step, unit
 
     def renewed(self, found: Decimal) -> str | int:
         """Return how a file says that what was found is as it shall be, compared as before."""
         if self.comparison:
-            return f"{self._inclusive} {self.told(found)}"
+            value, unit = self._rounded(found)
+            renewed = Bound(self.quantity, self._inclusive, value, unit)
+            if renewed.always_holds:
+                # With it, all would be as it shall be from then on.
+                renewed = replace(renewed, comparison="==" if value == found else self._inclusive[0])
+            return str(renewed)
         return int(found) if self.quantity is Quantity.COUNT else self.told(found)
+
+    @property
+    def always_holds(self) -> bool:
+        """Whether no number could be found for which it does not hold."""
+        compare = _COMPARE[self.comparison]
+        is_whole = self.quantity is Quantity.SHARE and self.value == _WHOLE
+        return (compare is operator.ge and self.value == _LEAST) or (compare is operator.le and is_whole)
+
+    @property
+    def never_holds(self) -> bool:
+        """Whether no number could be found for which it holds."""
+        compare = _COMPARE[self.comparison]
+        is_whole = self.quantity is Quantity.SHARE and self.value == _WHOLE
+        return (compare is operator.lt and self.value == _LEAST) or (compare is operator.gt and is_whole)
 
     @property
     def _inclusive(self) -> str:
@@ -92,6 +119,14 @@ class Bound:
 
 def _written(number: Decimal, unit: str) -> str:
     return f"{(number / _SIZES[unit]).normalize():f}{unit}"
+
+
+def _share(number: Decimal) -> Decimal:
+    """Return a share with so many digits as are told: of 20,000 messages, all but one are not all."""
+    rounded = number.quantize(_DIGITS)
+    if rounded == _WHOLE and number < _WHOLE:
+        return rounded - _DIGITS
+    return _DIGITS if not rounded and number else rounded
 
 
 def _fitting(unit: str, nanoseconds: Decimal) -> str:
@@ -110,10 +145,18 @@ def _bound(quantity: Quantity) -> Callable[[object], Bound]:
         assert matched is not None  # noqa: S101  it matches anything
         comparison = matched[1] or ""
         if quantity is Quantity.DURATION:
-            return Bound(quantity, comparison, *_duration(comparison, matched[2], value))
-        return Bound(quantity, comparison, *_number(quantity, matched[2], value))
+            return _able_to_fail(Bound(quantity, comparison, *_duration(comparison, matched[2], value)))
+        return _able_to_fail(Bound(quantity, comparison, *_number(quantity, matched[2], value)))
 
     return parse
+
+
+def _able_to_fail(bound: Bound) -> Bound:
+    if bound.always_holds:
+        raise ValueError(f"`{bound}` holds whatever is found, so it tests nothing")
+    if bound.never_holds:
+        raise ValueError(f"`{bound}` never holds, whatever is found")
+    return bound
 
 
 def _duration(comparison: str, text: str, value: object) -> tuple[Decimal, str]:
@@ -161,6 +204,6 @@ Share = Annotated[
 Time = Annotated[
     InstanceOf[Bound],
     BeforeValidator(_bound(Quantity.DURATION)),
-    _schema(number="number", text=r"[0-9.eE+]+\s*(ns|us|µs|μs|ms|s|min)\s*$"),
+    _schema(number="number", text=r"[0-9.eE+-]+\s*(ns|us|µs|μs|ms|s|min)\s*$"),
 ]
 """A bound of a duration."""

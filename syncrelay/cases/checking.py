@@ -11,7 +11,7 @@ from typing import Final, TypeAlias
 from syncrelay.bag import open_recording
 from syncrelay.bag.analysis.evaluation import Evaluation, evaluate
 from syncrelay.bag.analysis.streams import Stream, read_streams
-from syncrelay.bag.analysis.watching import watch_group
+from syncrelay.bag.analysis.watching import LASTING_NS, watch_group
 from syncrelay.bag.bindings import bind
 from syncrelay.bag.what_if import Disturbed
 from syncrelay.cases.bounds import Bound, Quantity
@@ -85,20 +85,23 @@ def _mismatches(loaded: LoadedCase, suite: Suite, remarks: list[str]) -> Iterato
     if loaded.recording is not None:
         yield from _compared(loaded, *_recorded(loaded, loaded.recording, suite, remarks))
         return
-    received, idle = arrivals(loaded.case, loaded.drawing, loaded.group, loaded.places, loaded.what_if)
+    case = loaded.case
+    received, idle = arrivals(case, loaded.drawing, loaded.group, loaded.places, loaded.what_if)
     remarks += idle
     drawing = loaded.drawing
     # A drawing beside which only figures are expected says nothing of when they come.
-    if drawing is not None and (drawing.expected or not loaded.case.expect.model_fields_set):
-        left = tuple(_left(loaded.group, received, end=START + (drawing.width - 1) * loaded.case.period, of=loaded))
+    if drawing is not None and (drawing.expected or case.expect is None):
+        left = tuple(_left(loaded.group, received, end=START + (drawing.width - 1) * case.period, of=loaded))
         if list(left) != drawing.expected:
             yield Mismatch(("cases", loaded.name, "drawing"), tuple(drawing.expected), left, left)
-    if loaded.case.expect.model_fields_set:
-        yield from _compared(loaded, loaded.group, streams(received, loaded.group))
+    drawn = 0 if drawing is None else drawing.width * case.period
+    yield from _compared(loaded, loaded.group, streams(received, loaded.group), START + max(drawn, case.lasts or 0))
 
 
-def _recorded(loaded: LoadedCase, path: str, suite: Suite, remarks: list[str]) -> tuple[GroupConfig, Sequence[Stream]]:
-    """Return the group as it is bound to the recording, and the streams of its inputs.
+def _recorded(
+    loaded: LoadedCase, path: str, suite: Suite, remarks: list[str]
+) -> tuple[GroupConfig, Sequence[Stream], int]:
+    """Return the group as it is bound to the recording, the streams of its inputs, and when the recording ends.
 
     Raises BagError where it cannot be read, and UsageError for a fault of a topic that it lacks.
     """
@@ -110,7 +113,7 @@ def _recorded(loaded: LoadedCase, path: str, suite: Suite, remarks: list[str]) -
             raise SyncRelayError("; ".join(binding.problems))
         (found,) = read_streams(recording, [binding])
         remarks += [*binding.problems, *recording.faults, *(() if disturbed is None else disturbed.idle())]
-    return binding.group, found
+    return binding.group, found, recording.end
 
 
 def _left(group: GroupConfig, received: Sequence[Arrival], *, end: int, of: LoadedCase) -> Iterator[str]:
@@ -157,15 +160,33 @@ def _told(outcome: Outcome) -> str:
     return f"{text} stamped {stamped}"
 
 
-def _compared(loaded: LoadedCase, group: GroupConfig, found: Sequence[Stream]) -> Iterator[Mismatch]:
+def _compared(loaded: LoadedCase, group: GroupConfig, found: Sequence[Stream], end: int) -> Iterator[Mismatch]:
+    """Yield what is not as expected; messages come until `end` if they come.
+
+    Raises SyncRelayError where what is expected could not fail.
+    """
     expect, path = loaded.case.expect, ("cases", loaded.name, "expect")
+    heard = [stream.received for stream in found if stream.received]
+    if not heard and (expect is None or expect.received is None):
+        raise SyncRelayError(
+            "no message came to the group, so nothing is tested: if none should come, expect `received: 0`"
+        )
+    if expect is None:
+        return
     evaluation = evaluate(group, found)
     yield from _of_bounds(expect, _figures(group, evaluation), path)
     for name, of_input in expect.inputs.items():
         index = loaded.places[name]
         yield from _of_bounds(of_input, _input_figures(evaluation, [index], index), (*path, "inputs", name))
     if expect.findings is not None:
-        codes = [each.finding.code.value for each in watch_group(group, found)]
+        began = min((received[0] for received in heard), default=end)
+        lasts = max([end, *(received[-1] for received in heard)]) - began
+        if lasts < LASTING_NS:
+            raise SyncRelayError(
+                f"the messages of this case last {lasts / 1e9:.3g} s, so they cannot test `findings`, which are what"
+                f" holds for {LASTING_NS / 1e9:g} s or longer"
+            )
+        codes = [each.finding.code.value for each in watch_group(group, found, until=end)]
         codes = list(dict.fromkeys(codes)) or [(Code.HEALTHY if evaluation.sets else Code.STARTING).value]
         if set(codes) != set(expect.findings):
             at = (*path, "findings")

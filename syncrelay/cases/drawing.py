@@ -113,7 +113,7 @@ def _add_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean
     drawing.keys = {letter: word for word in words for letter in word}
     # A key may be told by more than the letters that have it: `a1 A1`.
     of_words = [[letter for letter in word if letter in drawing.marks] for word in words]
-    if not all(of_words) or any(count > 1 for count in Counter(chain(*of_words)).values()):
+    if not words or not all(of_words) or any(count > 1 for count in Counter(chain(*of_words)).values()):
         yield _fault(
             number,
             line,

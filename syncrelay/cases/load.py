@@ -136,16 +136,19 @@ class _Reader:
             if label:
                 fault = drawings.Fault(line, max(0, lines[line].find(label)), len(label), "")
                 self._place(label, group, places, (*path, "drawing"), self._span((*path, "drawing"), lines, fault))
-        for section, names in (("inputs", case.inputs), ("expect", case.expect.inputs)):
+        for section, names in (("inputs", case.inputs), ("expect", case.expect.inputs if case.expect else {})):
             for each in names:
                 at = (*path, section, *(("inputs",) if section == "expect" else ()), each)
                 self._place(each, group, places, at, self._document.key_span(at))
-        self._check_sources(path, case, {places[label] for label in labels if label in places}, places)
+        if drawing is not None and drawing.keys and not drawing.faults and not any(topic.key for topic in group.topics):
+            self.report((*path, "drawing"), f"{group.name} does not match by keys: `keys:` changes nothing")
+        self._check_sources(path, case, group, {places[label] for label in labels if label in places}, places)
         what_if = tuple(self._faults(path, case, group))
-        if case.recording is not None and not case.expect.model_fields_set:
+        has_rates = any(source.rate is not None for source in case.inputs.values())
+        if case.expect is None and case.drawing is None and (has_rates or case.recording is not None):
             self.report(
                 path,
-                "missing, expected what should come of the recording, for example `expect: {sets: 100}`",
+                "missing, expected what should come of these messages, for example `expect: {sets: 100}`",
                 code="missing_key",
                 span=self._document.key_span(path),
             )
@@ -172,8 +175,8 @@ class _Reader:
         lines = case.drawing.splitlines()
         for fault in drawing.faults:
             self.report(path, fault.text, span=self._span(path, lines, fault))
-        if not drawing.labels and not drawing.faults:
-            self.report(path, "nothing is drawn, expected lanes such as `lidar |a.bc`")
+        if not drawing.marks and not drawing.faults:
+            self.report(path, "no message is drawn, expected lanes such as `lidar |a.bc`")
         if drawing.width * case.period > LONGEST:
             self.report(path, f"the drawing lasts longer than {MOST_SECONDS}s, at {case.period / 1e9:g}s a column")
         return drawing
@@ -193,22 +196,19 @@ class _Reader:
         except ValueError as error:
             self.report(path, str(error), code="unknown_input", span=span)
 
-    def _check_sources(self, path: Place, case: Case, drawn: set[int], places: Mapping[str, int]) -> None:
+    def _check_sources(
+        self, path: Place, case: Case, group: GroupConfig, drawn: set[int], places: Mapping[str, int]
+    ) -> None:
         if case.recording is not None:
             for key in ("drawing", "inputs", "lasts", "period"):
                 if key in case.model_fields_set:
-                    at = (*path, key)
-                    self.report(at, "cannot be used with a recording", span=self._document.key_span(at))
+                    self._refuse_key((*path, key), "cannot be used with a recording")
             return
         rates = [source.rate for source in case.inputs.values() if source.rate is not None]
         if case.drawing is None and not rates:
             text = "no messages: expected a `drawing`, a `recording`, or `inputs` with a `rate`"
             self.report(path, text, code="missing_key", span=self._document.key_span(path))
-        if rates and case.lasts is None:
-            text = "missing, expected how long the inputs with a rate send, for example `lasts: 30s`"
-            self.report((*path, "lasts"), text, code="missing_key", span=self._document.key_span((*path, "inputs")))
-        if case.lasts is not None and sum(case.lasts // rate for rate in rates) > _MOST_MESSAGES:
-            self.report((*path, "lasts"), f"more than {_MOST_MESSAGES} messages: shorten `lasts` or lower a `rate`")
+        self._check_times(path, case, rates)
         first: dict[int, str] = {}
         for name, source in case.inputs.items():
             at = (*path, "inputs", name)
@@ -216,6 +216,22 @@ class _Reader:
                 text = f"is the same input as {quoted(first[places[name]])}: name it once"
                 self.report(at, text, span=self._document.key_span(at))
             self._check_source(at, source, is_drawn=places.get(name) in drawn)
+            if source.field is not None and name in places and group.topics[places[name]].key is None:
+                self._refuse_key((*at, "field"), f"{group.name} does not match by keys: this changes nothing")
+
+    def _check_times(self, path: Place, case: Case, rates: Sequence[int]) -> None:
+        if "period" in case.model_fields_set and case.drawing is None:
+            self._refuse_key((*path, "period"), "works only with a `drawing`: it is the time of its columns")
+        if case.lasts is not None and not rates:
+            self._refuse_key((*path, "lasts"), "works only with an input that has a `rate`")
+        if rates and case.lasts is None:
+            text = "missing, expected how long the inputs with a rate send, for example `lasts: 30s`"
+            self.report((*path, "lasts"), text, code="missing_key", span=self._document.key_span((*path, "inputs")))
+        if case.lasts is not None and sum(case.lasts // rate for rate in rates) > _MOST_MESSAGES:
+            self.report((*path, "lasts"), f"more than {_MOST_MESSAGES} messages: shorten `lasts` or lower a `rate`")
+
+    def _refuse_key(self, path: Place, text: str) -> None:
+        self.report(path, text, span=self._document.key_span(path))
 
     def _check_source(self, path: Place, source: InputSource, *, is_drawn: bool) -> None:
         if source.rate is not None:
@@ -224,8 +240,7 @@ class _Reader:
             return
         for key in _ONLY_WITH_RATE:
             if key in source.model_fields_set:
-                at = (*path, key)
-                self.report(at, "works only on an input with a `rate`", span=self._document.key_span(at))
+                self._refuse_key((*path, key), "works only on an input with a `rate`")
 
     def _faults(self, path: Place, case: Case, group: GroupConfig) -> Iterator[Fault]:
         """Yield faults by the full names of their inputs; of a recording they may be of any of its topics."""

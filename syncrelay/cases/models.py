@@ -1,8 +1,9 @@
 """What a test file may say. Its JSON Schema and its errors come from these models and nowhere else."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Final, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, InstanceOf, WithJsonSchema, model_validator
+from pydantic.config import JsonDict
 
 from syncrelay.cases.bounds import Count, Share, Time
 from syncrelay.config.file import Version
@@ -64,9 +65,16 @@ else:
     CodeName = Literal[tuple(code.value for code in Code)]
 
 
+# What is said where nothing is found.
+_ALONE: Final = (Code.HEALTHY.value, Code.STARTING.value)
+
+
 def _one_or_more(codes: tuple[str, ...]) -> tuple[str, ...]:
     if not codes:
         raise ValueError("expected one code or more: `[healthy]` where nothing is wrong")
+    alone = next((code for code in codes if code in _ALONE), None)
+    if alone is not None and len(set(codes)) > 1:
+        raise ValueError(f"`{alone}` stands alone: with another finding a group is not {alone}")
     return codes
 
 
@@ -85,6 +93,16 @@ Loss = Annotated[
 ]
 """A share of messages in millionths."""
 
+_T = TypeVar("_T")
+
+
+def _not_empty(mapping: dict[str, _T]) -> dict[str, _T]:
+    if not mapping:
+        raise ValueError("expects nothing: name what you expect, or leave this out")
+    return mapping
+
+
+_NOT_EMPTY: Final[JsonDict] = {"minProperties": 1}
 _DURATION: Final = "A number is seconds, a string has a unit (ns, us, ms, s, min)."
 
 
@@ -130,6 +148,8 @@ class InputSource(Keys):
 class InputExpectation(Keys):
     """What becomes of the messages of an input."""
 
+    model_config = ConfigDict(json_schema_extra=_NOT_EMPTY)
+
     received: Annotated[Count | None, NOT_NULL] = Field(
         default=None, description="Messages that come. Default: any number.", examples=[300]
     )
@@ -142,11 +162,18 @@ class InputExpectation(Keys):
     dropped: Annotated[Count | None, NOT_NULL] = Field(
         default=None, description="Messages that leave without a set. Default: any number.", examples=[0]
     )
-    drops: dict[Reason, Count] = Field(
+    drops: Annotated[dict[Reason, Count], AfterValidator(_not_empty)] = Field(
         default_factory=dict,
         description="Messages that leave without a set, by reason. Default: any number of any.",
         examples=[{"overflow": 0}],
+        json_schema_extra=_NOT_EMPTY,
     )
+
+    @model_validator(mode="after")
+    def _expects_something(self) -> Self:
+        if not self.model_fields_set:
+            raise ValueError("expects nothing: name a figure such as `received`, or leave this out")
+        return self
 
 
 class Expectation(InputExpectation):
@@ -190,8 +217,10 @@ class Expectation(InputExpectation):
         " Default: any.",
         examples=[["healthy"]],
     )
-    inputs: dict[str, InputExpectation] = Field(
-        default_factory=dict, description="The same of single inputs, by their topics. Default: any."
+    inputs: Annotated[dict[str, InputExpectation], AfterValidator(_not_empty)] = Field(
+        default_factory=dict,
+        description="The same of single inputs, by their topics. Default: any.",
+        json_schema_extra=_NOT_EMPTY,
     )
 
 
@@ -233,8 +262,8 @@ class Case(Keys):
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(
         default=0, description="Seed of jitter, losses and faults. Default: 0."
     )
-    expect: Expectation = Field(
-        default_factory=Expectation, description="What the group makes of it. Default: what is drawn."
+    expect: Annotated[Expectation | None, NOT_NULL] = Field(
+        default=None, description="What the group makes of it. Default: what is drawn."
     )
 
 

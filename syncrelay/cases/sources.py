@@ -106,7 +106,8 @@ def _simulated(source: InputSource, index: int, case: Case, group: GroupConfig) 
     )
     # 30 Hz for 2 s are 60, though their period is a third of a nanosecond less than it should be.
     time = case.lasts - source.phase
-    messages = -(-(time - time // (2 * source.rate) - 1) // source.rate)
+    slack = min(time // source.rate // 2 + 1, (source.rate - 1) // 2)
+    messages = -(-(time - slack) // source.rate)
     for shot in takewhile(lambda shot: shot.number < messages, schedule(sensor, seed=case.seed, start=START)):
         # Their numbers are the keys of messages that are not drawn.
         arrival = Arrival(shot.sent, index, _clamped(shot.stamp), shot.number, "")

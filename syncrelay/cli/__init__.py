@@ -3,12 +3,14 @@
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from syncrelay.cli.stop import StopRequest, release_signals
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; arguments default to those of the process."""
+    _open_what_is_closed()
     words = sys.argv[1:] if arguments is None else list(arguments)
     stop = StopRequest()
     if _runs_until_stopped(words):
@@ -21,6 +23,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from syncrelay.cli.dispatch import dispatch
 
     return guarded(lambda: dispatch(words, stop=stop))
+
+
+def _open_what_is_closed() -> None:
+    """Give standard streams that were closed (`>&-`) to nobody: to Python they are None."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115  open as long as we run
 
 
 def _runs_until_stopped(words: Sequence[str]) -> bool:

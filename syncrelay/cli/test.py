@@ -7,6 +7,7 @@ from argparse import Namespace
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from syncrelay.cases import Result, Suite, check, load_suite, updated
 from syncrelay.cli.boundary import AT_FAULT, DONE, remark
@@ -14,9 +15,11 @@ from syncrelay.cli.case_reports import REPORTS, FileResult, Report
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import ConfigError
-from syncrelay.config.source import STDIN, listed, shown_name
+from syncrelay.config.source import STDIN, listed, read_source, shown_name
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
+
+_WRITABLE: Final = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
@@ -79,7 +82,7 @@ def _updated(suite: Suite, results: Sequence[Result]) -> Sequence[Result]:
         return results
     (source,) = suite.document.sources.values()
     try:
-        _replace(suite.name, updated(suite.document, source, renewed))
+        replace_text(suite.name, updated(suite.document, source, renewed), before=source.text)
     except SyncRelayError as error:
         remark(str(error))
         return results
@@ -92,14 +95,25 @@ def _as_updated(result: Result) -> Result:
     return replace(result, mismatches=left or result.mismatches, updated=bool(result.mismatches) and not left)
 
 
-def _replace(file: str, text: str) -> None:
-    """Write a file as a whole or not at all; it keeps its mode, and a link to it stays a link."""
+def replace_text(file: str, text: str, *, before: str) -> None:
+    """Write a file as a whole or not at all; it keeps its mode, and a link to it stays a link.
+
+    Raises SyncRelayError where it cannot be written, or no longer holds the text `before`.
+    """
     path = Path(os.path.realpath(file))
     try:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise SyncRelayError(f"{file}: cannot be written: it is not a regular file")
+        # To put another in its place takes no leave of the file itself.
+        if not mode & _WRITABLE or not os.access(path, os.W_OK):
+            raise SyncRelayError(f"{file}: cannot be written: it is read-only")
+        if read_source(str(path)).text != before:
+            raise SyncRelayError(f"{file}: was changed while its cases ran: run them again to update it")
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".syncrelay-") as folder:
             written = Path(folder, path.name)
             written.write_bytes(text.encode())
-            written.chmod(stat.S_IMODE(path.stat().st_mode))
+            written.chmod(stat.S_IMODE(mode))
             written.replace(path)
     except OSError as error:
         raise SyncRelayError(f"{file}: cannot be written: {error.strerror}") from error

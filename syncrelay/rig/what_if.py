@@ -11,6 +11,7 @@ import random
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
@@ -153,6 +154,23 @@ def _window(words: Sequence[str], text: str) -> tuple[int, int | None]:
     return begin, end
 
 
+def _plainly(drop: Fault) -> str:
+    """Return a loss in the plainest words: what means the same loses the same messages."""
+    share = f"{(Decimal(drop.amount) * 100 / _MILLION).normalize():f}"
+    begin = f" from {_seconds(drop.begin)}s" if drop.begin else ""
+    end = "" if drop.end is None else f" until {_seconds(drop.end)}s"
+    return f"drop: {drop.topic} {share}%{begin}{end}"
+
+
+def _seconds(nanoseconds: int) -> str:
+    return f"{(Decimal(nanoseconds) / _BILLION).normalize():f}"
+
+
+def _told_apart(words: Sequence[str]) -> Sequence[str]:
+    """Return words of which no two are the same: a loss that is there twice loses other messages each time."""
+    return [each + " again" * words[:place].count(each) for place, each in enumerate(words)]
+
+
 class Disturbance:
     """The faults of one topic at work on its messages, in the order in which they are received."""
 
@@ -160,10 +178,10 @@ class Disturbance:
         """`began` is when the first message of all was received, in nanoseconds."""
         self._faults = [each for each in faults if each.kind is not Kind.DROP]
         # Of their own each, so that one more fault does not change what another loses.
+        drops = [each for each in faults if each.kind is Kind.DROP]
         self._drops = [
-            (each, random.Random(f"{seed} {topic} {each.written}"))  # noqa: S311  repeatable is the point
-            for each in faults
-            if each.kind is Kind.DROP
+            (each, random.Random(f"{seed} {topic} {words}"))  # noqa: S311  repeatable is the point
+            for each, words in zip(drops, _told_apart([_plainly(each) for each in drops]), strict=True)
         ]
         self._topic = topic
         self._of_all = faults

@@ -1,7 +1,11 @@
 """What comes of drawn, simulated and recorded messages is what the engine and the judge make of them."""
 
 import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
 
+from syncrelay.config import load
+from syncrelay.sync import Match, Message
 from tests.bag.making import rig, write_mcap
 from tests.cases.suites import found, left, run
 from tests.ros.cdr_messages import VECTOR
@@ -94,8 +98,8 @@ def test_findings_are_those_of_the_judge(tmp_path, what_if, code):
 @pytest.mark.parametrize(
     ("expected", "told"),
     [
-        ({"match_rate": "< 98.765%"}, ("< 98.765%", "100%", "<= 100%")),
-        ({"match_rate": "< 0.9"}, ("< 0.9", "1", "<= 1")),
+        ({"match_rate": "< 98.765%"}, ("< 98.765%", "100%", "== 100%")),
+        ({"match_rate": "< 0.9"}, ("< 0.9", "1", "== 1")),
         ({"match_rate": "50%"}, ("50%", "100%", "100%")),
         ({"span_max": "> 1s"}, ("> 1s", "5ms", ">= 5ms")),
         ({"span_max": "< 4500us"}, ("< 4500us", "5000us", "<= 5000us")),
@@ -104,7 +108,7 @@ def test_findings_are_those_of_the_judge(tmp_path, what_if, code):
         ({"span_max": "< 0.004 s"}, ("< 0.004s", "5ms", "<= 5ms")),
         ({"span_max": "6ms"}, ("6ms", "5ms", "5ms")),
         ({"span_max": 0.006}, ("6ms", "5ms", "5ms")),
-        ({"latency_max": "> 1min"}, ("> 1min", "0min", ">= 0min")),
+        ({"latency_max": "> 1min"}, ("> 1min", "0min", "== 0min")),
     ],
 )
 def test_figures_are_told_in_the_unit_that_the_file_has(tmp_path, expected, told):
@@ -117,6 +121,54 @@ def test_of_a_share_in_percent_as_many_digits_are_told_as_of_one(tmp_path):
     assert found(tmp_path, {"match_rate": "> 98%"}, {**case, "inputs": {"lidar": {"latency": "1ms"}}}) == {}
     thirds = {"drawing": "camera |abc\nlidar  |A.........BC\n"}
     assert found(tmp_path, {"match_rate": "> 98%"}, thirds) == {"match_rate": "33.33%"}
+
+
+@pytest.mark.parametrize(
+    ("case", "error"),
+    [
+        (
+            {"what_if": ["dead: /camera", "dead: /lidar"], "expect": {"drops": {"late": 0}}},
+            "no message came to the group",
+        ),
+        ({"lasts": "2s", "expect": {"findings": ["healthy"]}}, "last 2 s, so they cannot test `findings`"),
+    ],
+)
+def test_what_could_not_fail_is_an_error(tmp_path, case, error):
+    result = run(tmp_path, {**RATES, **case})
+    assert error in result.error
+    assert not result.passed
+
+
+def test_that_nothing_comes_can_be_expected(tmp_path):
+    dead = {**RATES, "what_if": ["dead: /camera", "dead: /lidar"]}
+    assert found(tmp_path, {"received": 0}, dead) == {}
+
+
+def test_that_all_inputs_fall_silent_is_found(tmp_path):
+    dead = {**RATES, "what_if": ["dead: /camera from 8s", "dead: /lidar from 8s"]}
+    assert found(tmp_path, {"findings": ["healthy"]}, dead) == {"findings": "silent"}
+
+
+def test_all_but_one_are_not_all(tmp_path):
+    case = {**RATES, "lasts": "2500s", "what_if": ["dead: /camera from 9.95s until 10.05s"]}
+    expect = {"inputs": {"lidar": {"match_rate": 1}}}
+    assert found(tmp_path, expect, case) == {"match_rate": "0.9999"}
+
+
+@pytest.mark.parametrize(("rate", "lasts", "count"), [("30 Hz", "2s", 60), ("100 kHz", "0.3s", 30_000)])
+def test_as_many_messages_come_as_a_rate_says(tmp_path, rate, lasts, count):
+    case = {"inputs": {"camera": {"rate": rate}}, "lasts": lasts}
+    assert found(tmp_path, {"received": 1}, case) == {"received": str(count)}
+
+
+def test_losses_are_those_of_the_fault_however_it_is_written(tmp_path):
+    def lost(*faults):
+        expect = {"inputs": {"camera": {"received": 1}}}
+        return int(found(tmp_path, expect, {**RATES, "what_if": list(faults)})["received"])
+
+    once = lost("drop: /camera 50%")
+    assert lost("drop: camera 50.0 % from 0s") == once
+    assert 20 < lost("drop: /camera 50%", "drop: camera 50.0%") < 80 < once
 
 
 def test_a_fault_that_changes_nothing_is_remarked_on(tmp_path):
@@ -175,3 +227,37 @@ def test_a_recording_without_a_required_topic_fails(tmp_path):
     write_mcap(tmp_path / "rig.mcap", [frame for frame in rig(3) if frame.topic == "/camera"])
     result = run(tmp_path, {"recording": "rig.mcap", "expect": {"sets": 0}}, **RECORDED)
     assert result.error == "front: /lidar is not in the recording, it has /camera"
+
+
+@st.composite
+def lanes(draw):
+    """Draw two lanes of letters, in the order of the alphabet by column."""
+    columns = draw(st.lists(st.sampled_from(("..", "x.", ".x", "xx")), min_size=1, max_size=9))
+    letters = iter("abcdefghijklmnopqr")
+    marked = ["".join(next(letters) if mark == "x" else "." for mark in column) for column in columns]
+    return tuple("".join(column[lane] for column in marked) for lane in (0, 1))
+
+
+@given(drawn=lanes(), policy=st.sampled_from(("approximate_time", "approximate_time_eager", "exact_time")))
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_drawing_gives_what_the_engine_gives_by_hand(tmp_path, drawn, policy):
+    camera, lidar = drawn
+    group = {"policy": policy, "slop": None if policy == "exact_time" else "20ms", "queue_size": 3}
+    assume(set(camera + lidar) != {"."})
+    told = left(tmp_path, f"camera |{camera}\nlidar  |{lidar}\n", **group)
+    engine = load(str(tmp_path / "fusion.yaml")).groups[0].engine()
+    expected = []
+    for column, marks in enumerate(zip(camera, lidar, strict=True)):
+        for index, letter in enumerate(marks):
+            if letter != ".":
+                stamp = 10**18 + column * 10_000_000
+                outcomes = engine.add(Message(index, stamp, letter), now=stamp)
+                expected += [(letter, each) for each in outcomes]
+    by_letter = [(line[0], each) for line in told for each in line[3:].split(", ")]
+    assert by_letter == [(letter, in_words(outcome)) for letter, outcome in expected]
+
+
+def in_words(outcome):
+    if isinstance(outcome, Match):
+        return "".join(message.payload for message in outcome.messages)
+    return f"{outcome.message.payload} {outcome.reason.value}"

@@ -167,6 +167,19 @@ def test_a_reader_that_goes_away_is_no_bug(words, tmp_path):
     assert (done.returncode, done.stderr) == (1, "")
 
 
+@pytest.mark.parametrize(
+    ("words", "code", "said"), [(["schema", "--test"], 0, ""), (["validate", "-"], 1, "<stdin>: the file is empty")]
+)
+def test_a_standard_stream_that_is_closed_is_no_bug(words, code, said, tmp_path):
+    script = (
+        "import os, sys; os.close(0); os.close(1);"
+        "os.execv(sys.executable, [sys.executable, '-m', 'syncrelay', *sys.argv[1:]])"
+    )
+    done = run_python("-c", script, *words, folder=tmp_path)
+    assert done.returncode == code
+    assert done.stderr.partition(", ")[0].strip() == said
+
+
 def test_a_full_disk_is_no_bug(tmp_path):
     script = (
         "import os, sys; from syncrelay.cli import main; os.dup2(os.open('/dev/full', os.O_WRONLY), 1);"

@@ -2,16 +2,18 @@
 
 import io
 import json
+import os
 import random
 import sys
+import threading
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
 
 from syncrelay.cli import parsers
-from syncrelay.cli.test import command
-from syncrelay.errors import UsageError
+from syncrelay.cli.test import command, replace_text
+from syncrelay.errors import SyncRelayError, UsageError
 from tests.cases.suites import write
 from tests.hostile_names import assert_shown_safely, hostile_name
 
@@ -108,6 +110,31 @@ def test_what_no_file_can_expect_still_fails_after_an_update(folder, capsys):
         "tests.yaml\n  FAIL  it\n        span_p95: expected < 1ms, found no set left\n0 passed, 1 failed\n"
     )
     assert told.err == "syncrelay: tests.yaml: 1 expectation updated\n"
+
+
+def test_a_read_only_file_is_not_updated(folder, capsys):
+    (folder / "tests.yaml").chmod(0o444)
+    assert run("tests.yaml", "--update") == 1
+    assert capsys.readouterr().err == "syncrelay: tests.yaml: cannot be written: it is read-only\n"
+    assert (folder / "tests.yaml").read_text() == SUITE
+
+
+def test_a_file_that_is_changed_while_its_cases_run_is_not_updated(folder):
+    before, changed = SUITE, SUITE.replace(">= 60", ">= 70")
+    (folder / "tests.yaml").write_text(changed)
+    with pytest.raises(SyncRelayError, match="was changed while its cases ran"):
+        replace_text("tests.yaml", UPDATED, before=before)
+    assert (folder / "tests.yaml").read_text() == changed
+
+
+def test_a_pipe_is_not_replaced_by_a_file(folder, capsys):
+    os.mkfifo(folder / "pipe.yaml")
+    writer = threading.Thread(target=(folder / "pipe.yaml").write_text, args=(SUITE,))
+    writer.start()
+    assert run("pipe.yaml", "--update") == 1
+    writer.join()
+    assert capsys.readouterr().err == "syncrelay: pipe.yaml: cannot be written: it is not a regular file\n"
+    assert (folder / "pipe.yaml").is_fifo()
 
 
 def test_where_one_file_cannot_be_updated_the_others_are(folder, capsys):

@@ -25,6 +25,8 @@ _SECOND: Final = 1_000_000_000
 _PASSING: Final = 3
 # Findings speak of the last seconds: fewer than these.
 _CLOSELY: Final = 16
+LASTING_NS: Final = _PASSING * _SECOND
+"""Findings that last less long are not told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +37,12 @@ class LastingFinding:
     seconds: int
 
 
-def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingFinding, ...]:
+def watch_group(
+    group: GroupConfig, streams: Sequence[Stream], *, until: int | None = None
+) -> tuple[LastingFinding, ...]:
     """Return what the running relay would have found, judging once a second, the worst and longest first.
 
+    It is judged to the last message, or `until` later than that in nanoseconds of receipt.
     However long nothing is received, that takes no more than some tens of judgements.
     """
     watch = None
@@ -45,7 +50,7 @@ def watch_group(group: GroupConfig, streams: Sequence[Stream]) -> tuple[LastingF
         if watch is None:
             watch = _Watch(group, streams, began=message.payload)
         watch.add(message)
-    return () if watch is None else watch.lasting()
+    return () if watch is None else watch.lasting(until)
 
 
 def judged_seconds(seconds: int) -> list[int]:
@@ -94,8 +99,10 @@ class _Watch:
         self._driver.add(message, now=received)
         self._arrivals[index].append((stamp, received))
 
-    def lasting(self) -> tuple[LastingFinding, ...]:
-        """Judge the last second, and return what was wrong for longer than it takes to start or to end."""
+    def lasting(self, until: int | None) -> tuple[LastingFinding, ...]:
+        """Judge to the end, and return what was wrong for longer than it takes to start or to end."""
+        if until is not None and until >= self._due:
+            self._judge_until(until)
         self._judge(self._due, lasting=1)
         wrong = (each for each in self._found.values() if each.finding.severity is not Severity.OK)
         lasting = (each for each in wrong if each.seconds >= _PASSING)
