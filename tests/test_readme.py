@@ -45,8 +45,9 @@ def test_every_file_that_a_page_shows_is_in_order(text):
 
 def test_every_test_file_that_a_page_shows_is_in_order_and_passes_where_it_can(tmp_path):
     (tmp_path / "fusion.yaml").write_text(_FILES[0])
+    (tmp_path / "tests").mkdir()
     for text in _SUITES:
-        suite = load_suite_text(text, name=str(tmp_path / "tests.yaml"))
+        suite = load_suite_text(text, name=str(tmp_path / "tests" / "fusion.yaml"))
         assert [each.case.name for each in check(suite) if not each.passed and each.case.recording is None] == []
     assert _SUITES
 

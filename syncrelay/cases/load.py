@@ -101,6 +101,9 @@ def _tested(name: str, folder: Path, document: Document, environ: Mapping[str, s
     try:
         return load(path, environ=environ)
     except ConfigError as error:
+        if [problem.code for problem in error.problems] == ["other_kind"]:
+            text = f"{path} is a test file: expected the syncrelay file that is tested, relative to this one"
+            raise ConfigError([document.problem(("config",), text, code="other_kind")]) from error
         if any(problem.code != "unreadable" or problem.severity is not Severity.ERROR for problem in error.problems):
             raise
         texts = [f"{path}: {problem.text}" for problem in error.problems]
