@@ -22,9 +22,9 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 DURATIONS = ("slop", "max_wait", "max_age", "offset", "min_period")
 
 
-# The engine does the same with any of them. A set leaves at once when what is next of an input must be farther off than
-# the set is wide: with slop 20 ms, any period above 38 ms says so, and with 60 ms any above 115 ms. Beside the period
-# of the GNSS, that of the lidar tells nothing more up to 150 ms.
+# The engine does the same with any of them, unless messages come sooner than the file says. A set leaves at once when
+# what is next of an input must be farther off than the set is wide: with slop 20 ms, any period above 38 ms says so,
+# and with 60 ms any above 115 ms. Beside the period of the GNSS, that of the lidar tells nothing more up to 150 ms.
 ALIKE = {
     *(("camera_lidar.yaml", f"front.topics[1].min_period: {ms}000000ns") for ms in (45, 81, 99, 180)),
     *(("camera_lidar_imu_gnss.yaml", f"localization.topics[1].min_period: {ms}000000ns") for ms in (45, 81, 99)),
