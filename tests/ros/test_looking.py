@@ -50,7 +50,7 @@ def test_who_observes_beside_the_relay_publishes_nothing_and_sees_no_rival(stage
 def test_a_file_is_tried_on_a_terminal_and_one_that_fits_is_written(stage: Stage):
     (stage.folder / "tried.yaml").write_text(front(slop="1ms"))
     argv = [sys.executable, "-m", "syncrelay", "observe", "--config", "tried.yaml", "--write", "new.yaml"]
-    with on_terminal(argv, folder=stage.folder, environ={**stage.environment, "COLUMNS": "60"}) as look:
+    with on_terminal(argv, folder=stage.folder, environ={**stage.environment, "COLUMNS": "70"}) as look:
         play(stage, _RIG)
         look.wait_for("over slop")
         look.press("q")
@@ -60,7 +60,7 @@ def test_a_file_is_tried_on_a_terminal_and_one_that_fits_is_written(stage: Stage
     assert "would have left: 0 sets" in told
     assert "exit code 1: front has 1 error" in told
     lines = told.splitlines()[1:]
-    assert [line for line in lines if len(line) > 60 and not line.startswith("    ")] == []
+    assert [line for line in lines if len(line) > 70 and not line.startswith("    ")] == []
     (group,) = load_text((stage.folder / "new.yaml").read_text()).groups
     assert group.options.slop == 7 * MS
 
