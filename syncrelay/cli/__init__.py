@@ -10,6 +10,7 @@ from syncrelay.cli.stop import StopRequest, release_signals
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; arguments default to those of the process."""
     words = sys.argv[1:] if arguments is None else list(arguments)
+    _open_closed_streams()
     stop = StopRequest()
     if _runs_until_stopped(words):
         stop.install()
@@ -21,6 +22,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from syncrelay.cli.dispatch import dispatch
 
     return guarded(lambda: dispatch(words, stop=stop))
+
+
+def _open_closed_streams() -> None:
+    """Have standard streams that a shell or an init closed (`>&-`) be as good as none.
+
+    Else what is opened next, such as a socket, gets the number of one, and what is printed goes into it.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) in (0, 1, 2):
+        pass
+    os.close(number)
+    sys.stdin = sys.stdin or os.fdopen(0)
+    sys.stdout = sys.stdout or os.fdopen(1, "w")
+    sys.stderr = sys.stderr or os.fdopen(2, "w")
 
 
 def _runs_until_stopped(words: Sequence[str]) -> bool:
