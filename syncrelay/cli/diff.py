@@ -52,7 +52,7 @@ def _loaded(*files: str) -> Iterator[Config]:
 def difference_lines(found: Difference) -> Iterator[str]:
     """Yield what a reload does, in lines."""
     yield _summary(found)
-    yield from (f"  {_key_line(section)}" for section in found.sections)
+    yield from (f"  {section}" for section in found.sections)
     gone = found.exchange
     if not found.is_empty and not found.restart:
         yield from (f"  {name}: keeps running, loses nothing" for name in gone.kept)
@@ -82,20 +82,11 @@ def _summary(found: Difference) -> str:
 
 
 def _group_lines(change: GroupChange) -> Iterator[str]:
-    yield from map(_key_line, change.keys)
+    yield from map(str, change.keys)
     yield from (f"{topic}: no longer an input" for topic in change.removed)
     yield from (f"{topic}: a new input" for topic in change.added)
     if change.reordered:
         yield "its inputs are in another order"
-
-
-def _key_line(change: KeyChange) -> str:
-    key = f"{change.topic} {change.key}" if change.topic else change.key
-    return f"{key}: {_value(change.old)} -> {_value(change.new)}"
-
-
-def _value(written: str | None) -> str:
-    return "not set" if written is None else written
 
 
 def _endpoint_lines(title: str, endpoints: Endpoints) -> Iterator[str]:

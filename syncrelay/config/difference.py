@@ -27,6 +27,10 @@ class KeyChange:
     new: str | None
     topic: str | None = None
 
+    def __str__(self) -> str:
+        old, new = ("not set" if written is None else written for written in (self.old, self.new))
+        return f"{f'{self.topic} ' if self.topic else ''}{self.key}: {old} -> {new}"
+
 
 @dataclass(frozen=True, slots=True)
 class GroupChange:
@@ -74,14 +78,15 @@ def difference(old: Config, new: Config) -> Difference:
     return Difference(
         exchange=changed,
         restart=needs_restart(old, new),
-        sections=tuple(_sections(old, new)),
+        sections=tuple(section_changes(old, new)),
         groups=tuple(_Pair(old, new, *pair).change() for pair in pairs),
         subscriptions=_subscriptions(old, new),
         publishers=_publishers(old, new, kept=changed.kept),
     )
 
 
-def _sections(old: Config, new: Config) -> Iterator[KeyChange]:
+def section_changes(old: Config, new: Config) -> Iterator[KeyChange]:
+    """Yield what changes outside the groups."""
     if old.node != new.node:
         for key in type(old.node).model_fields:
             if getattr(old.node, key) != getattr(new.node, key):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any, Final
 
 from syncrelay.config import Config, ConfigError, GroupConfig
+from syncrelay.config.difference import section_changes
 from syncrelay.config.reload import Exchange, exchange, needs_restart
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.group import GroupRelay
@@ -252,7 +253,8 @@ def _chosen(config: Config, names: Collection[str] | None) -> list[GroupConfig]:
 def _require_same_node(running: Config, asked: Config) -> None:
     """Raise ReloadError for what a running relay cannot change."""
     for key in needs_restart(running, asked):
-        raise ReloadError(f"`{key}` cannot change while the relay runs: restart it")
+        changes = ", ".join(str(each) for each in section_changes(running, asked) if each.key.split(".")[0] == key)
+        raise ReloadError(f"`{key}` cannot change while the relay runs ({changes}): restart it")
 
 
 def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:

@@ -115,9 +115,9 @@ def test_a_faulty_file_changes_nothing_and_says_why(stage: Stage):
     assert "reload failed; keeping the running configuration:" in file.relay.stderr
     assert "needs" not in file.refuse("")
     why = file.refuse(config({"front": _FRONT}, metrics=ANY_PORT, node={"name": "other"}))
-    assert why == "`node` cannot change while the relay runs: restart it"
+    assert why == "`node` cannot change while the relay runs (node.name: not set -> other): restart it"
     why = file.refuse(config({"front": _FRONT}, metrics={**ANY_PORT, "hosts": ["robot"]}))
-    assert why == "`metrics` cannot change while the relay runs: restart it"
+    assert why == "`metrics` cannot change while the relay runs (metrics.hosts: not set -> [robot]): restart it"
     recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
     aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
     collector, player = stage.collector(aligned), stage.player(_PAIR)
