@@ -19,7 +19,7 @@ from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
 from syncrelay.config import load
-from syncrelay.config.wording import counted
+from syncrelay.config.wording import all_of, counted
 from syncrelay.explain import GroupLines, RecentDrop
 from syncrelay.printable import printable
 from syncrelay.rig.what_if import Fault, parse_fault
@@ -81,7 +81,12 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     for result in results:
         for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):
             tell(line)
-    return DONE if all(binding.is_complete for binding in bindings) else AT_FAULT
+    if not all(binding.is_complete for binding in bindings):
+        return AT_FAULT
+    none = [result.name for result in results if not result.sets]
+    if none and not wanted.what_if:
+        remark(f"no sets of {all_of(none)}: `syncrelay analyze` with this recording and file tells why")
+    return DONE
 
 
 def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:

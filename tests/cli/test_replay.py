@@ -86,6 +86,13 @@ def test_a_required_topic_that_is_not_there_is_a_fault_of_the_data(folder):
     assert done.stdout.startswith("front: 0 sets\n")
 
 
+def test_where_no_set_leaves_it_names_what_tells_why(folder):
+    (folder / "f.yaml").write_text(_file(slop="1ns"))
+    done = run("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
+    assert (done.returncode, done.stdout.splitlines()[0]) == (0, "front: 0 sets")
+    assert "no sets of front: `syncrelay analyze` with this recording and file tells why" in done.stderr
+
+
 @pytest.mark.parametrize("output", ["out.mcap", "out"])
 def test_what_is_written_can_be_replayed(output, folder):
     done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", output, folder=folder)
