@@ -3,15 +3,14 @@
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from syncrelay.cli.stop import StopRequest, release_signals
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; arguments default to those of the process."""
-    _open_what_is_closed()
     words = sys.argv[1:] if arguments is None else list(arguments)
+    _open_closed_streams()
     stop = StopRequest()
     if _runs_until_stopped(words):
         stop.install()
@@ -25,11 +24,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return guarded(lambda: dispatch(words, stop=stop))
 
 
-def _open_what_is_closed() -> None:
-    """Give standard streams that were closed (`>&-`) to nobody: to Python they are None."""
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115  open as long as we run
+def _open_closed_streams() -> None:
+    """Have standard streams that a shell or an init closed (`>&-`) be as good as none.
+
+    Else what is opened next, such as a socket, gets the number of one, and what is printed goes into it.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) in (0, 1, 2):
+        pass
+    os.close(number)
+    sys.stdin = sys.stdin or os.fdopen(0)
+    sys.stdout = sys.stdout or os.fdopen(1, "w")
+    sys.stderr = sys.stderr or os.fdopen(2, "w")
 
 
 def _runs_until_stopped(words: Sequence[str]) -> bool:

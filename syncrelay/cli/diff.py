@@ -9,7 +9,7 @@ from typing import Any, Final
 from syncrelay.cli.boundary import AT_FAULT, DONE, put
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config import load
+from syncrelay.config import Config, ConfigError, Problem, load
 from syncrelay.config.difference import Difference, Endpoints, GroupChange, KeyChange, difference
 from syncrelay.config.wording import all_of, counted
 
@@ -26,15 +26,27 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 def diff(old: str, new: str, output_format: str) -> int:
     """Print what a reload from one file to another does, as `text` or `json`; 1 if that is anything.
 
-    Raises ConfigError for a faulty file.
+    Raises ConfigError for faulty files.
     """
-    found = difference(load(old), load(new))
+    found = difference(*_loaded(old, new))
     if output_format == "json":
         put(json.dumps(_as_json(found), indent=2, ensure_ascii=False))
     else:
         for line in difference_lines(found):
             put(line)
     return DONE if found.is_empty else AT_FAULT
+
+
+def _loaded(*files: str) -> Iterator[Config]:
+    """Yield what each file says; raises ConfigError, at the end, with what is wrong in all."""
+    problems: list[Problem] = []
+    for file in files:
+        try:
+            yield load(file)
+        except ConfigError as error:
+            problems += error.problems
+    if problems:
+        raise ConfigError(problems)
 
 
 def difference_lines(found: Difference) -> Iterator[str]:

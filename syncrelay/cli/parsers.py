@@ -83,6 +83,7 @@ def diff() -> Parser:
         "syncrelay diff",
         description="Says what a reload would do to a relay that runs OLD and reads NEW: which groups go on, are "
         "rebuilt, start and end, for which keys, and which subscriptions and publishers go and come. Needs no ROS. "
+        "For files that run together, name a directory of them. "
         "Exit code 0 if nothing changes, 1 if something does or a file has an error.",
     )
     parser.add_argument("old", metavar="OLD", help="what the relay runs: a YAML file, a directory of them, or -")

@@ -104,9 +104,14 @@ class Document:
             raise ConfigError([self.problem((key,), text, code="other_kind", span=self.key_span((key,)))])
 
     def line(self, path: Path, *, beside: Path) -> str:
-        """Return the line of a value, and its file where that is another than the one of the value beside it."""
-        span = self.value_span(path)
-        is_elsewhere = span.source != self.value_span(beside).source
+        """Return the line of a value, to be said of the value beside it: with its file where that is another.
+
+        Both may stand at one place, in a block that is written once.
+        """
+        span, shown = self.value_span(path), self.value_span(beside)
+        if span == shown and path != beside:
+            return f"line {span.line}, which an alias or `<<` repeats"
+        is_elsewhere = span.source != shown.source
         return f"line {span.line}{f' of {printable(self.sources[span.source].name)}' if is_elsewhere else ''}"
 
     def has(self, path: Path) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, Final
 
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import NodeNameNonExistentError
 from rclpy.qos import QoSDurabilityPolicy, QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 
@@ -162,7 +163,8 @@ def is_relayed(node: Any, publisher: Any, name: str) -> bool:
     try:
         subscribed = node.get_subscriber_names_and_types_by_node(*named)
         published = node.get_publisher_names_and_types_by_node(*named)
-    except (NodeNameNonExistentError, UnicodeDecodeError):
+    except (NodeNameNonExistentError, UnicodeDecodeError, _rclpy.RCLError):
+        # RCLError: a name that ROS does not allow, as of a publisher without ROS, or one that has not arrived yet.
         return False
     tells_sets = re.compile(re.escape(f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}") + "/[^/]+/sets")
     return any(

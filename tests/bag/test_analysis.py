@@ -2,7 +2,7 @@
 
 import random
 from array import array
-from itertools import product
+from itertools import accumulate, product
 
 import pytest
 from hypothesis import given, settings
@@ -346,6 +346,15 @@ def test_a_clock_of_another_time_wants_an_offset():
     suggestion = _suggested(streams)
     assert _values(suggestion)[1, "offset"] == "3600s"
     assert suggestion.then >= 0.99 * suggestion.possible
+
+
+def test_what_comes_seconds_late_is_given_no_offset_that_would_cost_sets():
+    chance = random.Random(7)
+    at = list(accumulate(chance.randint(80 * MS, 400 * MS) for _ in range(60)))
+    streams = _streams([BEGIN + each for each in at], [BEGIN + each for each in at], late=3 * _SECOND)
+    suggestion = _suggested(streams, queue_size=100)
+    assert suggestion.then >= suggestion.now == 60
+    assert not any(change.key == "offset" for change in suggestion.changes)
 
 
 def test_least_periods_are_suggested_where_sets_leave_sooner():

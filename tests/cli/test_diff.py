@@ -66,4 +66,6 @@ def test_a_faulty_file_is_an_error_and_not_a_difference(folder):
     done = run("diff", "good.yaml", "bad.yaml", folder=folder)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("bad.yaml:4:13: groups.front.policy: unknown value `exact_tim`")
+    both = run("diff", "bad.yaml", "missing.yaml", folder=folder)
+    assert both.stderr == f"{done.stderr}missing.yaml: no such file\n"
     assert run("diff", "-", "-", folder=folder, stdin=GOOD).returncode == 2

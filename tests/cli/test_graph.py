@@ -219,6 +219,14 @@ def test_the_command_draws_files_together_and_says_what_the_relay_does_not_run(t
     assert live.returncode == 0
     assert live.stderr == "syncrelay: /syncrelay does not run new: drawn without figures\n"
     assert "OK, 10 of 10 sets/s" in texts(live.stdout)
+    (tmp_path / "old.yaml").write_text(states.file(front=states.group({"/old": states.IMAGE, "/lidar/points": None})))
+    with serving(states.rig()) as server:
+        other = run("graph", "old.yaml", "--url", server.url, folder=tmp_path)
+    assert "<br/>as /camera/image_raw<br/>" in other.stdout
+    assert other.stderr.splitlines()[-1] == (
+        "syncrelay: front of /syncrelay matches /camera/image_raw, which the files do not have there: a remap, or it"
+        " runs another version of them"
+    )
     gone = run("graph", "fusion.yaml", "--url", server.url, folder=tmp_path)
     assert (gone.returncode, gone.stdout) == (1, "")
     assert gone.stderr.startswith(f"syncrelay: no relay answers at {server.url}\n")

@@ -1,5 +1,6 @@
 """What a reload would do, key by key; what the relay does with it is in tests/ros/test_reload.py."""
 
+import random
 from dataclasses import replace
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from syncrelay.config import load_text
 from syncrelay.config.difference import Difference, KeyChange, difference
 from syncrelay.config.reload import exchange
+from tests.config.any_files import any_file
 from tests.config.test_together import file, group
 
 FRONT, REAR = group("front", "/a", "/b"), group("rear", "/a", "/c")
@@ -156,3 +158,25 @@ def test_keys_of_the_users_own_are_not_told_and_values_stay_on_one_line(environ)
         ("/a qos", "{depth: 4}", "{depth: 5}"),
     ]
     assert between(of("20ms", 4, "one"), of("20ms", 4, "other"), environ).is_empty
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_of_any_two_files_all_that_changes_is_told_and_nothing_else(seed: int, environ):
+    """What a group is built of, and each section, changes if and only if something is told of it."""
+    chance = random.Random(seed)
+    (_, old), (_, new) = (any_file(chance, environ) for _ in range(2))
+    found = difference(old, new)
+    before = {group.name: group for group in old.groups}
+    rebuilt = [group.name for group in new.groups if group.name in before and group != before[group.name]]
+    assert [change.name for change in found.groups] == rebuilt
+    told = [change for change in found.groups if change.keys or change.removed or change.added or change.reordered]
+    # Where the node changes, names do that are written as they were.
+    assert found.restart or told == list(found.groups)
+    assert all(each.old != each.new for each in (*found.sections, *(key for group in told for key in group.keys)))
+    sections = {each.key.partition(".")[0] for each in found.sections}
+    pairs = {name: (getattr(old, name), getattr(new, name)) for name in ("node", "listen", "diagnostics")}
+    changed = {name for name, (was, is_now) in pairs.items() if was != is_now}
+    assert sections == {"metrics" if name == "listen" else name for name in changed}
+    back = difference(new, old)
+    assert (back.subscriptions.lost, back.subscriptions.made) == (found.subscriptions.made, found.subscriptions.lost)
+    assert difference(old, old).is_empty

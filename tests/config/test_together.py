@@ -1,10 +1,12 @@
 """Several files as one: the same rules between them as within one, and what is wrong told by file and line."""
 
+import random
 from pathlib import Path
 
 import pytest
 
 from syncrelay.config import Config, ConfigError, load, load_text
+from tests.config.any_files import any_file, parts_of
 
 _TOPIC = "      - {{topic: {topic}, type: sensor_msgs/msg/{kind}}}\n"
 
@@ -53,6 +55,19 @@ def test_files_together_are_what_one_file_with_all_their_groups_is(environ):
         "rear",
         "front",
     ]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_file_is_what_its_parts_are_together(seed: int, environ):
+    chance = random.Random(seed)
+    keys, whole = any_file(chance, environ)
+    parts = together(environ, **{f"part{number}": text for number, text in enumerate(parts_of(keys, chance))})
+    assert ({each.name: each for each in parts.groups}, parts.node, parts.listen, parts.diagnostics) == (
+        {each.name: each for each in whole.groups},
+        whole.node,
+        whole.listen,
+        whole.diagnostics,
+    )
 
 
 def test_defaults_are_for_the_groups_of_their_own_file(environ):

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from syncrelay.config import StampField, load_text
+from syncrelay.config import Config, StampField, load_text
+from syncrelay.config.difference import Difference, difference
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint, Refusal
 from tests.ros.configs import config
@@ -68,6 +69,10 @@ def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
 
 def _groups(**topics: list[tuple[str, str, str]]) -> list[Any]:
     """Groups of these topics, types and outputs."""
+    return [GroupRelay(each, now=lambda: 0) for each in _file(**topics).groups]
+
+
+def _file(**topics: list[tuple[str, str, str]]) -> Config:
     named = {
         name: {
             "policy": "exact_time",
@@ -75,7 +80,7 @@ def _groups(**topics: list[tuple[str, str, str]]) -> list[Any]:
         }
         for name, inputs in topics.items()
     }
-    return [GroupRelay(each, now=lambda: 0) for each in load_text(config(named)).groups]
+    return load_text(config(named))
 
 
 def _poll(here: SimpleNamespace) -> None:
@@ -222,6 +227,32 @@ def test_a_field_that_a_type_does_not_have_stops_the_one_input_that_asks_for_it(
     wait_until(lambda: publishers[1].publish(sent) or fed(wrong) == [False, True], "messages of the other input")
 
 
+_STAYS = [("/s", _IMU, "/so"), ("/t", _FIELD, "/to")]
+
+
+def _entities(here: SimpleNamespace) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The publishers and subscriptions, by topic."""
+    node = here.node
+    return tuple({each.topic_name: each for each in of} for of in (node.publishers, node.subscriptions))
+
+
+def _names(told: tuple[tuple[str, ...], ...]) -> set[str]:
+    """Their topics; nobody publishes manifests here."""
+    return {each[0] for each in told if not each[0].endswith("/sets")}
+
+
+def _check_told(told: Difference, before: tuple[dict[str, Any], ...], now: tuple[dict[str, Any], ...]) -> None:
+    """What `syncrelay diff` says of two files is what became of the entities."""
+    (published, subscribed), (publishes, subscribes) = before, now
+    assert _names(told.publishers.lost) == published.keys() - publishes.keys()
+    assert _names(told.publishers.made) == publishes.keys() - published.keys()
+    both = published.keys() & publishes.keys()
+    assert _names(told.publishers.made_again) == {each for each in both if published[each] is not publishes[each]}
+    stayed = {name for name, each in subscribed.items() if subscribes.get(name) is each}
+    assert _names(told.subscriptions.lost) == subscribed.keys() - stayed
+    assert _names(told.subscriptions.made) == subscribes.keys() - stayed
+
+
 def _any_groups(chance: random.Random) -> dict[str, list[tuple[str, str, str]]]:
     """Groups that make a right file: no topic of theirs has two types, nor comes in and goes out."""
     came = {
@@ -244,16 +275,22 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
     """The entities of the node are those of the groups that run, whatever their topics were before as which types."""
     chance = random.Random(seed)
     # It keeps its topics, and so its publishers and subscriptions.
-    staying = _groups(stays=[("/s", _IMU, "/so"), ("/t", _FIELD, "/to")])
-    here.bindings.run(staying)
+    running = _file(stays=_STAYS)
+    here.bindings.run(_groups(stays=_STAYS))
     _poll(here)
     kept = {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
     refused = 0
     for _ in range(40):
-        before = here.bindings.groups
+        before, entities_before = here.bindings.groups, _entities(here)
         likelihood = chance.choice([0, 0, 0.1, 0.5])
         here.entities.refuses = lambda likelihood=likelihood: chance.random() < likelihood
-        asked = [*staying, *_groups(**_any_groups(chance))]
+        file = _file(stays=_STAYS, **_any_groups(chance))
+        told = difference(running, file)
+        by_name = {each.config.name: each for each in before}
+        asked = [
+            by_name[each.name] if each.name in told.exchange.kept else GroupRelay(each, now=lambda: 0)
+            for each in file.groups
+        ]
         try:
             here.bindings.run(asked)
         except ReloadError:
@@ -261,6 +298,7 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
             assert here.bindings.groups == before
         else:
             assert here.bindings.groups == asked
+            running = file
         _poll(here)
         here.entities.refuses = lambda: False
         for each in here.bindings.topics:
@@ -269,6 +307,8 @@ def test_any_groups_take_the_place_of_any_others_or_leave_them_as_they_were(here
         assert (_published(here), _subscribed(here)) == _asked(here)
         assert not any(each.missing and "DDS" in each.missing for each in here.bindings.topics)
         assert kept <= {id(each) for each in (*here.node.publishers, *here.node.subscriptions)}
+        if running is file:
+            _check_told(told, entities_before, _entities(here))
     assert refused
 
 

@@ -59,6 +59,18 @@ def suggest(
     if group.options.matched_by:
         return Suggestion((), (_not_measured(group.options.matched_by),), 0, 0, 0)
     stamping = list(_stamping(group, streams))
+    found = _suggested(group, streams, evaluation, changed, stamping)
+    # What comes seconds late looks like a clock that is off.
+    return _suggested(group, streams, evaluation, changed, []) if stamping and found.then < found.now else found
+
+
+def _suggested(
+    group: GroupConfig,
+    streams: Sequence[Stream],
+    evaluation: Evaluation,
+    changed: Callable[[Sequence[Change]], GroupConfig],
+    stamping: Sequence[Change],
+) -> Suggestion:
     base = changed(stamping)
     streams = stamped(base, streams)
     possible = possible_sets(base, streams)
@@ -68,7 +80,7 @@ def suggest(
     hints = tuple(_hints(base, streams))
     most = len(possible.spans)
     now = completed(evaluation.counts, possible.tightest.pivot)
-    changes, best = stamping, evaluate(base, streams) if stamping else evaluation
+    changes, best = [*stamping], evaluate(base, streams) if stamping else evaluation
     if not _does(base, best, possible):
         for more in _ladder(base, possible):
             attempt = evaluate(changed([*stamping, *more]), streams)

@@ -56,3 +56,10 @@ def _remark_on_others(config: Config, state: "State") -> None:
         remark(f"{state.relay.node} does not run {all_of(missing)}: drawn without figures")
     if others := sorted(running - drawn):
         remark(f"{state.relay.node} also runs {all_of(others)}: not drawn, as the files do not have them")
+    for group in (each for each in state.groups if each.name in drawn):
+        names = next(each.inputs.names for each in config.groups if each.name == group.name)
+        if strange := [each.topic for each in group.inputs if each.topic not in names]:
+            remark(
+                f"{group.name} of {state.relay.node} matches {all_of(strange)}, which the files do not have there: a"
+                " remap, or it runs another version of them"
+            )

@@ -97,7 +97,8 @@ def _input_box(name: str, topic: TopicConfig, live: "Input | None") -> Box:
     if live is None:
         return Box(name, (type_name,))
     rate = f"{figure(live.rate_hz)} Hz" if live.rate_hz else "no messages"
-    return Box(name, (type_name, rate), mark=Mark.OK if live.rate_hz else Mark.STALE)
+    other_name = () if live.topic == name else (f"as {live.topic}",)
+    return Box(name, (type_name, *other_name, rate), mark=Mark.OK if live.rate_hz else Mark.STALE)
 
 
 def _output_box(name: str, live: "Input | None") -> Box:
