@@ -21,6 +21,7 @@ Convert: TypeAlias = Callable[[bytes], bytes | None]
 """From a ROS 1 payload to the same message as CDR; None where it is malformed."""
 
 _HEADER: Final = "std_msgs/msg/Header"
+_TIME: Final = "builtin_interfaces/msg/Time"
 # Far beyond the definitions of real messages; what is done with them takes seconds.
 _MOST_FIELDS: Final = 20_000
 _DEEPEST: Final = 50
@@ -51,6 +52,12 @@ def begins_with_header(channel: Channel) -> bool | None:
     if fields is None:
         return None
     return bool(fields[1]) and fields[1][0][1] == (Nodetype.NAME, _HEADER)
+
+
+def stamp_fields(type_name: str, definition: Definition | None = None) -> tuple[str, ...]:
+    """Return the fields of a type that `stamp: {field: ...}` can name as they are, none where the type is not known."""
+    _, fields = _store_of(type_name, definition).fielddefs.get(type_name, ([], []))
+    return tuple(name for name, description in fields if description == (Nodetype.NAME, _TIME))
 
 
 def converter(channel: Channel) -> Convert:

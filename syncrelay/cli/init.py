@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from syncrelay.bag import Channel, Encoding, open_recording
 from syncrelay.bag.analysis import Proposal, inventory_of, propose, propose_for
-from syncrelay.bag.analysis.inventory import NO_HEADER
+from syncrelay.bag.analysis.inventory import no_header
 from syncrelay.bag.analysis.streams import Stream
 from syncrelay.bag.qos import Profile
 from syncrelay.cli.boundary import DONE, put, remark, say
@@ -62,7 +62,7 @@ def init_from_graph(seconds: float, output: str | None) -> int:
     heard = listen(seconds=seconds)
     if heard.relayed:
         remark(f"left out: published by a running relay: {', '.join(heard.relayed)}")
-    headerless = [f"{name} ({type_name}): {NO_HEADER}" for name, type_name in heard.headerless.items()]
+    headerless = [f"{name} ({type_name}): {no_header(type_name)}" for name, type_name in heard.headerless.items()]
     without = (*heard.unusable, *headerless)
     try:
         proposal = propose_for(inventory_of(list(_streams(heard))), source=f"{seconds:g} s of the graph")

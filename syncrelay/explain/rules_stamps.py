@@ -228,11 +228,18 @@ def clock_step(facts: GroupFacts) -> Found:
             yield Finding(
                 Code.CLOCK_STEP,
                 blocks(facts, an_input),
-                f"stamps of {an_input.name} jumped {_forward(step.by)}, {_ago(now, step.at)}; those of the other inputs"
-                " did not",
+                f"stamps of {an_input.name} jumped {_forward(step.by)}, {_ago(now, step.at)}"
+                f"{_of_others(facts, index, step.at)}",
                 _SLEW.format(where=f"of {nodes(an_input)}"),
                 index,
             )
+
+
+def _of_others(facts: GroupFacts, index: int, at: int) -> str:
+    """Say that the others' stamps did not jump, where each had messages before and after that moment."""
+    others = [each.figures for other, each in enumerate(facts.inputs) if other != index]
+    are_known = all((each.flows_since or at) < at < (each.last_received or at) for each in others)
+    return "; those of the other inputs did not" if are_known and not any(each.stepped for each in others) else ""
 
 
 def _forward(by: int) -> str:

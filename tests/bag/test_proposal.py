@@ -7,7 +7,9 @@ import pytest
 
 from syncrelay.bag import open_recording
 from syncrelay.bag.analysis import propose
+from syncrelay.bag.analysis.inventory import no_header
 from syncrelay.bag.bindings import bind
+from syncrelay.bag.recording import Definition
 from syncrelay.bag.replay import replay
 from syncrelay.config import load_text
 from syncrelay.errors import NothingToMatchError
@@ -95,6 +97,23 @@ def test_every_topic_that_is_left_out_is_named_with_the_reason(tmp_path):
         f"/unset ({VECTOR})": "50 messages, 50 with stamp 0",
         f"/unset_once ({VECTOR})": "10 messages, 1 with stamp 0",
     }
+
+
+@pytest.mark.parametrize(
+    ("type_name", "definition", "said"),
+    [
+        ("rcl_interfaces/msg/Log", None, "; to match by a field of it, write `stamp: {field: stamp}`"),
+        (
+            "robot/msg/Shot",
+            Definition("ros2msg", "builtin_interfaces/Time begin\nuint8 number\nbuiltin_interfaces/Time end"),
+            "; to match by a field of it, write `stamp: {field: begin}` or `stamp: {field: end}`",
+        ),
+        (STRING, None, ", so no stamp to match by"),
+        ("robot/msg/Unknown", None, ", so no stamp to match by"),
+    ],
+)
+def test_a_type_without_a_header_is_told_with_its_fields_of_time(type_name, definition, said):
+    assert no_header(type_name, definition) == f"its type has no header{said}"
 
 
 def test_where_all_can_be_matched_none_is_left_out(tmp_path):

@@ -236,6 +236,14 @@ def test_the_one_input_whose_clock_steps_is_named(by):
     says_only(told, "clock_step", f"stamps of /b jumped {direction} by ", "those of the other inputs did not")
 
 
+def test_nothing_is_said_of_inputs_that_sent_nothing_when_another_ones_clock_stepped():
+    camera = Source("/camera", 15, clock=lambda second: 0.0 if second < 20 else 2.0)
+    told = run(camera, Source("/lidar", 10, sends=lambda second: second < 15), seconds=30, options={"slop": "40ms"})
+    steps = [finding.text for _, finding in told.findings("clock_step")]
+    assert steps
+    assert not any("other inputs" in text for text in steps)
+
+
 def test_a_step_that_stays_is_another_clock_in_the_end():
     told = a_trio(clock=lambda second: 0.0 if second < 20 else 2.0, seconds=80)
     assert [line.code for line in told.warnings][-1] == "other_clock"

@@ -6,14 +6,13 @@ from typing import Final
 
 from syncrelay.bag.analysis.streams import Stream, read_topics
 from syncrelay.bag.analysis.topics import TopicFigures, figures_of
-from syncrelay.bag.definitions import begins_with_header
-from syncrelay.bag.recording import Channel, Encoding, Recording
+from syncrelay.bag.definitions import begins_with_header, stamp_fields
+from syncrelay.bag.recording import Channel, Definition, Encoding, Recording
 from syncrelay.config.names import check_topic_name, check_type_name
 from syncrelay.config.wording import counted
 
 FEWEST: Final = 10
 """Fewer messages tell nothing of a rhythm."""
-NO_HEADER: Final = "its type has no header, so no stamp to match by"
 
 # Stamped, but of nodes, not of the world.
 _OF_NO_SENSOR: Final = ("diagnostic_msgs/msg/DiagnosticArray",)
@@ -74,7 +73,15 @@ def _lack(channel: Channel) -> str | None:
     has_header = begins_with_header(channel)
     if has_header is None:
         return "the recording does not define its type, so nothing is known about its stamps"
-    return None if has_header else NO_HEADER
+    return None if has_header else no_header(channel.type, channel.definition)
+
+
+def no_header(type_name: str, definition: Definition | None = None) -> str:
+    """Return why a type without a header is not matched, and by which of its fields it could be."""
+    written = [f"`stamp: {{field: {name}}}`" for name in stamp_fields(type_name, definition)]
+    if not written:
+        return "its type has no header, so no stamp to match by"
+    return f"its type has no header; to match by a field of it, write {' or '.join(written)}"
 
 
 def _too_little(channel: Channel, figures: TopicFigures) -> str | None:
