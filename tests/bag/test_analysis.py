@@ -529,3 +529,9 @@ def test_a_merged_value_is_changed_in_the_group_alone(group: str):
 def test_what_would_change_another_group_or_cannot_be_taken_away_is_refused(change: Change):
     with pytest.raises(BagError, match="cannot be written for one group alone: write them by hand"):
         file_with_changes(_SHARED, [change])
+
+
+def test_two_spaces_stand_before_a_comment_on_a_value_that_was_there():
+    text = "groups:\n  front:\n    queue_size: 10\n    slop: 20ms  # mine\n"
+    changed = with_changes(text, [Change("front", None, "queue_size", 30, "why")])
+    assert changed == text.replace("10", "30  # why")

@@ -99,7 +99,9 @@ def _set(mapping: Any, change: Change) -> None:
 def _comment(mapping: Any, key: str, comment: str) -> None:
     # Behind a key in braces a comment would swallow the rest of the line.
     if comment and key not in mapping.ca.items and not mapping.fa.flow_style():
-        mapping.yaml_add_eol_comment(comment, key)
+        mapping.yaml_add_eol_comment(comment, key, column=0)
+        # ruamel.yaml puts one space before it, and linters of YAML ask for two.
+        mapping.ca.items[key][2].value = f" # {comment}"
 
 
 def _fit(group: Any, policy: str) -> None:
