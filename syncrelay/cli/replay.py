@@ -9,7 +9,7 @@ from pathlib import Path
 from syncrelay.bag import Encoding, open_recording
 from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.bag.mcap_output import McapOutput
-from syncrelay.bag.replay import Listener, received
+from syncrelay.bag.replay import GroupResult, Listener, received
 from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.what_if import Disturbed
 from syncrelay.bag.writing import SetWriter
@@ -61,6 +61,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     with ExitStack() as opened:
         recording = open_recording(bags)
         opened.callback(recording.close)
+        plain = recording
         disturbed = Disturbed(recording, wanted.what_if, seed=wanted.seed) if wanted.what_if else None
         if disturbed is not None:
             recording = disturbed
@@ -74,6 +75,10 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
             results = replay_groups(recording, bindings, listeners=listeners)
         _say_all(recording.faults)
         _say_all(disturbed.idle() if disturbed is not None else ())
+        without_faults = results
+        if disturbed is not None:
+            with reading(plain):
+                without_faults = replay_groups(plain, bindings)
     if written is not None:
         sets = sum(result.sets for result in results)
         remark(f"wrote {wanted.output}: {counted(written.messages, 'message')} of {counted(sets, 'set')}")
@@ -81,12 +86,18 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     for result in results:
         for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):
             tell(line)
+    if wanted.what_if:
+        _say_all([_compared(*each) for each in zip(results, without_faults, strict=True)])
     if not all(binding.is_complete for binding in bindings):
         return AT_FAULT
-    none = [result.name for result in results if not result.sets]
-    if none and not wanted.what_if:
+    none = [result.name for result in without_faults if not result.sets]
+    if none:
         remark(f"no sets of {all_of(none)}: `syncrelay analyze` with this recording and file tells why")
     return DONE
+
+
+def _compared(result: GroupResult, without_faults: GroupResult) -> str:
+    return f"{result.name}: {counted(result.sets, 'set')} with the faults, {without_faults.sets} without"
 
 
 def _say_all(sentences: Iterator[str] | Sequence[str]) -> None:

@@ -32,7 +32,10 @@ def test_a_fault_changes_what_comes_and_is_named(replayed):
     assert (code, sets, said) == (0, "front: 40 sets", "")
     code, (sets, _, lidar), said = replayed("--what-if", "dead: /lidar from 2s", "--what-if", "offset: /lidar 5ms")
     assert (code, sets, lidar) == (0, "front: 20 sets", "front:   /lidar: 20 received, 20 in sets, 0 dropped")
-    assert said == "syncrelay: faults laid over the recording (seed 0): `dead: /lidar from 2s`, `offset: /lidar 5ms`\n"
+    assert said.splitlines() == [
+        "syncrelay: faults laid over the recording (seed 0): `dead: /lidar from 2s`, `offset: /lidar 5ms`",
+        "syncrelay: front: 20 sets with the faults, 40 without",
+    ]
 
 
 def test_a_fault_that_changes_nothing_is_told(replayed):
