@@ -115,19 +115,19 @@ class Files:
 def _files(named: Sequence[str]) -> Iterator[Path]:
     for name in named:
         try:
-            yield from _files_of(Path(name))
+            yield from _files_of(Path(name), named)
         except OSError as error:
             raise BagError(f"{name}: cannot be read: {error.strerror}") from error
 
 
-def _files_of(path: Path) -> list[Path]:
+def _files_of(path: Path, named: Sequence[str]) -> list[Path]:
     if path.name == _METADATA and path.is_file():
         path = path.parent
     if path.is_dir():
         return _files_in(path)
     if path.exists():
         return [path]
-    raise BagError(f"{path}: no such file or folder{_similar(path)}")
+    raise BagError(f"{path}: no such file or folder{_similar(path, named)}")
 
 
 def _files_in(folder: Path) -> list[Path]:
@@ -146,9 +146,11 @@ def _natural(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
-def _similar(path: Path) -> str:
+def _similar(path: Path, named: Sequence[str]) -> str:
+    """Return a question for the recording beside a path whose name is most like it, and that is not named already."""
     try:
-        beside = [each.name for each in path.parent.iterdir() if each.is_dir() or _bare_suffix(each) in _SUFFIXES]
+        others = set(path.parent.iterdir()).difference(map(Path, named))
+        beside = [each.name for each in sorted(others) if each.is_dir() or _bare_suffix(each) in _SUFFIXES]
     except OSError:
         return ""
     return did_you_mean(path.name, beside)

@@ -102,7 +102,9 @@ def _tested(name: str, folder: Path, document: Document, environ: Mapping[str, s
         return load(path, environ=environ)
     except ConfigError as error:
         if [problem.code for problem in error.problems] == ["other_kind"]:
-            text = f"{path} is a test file: expected the syncrelay file that is tested, relative to this one"
+            itself = Path(path).resolve() == Path(document.sources[0].name).resolve()
+            kind = "this test file itself" if itself else "a test file"
+            text = f"{path} is {kind}: expected the syncrelay file that is tested, relative to this one"
             raise ConfigError([document.problem(("config",), text, code="other_kind")]) from error
         if any(problem.code != "unreadable" or problem.severity is not Severity.ERROR for problem in error.problems):
             raise

@@ -10,7 +10,7 @@ from syncrelay.cli.parser import Parser, count, positive, seed
 _RELAY_USAGE: Final = "syncrelay --config FILE [option ...] | syncrelay COMMAND ..."
 _EXIT_CODES: Final = """\
 exit codes: 0 done, 1 a problem in a file or data, 2 wrong usage, 69 ROS or a
-  package cannot be used here, 70 a bug in syncrelay, 130 interrupted"""
+  package cannot be used, 70 a bug, 130 interrupted (a relay: by a 2nd Ctrl-C)"""
 
 
 def relay() -> Parser:

@@ -8,7 +8,7 @@ from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import GroupConfig
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
-from syncrelay.config.wording import all_of, quoted
+from syncrelay.config.wording import all_of, or_nearest, quoted
 
 # The longest of what every node offers below its name.
 _LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
@@ -55,8 +55,9 @@ def _too_few(group: GroupConfig, document: Document) -> Iterator[Problem]:
 def _restamp(group: GroupConfig, document: Document) -> Iterator[Problem]:
     restamp = group.options.restamp
     if restamp not in _RESTAMP_WORDS and group.restamp is None:
-        hint = document.did_you_mean(restamp, (*_RESTAMP_WORDS, *_inputs(group)))
-        text = f"expected none, earliest, latest or an input of this group, found {quoted(restamp)}{hint}"
+        below = [name for name in _inputs(group) if name.startswith(f"{restamp}/")]
+        likely = below[0] if len(below) == 1 else document.nearest(restamp, (*_RESTAMP_WORDS, *_inputs(group)))
+        text = f"expected none, earliest, latest or an input of this group, found {quoted(restamp)}{or_nearest(likely)}"
         yield document.problem((*group.path, "restamp"), text, code="bad_value")
 
 

@@ -1,5 +1,6 @@
 """pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any, Final, Protocol, TypeAlias
 
@@ -31,6 +32,8 @@ _MAPPING_FORMS: Final = {"qos": "a mapping", "stamp": "{field: path.to.a.Time}"}
 _A_SLIP: Final = 0.8
 # What YAML 1.1 and other formats take for a truth value.
 _TRUTH_WORDS: Final = ("yes", "no", "on", "off", "true", "false")
+# What stands in brackets, or behind a key, as it is, and can be read in a line.
+_A_WORD: Final = re.compile(r"[\w./~-]{1,80}")
 
 
 class Form(Protocol):
@@ -89,7 +92,7 @@ def _problem(error: ErrorDetails, path: Path, meant: str | None, document: Docum
             text = f"missing, {form.missing(error['loc'])}"
             return document.problem(path, text, code="missing_key", span=_owner_span(path, document))
         case kind if kind in _EXPECTED:
-            text = f"expected {_EXPECTED[kind]}, {_found(error['input'], kind)}"
+            text = f"expected {_EXPECTED[kind]}, {_found(error['input'], kind)}{_rather(error, form)}"
             return document.problem(path, text, code="wrong_type", span=document.value_span(path))
         case kind:
             at_key = error["loc"][-1] == "[key]"
@@ -120,6 +123,27 @@ def _no_such_word(found: object, words: Sequence[str], loc: Location, document: 
         return f"unknown value {quoted(str(found))}{or_nearest(close)}"
     choices = [*words, _MAPPING_FORMS[str(loc[-2])]] if loc[-1] == "<name>" else words
     return f"expected {one_of(choices)}, found {describe(found)}"
+
+
+def _rather(error: ErrorDetails, form: Form) -> str:
+    """Say what to write where the value is near enough to tell; nothing elsewhere."""
+    found, loc = error["input"], error["loc"]
+    match error["type"]:
+        case "tuple_type" if _is_word(found) and loc[-1] != "topics":
+            return f": write `[{found}]`"
+        case "model_type" | "model_attributes_type" if _is_word(found) and loc[-2:-1] == ("topics",):
+            return f": write `topic: {found}`"
+        case "model_type" | "model_attributes_type" if isinstance(found, bool) and len(loc) == 1:
+            return f": write its keys, such as `{next(iter(form.model(loc).model_fields))}`, or leave it out"
+        case "string_type" if isinstance(found, int | float):
+            field = form.model(loc[:-1]).model_fields.get(str(loc[-1]))
+            return f": write for example `{field.examples[0]}`" if field is not None and field.examples else ""
+        case _:
+            return ""
+
+
+def _is_word(value: object) -> bool:
+    return isinstance(value, str) and _A_WORD.fullmatch(value) is not None
 
 
 def _found(value: object, kind: str) -> str:

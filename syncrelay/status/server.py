@@ -138,7 +138,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         **{path: _of_page(path) for path in PATHS},
         "/metrics": answer_metrics,
         "/status": lambda _, start: _json(start, document(state())),
-        "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"]),
+        "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"], state()),
         "/livez": lambda _, start: _liveness(start, state()),
         "/readyz": lambda _, start: _readiness(start, state()),
     }
@@ -182,9 +182,10 @@ def _of_page(path: str) -> _Answer:
     return answer
 
 
-def _tapped(start: _Start, taps: Taps, query: str) -> list[bytes]:
+def _tapped(start: _Start, taps: Taps, query: str, state: RelayState) -> list[bytes]:
+    groups = [*(report.facts.name for report in state.groups), *state.unjudged]
     try:
-        return _answer(start, "200 OK", taps.answer(query), _JSON)
+        return _answer(start, "200 OK", taps.answer(query, groups=groups), _JSON)
     except TapRefusedError as error:
         return _text(start, error.status, str(error))
 

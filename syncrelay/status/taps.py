@@ -14,6 +14,7 @@ from typing import Final, Self
 from urllib.parse import parse_qs
 
 from syncrelay.config import GroupConfig
+from syncrelay.config.wording import one_of
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import GroupLines, Left, RecentDrop, Tape
 from syncrelay.explain.tape import UNHEARD_S
@@ -45,7 +46,7 @@ class TapRefusedError(SyncRelayError):
 class Wanted:
     """What a tap wants of what leaves; empty is all. Reasons and `drops` leave out the sets."""
 
-    groups: Collection[str]
+    groups: frozenset[str]
     inputs: Collection[str]
     reasons: Collection[str]
     drops: bool
@@ -121,14 +122,20 @@ class Taps:
         self._asked: dict[str, float] = {}
         self._lock = Lock()
 
-    def answer(self, text: str) -> bytes:
+    def answer(self, text: str, *, groups: Collection[str] = ()) -> bytes:
         """Return what has left since, as JSON. Raises TapRefusedError.
+
+        A tap that begins may name none but these groups, where there are any. One that goes on may: a reload may have
+        taken its group away, and may bring it back.
 
         `after` is what to ask with next, `more` says that there is more at once. `lost` counts sets and drops of all
         groups that were too old to be given; it is null where nobody counted. While taps have taken more than their
         share of the processor, nothing is given.
         """
         query = Query.of(text)
+        unknown = sorted(query.wanted.groups.difference(groups))
+        if query.after is None and groups and unknown:
+            raise _bad(f"there is no group {unknown[0]!a}: expected {one_of(groups)}")
         was_there = self._enter(query.name)
         last = self.tape.last
         if query.after is None or not was_there or query.after > last:

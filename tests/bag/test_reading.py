@@ -284,6 +284,8 @@ def test_a_name_that_is_not_there_gets_the_nearest(tmp_path):
     (tmp_path / "drive.mcap").touch()
     with pytest.raises(BagError, match=r"drve\.mcap: no such file or folder, did you mean `drive\.mcap`"):
         open_recording([str(tmp_path / "drve.mcap")])
+    with pytest.raises(BagError, match=r"drve\.mcap: no such file or folder$"):
+        open_recording([str(tmp_path / "drive.mcap"), str(tmp_path / "drve.mcap")])
     (tmp_path / "sub").mkdir()
     with pytest.raises(BagError, match="holds no recording"):
         open_recording([str(tmp_path / "sub")])

@@ -198,6 +198,7 @@ def test_so_many_taps_are_answered_and_not_one_more(taps):
         (f"tap=a&after={'9' * 19}", "expected `after`"),
         ("tap=a&reason=lat", "expected as `reason` one of late"),
         ("tap=a&groups=front", "there is no 'groups'"),
+        ("tap=a&group=zz", f"there is no group 'zz': expected {GROUP.name}\n"),
         ("tap=a&group=%ff", "not a valid /tap query"),
         ("tap=a" + "&group=x" * 100, "not a valid /tap query"),
     ],
@@ -217,6 +218,9 @@ def test_a_tap_is_answered_over_http():
         code, body = asked(address, "/tap?tap=a&after=0")
         assert code == 200
         assert len(json.loads(body)["lines"]) == 2
+        assert asked(address, f"/tap?tap=b&group={GROUP.name}")[0] == 200
+        # Its group may have gone with a reload, and may come back.
+        assert asked(address, "/tap?tap=b&group=gone&after=0")[0] == 200
         assert asked(address, "/tap?tap=a&after=0", host="evil.example")[0] == 403
 
 
