@@ -138,7 +138,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
         **{path: _of_page(path) for path in PATHS},
         "/metrics": answer_metrics,
         "/status": lambda _, start: _json(start, document(state())),
-        "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"], state()),
+        "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"], state),
         "/livez": lambda _, start: _liveness(start, state()),
         "/readyz": lambda _, start: _readiness(start, state()),
     }
@@ -182,8 +182,11 @@ def _of_page(path: str) -> _Answer:
     return answer
 
 
-def _tapped(start: _Start, taps: Taps, query: str, state: RelayState) -> list[bytes]:
-    groups = [*(report.facts.name for report in state.groups), *state.unjudged]
+def _tapped(start: _Start, taps: Taps, query: str, state: Callable[[], RelayState]) -> list[bytes]:
+    def groups() -> list[str]:
+        now = state()
+        return [*(report.facts.name for report in now.groups), *now.unjudged]
+
     try:
         return _answer(start, "200 OK", taps.answer(query, groups=groups), _JSON)
     except TapRefusedError as error:

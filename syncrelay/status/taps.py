@@ -108,6 +108,12 @@ def _bad(sentence: str) -> TapRefusedError:
     return TapRefusedError("400 Bad Request", sentence)
 
 
+def _require_known(wanted: frozenset[str], groups: Collection[str]) -> None:
+    unknown = sorted(wanted.difference(groups))
+    if groups and unknown:
+        raise _bad(f"there is no group {unknown[0]!a}: expected {one_of(groups)}")
+
+
 class Taps:
     """Answers taps. Any thread. `full_name` gives a topic's name in the graph."""
 
@@ -122,7 +128,7 @@ class Taps:
         self._asked: dict[str, float] = {}
         self._lock = Lock()
 
-    def answer(self, text: str, *, groups: Collection[str] = ()) -> bytes:
+    def answer(self, text: str, *, groups: Callable[[], Collection[str]] = tuple) -> bytes:
         """Return what has left since, as JSON. Raises TapRefusedError.
 
         A tap that begins may name none but these groups, where there are any. One that goes on may: a reload may have
@@ -133,9 +139,9 @@ class Taps:
         share of the processor, nothing is given.
         """
         query = Query.of(text)
-        unknown = sorted(query.wanted.groups.difference(groups))
-        if query.after is None and groups and unknown:
-            raise _bad(f"there is no group {unknown[0]!a}: expected {one_of(groups)}")
+        # The relay's state is not to be had for nothing.
+        if query.after is None and query.wanted.groups:
+            _require_known(query.wanted.groups, groups())
         was_there = self._enter(query.name)
         last = self.tape.last
         if query.after is None or not was_there or query.after > last:

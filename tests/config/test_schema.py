@@ -43,6 +43,7 @@ BEYOND_A_SCHEMA = {
     "output_is_its_own_input",
     "package_not_installed",
     "package_without_messages",
+    "restamp_by_a_part_of_an_input",
     "restamp_by_a_topic_of_no_input",
     "restamp_misspelt",
     "restamp_without_a_header",
