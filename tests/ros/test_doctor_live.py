@@ -264,7 +264,8 @@ def test_several_topics_in_another_namespace_are_named_with_it_and_not_the_outpu
     _, problems, *_ = examine(
         stage,
         config({"front": group("/camera", "/imu")}),
-        until=lambda seen: seen.report["graph"]["n_topics"] == 4 and len(seen.problems) == 1,
+        # Those of the player, the relay's outputs and its manifest.
+        until=lambda seen: seen.report["graph"]["n_topics"] == 5 and len(seen.problems) == 1,
     )
     (found,) = problems
     assert found["what"] == "front: nobody publishes /camera or /imu"

@@ -23,7 +23,9 @@ TEXT = config({"front": {"policy": "approximate_time", "slop": "20ms", "topics":
 def test_every_set_that_leaves_is_a_line(stage: Stage):
     relay = stage.relay(TEXT)
     player, collector = stage.player(PAIR), stage.collector(OUT)
-    recording = merged(stream("/camera", hz=50), stream("/lidar", hz=50, shift_ms=7))
+    recording = merged(
+        *(stream(topic, hz=50, shift_ms=shift, last_ms=20_000) for topic, shift in (("/camera", 0), ("/lidar", 7)))
+    )
     connect(player, collector, recording, OUT)
     first_group(relay)
     tap = stage.start("tap", [sys.executable, "-m", "syncrelay", "tap", "--json", "--url", address(relay)])
