@@ -29,6 +29,12 @@ _DEEPEST: Final = 50
 _ROSIDL: Final = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
 
 
+def typestore(type_name: str, definition: Definition | None) -> Typestore | None:
+    """Return what decodes messages of a type, as CDR; None where neither its definition nor ROS 2 tells of it."""
+    store = _store_of(type_name, definition)
+    return store if type_name in store.fielddefs else None
+
+
 def fields_of(channel: Channel) -> Callable[[str], Mapping[str, str]] | None:
     """Return what tells the fields of a type (`pkg/Name`) that the channel's is made of, as rosidl's classes would.
 

@@ -57,6 +57,43 @@ class GroupReplay:
                 listener(self.binding, outcome, now)
 
 
+class Replay:
+    """Groups at work on a recording, a step for each batch that is read of it."""
+
+    def __init__(
+        self, recording: Recording, bindings: Sequence[GroupBinding], *, listeners: Sequence[Listener] = ()
+    ) -> None:
+        """Make the groups' engines; raises BagError for a stamp or key that a recorded type does not have."""
+        self._recording = recording
+        self._groups = [GroupReplay(binding, listeners) for binding in bindings]
+        self._columns = Columns([readers for group in self._groups for readers in group.readers()])
+
+    def steps(self) -> Iterator[None]:
+        """Feed the recording to its end, a batch a step."""
+        # What waited in one group leaves before a later message of another arrives.
+        waiting = [group.driver for group in self._groups if group.driver.has_deadlines]
+        inputs = [(group.driver, index) for group in self._groups for index in range(len(group.binding.inputs))]
+        now = self._recording.begin
+        for batch in map(Batch, self._recording.batches(self._columns.channels)):
+            for place, raw, stamp, key in self._columns.in_order(batch):
+                now = raw[1]
+                for driver in waiting:
+                    driver.expire(now)
+                driver, index = inputs[place]
+                if stamp == UNREADABLE:
+                    driver.reject(index, raw, now=now)
+                else:
+                    driver.add(Message(index, stamp, raw, key), now=now)
+            yield
+        for group in self._groups:
+            # A damaged recording may give a false end.
+            group.driver.finish(max(now, self._recording.end))
+
+    def results(self) -> list[GroupResult]:
+        """Give what became of all messages so far, in the order of the groups."""
+        return [group.result() for group in self._groups]
+
+
 def replay(
     recording: Recording, bindings: Sequence[GroupBinding], *, listeners: Sequence[Listener] = ()
 ) -> list[GroupResult]:
@@ -64,26 +101,10 @@ def replay(
 
     Raises BagError for a stamp or key that a recorded type does not have.
     """
-    groups = [GroupReplay(binding, listeners) for binding in bindings]
-    # What waited in one group leaves before a later message of another arrives.
-    waiting = [group.driver for group in groups if group.driver.has_deadlines]
-    inputs = [(group.driver, index) for group in groups for index in range(len(group.binding.inputs))]
-    columns = Columns([readers for group in groups for readers in group.readers()])
-    now = recording.begin
-    for batch in map(Batch, recording.batches(columns.channels)):
-        for place, raw, stamp, key in columns.in_order(batch):
-            now = raw[1]
-            for driver in waiting:
-                driver.expire(now)
-            driver, index = inputs[place]
-            if stamp == UNREADABLE:
-                driver.reject(index, raw, now=now)
-            else:
-                driver.add(Message(index, stamp, raw, key), now=now)
-    for group in groups:
-        # A damaged recording may give a false end.
-        group.driver.finish(max(now, recording.end))
-    return [group.result() for group in groups]
+    whole = Replay(recording, bindings, listeners=listeners)
+    for _ in whole.steps():
+        pass
+    return whole.results()
 
 
 def received(message: Message) -> int:

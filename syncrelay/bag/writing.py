@@ -15,7 +15,7 @@ from syncrelay.errors import BagError
 from syncrelay.sync import Match, Message, Outcome
 
 
-class _Payload(NamedTuple):
+class Outgoing(NamedTuple):
     """From a recorded payload and a set's common stamp to what leaves; whether it gets that stamp."""
 
     written: Callable[[bytes, int | None], bytes]
@@ -39,7 +39,7 @@ class SetWriter:
     def __init__(self, recording: McapOutput) -> None:
         self._recording = recording
         self._outputs: dict[str, Output] = {}
-        self._payloads: dict[tuple[str, Channel], _Payload] = {}
+        self._payloads: dict[tuple[str, Channel], Outgoing] = {}
         self._manifests: dict[str, _Manifest] = {}
         self.messages = 0
         """How many messages of sets were written."""
@@ -90,10 +90,14 @@ class SetWriter:
         profile = output_profile(each.config.qos, offered)
         self._outputs[each.output] = self._recording.add(each.output, first.type, *as_ros2(first), profile)
         for channel in each.channels:
-            self._payloads[each.output, channel] = _payload(each, channel)
+            self._payloads[each.output, channel] = outgoing(each, channel)
 
 
-def _payload(each: Input, channel: Channel) -> _Payload:
+def outgoing(each: Input, channel: Channel) -> Outgoing:
+    """Return what makes the messages of an input that a channel holds those that leave.
+
+    It raises BagError for a message that does not fit its definition.
+    """
     convert = converter(channel) if channel.encoding is Encoding.ROS1 else None
     has_header = begins_with_header(channel)
     # Of a type that nothing is known of, the file says where the stamp is.
@@ -105,4 +109,4 @@ def _payload(each: Input, channel: Channel) -> _Payload:
             raise BagError(f"{channel.topic}: a message does not fit the definition of {channel.type} in the bag")
         return payload if stamp is None or not restamped else patch_stamp(payload, stamp)
 
-    return _Payload(payload_of, restamped)
+    return Outgoing(payload_of, restamped)
