@@ -10,8 +10,18 @@ import pyarrow as pa
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from syncrelay.datasets.layouts import Characters, Layout, Listed, Numbers, Parts, Place, Repeated, UnfitError, layout_of
-from syncrelay.datasets.message_types import Array, Node, Number, Run, Struct, Text, arrow_type, asked_fields
+from syncrelay.datasets.layouts import (
+    Characters,
+    Layout,
+    Listed,
+    Numbers,
+    Parts,
+    Place,
+    Repeated,
+    UnfitError,
+    layout_of,
+)
+from syncrelay.datasets.message_types import Array, Node, Number, Run, Struct, Text, arrow_type, is_empty
 
 # From here on a copy costs more than what is done for each message.
 _LARGE: Final = 65_536
@@ -41,7 +51,7 @@ class _View(NamedTuple):
         return found if found.dtype.isnative else found.astype(found.dtype.newbyteorder("="))
 
     @property
-    def count(self) -> int:
+    def messages(self) -> int:
         """How many there are."""
         return int(np.prod(self.shape, dtype=np.int64))
 
@@ -61,9 +71,7 @@ class Decoder:
 
     def decode(self, payloads: Sequence[bytes | None]) -> pa.ChunkedArray:
         """Return a column with a row a payload, null for None and for what cannot be decoded."""
-        large = [
-            None if payload is None or len(payload) < _LARGE else self._one(payload) for payload in payloads
-        ]
+        large = [None if payload is None or len(payload) < _LARGE else self._one(payload) for payload in payloads]
         if all(each is not None for each in large):
             return pa.chunked_array(large, type=self.arrow)
         alike: dict[tuple[int, bytes], list[int]] = defaultdict(list)
@@ -187,15 +195,17 @@ def _column(node: Node, place: Place, view: _View) -> pa.Array:
         case Text(), Characters():
             return _texts(place, view)
         case Struct(), Parts():
-            children = zip(node.fields, place.parts, strict=True)
-            asked = list(asked_fields(node))
-            arrays = [_column(field.node, part, view) for field, part in children if field in asked]
+            arrays = [
+                _column(field.node, part, view)
+                for field, part in zip(node.fields, place.parts, strict=True)
+                if field.is_asked and not is_empty(field.node)
+            ]
             return pa.StructArray.from_arrays(arrays, fields=list(arrow_type(node)))
         case Run(is_bytes=True), Numbers(count=int(count)):
-            return _binary(pa.binary(), view.numbers(_OF_BYTES, 1, place.offset, count), count, view.count)
-        case (Array() | Run()), _:
+            return _binary(pa.binary(), view.numbers(_OF_BYTES, 1, place.offset, count), count, view.messages)
+        case ((Array() | Run()), _):
             values, count = _elements(node.element, place, view)
-            return _lists(node, values, count, view.count)
+            return _lists(node, values, count, view.messages)
     raise AssertionError(f"{node} is no {place}")
 
 
@@ -212,7 +222,7 @@ def _elements(element: Node, place: Place, view: _View) -> tuple[pa.Array, int]:
         case Listed(elements):
             arrays = [_column(element, each, view) for each in elements]
             # One behind another now; then message by message.
-            order = np.arange(len(arrays) * view.count).reshape(len(arrays), view.count).T.reshape(-1)
+            order = np.arange(len(arrays) * view.messages).reshape(len(arrays), view.messages).T.reshape(-1)
             return pa.concat_arrays(arrays).take(pa.array(order)), len(arrays)
     raise AssertionError(f"{element} is not at {place}")
 
@@ -232,7 +242,7 @@ def _lists(node: Array | Run, values: pa.Array, count: int, messages: int) -> pa
 
 def _texts(place: Characters, view: _View) -> pa.Array:
     content = view.numbers(_OF_BYTES, 1, place.offset, place.length)
-    found = _binary(pa.binary(), content, place.length, view.count)
+    found = _binary(pa.binary(), content, place.length, view.messages)
     try:
         return found.cast(pa.string())
     except pa.ArrowInvalid:
@@ -248,14 +258,21 @@ def _plain(node: Node, value: Any) -> Any:
     """Return what rosbags decoded as Arrow takes it."""
     match node:
         case Struct():
-            # rosbags renames fields that are Python's words; their order is the definition's.
-            values = {field.name: getattr(value, own.name) for field, own in zip(node.fields, fields(value), strict=True)}
-            return {field.name: _plain(field.node, values[field.name]) for field in asked_fields(node)}
+            # rosbags renames fields that are Python's words; their order is the definition's. It adds the type's name.
+            own = [each.name for each in fields(value) if each.name != "__msgtype__"]
+            return {
+                field.name: _plain(field.node, getattr(value, name))
+                for field, name in zip(node.fields, own, strict=True)
+                if field.is_asked and not is_empty(field.node)
+            }
         case Run(is_bytes=True):
             return bytes(value)
         case Array() | Run():
             if isinstance(node.element, Number):
-                return np.asarray(value)
+                # To rosbags a `byte` is signed.
+                return value.view(np.uint8) if node.element.code == _OF_BYTES else value
             return [_plain(node.element, each) for each in value]
+        case Number(code="u1"):
+            return value & 0xFF
         case _:
             return value

@@ -86,7 +86,9 @@ class ImageColumn:
 
     def arrow(self, decoded: pa.StructType, asked: frozenset[str]) -> pa.StructType:
         """Return the type of the column: the fields asked for, with `format` before `data` in place of the layout."""
-        kept = [field for field in decoded if field.name in asked and field.name not in ("is_bigendian", "step", "data")]
+        kept = [
+            field for field in decoded if field.name in asked and field.name not in ("is_bigendian", "step", "data")
+        ]
         more = [pa.field("format", pa.string()), pa.field("data", pa.binary())] if "data" in asked else []
         return pa.struct([*kept, *more])
 

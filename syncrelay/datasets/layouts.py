@@ -5,7 +5,6 @@ a multiple of its size. What has strings and sequences of the same lengths is la
 messages with one frame_id, each field is a column at a fixed distance.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from struct import Struct as Packed
 from struct import error
@@ -16,6 +15,8 @@ from syncrelay.datasets.message_types import Array, Node, Number, Run, Struct, T
 ENCAPSULATION: Final = 4
 # More elements of differing lengths than this are decoded one by one.
 _MOST_ELEMENTS: Final = 64
+# The payload's own length is a multiple of four where a writer pads it.
+_MOST_PADDING: Final = 3
 _COUNTS: Final = {"<": Packed("<I"), ">": Packed(">I")}
 
 
@@ -82,6 +83,8 @@ def layout_of(tree: Struct, payload: bytes | memoryview) -> Layout:
     root = walk.struct(tree)
     if walk.at > len(payload):
         raise UnfitError("it ends too soon")
+    if walk.at + _MOST_PADDING < len(payload):
+        raise UnfitError("it is longer than the message in it")
     return Layout(walk.order, root, tuple(walk.lengths))
 
 
@@ -168,9 +171,8 @@ def _alignment(node: Node) -> int | None:
         case Array():
             return _alignment(node.element)
         case Struct():
-            found: Sequence[int | None] = [_alignment(field.node) for field in node.fields]
-            known = [each for each in found if each is not None]
-            return max(known, default=1) if len(known) == len(found) else None
+            known = [each for each in (_alignment(field.node) for field in node.fields) if each is not None]
+            return max(known, default=1) if len(known) == len(node.fields) else None
         case _:
             return None
 

@@ -1,10 +1,10 @@
 """Message types as trees, what they are in Arrow, and which of their fields are asked for.
 
-bool, numbers and strings are Arrow's own; a message within a message is a struct, `T[n]` a fixed-size list, `T[]` a list,
-and `uint8[]` and `byte[]` are binary: images, clouds and packets stay bytes.
+bool, numbers and strings are Arrow's own; a message within a message is a struct, `T[n]` a fixed-size list, `T[]` a
+list, and `uint8[]` and `byte[]` are binary: images, clouds and packets stay bytes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
@@ -114,9 +114,10 @@ def _node(store: Typestore, owner: str, description: Any) -> Node:
 
 
 def only(tree: Struct, paths: Sequence[str], topic: str) -> Struct:
-    """Return a tree of which these fields alone, named by dotted paths, are asked for; raises BagError for unknown ones.
+    """Return a tree of which these fields alone, named by dotted paths, are asked for.
 
-    A field within the elements of an array or sequence has the path that it would have without it.
+    Raises BagError for one that is not there. A field within the elements of an array has the path that it would have
+    without the array.
     """
     asked: dict[str, list[str]] = {}
     for path in paths:
@@ -151,15 +152,11 @@ def _narrowed_node(node: Node, rests: Sequence[str], name: str, topic: str) -> N
     raise BagError(f"{topic}: `{name}` is a value and has no field `{rests[0]}`")
 
 
-def asked_fields(tree: Struct) -> Iterator[Field]:
-    """Yield the fields that are given: those asked for which hold something."""
-    return (field for field in tree.fields if field.is_asked and not _is_empty(field.node))
-
-
-def _is_empty(node: Node) -> bool:
+def is_empty(node: Node) -> bool:
+    """Tell whether nothing that is asked for is in a tree."""
     if isinstance(node, Array | Run):
-        return _is_empty(node.element)
-    return isinstance(node, Struct) and not any(asked_fields(node))
+        return is_empty(node.element)
+    return isinstance(node, Struct) and not any(field.is_asked and not is_empty(field.node) for field in node.fields)
 
 
 def arrow_type(node: Node) -> pa.DataType:
@@ -174,7 +171,9 @@ def arrow_type(node: Node) -> pa.DataType:
         case Run():
             return pa.binary() if node.is_bytes else pa.list_(arrow_type(node.element))
         case Struct():
-            return pa.struct([_arrow_field(node.type, field) for field in asked_fields(node)])
+            return pa.struct(
+                [_arrow_field(node.type, field) for field in node.fields if field.is_asked and not is_empty(field.node)]
+            )
 
 
 def _arrow_field(type_name: str, field: Field) -> pa.Field:

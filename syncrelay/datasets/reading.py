@@ -1,15 +1,122 @@
-"""Sets of recordings as record batches, read as they are asked for."""
+"""Sets of recordings as tables, read as they are asked for: memory holds some, whatever the recording's size."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
+from os import PathLike, fspath
+from typing import Final, NamedTuple
 
 import pyarrow as pa
 
-from syncrelay.bag import open_recording
-from syncrelay.bag.bindings import bind
-from syncrelay.bag.replay import Replay
+from syncrelay.bag import Recording, open_recording
+from syncrelay.bag.bindings import GroupBinding, bind, full_name
+from syncrelay.bag.replay import GroupResult, Replay
 from syncrelay.config import Config, load
 from syncrelay.config.wording import all_of, did_you_mean
-from syncrelay.datasets.tables import Content, Fields, SetTable
 from syncrelay.datasets.images import ImageFormat
-from syncrelay.errors import UsageError
+from syncrelay.datasets.tables import Content, Fields, SetTable
+from syncrelay.errors import BagError, UsageError
+
+MOST_BYTES: Final = 32_000_000
+"""How many bytes of messages are held until they become a table."""
+
+# Small messages cost by their number.
+_MOST_SETS: Final = 20_000
+
+
+class Part(NamedTuple):
+    """Sets of one group that left one behind another."""
+
+    group: SetTable
+    table: pa.Table
+
+
+class SetsOf:
+    """The sets of a recording, group by group as tables; what became of all messages when they have been read."""
+
+    def __init__(self, recording: Recording, bindings: Sequence[GroupBinding], content: Content, *, name: str) -> None:
+        """`name` is what the sets' column `recording` says.
+
+        Raises BagError for a stamp, key or field that a recorded type does not have.
+        """
+        self.groups: Final = tuple(SetTable(binding, content, recording=name) for binding in bindings)
+        self._replay = Replay(recording, bindings, listeners=[group.take for group in self.groups])
+
+    def parts(self, *, most_bytes: int = MOST_BYTES) -> Iterator[Part]:
+        """Yield the sets of all groups; those of a group in their order."""
+        for _ in self._replay.steps():
+            is_full = sum(group.bytes for group in self.groups) >= most_bytes
+            for group in self.groups:
+                if group.gathered and (is_full or group.gathered >= _MOST_SETS):
+                    yield Part(group, group.table())
+        for group in self.groups:
+            if group.gathered:
+                yield Part(group, group.table())
+
+    def results(self) -> list[GroupResult]:
+        """Give what became of all messages, in the order of the groups."""
+        return self._replay.results()
+
+    def faults(self) -> list[str]:
+        """Return a sentence for each input of which messages could not be decoded."""
+        return [sentence for group in self.groups for sentence in group.undecodable()]
+
+
+def read_sets(
+    recordings: str | PathLike[str] | Sequence[str | PathLike[str]],
+    config: str | PathLike[str] | Config,
+    *,
+    group: str | None = None,
+    fields: Fields | None = None,
+    images: ImageFormat | None = None,
+    raw: bool = False,
+    most_bytes: int = MOST_BYTES,
+) -> Iterator[pa.RecordBatch]:
+    """Yield the sets of recordings as record batches; a row is a set, in the order in which sets leave.
+
+    Each of `recordings` (a file, a rosbag2 folder or a URL) is read by itself and after the one before. `config` is a
+    file's path, or what `syncrelay.config.load` gives; `group` names one of its groups and is needed where it has
+    several. `fields` maps an input to dotted paths of the fields that are wanted, None to all; `images` is "png" or
+    "jpeg", None for the raw pixels; with `raw` each message is its CDR bytes. A batch holds the sets of about
+    `most_bytes` bytes of messages. The columns: see syncrelay.datasets.tables.
+
+    Raises ConfigError for a faulty file, BagError for a recording that cannot be read or lacks a required topic, and
+    UsageError for a group or an input that the file does not have.
+    """
+    loaded = config if isinstance(config, Config) else load(fspath(config))
+    chosen = _chosen(loaded, group)
+    content = Content(resolved(fields or {}, loaded), images, raw)
+    words = [recordings] if isinstance(recordings, str | PathLike) else recordings
+    for word in [fspath(each) for each in words]:
+        with closing(open_recording([word])) as recording:
+            (binding,) = (each for each in bind(loaded, recording) if each.group.name == chosen)
+            require_complete([binding])
+            for part in SetsOf(recording, [binding], content, name=word).parts(most_bytes=most_bytes):
+                yield from part.table.combine_chunks().to_batches()
+
+
+def resolved(fields: Mapping[str, Sequence[str]], config: Config) -> Fields:
+    """Return fields by the inputs' full names; raises UsageError for an input that no group has."""
+    topics = [full_name(topic.topic, config) for group in config.groups for topic in group.topics]
+    found: dict[str, Sequence[str]] = {}
+    for named, paths in fields.items():
+        name = full_name(named, config)
+        if name not in topics:
+            raise UsageError(f"{named} is no input of the file{did_you_mean(named, topics)}; it has {all_of(topics)}")
+        found[name] = paths
+    return found
+
+
+def require_complete(bindings: Sequence[GroupBinding]) -> None:
+    """Raise BagError where a required input has no messages in the recording: there can be no sets."""
+    lacking = [problem for binding in bindings if not binding.is_complete for problem in binding.problems]
+    if lacking:
+        raise BagError("\n".join(lacking))
+
+
+def _chosen(config: Config, group: str | None) -> str:
+    names = [each.name for each in config.groups]
+    if group is None and len(names) > 1:
+        raise UsageError(f"the file has the groups {all_of(names)}: say which one, as group={names[0]!r}")
+    if group is not None and group not in names:
+        raise UsageError(f"the file has no group {group}{did_you_mean(group, names)}; it has {all_of(names)}")
+    return group or names[0]

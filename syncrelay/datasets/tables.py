@@ -1,8 +1,9 @@
 """Sets of a group as rows of a table: when they were, and each input's message.
 
-Columns: `set` (from 1), `stamp` (what restamping gave it, else the newest), `left`, `span_ns` (with the inputs' offsets),
-`latency_ns`, `recording`, `stamps` and `received` (structs with a field for each input), and a column for each
-input, named as its topic, null where the set lacks an optional one. Times are UTC, in nanoseconds.
+Columns: `set` (from 1), `stamp_ns` (what restamping gave it, else the newest), `left_ns`, `span_ns` (with the inputs'
+offsets), `latency_ns` (since its last message was received), `recording`, `stamps_ns` and `received_ns` (structs with a
+field for each input), and a column for each input, named as its topic, null where the set lacks an optional one. Times
+are nanoseconds since 1970 (UTC), or of whatever clock the recording has.
 """
 
 import json
@@ -12,19 +13,20 @@ from typing import Any, Final, TypeAlias
 
 import pyarrow as pa
 
-from syncrelay import __version__
+from syncrelay import own_version
 from syncrelay.bag.bindings import GroupBinding, Input
 from syncrelay.bag.definitions import typestore
 from syncrelay.bag.recording import Channel
 from syncrelay.bag.replay import received
 from syncrelay.bag.writing import Outgoing, outgoing
+from syncrelay.config.wording import counted
 from syncrelay.datasets.decoding import Decoder
 from syncrelay.datasets.images import IMAGE, NEEDED, ImageColumn, ImageFormat
 from syncrelay.datasets.message_types import only, type_tree
 from syncrelay.errors import BagError
 from syncrelay.sync import Match, Message, Outcome
 
-_TIME: Final = pa.timestamp("ns", tz="UTC")
+_TIME: Final = pa.int64()
 METADATA: Final = b"syncrelay"
 """The key of a schema's metadata under which a JSON document says what the table is made of."""
 
@@ -86,8 +88,8 @@ class SetTable:
         names = [each.topic for each in self.binding.inputs]
         columns = {
             "set": pa.array(numbers, pa.int64()),
-            "stamp": pa.array(map(_stamp_of, matches), _TIME),
-            "left": pa.array(left, _TIME),
+            "stamp_ns": pa.array(map(_stamp_of, matches), _TIME),
+            "left_ns": pa.array(left, _TIME),
             "span_ns": pa.array(map(self._span, stamps), pa.int64()),
             "latency_ns": pa.array(
                 [at - max(filter(None, some)) for at, some in zip(left, arrivals, strict=True)], pa.int64()
@@ -95,26 +97,22 @@ class SetTable:
             "recording": pa.DictionaryArray.from_arrays(
                 pa.array([0] * len(matches), pa.int32()), pa.array([self._recording])
             ),
-            "stamps": _times(names, stamps),
-            "received": _times(names, arrivals),
+            "stamps_ns": _times(names, stamps),
+            "received_ns": _times(names, arrivals),
         }
         for index, column in enumerate(self._columns):
             columns[column.topic] = column.column([(match.messages[index], match.stamp) for match in matches])
         whole = pa.table(columns)
         if self._schema is None:
             self._schema = self._described(whole)
-        return whole.cast(self._schema) if whole.schema != self._schema else whole.replace_schema_metadata(
-            self._schema.metadata
-        )
+        return pa.Table.from_arrays(whole.columns, schema=self._schema)
 
     def undecodable(self) -> Iterator[str]:
         """Yield a sentence for each input of which messages could not be decoded."""
         for column in self._columns:
             if column.undecodable:
-                yield (
-                    f"{column.topic}: {column.undecodable} of its messages could not be decoded as {column.type}: they are"
-                    " null"
-                )
+                lost = counted(column.undecodable, "message")
+                yield f"{column.topic}: {lost} could not be decoded as {column.type}, their cells are null"
 
     def _span(self, stamps: Sequence[int | None]) -> int:
         matched = [stamp + offset for stamp, offset in zip(stamps, self._offsets, strict=True) if stamp is not None]
@@ -123,7 +121,7 @@ class SetTable:
     def _described(self, table: pa.Table) -> pa.Schema:
         """Return the schema of this and all following tables, with what is known of the inputs."""
         group = self.binding.group
-        about: dict[str, Any] = {"version": __version__, "group": group.name, "policy": group.options.policy}
+        about: dict[str, Any] = {"version": own_version(), "group": group.name, "policy": group.options.policy}
         about["inputs"] = {column.topic: column.described(table[column.topic]) for column in self._columns}
         schema = table.schema
         for index, name in enumerate(schema.names):
@@ -242,4 +240,3 @@ def _stamp_of(match: Match) -> int:
 def _times(names: Sequence[str], rows: Sequence[Sequence[int | None]]) -> pa.StructArray:
     by_input = zip(*rows, strict=True) if rows else [()] * len(names)
     return pa.StructArray.from_arrays([pa.array(each, _TIME) for each in by_input], names=list(names))
-
