@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Final, Protocol, TypeAlias
 
 from syncrelay import own_version
+from syncrelay.config import Config
+from syncrelay.config.document import plain
 
 JSON: TypeAlias = "dict[str, JSON] | list[JSON] | str | int | float | bool | None"
 """What json.dumps takes."""
@@ -42,10 +44,15 @@ class Task(Protocol):
         ...
 
 
+def text_of(config: Config) -> str:
+    """Return what the files of a configuration say: their text, and all values with environment variables filled in."""
+    return json.dumps([*(source.text for source in config.sources), plain(config.names.document.root)], default=str)
+
+
 def fingerprint_of(command: str, *, config: str, options: Mapping[str, JSON]) -> str:
     """Return a line of what decides a command's result: its name, syncrelay's version, the file's text, its options.
 
-    `config` is the text of all files, `options` what else changes the result: not where it goes, nor how fast. Two
+    `config` is what text_of gives, `options` what else changes the result: not where it goes, nor how fast. Two
     lines are equal if all of these are; the words of a line tell which one differs.
     """
     written = json.dumps(options, sort_keys=True)
