@@ -209,3 +209,13 @@ def _decompressed(path: Path, decompressor: Callable[[Path], Any], opened: ExitS
                 ) from error
             return content, [f"{path}: cut off or damaged; read up to there: {error}"]
     return content, []
+
+
+def files_of(words: Sequence[str]) -> list[Path]:
+    """Return the files that open_recording would read; raises BagError where there are none."""
+    return list(_files(words))
+
+
+def is_named_as_recording(path: Path) -> bool:
+    """Tell whether a file of a folder counts as a recording, by its name alone."""
+    return _bare_suffix(path) in _SUFFIXES

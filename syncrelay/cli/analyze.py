@@ -10,10 +10,11 @@ from functools import partial
 
 from syncrelay.bag import Channel, Recording, is_recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
-from syncrelay.bag.bindings import bind
+from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
+from syncrelay.cli.fleet import do_on_many, require_into
 from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
@@ -24,6 +25,7 @@ from syncrelay.config import load_text
 from syncrelay.config.source import read_source
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, UsageError
+from syncrelay.fleet.recordings import names_recordings
 from syncrelay.printable import printable
 
 _GROUP = "matched"
@@ -50,19 +52,28 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     config, *others = arguments.config or [None]
     if others:
         parser.error("--config was given more than once: analyze takes one file")
-    bags = [arguments.bag, *filter(is_recording, arguments.more)]
+    require_into(parser, arguments)
+    is_bag = is_recording if arguments.into is None else names_recordings
+    bags = [arguments.bag, *filter(is_bag, arguments.more)]
     asked = Asked(
         config=config,
         text=None,
-        topics=tuple(word for word in arguments.more if not is_recording(word)),
+        topics=tuple(word for word in arguments.more if not is_bag(word)),
         write=arguments.write,
         html=arguments.html,
         json=arguments.json,
         indent=2 if len(bags) == 1 else None,
     )
-    _require_sense(asked, bags)
+    _require_sense(asked, bags if arguments.into is None else bags[:1])
     if config is not None:
         asked = replace(asked, text=read_source(config).text)
+    if arguments.into is not None:
+        from syncrelay.cli.fleet_tasks import AnalyzeTask
+
+        for name in ("write", "html", "json"):
+            if getattr(asked, name):
+                parser.error(f"--{name} is for what is printed, and --into prints nothing: it writes JSON")
+        return do_on_many(AnalyzeTask.of(asked), bags, arguments)
     if len(bags) == 1:
         return analyze_bag(bags[0], asked)
     if asked.text is not None:
@@ -81,17 +92,26 @@ def analyze_bag(bag: str, asked: Asked) -> int:
             put_inventory(bag, recording, is_json=asked.json, indent=asked.indent)
             _tell_faults(recording)
             return DONE
-        text = _proposed(recording, asked.topics) if asked.text is None else asked.text
-        bindings = bind(load_text(text, name=asked.config or "<topics>"), recording)
+        text, bindings = bound(recording, asked)
         for problem in (problem for binding in bindings for problem in binding.problems):
             remark(printable(problem))
         with reading(recording):
-            analysis = analyze(recording, text, bindings)
-        if asked.config is None:
-            analysis = settled(analysis)
+            analysis = measured(recording, text, bindings, asked)
         _tell_faults(recording)
     _print(bag, analysis, asked)
     return DONE if all(binding.is_complete for binding in bindings) else AT_FAULT
+
+
+def bound(recording: Recording, asked: Asked) -> tuple[str, tuple[GroupBinding, ...]]:
+    """Return the text of the file that is meant, and its groups as the recording fills them; raises as analyze_bag."""
+    text = _proposed(recording, asked.topics) if asked.text is None else asked.text
+    return text, bind(load_text(text, name=asked.config or "<topics>"), recording)
+
+
+def measured(recording: Recording, text: str, bindings: Sequence[GroupBinding], asked: Asked) -> Analysis:
+    """Read a recording to its end; where only topics are named, with the values that fit them."""
+    analysis = analyze(recording, text, bindings)
+    return settled(analysis) if asked.config is None else analysis
 
 
 def _require_sense(asked: Asked, bags: Sequence[str]) -> None:

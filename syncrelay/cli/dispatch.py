@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from syncrelay.cli import parsers
+from syncrelay.cli import parsers, recording_parsers
 from syncrelay.cli.boundary import DONE, USAGE, put, say
 from syncrelay.cli.parser import HelpRequested, Parser
 from syncrelay.cli.stop import StopRequest
@@ -33,8 +33,10 @@ COMMANDS: Final = {
         Command("diff OLD NEW", "say what a reload to another file would do", parsers.diff, "diff"),
         Command("graph FILE...", "draw the groups of files: Mermaid, DOT or SVG", parsers.graph, "graph"),
         Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", parsers.init, "init"),
-        Command("analyze BAG...", "measure recordings, and suggest values that fit", parsers.analyze, "analyze"),
-        Command("replay BAG...", "run a file's groups on a recording, without ROS", parsers.replay, "replay"),
+        Command(
+            "analyze BAG...", "measure recordings, and suggest values that fit", recording_parsers.analyze, "analyze"
+        ),
+        Command("replay BAG...", "run a file's groups on a recording, without ROS", recording_parsers.replay, "replay"),
         Command("test FILE...", "run the tests of a configuration, without ROS", parsers.test, "test"),
         Command("demo", "try it on simulated sensors; needs no robot", parsers.demo, "demo"),
         Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),

@@ -24,7 +24,7 @@ def put_inventory(bag: str, recording: Recording, *, is_json: bool, indent: int 
     with reading(recording):
         topics = inventory(recording)
     if is_json:
-        put(json.dumps(_as_json(bag, recording, topics), indent=indent))
+        put(json.dumps(inventory_as_json(bag, recording, topics), indent=indent))
         return
     messages = sum(topic.figures.messages for topic in topics)
     lasts = words.seconds(recording.end - recording.begin)
@@ -35,7 +35,7 @@ def put_inventory(bag: str, recording: Recording, *, is_json: bool, indent: int 
         put(line)
 
 
-def _as_json(bag: str, recording: Recording, topics: Sequence[Topic]) -> dict[str, Any]:
+def inventory_as_json(bag: str, recording: Recording, topics: Sequence[Topic]) -> dict[str, Any]:
     """Return what json.dumps takes, in the form of an analysis without groups; `unfit` as Topic has it."""
     return {
         "recording": bag,

@@ -5,7 +5,7 @@ A metavar says what kind of word is expected, and so what completes it (syncrela
 
 from typing import Final
 
-from syncrelay.cli.parser import Parser, count, positive, seed
+from syncrelay.cli.parser import Parser, count, positive
 
 _RELAY_USAGE: Final = "syncrelay --config FILE [option ...] | syncrelay COMMAND ..."
 _EXIT_CODES: Final = """\
@@ -123,66 +123,6 @@ def init() -> Parser:
     source.add_argument("--from-graph", action="store_true", help="listen to what is being published now")
     parser.add_argument("--seconds", metavar="N", type=positive, help="with --from-graph: listen for N s (10)")
     parser.add_argument("-o", "--output", metavar="NEW", help="write the file here instead of printing it")
-    return parser
-
-
-def analyze() -> Parser:
-    """Return the parser of `syncrelay analyze`."""
-    parser = Parser(
-        "syncrelay analyze",
-        description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
-        "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
-        "Each of several recordings is measured by itself, on all cores. "
-        "Exit code 1 if a recording lacks a required topic.",
-    )
-    parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
-    parser.add_argument(
-        "more", metavar="BAG|TOPIC", nargs="*", help="more recordings; topics to match, if there is no file yet"
-    )
-    parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
-    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
-    parser.add_argument("--html", metavar="REPORT", help="write a report with charts: one HTML file, opens offline")
-    parser.add_argument(
-        "--json", action="store_true", help="print all figures as JSON; of several recordings, each in one line"
-    )
-    parser.add_argument("--jobs", metavar="N", type=count, help="recordings at a time; default: one for each core")
-    return parser
-
-
-def replay() -> Parser:
-    """Return the parser of `syncrelay replay`."""
-    parser = Parser(
-        "syncrelay replay",
-        description="Runs the groups of a file on a recording, without ROS, and says what became of every message. "
-        "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic.",
-    )
-    parser.add_argument(
-        "bags",
-        metavar="BAG",
-        nargs="+",
-        help="a rosbag2 folder, or an MCAP, sqlite3 or ROS 1 bag file, compressed or not; several are read as one",
-    )
-    parser.add_argument(
-        "--config",
-        metavar="FILE",
-        action="append",
-        required=True,
-        help="the file with the groups, or a directory of files; may be repeated",
-    )
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
-    )
-    parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
-    parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
-    parser.add_argument(
-        "--what-if",
-        metavar="FAULT",
-        action="append",
-        default=[],
-        help="lay a fault over the recording, such as 'late: TOPIC 80ms' or 'drop: TOPIC 10%% from 12s'; also offset,"
-        " drift, dead; may be repeated",
-    )
-    parser.add_argument("--seed", metavar="N", type=seed, default=0, help="with --what-if: which messages are lost (0)")
     return parser
 
 

@@ -34,7 +34,7 @@ class _Bar(Progress):
 @contextmanager
 def reading(recording: Recording) -> Iterator[None]:
     """Show how far the recording has been read, while it is, with the garbage collector at ease."""
-    with _eased_collector():
+    with eased_collector():
         if not sys.stderr.isatty():
             yield
             return
@@ -43,7 +43,7 @@ def reading(recording: Recording) -> Iterator[None]:
 
 
 @contextmanager
-def _eased_collector() -> Iterator[None]:
+def eased_collector() -> Iterator[None]:
     """Have the garbage collector look less often: messages live for a chunk and make no cycles, and are many.
 
     At its usual pace, it takes an eighth of the time of a replay.

@@ -14,6 +14,7 @@ from syncrelay.bag.replay import replay as replay_groups
 from syncrelay.bag.what_if import Disturbed
 from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
+from syncrelay.cli.fleet import do_on_many, require_into
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading
 from syncrelay.cli.stop import StopRequest
@@ -47,6 +48,16 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         what_if = tuple(map(parse_fault, arguments.what_if))
     except ValueError as error:
         parser.error(f"argument --what-if: {error}")
+    require_into(parser, arguments)
+    if arguments.into is not None:
+        from syncrelay.cli.fleet_tasks import ReplayTask
+
+        if arguments.output or arguments.json or arguments.drops:
+            parser.error("--output, --json and --drops are for one replay: --into writes the sets of each recording")
+        task = ReplayTask.of(load(*arguments.config), what_if, arguments.seed)
+        return do_on_many(task, arguments.bags, arguments)
+    if arguments.jobs is not None:
+        parser.error("--jobs goes with --into")
     wanted = Wanted(arguments.json, arguments.drops, arguments.output, what_if, arguments.seed)
     return replay(arguments.bags, arguments.config, wanted)
 

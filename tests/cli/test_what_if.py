@@ -2,7 +2,7 @@
 
 import pytest
 
-from syncrelay.cli import parsers
+from syncrelay.cli import recording_parsers
 from syncrelay.cli.replay import command
 from syncrelay.errors import UsageError
 from tests.bag.making import rig, write_mcap
@@ -19,7 +19,7 @@ def replayed(tmp_path, monkeypatch, capsys):
     write(tmp_path, {}, topics=_TOPICS)
 
     def run(*words):
-        parser = parsers.replay()
+        parser = recording_parsers.replay()
         code = command(parser, parser.read(["rig.mcap", "--config", "fusion.yaml", *words]), None)
         told = capsys.readouterr()
         return code, told.out.splitlines(), told.err

@@ -1,0 +1,132 @@
+"""What `replay --into` and `analyze --into` do with each recording."""
+
+import json
+from collections.abc import Iterable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Self
+
+from syncrelay.bag import Recording, open_recording
+from syncrelay.bag.analysis import inventory
+from syncrelay.bag.bindings import GroupBinding, bind
+from syncrelay.bag.mcap_output import McapOutput
+from syncrelay.bag.replay import GroupResult
+from syncrelay.bag.replay import replay as replay_groups
+from syncrelay.bag.what_if import Disturbed
+from syncrelay.bag.writing import SetWriter
+from syncrelay.cli.analysis_json import as_json
+from syncrelay.cli.analyze import Asked, bound, measured
+from syncrelay.cli.inventory import inventory_as_json
+from syncrelay.cli.reading import eased_collector
+from syncrelay.config import Config, load_text
+from syncrelay.fleet.task import JSON, PROBLEMS, Source, fingerprint_of, text_of
+from syncrelay.rig.what_if import Fault
+
+SETS: Final = "sets.mcap"
+"""The file of a recording's sets in the folder of its result, as `replay -o` writes it."""
+
+ANALYSIS: Final = "analysis.json"
+"""The file of a recording's analysis in the folder of its result, as `analyze --json` prints it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayTask:
+    """Writes the sets of a recording; see Task. Facts are the counts of each input."""
+
+    config: Config
+    what_if: tuple[Fault, ...]
+    seed: int
+    decided_by: str
+
+    @classmethod
+    def of(cls, config: Config, what_if: tuple[Fault, ...], seed: int) -> Self:
+        """Return the task of a file, with faults laid over each recording whose chance is that of `seed`."""
+        options: dict[str, JSON] = {"what_if": [fault.written for fault in what_if], "seed": seed if what_if else 0}
+        return cls(config, what_if, seed, fingerprint_of("replay", config=text_of(config), options=options))
+
+    def fingerprint(self) -> str:
+        """See Task."""
+        return self.decided_by
+
+    def run(self, source: Source, folder: Path) -> dict[str, JSON]:
+        """See Task."""
+        with closing(open_recording(source.words)) as plain, eased_collector():
+            recording = Disturbed(plain, self.what_if, seed=self.seed) if self.what_if else plain
+            bindings = bind(self.config, recording)
+            with McapOutput(folder / SETS) as output:
+                writer = SetWriter(output)
+                for binding in bindings:
+                    writer.begin(binding)
+                results = replay_groups(recording, bindings, listeners=[writer.take])
+            return {
+                **_about(recording, bindings),
+                "messages": writer.messages,
+                "groups": [_counts(result) for result in results],
+            }
+
+
+@dataclass(frozen=True, slots=True)
+class AnalyzeTask:
+    """Writes the analysis of a recording; see Task. Facts are the sets and the findings of each group."""
+
+    asked: Asked
+    decided_by: str
+
+    @classmethod
+    def of(cls, asked: Asked) -> Self:
+        """Return the task of what is asked of each recording."""
+        config = "" if asked.text is None else text_of(load_text(asked.text, name=asked.config or "<text>"))
+        return cls(asked, fingerprint_of("analyze", config=config, options={"topics": list(asked.topics)}))
+
+    def fingerprint(self) -> str:
+        """See Task."""
+        return self.decided_by
+
+    def run(self, source: Source, folder: Path) -> dict[str, JSON]:
+        """See Task."""
+        with closing(open_recording(source.words)) as recording, eased_collector():
+            if self.asked.text is None and not self.asked.topics:
+                document = inventory_as_json(source.words[0], recording, inventory(recording))
+                facts = _about(recording, ())
+            else:
+                text, bindings = bound(recording, self.asked)
+                analysis = measured(recording, text, bindings, self.asked)
+                document = as_json(source.words[0], analysis)
+                groups: list[JSON] = [
+                    {
+                        "name": each.group.name,
+                        "sets": len(each.evaluation.sets),
+                        "findings": [lasting.finding.code.value for lasting in each.findings],
+                    }
+                    for each in analysis.groups
+                ]
+                facts = {**_about(recording, bindings), "groups": groups}
+        (folder / ANALYSIS).write_text(f"{json.dumps(document, indent=2)}\n")
+        return facts
+
+
+def _about(recording: Recording, bindings: Sequence[GroupBinding]) -> dict[str, JSON]:
+    """Return when a recording was made, and what is wrong with it: what it lacks, and what could not be read."""
+    lacking = [problem for binding in bindings if not binding.is_complete for problem in binding.problems]
+    facts: dict[str, JSON] = {"begin": recording.begin, "end": recording.end}
+    return {**facts, **_unless_empty(PROBLEMS, lacking), **_unless_empty("faults", recording.faults)}
+
+
+def _unless_empty(name: str, sentences: Iterable[str]) -> dict[str, JSON]:
+    found: list[JSON] = list(sentences)
+    return {name: found} if found else {}
+
+
+def _counts(result: GroupResult) -> dict[str, JSON]:
+    """Return what became of the messages of a group, in the words of an analysis."""
+    inputs: list[JSON] = [
+        {
+            "topic": each.topic,
+            "received": each.counts.fed,
+            "matched": each.counts.matched,
+            "dropped": {reason.value: count for reason, count in each.counts.dropped.items()},
+        }
+        for each in result.inputs
+    ]
+    return {"name": result.name, "sets": result.sets, "inputs": inputs}
