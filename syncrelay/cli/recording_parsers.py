@@ -63,3 +63,45 @@ def replay() -> Parser:
     parser.add_argument("--seed", metavar="N", type=seed, default=0, help="with --what-if: which messages are lost (0)")
     add_fleet_options(parser)
     return parser
+
+
+def export() -> Parser:
+    """Return the parser of `syncrelay export`."""
+    parser = Parser(
+        "syncrelay export",
+        description="Writes the sets that the groups of a file make of recordings as a dataset: in Parquet, a row a set, "
+        "with the messages decoded. They are the sets of `syncrelay replay`. Exit code 1 if a recording cannot be read "
+        "or lacks a required topic.",
+    )
+    parser.add_argument("bags", metavar="BAG", nargs="+", help="a recording as for replay; each is exported by itself")
+    parser.add_argument(
+        "--config",
+        metavar="FILE",
+        action="append",
+        required=True,
+        help="the file with the groups, or a directory of files; may be repeated",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("parquet", "mcap"),
+        default="parquet",
+        metavar="FORMAT",
+        help="parquet (default): BAG/GROUP.parquet in FOLDER; mcap: the sets as a recording, as replay -o writes them",
+    )
+    parser.add_argument(
+        "--group", metavar="NAME", action="append", default=[], help="export this group only; may be repeated"
+    )
+    parser.add_argument(
+        "--fields",
+        metavar="TOPIC:FIELD,...",
+        action="append",
+        default=[],
+        help="of this input's messages write these fields only, such as /imu/data:linear_acceleration,header.stamp; may"
+        " be repeated",
+    )
+    parser.add_argument(
+        "--images", choices=("png", "jpeg"), metavar="FORMAT", help="write images as png or jpeg instead of raw pixels"
+    )
+    parser.add_argument("--raw", action="store_true", help="write each message as the CDR bytes that were recorded")
+    add_fleet_options(parser, "-o", "--output")
+    return parser

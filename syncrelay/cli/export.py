@@ -1,0 +1,104 @@
+"""`syncrelay export BAG... --config FILE -o FOLDER`: the matched sets of recordings as datasets."""
+
+from argparse import Namespace
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Self
+
+from syncrelay.bag import open_recording
+from syncrelay.bag.bindings import bind
+from syncrelay.cli.fleet import do_on_many
+from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of
+from syncrelay.cli.parser import Parser
+from syncrelay.cli.reading import eased_collector
+from syncrelay.cli.stop import StopRequest
+from syncrelay.config import Config, load
+from syncrelay.config.wording import all_of, did_you_mean
+from syncrelay.datasets.parquet import write_parquet
+from syncrelay.datasets.reading import SetsOf, resolved
+from syncrelay.datasets.tables import Content
+from syncrelay.errors import UsageError
+from syncrelay.fleet.task import JSON, PROBLEMS, Source, fingerprint_of, text_of
+
+
+def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
+    """Run `syncrelay export`."""
+    parser.refuse_repeated(arguments.config)
+    if arguments.into is None:
+        parser.error("the following arguments are required: -o/--output")
+    if arguments.raw and (arguments.fields or arguments.images):
+        parser.error("--raw keeps each message as it is: --fields and --images do not go with it")
+    config = _of_groups(load(*arguments.config), arguments.group)
+    if arguments.format == "mcap":
+        if arguments.raw or arguments.fields or arguments.images:
+            parser.error("--fields, --images and --raw are for tables: --format mcap writes whole messages")
+        return do_on_many(ReplayTask.of(config, (), 0), arguments.bags, arguments)
+    if arguments.images:
+        # In a worker it would be a bug.
+        import_module("PIL.Image")
+    content = Content(resolved(_parsed(arguments.fields), config), arguments.images, arguments.raw)
+    return do_on_many(ParquetTask.of(config, content), arguments.bags, arguments)
+
+
+@dataclass(frozen=True, slots=True)
+class ParquetTask:
+    """Writes the sets of a recording as a Parquet file for each group; see Task. Facts are the counts of each input."""
+
+    config: Config
+    content: Content
+    decided_by: str
+
+    @classmethod
+    def of(cls, config: Config, content: Content) -> Self:
+        """Return the task of a file."""
+        fields: dict[str, JSON] = {topic: list(paths) for topic, paths in content.fields.items()}
+        groups: list[JSON] = [group.name for group in config.groups]
+        options: dict[str, JSON] = {
+            "format": "parquet",
+            "groups": groups,
+            "fields": fields,
+            "images": content.images,
+            "raw": content.raw,
+        }
+        return cls(config, content, fingerprint_of("export", config=text_of(config), options=options))
+
+    def fingerprint(self) -> str:
+        """See Task."""
+        return self.decided_by
+
+    def run(self, source: Source, folder: Path) -> dict[str, JSON]:
+        """See Task."""
+        with closing(open_recording(source.words)) as recording, eased_collector():
+            bindings = bind(self.config, recording)
+            sets = SetsOf(recording, bindings, self.content, name=source.name)
+            write_parquet(sets, folder)
+            facts = about(recording, bindings)
+            undecodable = sets.faults()
+            if undecodable:
+                known = facts.get(PROBLEMS)
+                facts[PROBLEMS] = [*(known if isinstance(known, list) else []), *undecodable]
+            return {**facts, "groups": [counts_of(result) for result in sets.results()]}
+
+
+def _of_groups(config: Config, names: Sequence[str]) -> Config:
+    """Return a file with these of its groups alone, all where none is named."""
+    known = [group.name for group in config.groups]
+    for name in names:
+        if name not in known:
+            raise UsageError(f"--group {name}: no such group{did_you_mean(name, known)}; the file has {all_of(known)}")
+    return replace(config, groups=tuple(group for group in config.groups if not names or group.name in names))
+
+
+def _parsed(words: Sequence[str]) -> dict[str, list[str]]:
+    """Return the fields of each input from words such as /imu/data:linear_acceleration,angular_velocity."""
+    fields: dict[str, list[str]] = {}
+    for word in words:
+        topic, colon, paths = word.partition(":")
+        named = [path.strip() for path in paths.split(",")]
+        if not colon or not topic or not all(named):
+            raise UsageError(f"--fields {word}: expected TOPIC:FIELD,FIELD, such as /imu/data:linear_acceleration")
+        fields.setdefault(topic, []).extend(named)
+    return fields
