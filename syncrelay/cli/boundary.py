@@ -21,7 +21,10 @@ OUR_BUG: Final = 70
 INTERRUPTED: Final = 130
 
 # What brings the packages that only some commands need.
-_EXTRAS: Final = {**dict.fromkeys(("pyarrow", "PIL", "av"), "[datasets]"), **dict.fromkeys(("fsspec", "ray"), "[fleet]")}
+_EXTRAS: Final = {
+    **dict.fromkeys(("pyarrow", "PIL", "av"), "[datasets]"),
+    **dict.fromkeys(("fsspec", "ray"), "[fleet]"),
+}
 # All that our own texts are coloured with (syncrelay.config.render, syncrelay.doctor.text), and nothing else.
 _COLOURS: Final = re.compile("(\033\\[(?:[0-2]|3[134])m)")
 

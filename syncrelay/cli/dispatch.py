@@ -37,7 +37,9 @@ COMMANDS: Final = {
             "analyze BAG...", "measure recordings, and suggest values that fit", recording_parsers.analyze, "analyze"
         ),
         Command("replay BAG...", "run a file's groups on a recording, without ROS", recording_parsers.replay, "replay"),
-        Command("export BAG...", "write the matched sets of recordings as datasets", recording_parsers.export, "export"),
+        Command(
+            "export BAG...", "write the matched sets of recordings as datasets", recording_parsers.export, "export"
+        ),
         Command("test FILE...", "run the tests of a configuration, without ROS", parsers.test, "test"),
         Command("demo", "try it on simulated sensors; needs no robot", parsers.demo, "demo"),
         Command("doctor", "find out why messages may not arrive", parsers.doctor, "doctor"),

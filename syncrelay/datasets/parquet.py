@@ -51,15 +51,25 @@ def _open(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
     texts = [name for name, kind in leaves if pa.types.is_string(kind)]
     # What is compared with: neither pictures nor what stands within lists.
     compared = [name for name, kind in leaves if not pa.types.is_binary(kind) and ".list." not in name]
+    # Pictures are compressed already: to try again costs their time and gives nothing.
+    pictures = [f"{field.name}.data" for field in schema if _is_picture(field.type)]
     return pq.ParquetWriter(
         path,
         schema,
-        compression="zstd",
-        compression_level=_ZSTD_LEVEL,
+        compression={name: "none" if name in pictures else "zstd" for name, _ in leaves},
+        compression_level={name: _ZSTD_LEVEL for name, _ in leaves if name not in pictures},
         use_dictionary=texts or False,
         write_statistics=compared or False,
         write_page_index=True,
     )
+
+
+def _is_picture(kind: pa.DataType) -> bool:
+    """Tell whether a column holds CompressedImage, or what images became: a format's name beside bytes."""
+    if not pa.types.is_struct(kind):
+        return False
+    types = {field.name: field.type for field in kind}
+    return types.get("format") == pa.string() and types.get("data") == pa.binary()
 
 
 def _leaves(prefix: str, fields: Sequence[pa.Field] | pa.Schema | Any) -> Iterator[tuple[str, pa.DataType]]:

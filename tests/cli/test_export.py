@@ -1,0 +1,199 @@
+"""`syncrelay export`: the sets of a replay as Parquet, in a folder that says what it holds."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+
+from syncrelay.cli.demo import shipped_config
+from syncrelay.datasets import read_sets
+from tests.bag.making import rig, write_mcap, write_rosbag2
+from tests.cli.command import run, run_python
+from tests.ros.cdr_messages import STORE, header
+from tests.ros.frames import Frame
+
+PAIR = """
+version: 1
+groups:
+  front:
+    policy: approximate_time
+    slop: 20ms
+    topics: [{topic: /camera}, {topic: /lidar}]
+"""
+
+
+@pytest.fixture(scope="module")
+def rigged(tmp_path_factory):
+    """The demo's recording and file, exported."""
+    folder = tmp_path_factory.mktemp("export")
+    (folder / "demo.yaml").write_text(shipped_config())
+    run("demo", "--record", "rig.mcap", "--seconds", "3", folder=folder)
+    done = run("export", "rig.mcap", "--config", "demo.yaml", "-o", "out", folder=folder)
+    assert (done.returncode, done.stdout) == (0, "out: 1 recording: 1 done\n")
+    return folder
+
+
+def exported(folder: Path, group: str):
+    (path,) = folder.glob(f"out/*/{group}.parquet")
+    return pq.ParquetFile(path)
+
+
+@pytest.mark.parametrize("group", ["camera_lidar", "lidar_imu"])
+def test_the_rows_are_the_sets_that_replay_prints(rigged, group):
+    lines = run("replay", "rig.mcap", "--config", "demo.yaml", "--json", folder=rigged).stdout.splitlines()
+    told = [line for line in map(json.loads, lines) if line["group"] == group]
+    rows = exported(rigged, group).read(["stamps_ns", "left_ns", "span_ns", "latency_ns"]).to_pylist()
+    assert [(row["stamps_ns"], row["left_ns"], row["span_ns"], row["latency_ns"]) for row in rows] == [
+        (line["stamps"], line["time"], line["span"], line["latency"]) for line in told
+    ]
+    assert len(rows) > 20
+
+
+def test_the_file_is_the_table_that_programs_read(rigged):
+    (batch,) = read_sets(rigged / "rig.mcap", rigged / "demo.yaml", group="lidar_imu")
+    table = exported(rigged, "lidar_imu").read()
+    drop = ["recording"]
+    assert table.drop_columns(drop).equals(pa.Table.from_batches([batch]).drop_columns(drop))
+    assert table.schema.field("/demo/imu/data").metadata == {b"type": b"sensor_msgs/msg/Imu", b"frame_id": b"imu"}
+
+
+def test_it_is_written_for_those_who_read_parts_of_it(rigged):
+    file = exported(rigged, "camera_lidar")
+    group = file.metadata.row_group(0)
+    columns = {group.column(index).path_in_schema: group.column(index) for index in range(group.num_columns)}
+    assert columns["set"].has_column_index
+    assert columns["set"].has_offset_index
+    assert columns["/demo/camera/image_raw.data"].compression == "ZSTD"
+    assert not columns["/demo/camera/image_raw.data"].is_stats_set
+    assert max(file.metadata.row_group(index).total_byte_size for index in range(file.num_row_groups)) < 50_000_000
+
+
+def test_pictures_are_not_compressed_again(rigged, tmp_path):
+    done = run("export", "rig.mcap", "--config", "demo.yaml", "--group", "camera_lidar", "--images", "jpeg",
+               "-o", str(tmp_path / "out"), folder=rigged)  # fmt: skip
+    assert done.returncode == 0
+    file = exported(tmp_path, "camera_lidar")
+    group = file.metadata.row_group(0)
+    columns = {group.column(index).path_in_schema: group.column(index) for index in range(group.num_columns)}
+    assert columns["/demo/camera/image_raw.data"].compression == "UNCOMPRESSED"
+    assert file.read(["/demo/camera/image_raw"])[0][0].as_py()["data"].startswith(b"\xff\xd8")
+    assert list(tmp_path.glob("out/*/lidar_imu.parquet")) == []
+
+
+def test_fields_and_raw_bytes_are_chosen_on_the_command_line(rigged, tmp_path):
+    fields = ["--fields", "/demo/imu/data:angular_velocity, header.stamp", "--fields", "/demo/lidar/points:width"]
+    words = ["export", "rig.mcap", "--config", "demo.yaml", "--group", "lidar_imu"]
+    run(*words, *fields, "-o", str(tmp_path / "fields/out"), folder=rigged)
+    run(*words, "--raw", "-o", str(tmp_path / "raw/out"), folder=rigged)
+    row = exported(tmp_path / "fields", "lidar_imu").read().to_pylist()[0]
+    assert row["/demo/imu/data"].keys() == {"header", "angular_velocity"}
+    assert row["/demo/lidar/points"].keys() == {"width"}
+    with (rigged / "rig.mcap").open("rb") as file:
+        recorded = {message.data for _, _, message in make_reader(file).iter_messages(["/demo/imu/data"])}
+    raw = exported(tmp_path / "raw", "lidar_imu").read(["/demo/imu/data"])["/demo/imu/data"].to_pylist()
+    assert set(raw) <= recorded
+
+
+def test_mcap_is_what_replay_writes(rigged, tmp_path):
+    run("replay", "rig.mcap", "--config", "demo.yaml", "-o", str(tmp_path / "sets.mcap"), folder=rigged)
+    done = run(
+        "export", "rig.mcap", "--config", "demo.yaml", "--format", "mcap", "-o", str(tmp_path / "out"), folder=rigged
+    )
+    assert done.returncode == 0
+    (written,) = tmp_path.glob("out/*/*.mcap")
+    assert written.read_bytes() == (tmp_path / "sets.mcap").read_bytes()
+
+
+def test_the_same_command_again_does_what_is_missing(rigged, tmp_path):
+    for name in ("a.mcap", "b.mcap"):
+        write_mcap(tmp_path / name, rig())
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    words = ["export", "*.mcap", "--config", "pair.yaml", "-o", "out"]
+    assert run(*words, folder=tmp_path).stdout == "out: 2 recordings: 2 done\n"
+    write_rosbag2(tmp_path / "c.mcap", rig())
+    assert run(*words, folder=tmp_path).stdout == "out: 3 recordings: 1 done, 2 done before\n"
+    other = run(*words, "--raw", folder=tmp_path)
+    assert other.returncode == 1
+    assert "holds results of other options: name another folder, or replace them with --overwrite" in other.stderr
+    assert run(*words, "--raw", "--overwrite", folder=tmp_path).stdout == "out: 3 recordings: 3 done\n"
+
+
+def test_a_group_without_sets_has_a_file_without_rows(tmp_path):
+    write_mcap(tmp_path / "bag.mcap", [frame for frame in rig() if frame.topic == "/camera"])
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    done = run("export", "bag.mcap", "--config", "pair.yaml", "-o", "out", folder=tmp_path)
+    assert done.returncode == 1
+    assert "front: /lidar is not in the recording" in done.stderr
+    table = exported(tmp_path, "front").read()
+    assert (len(table), table["/camera"].type.num_fields) == (0, 2)
+
+
+def test_messages_that_cannot_be_decoded_are_told(tmp_path):
+    frames = [
+        frame._replace(payload=frame.payload[:-9]) if frame.topic == "/lidar" and index % 20 == 0 else frame
+        for index, frame in enumerate(rig())
+    ]
+    write_mcap(tmp_path / "bag.mcap", frames)
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    done = run("export", "bag.mcap", "--config", "pair.yaml", "-o", "out", folder=tmp_path)
+    assert done.returncode == 1
+    told = "messages could not be decoded as geometry_msgs/msg/Vector3Stamped, their cells are null"
+    assert f"/lidar: 4 {told}" in done.stderr
+    assert exported(tmp_path, "front").read()["/lidar"].null_count == 4
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["--fields", "/camera"], 2, "--fields /camera: expected TOPIC:FIELD,FIELD"),
+        (["--fields", "/camra:x"], 2, "/camra is no input of the file, did you mean `/camera`?"),
+        (["--fields", "/camera:vectr"], 1, "has no field `vectr`, did you mean `vector`?"),
+        (["--group", "frnt"], 2, "--group frnt: no such group, did you mean `front`?; the file has front"),
+        (["--raw", "--images", "png"], 2, "--raw keeps each message as it is"),
+        (["--format", "mcap", "--raw"], 2, "--format mcap writes whole messages"),
+    ],
+)
+def test_words_that_make_no_sense_are_refused(tmp_path, words, code, told):
+    write_mcap(tmp_path / "bag.mcap", rig())
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    done = run("export", "bag.mcap", "--config", "pair.yaml", "-o", "out", *words, folder=tmp_path)
+    assert (done.returncode, told in done.stderr) == (code, True), done.stderr
+
+
+def test_without_pyarrow_it_says_what_to_install(tmp_path):
+    without = "import sys; sys.modules['pyarrow'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    done = run_python("-c", without, "export", "bag.mcap", "--config", "pair.yaml", "-o", "out", folder=tmp_path)
+    assert done.returncode == 69
+    assert "pyarrow" in done.stderr
+    assert "pip install 'FOLDER-OF-SYNCRELAY[datasets]'" in done.stderr
+
+
+def test_memory_does_not_grow_with_the_recording(tmp_path):
+    image = STORE.types["sensor_msgs/msg/Image"]
+    empty = np.zeros(4_000_000, np.uint8)
+
+    def frame(topic: str, number: int) -> Frame:
+        stamp = 10**18 + number * 10**8
+        made = image(header(stamp), 1000, 4000, "mono8", 0, 4000, empty)
+        return Frame(topic, "sensor_msgs/msg/Image", stamp, bytes(STORE.serialize_cdr(made, "sensor_msgs/msg/Image")))
+
+    frames = (frame(topic, number) for number in range(100) for topic in ("/camera", "/lidar"))
+    write_mcap(tmp_path / "bag.mcap", frames, compression=CompressionType.ZSTD, chunk_size=1_000_000)
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    script = (
+        "import resource, subprocess, sys; done = subprocess.run(sys.argv[1:]);"
+        " print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss); sys.exit(done.returncode)"
+    )
+    command = [sys.executable, "-m", "syncrelay", "export", "bag.mcap", "--config", "pair.yaml", "-o", "out"]
+    done = run_python("-c", script, *command, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert exported(tmp_path, "front").metadata.num_rows == 100
+    # 800 MB of messages; the programs and what they import take 150 MB of it.
+    assert int(done.stdout.split()[-1]) < 400_000
