@@ -86,7 +86,13 @@ def _is_make_target(words):
 
 
 def _is_known_install(words):
-    return " ".join(words) in {"install .", "install '.[ros]'", "install '.[kilted]'", "install '.[ros,test,lint]'"}
+    return " ".join(words) in {
+        "install .",
+        "install '.[ros]'",
+        "install '.[kilted]'",
+        "install '.[ros,test,lint]'",
+        "install '.[datasets]'",
+    }
 
 
 def _is_syncrelay_command(words):

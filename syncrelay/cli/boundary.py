@@ -22,8 +22,8 @@ INTERRUPTED: Final = 130
 
 # What brings the packages that only some commands need.
 _EXTRAS: Final = {
-    **dict.fromkeys(("pyarrow", "PIL", "av"), "[datasets]"),
-    **dict.fromkeys(("fsspec", "ray"), "[fleet]"),
+    **dict.fromkeys(("PIL", "av", "pyarrow"), "[datasets]"),
+    **dict.fromkeys(("fsspec", "pandas", "ray"), "[fleet]"),
 }
 # All that our own texts are coloured with (syncrelay.config.render, syncrelay.doctor.text), and nothing else.
 _COLOURS: Final = re.compile("(\033\\[(?:[0-2]|3[134])m)")
@@ -60,10 +60,10 @@ def _guarded(command: Callable[[], int]) -> int:
     except Exception as error:  # noqa: BLE001  the boundary: everything else is our bug
         if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
             extra = _EXTRAS.get(error.name.partition(".")[0], "")
+            needs = "this command" if extra else "syncrelay"
             remark(
-                f"{sys.executable} lacks a Python package that {'this' if extra else 'syncrelay'} needs, or has too old a"
-                f" version: {error}; run `python3 -m pip install 'FOLDER-OF-SYNCRELAY{extra}'`, or see docs/workspace.md"
-                " for a ROS workspace"
+                f"{sys.executable} lacks a Python package that {needs} needs, or has too old a version: {error}; run"
+                f" `python3 -m pip install 'FOLDER-OF-SYNCRELAY{extra}'`, or see docs/workspace.md for a ROS workspace"
             )
             return UNAVAILABLE
         say(traceback.format_exc())

@@ -69,7 +69,7 @@ def _is_picture(kind: pa.DataType) -> bool:
     if not pa.types.is_struct(kind):
         return False
     types = {field.name: field.type for field in kind}
-    return types.get("format") == pa.string() and types.get("data") == pa.binary()
+    return bool(types.get("format") == pa.string() and types.get("data") == pa.binary())
 
 
 def _leaves(prefix: str, fields: Sequence[pa.Field] | pa.Schema | Any) -> Iterator[tuple[str, pa.DataType]]:

@@ -110,7 +110,7 @@ def test_mcap_is_what_replay_writes(rigged, tmp_path):
     assert written.read_bytes() == (tmp_path / "sets.mcap").read_bytes()
 
 
-def test_the_same_command_again_does_what_is_missing(rigged, tmp_path):
+def test_the_same_command_again_does_what_is_missing(tmp_path):
     for name in ("a.mcap", "b.mcap"):
         write_mcap(tmp_path / name, rig())
     (tmp_path / "pair.yaml").write_text(PAIR)

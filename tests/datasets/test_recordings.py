@@ -1,4 +1,4 @@
-"""Real recordings as datasets: of each, the sets of a replay with a file that `init` proposes, and all can be decoded."""
+"""Real recordings as datasets, with the file that `init` proposes: the sets of a replay, every message decoded."""
 
 from contextlib import closing
 
@@ -45,13 +45,9 @@ def test_every_set_is_a_row_and_every_message_is_decoded(name, real_data):
         sets = SetsOf(recording, bind(config, recording), Content(), name=name)
         for group, table in sets.parts(most_bytes=100_000):
             inputs = [each.topic for each in group.binding.inputs]
+            stamps = table["stamps_ns"].combine_chunks()
             for topic in inputs:
-                assert (
-                    table[topic]
-                    .combine_chunks()
-                    .is_null()
-                    .equals(table["stamps_ns"].combine_chunks().field(topic).is_null())
-                )
+                assert table[topic].combine_chunks().is_null().equals(stamps.field(topic).is_null())
             rows[group.binding.group.name] += [
                 (tuple(row["stamps_ns"].values()), row["left_ns"], row["latency_ns"])
                 for row in table.select(["stamps_ns", "left_ns", "latency_ns"]).to_pylist()
