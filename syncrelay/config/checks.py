@@ -104,7 +104,7 @@ def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
     needed = -(-max_wait // ticks.period_ns) + _HELD_BESIDE
     if needed > size:
         text = (
-            f"{quoted(str(size))} is too short for max_wait at {ticks}: up to {needed} messages of an input wait for"
+            f"queue_size {size} is too short for this max_wait at {ticks}: up to {needed} messages of an input wait for"
             f" their ticks, write {'`queue_size: ' + str(needed) + '`' if needed <= MOST else 'a shorter max_wait'}"
         )
         path = (*group.path, "queue_size")

@@ -178,10 +178,10 @@ class GroupFacts:
     stamps are what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest
     of the others, which may serve again; `ticks_hz` is the rate of the clock that makes them, where one does. `clock`
     is the simulated one, None without use_sim_time; `clock_set` when and by how much this machine's clock was set of
-    late; `is_recorded` says that a recording is judged and no live graph; `waited` how long its messages at most lay of late before the relay took them; `standstills` those of
-    late; `failure` what stopped the group for good; `pause` since when it is paused, and `unpaused` when the last pause
-    ended; `asleep` that it is lazy and nobody subscribes to what it gives; `empty_graph` the graph, where it holds no
-    node but our own.
+    late; `is_recorded` says that a recording is judged and no live graph; `waited` how long its messages at most lay of
+    late before the relay took them; `standstills` those of late; `failure` what stopped the group for good; `pause`
+    since when it is paused, and `unpaused` when the last pause ended; `asleep` that it is lazy and nobody subscribes to
+    what it gives; `empty_graph` the graph, where it holds no node but our own.
     `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
     the name of a managed node that waits to be activated.
     """
