@@ -107,7 +107,7 @@ def options(draw, *, optional=True, limited=True, thinned=True, offset=False):
         min_periods=draw(st.just(()) | st.tuples(*[few(0, 4)] * n_inputs)),
         max_wait=draw(waits),
         offsets=draw(shifts if offset else st.just(()) | shifts),
-        restamp=draw(st.none() | st.sampled_from(Restamp) | few(0, n_inputs - 1)),
+        restamp=draw(st.none() | st.sampled_from((Restamp.EARLIEST, Restamp.LATEST)) | few(0, n_inputs - 1)),
         every=draw(few(1, 3)) if thinned else 1,
         min_set_period=draw(st.none() | few(1, 6)) if thinned else None,
     )
