@@ -17,6 +17,10 @@ class BagError(SyncRelayError):
     """A recording cannot be read, or not as the file asks for."""
 
 
+class StorageError(BagError):
+    """A recording in object storage or on a server cannot be reached, or not to its end."""
+
+
 class NothingToMatchError(SyncRelayError):
     """What was recorded or heard is too little to propose a file from."""
 

@@ -2,5 +2,6 @@
 
 from syncrelay.bag.opening import is_recording, open_recording
 from syncrelay.bag.recording import Channel, Encoding, RawMessage, Recording
+from syncrelay.bag.storage import is_url
 
-__all__ = ["Channel", "Encoding", "RawMessage", "Recording", "is_recording", "open_recording"]
+__all__ = ["Channel", "Encoding", "RawMessage", "Recording", "is_recording", "is_url", "open_recording"]

@@ -1,10 +1,8 @@
 """MCAP files: by their index, or by one made in a first pass where there is none that can be trusted."""
 
-import os
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import suppress
-from pathlib import Path
 from struct import Struct
 from typing import Final
 
@@ -26,7 +24,8 @@ from syncrelay.bag.mcap_records import (
 from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import read_profiles
 from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
-from syncrelay.bag.segments import Segment, extent, read_in_order
+from syncrelay.bag.segments import PIECE, Pieces, Segment, extent, read_in_order
+from syncrelay.bag.sources import NoIndexError, Source
 from syncrelay.errors import BagError
 
 MAGIC: Final = b"\x89MCAP0\r\n"
@@ -37,8 +36,7 @@ _FOOTER: Final = Struct("<QQI")
 _CHECKSUM_SIZE: Final = 4
 # DATA_END holds a checksum alone.
 _DATA_END_SIZE: Final = 4
-# Messages outside of chunks are read by the piece.
-_PIECE: Final = 4_000_000
+_TAIL: Final = 32_000
 # No text of a schema or a channel is so long.
 _LONGEST_TEXT: Final = 64_000_000
 _ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
@@ -47,17 +45,21 @@ _ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Enc
 class McapFile:
     """One MCAP file, opened for reading; see Recording."""
 
-    def __init__(self, path: Path, name: str) -> None:
-        """Open a file that messages call `name`."""
-        self._file = path.open("rb")
+    def __init__(self, file: Source, name: str) -> None:
+        """Read a file that messages call `name`; raises NoIndexError where a far one would have to be gone through."""
+        self._file = file
         self._losses = Losses(name)
-        self.size = os.fstat(self._file.fileno()).st_size
+        self.size = file.size
         self.position = 0
         self._segments: list[Segment] = []
         self._chunked: set[Segment] = set()
         self._schemas: dict[int, Schema] = {}
         self._records: dict[int, ChannelRecord] = {}
+        self._holds: dict[Segment, frozenset[int]] = {}
+        self._counts: dict[int, int] = {}
         if not self._read_index():
+            if not file.is_near:
+                raise NoIndexError
             self._scan()
         self._by_id = {number: self._channel(record) for number, record in self._records.items()}
         self.channels = tuple(self._by_id.values())
@@ -72,10 +74,23 @@ class McapFile:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
-        for segment, found in read_in_order(self._segments, lambda each: self._read(each, chosen), self._losses):
+        needed = [each for each in self._segments if self._is_needed(each, chosen)]
+        self.position = sum(each.size for each in self._segments) - sum(each.size for each in needed)
+        self._file.expect([(each.offset, each.size) for each in needed])
+        said, count = self.faults, 0
+        for segment, found in read_in_order(needed, lambda each: self._read(each, chosen), self._losses):
             self.position += segment.size
+            count += len(found)
             yield found
         self.position = self.size
+        told = sum(self._counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
+        if len(needed) < len(self._segments) and count < told and said == self.faults:
+            self._losses.say(f"its statistics tell of {told} messages, of which the index leads to {count}")
+
+    def _is_needed(self, segment: Segment, channels: dict[int, Channel | None]) -> bool:
+        """Tell whether a segment is to be read: not if an index that can be trusted names only what is not wanted."""
+        held = self._holds.get(segment)
+        return not held or any(number not in channels or channels[number] is not None for number in held)
 
     def close(self) -> None:
         """See Recording."""
@@ -153,6 +168,9 @@ class McapFile:
             for each in chunks
         ]
         self._chunked = set(self._segments)
+        if self._counts:
+            held = (frozenset(each.message_index_offsets) for each in chunks)
+            self._holds = dict(zip(self._segments, held, strict=True))
         return True
 
     def _summary(self) -> Iterator[ChunkIndex]:
@@ -160,13 +178,18 @@ class McapFile:
         end = self.size - len(MAGIC) - RECORD.size - _FOOTER.size
         if end < len(MAGIC):
             raise EOFError("there is no footer")
+        # The footer, and all of the summary where it is no longer than most.
+        tail = max(len(MAGIC), self.size - _TAIL)
+        self._file.expect([(tail, self.size - tail)])
         head, footer = self._bytes(end, RECORD.size), self._bytes(end + RECORD.size, _FOOTER.size)
         begin, _, checksum = _FOOTER.unpack(footer)
         if head != RECORD.pack(Opcode.FOOTER, _FOOTER.size) or not len(MAGIC) <= begin < end:
             raise ValueError("there is no summary")
+        self._file.expect([(begin, self.size - begin)])
         if checksum not in (0, self._checksum(begin, end + RECORD.size + _FOOTER.size - _CHECKSUM_SIZE)):
             raise ValueError("its checksum is wrong")
         count = told = 0
+        self._counts = {}
         for opcode, place, stop in self._walk(begin, end):
             match opcode:
                 case Opcode.SCHEMA | Opcode.CHANNEL:
@@ -175,14 +198,17 @@ class McapFile:
                     yield parsed(ChunkIndex, self._text(place, stop))
                     count += 1
                 case Opcode.STATISTICS:
-                    told = parsed(Statistics, self._text(place, stop)).chunk_count
+                    statistics = parsed(Statistics, self._text(place, stop))
+                    told = statistics.chunk_count
+                    # A flipped bit could name another channel: only with a checksum is more taken from the index.
+                    self._counts = statistics.channel_message_counts if checksum else {}
         if told not in (0, count):
             raise ValueError("chunks are missing in it")
 
     def _checksum(self, begin: int, end: int) -> int:
         checksum = 0
-        for place in range(begin, end, _PIECE):
-            checksum = zlib.crc32(self._bytes(place, min(_PIECE, end - place)), checksum)
+        for place in range(begin, end, PIECE):
+            checksum = zlib.crc32(self._bytes(place, min(PIECE, end - place)), checksum)
         return checksum
 
     def _text(self, begin: int, end: int) -> bytes:
@@ -195,7 +221,7 @@ class McapFile:
         """Find channels and segments by going through the file to its end, or as far as it can be read."""
         self._schemas.clear()
         self._records.clear()
-        loose = _Pieces()
+        loose = Pieces()
         place = len(MAGIC)
         try:
             for opcode, begin, end in self._walk(place, self.size):
@@ -209,7 +235,7 @@ class McapFile:
             self._losses.cut_off(place, self.size)
         self._segments += loose.segments()
 
-    def _note(self, opcode: int, begin: int, end: int, loose: "_Pieces") -> None:
+    def _note(self, opcode: int, begin: int, end: int, loose: Pieces) -> None:
         """Take in what a record of the file says."""
         place = begin - RECORD.size
         try:
@@ -251,34 +277,9 @@ class McapFile:
             self._records[channel.id] = channel
 
 
-class _Pieces:
-    """Messages outside of chunks, as segments that are read whole."""
-
-    def __init__(self) -> None:
-        self._done: list[Segment] = []
-        self._last: Segment | None = None
-
-    def add(self, record: Segment) -> None:
-        """Take a message that stands behind all before."""
-        last = self._last
-        if last is None or record.offset - last.offset > _PIECE:
-            self._done += self._open()
-            self._last = record
-        else:
-            size = record.offset + record.size - last.offset
-            self._last = Segment(last.offset, size, min(last.begin, record.begin), max(last.end, record.end))
-
-    def segments(self) -> list[Segment]:
-        """Give what all messages are in."""
-        return self._done + self._open()
-
-    def _open(self) -> list[Segment]:
-        return [] if self._last is None else [self._last]
-
-
-def open_mcap(path: Path, name: str) -> McapFile:
-    """Open an MCAP file; raises BagError where nothing of it can be read."""
-    file = McapFile(path, name)
+def open_mcap(source: Source, name: str) -> McapFile:
+    """Open an MCAP file; raises BagError where nothing of it can be read, NoIndexError as McapFile does."""
+    file = McapFile(source, name)
     if not file.channels:
         file.close()
         raise BagError(f"{name}: no message can be read{': ' + file.faults[0] if file.faults else ', it is empty'}")

@@ -4,7 +4,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from io import BytesIO
 from struct import Struct, error
-from typing import Any, BinaryIO, Final, Protocol, TypeVar
+from typing import Any, Final, Protocol, TypeVar
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -39,10 +39,16 @@ class Kind(Protocol[_Parsed_co]):
     def read(stream: ReadDataStream) -> _Parsed_co: ...
 
 
+class Readable(Protocol):
+    """What gives so many of the next bytes."""
+
+    def read(self, size: int, /) -> bytes: ...
+
+
 class _Bounded:
     """So many bytes of a stream: a length that asks for more raises, and does not get fewer."""
 
-    def __init__(self, stream: BinaryIO | BytesIO, size: int) -> None:
+    def __init__(self, stream: Readable, size: int) -> None:
         self._stream = stream
         self._left = size
 
@@ -58,7 +64,7 @@ def parsed(kind: Kind[_Parsed_co], content: bytes) -> _Parsed_co:
     return parsed_from(kind, BytesIO(content), len(content))
 
 
-def parsed_from(kind: Kind[_Parsed_co], stream: BinaryIO | BytesIO, size: int) -> _Parsed_co:
+def parsed_from(kind: Kind[_Parsed_co], stream: Readable, size: int) -> _Parsed_co:
     """Return a record as `parsed` does from so many bytes that come next, of which none is copied twice."""
     bounded: Any = _Bounded(stream, size)
     return kind.read(ReadDataStream(bounded))

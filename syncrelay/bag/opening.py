@@ -1,9 +1,8 @@
-"""From paths to a recording: files by what they begin with, folders, splits, and files compressed as a whole."""
+"""From paths and URLs to a recording: files by what they begin with, folders, splits, files compressed as a whole."""
 
 import bz2
 import gzip
 import heapq
-import re
 import shutil
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -13,20 +12,24 @@ from itertools import chain, pairwise
 from operator import itemgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import zstandard
 
 from syncrelay.bag import mcap_file, ros1_file, sqlite_file
 from syncrelay.bag.batching import batched, filled
+from syncrelay.bag.names import METADATA, SUFFIXES, is_recording_name, natural
 from syncrelay.bag.recording import Channel, RawMessage, Recording
+from syncrelay.bag.sources import LocalFile, NoIndexError
+from syncrelay.bag.storage import files_of, is_url, open_url
 from syncrelay.config.wording import did_you_mean
-from syncrelay.errors import BagError
+from syncrelay.errors import BagError, StorageError
 
-_SUFFIXES: Final = (".mcap", ".db3", ".bag", ".active")
-_COMPRESSED: Final = (".bz2", ".zstd", ".zst", ".gz")
+Tell: TypeAlias = Callable[[str], object]
+"""Takes a sentence that is worth a remark and is no fault."""
+
 _OPENERS: Final[Mapping[bytes, Callable[[Path, str], Recording]]] = {
-    mcap_file.MAGIC: mcap_file.open_mcap,
+    mcap_file.MAGIC: lambda path, name: mcap_file.open_mcap(LocalFile(path), name),
     sqlite_file.MAGIC: sqlite_file.SqliteFile,
     ros1_file.MAGIC: ros1_file.open_ros1,
 }
@@ -43,13 +46,13 @@ _DECOMPRESSORS: Final[Mapping[bytes, Callable[[Path], Any]]] = {
 }
 _LONGEST_MAGIC: Final = 16
 _PIECE: Final = 1_000_000
-_METADATA: Final = "metadata.yaml"
 
 
-def open_recording(paths: Sequence[str]) -> Recording:
-    """Open a recording: files, and folders of which all files are one recording.
+def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Recording:
+    """Open a recording: files, and folders of which all files are one recording, by their paths or URLs.
 
-    Of several files, those that cannot be read are faults of the recording. Raises BagError where none can.
+    Of several files, those that cannot be read are faults of the recording. Raises BagError where none can, and
+    StorageError where one cannot be reached. `tell` takes what has to be copied here first.
     """
     with ExitStack() as opened:
         files: list[Recording] = []
@@ -57,7 +60,12 @@ def open_recording(paths: Sequence[str]) -> Recording:
         faults: list[str] = []
         for path in _files(paths):
             try:
-                file = _open(path, opened, faults)
+                if isinstance(path, str):
+                    file = _open_remote(path, opened, faults, tell)
+                else:
+                    file = _open(path, str(path), opened, faults)
+            except StorageError:
+                raise
             except BagError as error:
                 unreadable.append(error)
                 continue
@@ -69,7 +77,12 @@ def open_recording(paths: Sequence[str]) -> Recording:
 
 
 def is_recording(word: str) -> bool:
-    """Tell whether a word means a recording and no topic: something that is there, or has a dot, which no topic has."""
+    """Tell whether a word means a recording and no topic, and fetch nothing for it.
+
+    A recording is something that is there, a URL, or has a dot, which no topic has.
+    """
+    if is_url(word):
+        return True
     path = Path(word)
     try:
         return "." in path.name or path.is_file() or (path.is_dir() and bool(_files_in(path)))
@@ -112,8 +125,12 @@ class Files:
         self._opened.close()
 
 
-def _files(named: Sequence[str]) -> Iterator[Path]:
+def _files(named: Sequence[str]) -> Iterator[Path | str]:
+    """Yield the paths of files, and the URLs of those that are not here."""
     for name in named:
+        if is_url(name):
+            yield from files_of(name)
+            continue
         try:
             yield from _files_of(Path(name), named)
         except OSError as error:
@@ -121,7 +138,7 @@ def _files(named: Sequence[str]) -> Iterator[Path]:
 
 
 def _files_of(path: Path, named: Sequence[str]) -> list[Path]:
-    if path.name == _METADATA and path.is_file():
+    if path.name == METADATA and path.is_file():
         path = path.parent
     if path.is_dir():
         return _files_in(path)
@@ -131,42 +148,53 @@ def _files_of(path: Path, named: Sequence[str]) -> list[Path]:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    files = sorted((path for path in folder.iterdir() if _bare_suffix(path) in _SUFFIXES), key=_natural)
+    files = sorted(
+        (path for path in folder.iterdir() if is_recording_name(path.name)), key=lambda path: natural(path.name)
+    )
     if not files:
-        raise BagError(f"{folder}: holds no recording, expected files that end in {', '.join(_SUFFIXES)}")
+        raise BagError(f"{folder}: holds no recording, expected files that end in {', '.join(SUFFIXES)}")
     return files
-
-
-def _bare_suffix(path: Path) -> str:
-    return Path(path.stem).suffix if path.suffix in _COMPRESSED else path.suffix
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sort split files by their numbers: _9 before _10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def _similar(path: Path, named: Sequence[str]) -> str:
     """Return a question for the recording beside a path whose name is most like it, and that is not named already."""
     try:
         others = set(path.parent.iterdir()).difference(map(Path, named))
-        beside = [each.name for each in sorted(others) if each.is_dir() or _bare_suffix(each) in _SUFFIXES]
+        beside = [each.name for each in sorted(others) if each.is_dir() or is_recording_name(each.name)]
     except OSError:
         return ""
     return did_you_mean(path.name, beside)
 
 
-def _open(path: Path, opened: ExitStack, faults: list[str]) -> Recording:
+def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> Recording:
+    """Open a file behind a URL by ranges if that is possible, and else copy it here, once."""
+    remote = open_url(url)
+    opened.callback(remote.close)
+    why = "its format is read from a file of this machine"
+    if not remote.has_ranges:
+        why = "its server cannot send parts of it"
+    elif remote.read(_LONGEST_MAGIC).startswith(mcap_file.MAGIC):
+        try:
+            return mcap_file.open_mcap(remote, remote.name)
+        except NoIndexError:
+            why = "it has no index that can be trusted"
+    copy = _temporary(remote.name, "copy it to", opened) / "recording"
+    remote.download(copy)
+    tell(f"{remote.name}: copied here as a whole ({copy.stat().st_size:,} bytes): {why}")
+    return _open(copy, remote.name, opened, faults)
+
+
+def _open(path: Path, name: str, opened: ExitStack, faults: list[str]) -> Recording:
     """Open one file by its content, decompressed into a temporary one if it is compressed as a whole."""
     magic = _magic(path)
     for begin, decompressor in _DECOMPRESSORS.items():
         if magic.startswith(begin):
-            content, found = _decompressed(path, decompressor, opened)
+            content, found = _decompressed(path, name, decompressor, opened)
             if found and not content.stat().st_size:
                 raise BagError(found[0])
             faults += found
-            return _open_plain(content, _magic(content), str(path))
-    return _open_plain(path, magic, str(path))
+            return _open_plain(content, _magic(content), name)
+    return _open_plain(path, magic, name)
 
 
 def _open_plain(path: Path, magic: bytes, name: str) -> Recording:
@@ -190,24 +218,30 @@ def _magic(path: Path) -> bytes:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from error
 
 
-def _decompressed(path: Path, decompressor: Callable[[Path], Any], opened: ExitStack) -> tuple[Path, list[str]]:
-    """Return a temporary file of the content, and what is wrong with it."""
+def _temporary(name: str, purpose: str, opened: ExitStack) -> Path:
     try:
-        folder = opened.enter_context(TemporaryDirectory(prefix="syncrelay-"))
+        return Path(opened.enter_context(TemporaryDirectory(prefix="syncrelay-")))
     except OSError as error:
         raise BagError(
-            f"{path}: no temporary folder to decompress it in, set TMPDIR to one that can be written: {error.strerror}"
+            f"{name}: no temporary folder to {purpose}, set TMPDIR to one that can be written: {error.strerror}"
         ) from error
-    content = Path(folder) / path.stem
+
+
+def _decompressed(
+    path: Path, name: str, decompressor: Callable[[Path], Any], opened: ExitStack
+) -> tuple[Path, list[str]]:
+    """Return a temporary file of the content, and what is wrong with it."""
+    folder = _temporary(name, "decompress it in", opened)
+    content = folder / path.stem
     with decompressor(path) as packed, content.open("wb") as plain:
         try:
             shutil.copyfileobj(packed, plain, _PIECE)
         except (EOFError, OSError, zlib.error, zstandard.ZstdError) as error:
             if isinstance(error, OSError) and error.errno == ENOSPC:
                 raise BagError(
-                    f"{path}: no space in {folder} to decompress it, set TMPDIR to another folder"
+                    f"{name}: no space in {folder} to decompress it, set TMPDIR to another folder"
                 ) from error
-            return content, [f"{path}: cut off or damaged; read up to there: {error}"]
+            return content, [f"{name}: cut off or damaged; read up to there: {error}"]
     return content, []
 
 

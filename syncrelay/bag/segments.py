@@ -12,6 +12,9 @@ from typing import Final
 from syncrelay.bag.losses import Losses
 from syncrelay.bag.recording import LATEST, RawMessage
 
+PIECE: Final = 4_000_000
+"""How much is read at a time of what stands in no chunk."""
+
 _RECEIVED: Final = itemgetter(1)
 
 
@@ -57,3 +60,29 @@ def read_in_order(
         if due:
             until = held[due - 1][1]
         del held[:due]
+
+
+class Pieces:
+    """Messages outside of chunks, as segments that are read whole."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._done: list[Segment] = []
+        self._last: Segment | None = None
+
+    def add(self, record: Segment) -> None:
+        """Take a message that stands behind all before."""
+        last = self._last
+        if last is None or record.offset - last.offset > PIECE:
+            self._done += self._open()
+            self._last = record
+        else:
+            size = record.offset + record.size - last.offset
+            self._last = Segment(last.offset, size, min(last.begin, record.begin), max(last.end, record.end))
+
+    def segments(self) -> list[Segment]:
+        """Give what all messages are in."""
+        return self._done + self._open()
+
+    def _open(self) -> list[Segment]:
+        return [] if self._last is None else [self._last]

@@ -105,7 +105,7 @@ def _recorded(
 
     Raises BagError where it cannot be read, and UsageError for a fault of a topic that it lacks.
     """
-    with closing(open_recording([path])) as opened:
+    with closing(open_recording([path], tell=remarks.append)) as opened:
         disturbed = Disturbed(opened, loaded.what_if, seed=loaded.case.seed) if loaded.what_if else None
         recording = opened if disturbed is None else disturbed
         binding = next(each for each in bind(suite.config, recording) if each.group.name == loaded.group.name)

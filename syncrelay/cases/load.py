@@ -8,6 +8,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from syncrelay.bag import is_url
 from syncrelay.bag.bindings import full_name
 from syncrelay.cases import drawing as drawings
 from syncrelay.cases.drawing import Drawing
@@ -157,7 +158,9 @@ class _Reader:
                 code="missing_key",
                 span=self._document.key_span(path),
             )
-        recording = None if case.recording is None else str(self._folder / case.recording)
+        recording = case.recording
+        if recording is not None and not is_url(recording):
+            recording = str(self._folder / recording)
         span = self._document.key_span(path)
         return LoadedCase(name, span, group, case, drawing, recording, places, what_if)
 

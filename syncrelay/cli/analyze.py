@@ -10,6 +10,7 @@ from functools import partial
 
 from syncrelay.bag import Channel, Recording, is_recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
+from syncrelay.bag.attempts import redacted
 from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
@@ -78,7 +79,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         return analyze_bag(bags[0], asked)
     if asked.text is not None:
         load_text(asked.text, name=config)
-    works = [Work(bag, partial(analyze_bag, bag, asked)) for bag in bags]
+    works = [Work(redacted(bag), partial(analyze_bag, bag, asked)) for bag in bags]
     return side_by_side(works, jobs=arguments.jobs or len(os.sched_getaffinity(0)))
 
 
@@ -87,9 +88,10 @@ def analyze_bag(bag: str, asked: Asked) -> int:
 
     Raises ConfigError for a faulty file, BagError for a recording that cannot be read.
     """
-    with closing(open_recording([bag])) as recording:
+    name = redacted(bag)
+    with closing(open_recording([bag], tell=remark)) as recording:
         if asked.config is None and not asked.topics:
-            put_inventory(bag, recording, is_json=asked.json, indent=asked.indent)
+            put_inventory(name, recording, is_json=asked.json, indent=asked.indent)
             _tell_faults(recording)
             return DONE
         text, bindings = bound(recording, asked)
@@ -98,7 +100,7 @@ def analyze_bag(bag: str, asked: Asked) -> int:
         with reading(recording):
             analysis = measured(recording, text, bindings, asked)
         _tell_faults(recording)
-    _print(bag, analysis, asked)
+    _print(name, analysis, asked)
     return DONE if all(binding.is_complete for binding in bindings) else AT_FAULT
 
 

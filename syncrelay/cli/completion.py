@@ -176,12 +176,14 @@ class _Opened:
 
 def _recordings_and_topics(typed: str, arguments: Namespace) -> Iterator[str]:
     """Give the topics of the recording that is named first; where none begins so, more recordings."""
-    from syncrelay.bag import open_recording
+    from syncrelay.bag import is_url, open_recording
     from syncrelay.errors import BagError
 
     topics = set[str]()
-    with suppress(BagError), closing(open_recording([arguments.bag])) as recording:
-        topics = {channel.topic for channel in recording.channels} - set(arguments.more)
+    # Nobody pays for a press of the Tab key, or waits for a server.
+    if not is_url(arguments.bag):
+        with suppress(BagError), closing(open_recording([arguments.bag])) as recording:
+            topics = {channel.topic for channel in recording.channels} - set(arguments.more)
     begun = sorted(topic for topic in topics if topic.startswith(typed))
     yield from begun or _files(_RECORDING)(typed, arguments)
 

@@ -39,7 +39,7 @@ def init_from_bag(bag: str, output: str | None) -> int:
 
     Raises BagError for a recording that cannot be read, NothingToMatchError where it holds too little.
     """
-    with closing(open_recording([bag])) as recording:
+    with closing(open_recording([bag], tell=remark)) as recording:
         with reading(recording):
             proposal = propose(recording)
         for fault in recording.faults:

@@ -70,7 +70,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     """
     config = load(*config_paths)
     with ExitStack() as opened:
-        recording = open_recording(bags)
+        recording = open_recording(bags, tell=remark)
         opened.callback(recording.close)
         plain = recording
         disturbed = Disturbed(recording, wanted.what_if, seed=wanted.seed) if wanted.what_if else None
