@@ -137,6 +137,11 @@ def _files(named: Sequence[str]) -> Iterator[Path | str]:
             raise BagError(f"{name}: cannot be read: {error.strerror}") from error
 
 
+def local_files(word: str) -> list[Path]:
+    """Return the files of this machine that open_recording would read; raises BagError where there are none."""
+    return [file for file in _files([word]) if isinstance(file, Path)]
+
+
 def _files_of(path: Path, named: Sequence[str]) -> list[Path]:
     if path.name == METADATA and path.is_file():
         path = path.parent
@@ -243,13 +248,3 @@ def _decompressed(
                 ) from error
             return content, [f"{name}: cut off or damaged; read up to there: {error}"]
     return content, []
-
-
-def files_of(words: Sequence[str]) -> list[Path]:
-    """Return the files that open_recording would read; raises BagError where there are none."""
-    return list(_files(words))
-
-
-def is_named_as_recording(path: Path) -> bool:
-    """Tell whether a file of a folder counts as a recording, by its name alone."""
-    return _bare_suffix(path) in _SUFFIXES

@@ -2,14 +2,16 @@
 
 import os
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from hashlib import blake2b, file_digest
 from pathlib import Path
 from typing import Final
 
-from syncrelay.bag.opening import files_of
+from syncrelay.bag.attempts import redacted
+from syncrelay.bag.opening import local_files
+from syncrelay.bag.storage import files_of, is_url, open_url
 from syncrelay.errors import BagError
-from syncrelay.fleet.remote import content_of_url, is_url
 
 _DIGEST_BYTES: Final = 20
 
@@ -47,7 +49,7 @@ def content_of(words: Sequence[str]) -> Content:
 
 def marks_of(words: Sequence[str]) -> tuple[tuple[int, ...], ...]:
     """Return the marks that content_of gives, without reading a file."""
-    return tuple(mark for word in words if not is_url(word) for mark in _marks(files_of([word])))
+    return tuple(mark for word in words if not is_url(word) for mark in _marks(local_files(word)))
 
 
 def size_of(words: Sequence[str]) -> int:
@@ -99,12 +101,23 @@ def _is_intact(path: Path, file: ResultFile) -> bool:
         return file_digest(content, _blake).hexdigest() == file.hash
 
 
-def _of_url(url: str) -> Content:
-    return Content(*content_of_url(url), ())
+def _of_url(word: str) -> Content:
+    """Return what changes when the content behind a URL does, as its server tells it, and its size; nothing is read."""
+    parts = []
+    for url in files_of(word):
+        with closing(open_url(url)) as file:
+            if not file.identity:
+                raise BagError(
+                    f"{redacted(url)}: its server tells no ETag and no date, by which a change of it would be seen:"
+                    " download it"
+                )
+            parts.append((f"{file.identity}:{file.size}", file.size))
+    hashes = [told for told, _ in parts]
+    return Content(_of_several(hashes), sum(size for _, size in parts), ())
 
 
 def _of_files(word: str) -> Content:
-    files = files_of([word])
+    files = local_files(word)
     marks = _marks(files)
     hashes = [_hash(path) for path in files]
     # The parts of a split recording are told apart, and put in order, by their names.

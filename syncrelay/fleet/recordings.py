@@ -8,13 +8,13 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Final
 
-from syncrelay.bag.opening import is_named_as_recording
+from syncrelay.bag.attempts import redacted
+from syncrelay.bag.names import METADATA, is_recording_name
+from syncrelay.bag.storage import find, is_url
 from syncrelay.errors import BagError
-from syncrelay.fleet.remote import is_url
 from syncrelay.fleet.task import Source
 
 _EXPECTED: Final = "expected files that end in .mcap, .db3 or .bag, compressed or not"
-_METADATA: Final = "metadata.yaml"
 _LIST: Final = "@"
 # Of UTF-8: with the hash behind it, a name stays below the 255 bytes that file systems allow.
 _LONGEST_STEM: Final = 100
@@ -52,6 +52,8 @@ def result_name(place: str) -> str:
     It begins with the recording's own name, as far as any folder can hold that, and ends with a hash of the whole path:
     recordings of one name in several folders stay apart.
     """
+    # Who signs a URL anew means the same recording.
+    place = redacted(place)
     own = place.rstrip("/").rpartition("/")[2]
     stem = own.partition(".")[0] or own
     plain = "".join(each if each.isalnum() or each in "-_" else "_" for each in stem)
@@ -82,9 +84,9 @@ def _listed(name: str) -> Iterator[str]:
 
 
 def _places(word: str) -> list[str]:
-    """Return the absolute paths of the recordings that a word names, or the URL that it is."""
+    """Return the absolute paths of the recordings that a word names, or their URLs."""
     if is_url(word):
-        return [word]
+        return find(word)
     try:
         found = _matching(word) if has_magic(word) and not os.path.lexists(word) else _named(Path(word))
     except OSError as error:
@@ -105,7 +107,7 @@ def _matching(pattern: str) -> list[Path]:
 
 
 def _named(path: Path) -> list[Path]:
-    if path.name == _METADATA and path.is_file():
+    if path.name == METADATA and path.is_file():
         path = path.parent
     if not path.is_dir():
         if not path.exists():
@@ -136,8 +138,8 @@ def _inside(folder: Path) -> Iterator[Path]:
 def _is_rosbag2(folder: Path, files: Sequence[Path], recordings: Sequence[Path]) -> bool:
     """Tell a recording of rosbag2, which a crash may have left without its metadata, from loose ones."""
     split = re.compile(re.escape(folder.name) + r"_\d+\..*", re.DOTALL)
-    return any(file.name == _METADATA for file in files) or all(split.fullmatch(file.name) for file in recordings)
+    return any(file.name == METADATA for file in files) or all(split.fullmatch(file.name) for file in recordings)
 
 
 def _if_recording(path: Path) -> list[Path]:
-    return [path] if is_named_as_recording(path) else []
+    return [path] if is_recording_name(path.name) else []
