@@ -91,8 +91,6 @@ def _places(word: str) -> list[str]:
         found = _matching(word) if has_magic(word) and not os.path.lexists(word) else _named(Path(word))
     except OSError as error:
         raise BagError(f"{word}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise BagError(f"{word!r}: is not a file name") from error
     return [os.path.abspath(path) for path in found]  # noqa: PTH100  a link keeps its name, as a folder of links has them
 
 

@@ -86,7 +86,9 @@ class Run:
                 _put_in_place(outcome.folder, self._ledger.folder / source.name)
             case Failed() if not outcome.ends_all and (outcome.content or finished.job.done is None):
                 self._take_away(source.name)
-                self._ledger.append(self._failed(source, outcome))
+                entry = self._failed(source, outcome)
+                if self._ledger.entries.get(source.name) != entry:
+                    self._ledger.append(entry)
             case Failed() | Kept():
                 # A recording that cannot be reached now keeps the result that it has.
                 pass
