@@ -62,9 +62,6 @@ class HttpFile:
         file.truncate()
         self._run(lambda: self._ask({}, lambda answer: self._whole(answer, file), max(self.size, 0)))
 
-    def close(self) -> None:
-        """See Ranges: connections are the file system's, which others use too."""
-
     def _run(self, work: Callable[[], Awaitable[_Done]]) -> _Done:
         try:
             done: _Done = sync(self._files.loop, work)

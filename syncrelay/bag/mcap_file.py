@@ -11,6 +11,7 @@ from mcap.records import Channel as ChannelRecord
 from mcap.records import Chunk, ChunkIndex, Schema, Statistics
 
 from syncrelay.bag.losses import Losses
+from syncrelay.bag.mcap_parts import Parts, PlainChunk, is_mixed, is_needed, plain_chunk
 from syncrelay.bag.mcap_records import (
     MESSAGE_FIELDS,
     RECORD,
@@ -56,6 +57,7 @@ class McapFile:
         self._schemas: dict[int, Schema] = {}
         self._records: dict[int, ChannelRecord] = {}
         self._holds: dict[Segment, frozenset[int]] = {}
+        self._plain: dict[Segment, PlainChunk] = {}
         self._counts: dict[int, int] = {}
         if not self._read_index():
             if not file.is_near:
@@ -74,23 +76,25 @@ class McapFile:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
-        needed = [each for each in self._segments if self._is_needed(each, chosen)]
+        needed = sorted(
+            (each for each in self._segments if is_needed(self._holds.get(each), chosen)), key=lambda each: each.begin
+        )
         self.position = sum(each.size for each in self._segments) - sum(each.size for each in needed)
-        self._file.expect([(each.offset, each.size) for each in needed])
+        parts = None
+        if not self._file.is_near:
+            plain = {each: chunk for each, chunk in self._plain.items() if is_mixed(self._holds.get(each), chosen)}
+            numbers = [number for number, channel in chosen.items() if channel is not None]
+            parts = Parts(self._file, needed, plain, numbers)
         said, count = self.faults, 0
-        for segment, found in read_in_order(needed, lambda each: self._read(each, chosen), self._losses):
+        for segment, found in read_in_order(needed, lambda each: self._read(each, chosen, parts), self._losses):
             self.position += segment.size
             count += len(found)
             yield found
         self.position = self.size
         told = sum(self._counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
-        if len(needed) < len(self._segments) and count < told and said == self.faults:
+        is_part = parts is not None or len(needed) < len(self._segments)
+        if is_part and count < told and said == self.faults:
             self._losses.say(f"its statistics tell of {told} messages, of which the index leads to {count}")
-
-    def _is_needed(self, segment: Segment, channels: dict[int, Channel | None]) -> bool:
-        """Tell whether a segment is to be read: not if an index that can be trusted names only what is not wanted."""
-        held = self._holds.get(segment)
-        return not held or any(number not in channels or channels[number] is not None for number in held)
 
     def close(self) -> None:
         """See Recording."""
@@ -108,10 +112,11 @@ class McapFile:
             record.metadata.get("topic_type_hash", ""),
         )
 
-    def _read(self, segment: Segment, channels: dict[int, Channel | None]) -> list[RawMessage]:
+    def _read(self, segment: Segment, channels: dict[int, Channel | None], parts: Parts | None) -> list[RawMessage]:
         found: list[RawMessage] = []
         try:
-            add_messages(found, self._content(segment), channels)
+            content = parts.of(segment) if parts is not None else None
+            add_messages(found, self._content(segment) if content is None else content, channels)
         except UNREADABLE as fault:
             self._losses.damaged(f"the chunk at byte {segment.offset}", fault, read=len(found))
         return found
@@ -171,6 +176,8 @@ class McapFile:
         if self._counts:
             held = (frozenset(each.message_index_offsets) for each in chunks)
             self._holds = dict(zip(self._segments, held, strict=True))
+            plain = zip(self._segments, map(plain_chunk, chunks), strict=True)
+            self._plain = {segment: chunk for segment, chunk in plain if chunk is not None}
         return True
 
     def _summary(self) -> Iterator[ChunkIndex]:

@@ -68,9 +68,6 @@ class StoredObject:
         """See Ranges: there are ranges, so nobody asks."""
         raise NotImplementedError
 
-    def close(self) -> None:
-        """See Ranges: connections are the file system's, which others use too."""
-
 
 class _MissingError(LastingError):
     """There is no such object."""
@@ -86,12 +83,7 @@ def _opened(store: ObjectStore, url: str) -> tuple[Callable[[int, int], bytes], 
         return lambda begin, end: bytes(store.files.cat_file(url, begin, end, generation=generation)), about
     # Each of its requests asks for the ETag that it found.
     file = store.files.open(url, "rb", cache_type="none")
-
-    def read(begin: int, end: int) -> bytes:
-        file.seek(begin)
-        return bytes(file.read(end - begin))
-
-    return read, dict(file.details)
+    return file.cache.fetcher, dict(file.details)
 
 
 def _tried(work: Callable[[], _Done]) -> _Done:

@@ -4,17 +4,12 @@ What reaches them is optional (the extra `fleet`) and is imported here when a UR
 """
 
 import re
-import shutil
-from bisect import bisect_right
-from collections import deque
-from collections.abc import Callable, Sequence
-from errno import ENOSPC
-from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, Protocol, TypeVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from syncrelay.bag.attempts import Patience, persist, redacted, scheme_of
 from syncrelay.bag.names import METADATA, is_recording_name, natural
-from syncrelay.bag.sources import Span
+from syncrelay.bag.remote_file import RemoteFile
 from syncrelay.errors import BagError, StorageError
 
 if TYPE_CHECKING:
@@ -24,37 +19,9 @@ _Done = TypeVar("_Done")
 _STORES: Final = ("s3", "gs")
 _SERVERS: Final = ("http", "https")
 _PATTERN: Final = re.compile(r"[*?\[]")
-# What is asked for at once, and what may lie between two parts of it: less than one more request costs.
-_AT_ONCE: Final = 4_000_000
-_GAP: Final = 32_000
-# Chunks that overlap in time are read in turns.
-_HELD: Final = 3
 PATIENCE: Final = Patience()
 # The libraries of stores try again by themselves.
 _STORE_PATIENCE: Final = Patience(attempts=3)
-
-
-class Ranges(Protocol):
-    """A file that is read by ranges, as it was when it was opened. All raise PassingError or LastingError.
-
-    `identity` tells it from another that is behind the URL later: an ETag, a generation, or when it was changed.
-    """
-
-    size: int
-    identity: str
-    has_ranges: bool
-
-    def fetch(self, begin: int, end: int) -> bytes:
-        """Return the bytes from one place up to another: all of them."""
-        ...
-
-    def fetch_all(self, file: BinaryIO) -> None:
-        """Write the whole into a file from its begin on, where there are no ranges."""
-        ...
-
-    def close(self) -> None:
-        """Let go of it."""
-        ...
 
 
 def is_url(word: str) -> bool:
@@ -101,7 +68,7 @@ def files_of(word: str) -> list[str]:
     return sorted(files, key=natural)
 
 
-def open_url(url: str, patience: Patience | None = None) -> "RemoteFile":
+def open_url(url: str, patience: Patience | None = None) -> RemoteFile:
     """Open a file behind a URL; raises StorageError where it cannot be reached, and names the extra if that is it."""
     scheme = scheme_of(url)
     try:
@@ -118,96 +85,6 @@ def open_url(url: str, patience: Patience | None = None) -> "RemoteFile":
     except ImportError as error:
         raise _missing(url, error) from error
     raise BagError(f"{redacted(url)}: {scheme}:// cannot be read, expected s3://, gs://, https:// or http://")
-
-
-class RemoteFile:
-    """A file behind a URL, open for reading; see Source. What is read is what was there when it was opened.
-
-    Each read gives all that was asked for, or raises StorageError.
-    """
-
-    is_near = False
-
-    def __init__(self, ranges: Ranges, name: str, patience: Patience) -> None:
-        """Read a file that messages call `name`, which holds no secret."""
-        self.name = name
-        self.size = ranges.size
-        self.identity = ranges.identity
-        self.has_ranges = ranges.has_ranges
-        self._ranges = ranges
-        self._patience = patience
-        self._place = 0
-        self._held: deque[tuple[int, bytes]] = deque(maxlen=_HELD)
-        self._planned: list[Span] = []
-
-    def seek(self, place: int, /) -> int:
-        """See Source."""
-        self._place = place
-        return place
-
-    def read(self, size: int, /) -> bytes:
-        """See Source."""
-        end = min(self._place + size, self.size)
-        parts = []
-        while self._place < end:
-            begin, held = self._holding(end)
-            part = held[self._place - begin : end - begin]
-            self._place += len(part)
-            parts.append(part)
-        return parts[0] if len(parts) == 1 else b"".join(parts)
-
-    def expect(self, spans: Sequence[Span]) -> None:
-        """See Source: what stands close together is asked for at once."""
-        planned: list[Span] = []
-        for begin, size in sorted(spans):
-            last, length = planned[-1] if planned else (begin, -1)
-            if length >= 0 and begin - last - length <= _GAP and begin + size - last <= _AT_ONCE:
-                planned[-1] = last, max(length, begin + size - last)
-            else:
-                planned.append((begin, size))
-        self._planned = planned
-
-    def download(self, path: Path) -> None:
-        """Write the whole into a file; raises StorageError, and BagError where there is no space for it."""
-        try:
-            free = shutil.disk_usage(path.parent).free
-            if self.size <= free:
-                self._copy_to(path)
-                return
-            why = f"it has {self.size:,} bytes, and {free:,} are free"
-        except OSError as error:
-            why = "no space is left" if error.errno == ENOSPC else f"{error.strerror}"
-        raise BagError(f"{self.name}: cannot be copied to {path.parent}: {why}, set TMPDIR to another folder")
-
-    def _copy_to(self, path: Path) -> None:
-        with path.open("wb") as file:
-            if not self.has_ranges:
-                persist(self.name, lambda: self._ranges.fetch_all(file), self._patience)
-                return
-            self.seek(0)
-            self.expect([(0, self.size)])
-            while piece := self.read(_AT_ONCE):
-                file.write(piece)
-
-    def close(self) -> None:
-        """See Source."""
-        self._held.clear()
-        self._ranges.close()
-
-    def _holding(self, asked: int) -> tuple[int, bytes]:
-        """Return bytes that hold the present place, and where they begin."""
-        for each in self._held:
-            if each[0] <= self._place < each[0] + len(each[1]):
-                return each
-        self._held.append((self._place, self._fetch(self._place, asked)))
-        return self._held[-1]
-
-    def _fetch(self, begin: int, asked: int) -> bytes:
-        """Return what is at a place, up to the end of what is planned there or else of what was asked for."""
-        at = bisect_right(self._planned, begin, key=lambda span: span[0]) - 1
-        planned = sum(self._planned[at]) if at >= 0 else 0
-        end = min(planned if planned > begin else asked, begin + _AT_ONCE, self.size)
-        return persist(self.name, lambda: self._ranges.fetch(begin, end), self._patience)
 
 
 def _kinds(store: "ObjectStore", word: str) -> dict[str, str]:

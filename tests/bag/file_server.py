@@ -1,0 +1,135 @@
+"""A file server on this machine that counts what it sends, and breaks off, lies or refuses when it is told to.
+
+It speaks as much HTTP as reading by ranges takes, and by that as much of S3 as reading one object takes.
+"""
+
+import re
+import socket
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Event, Lock, Thread
+
+
+class FileServer:
+    """Files by their paths; `fault` names what is wrong with the answer to the n-th request, from 0.
+
+    `etags` tells files apart. `sent` counts the bytes of contents.
+    """
+
+    def __init__(self) -> None:
+        self.files: dict[str, bytes] = {}
+        self.etags: dict[str, str] = {}
+        self.has_ranges = True
+        self.fault: Callable[[int], str] = lambda _: ""
+        self.requests: list[str] = []
+        self.sent = 0
+        self.lock = Lock()
+        self.ends = Event()
+        self.port = 0
+
+    def url(self, path: str) -> str:
+        return f"http://127.0.0.1:{self.port}{path}"
+
+    def forget(self) -> None:
+        """Count from here."""
+        self.requests.clear()
+        self.sent = 0
+
+
+@contextmanager
+def file_server() -> Iterator[FileServer]:
+    served = FileServer()
+
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+        timeout = 60
+
+        def log_message(self, *_):
+            pass
+
+        def do_HEAD(self):
+            _answer(self, served)
+
+        def do_GET(self):
+            _answer(self, served)
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.daemon_threads = True
+    served.port = server.server_address[1]
+    thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
+    thread.start()
+    try:
+        yield served
+    finally:
+        served.ends.set()
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def _answer(request: BaseHTTPRequestHandler, served: FileServer) -> None:
+    path = request.path.partition("?")[0]
+    with served.lock:
+        fault = served.fault(len(served.requests))
+        served.requests.append(f"{request.command} {request.headers.get('Range', '')}".strip())
+    if fault == "silent":
+        served.ends.wait(60)
+    etag = f'"{served.etags.get(path, "one")}"'
+    if fault in ("drop", "silent"):
+        _close(request)
+    elif fault.isdigit():
+        _say(request, int(fault))
+    elif path not in served.files:
+        _say(request, 404)
+    elif request.headers.get("If-Match", etag) != etag:
+        _say(request, 412)
+    else:
+        _send(request, served, served.files[path], fault, etag)
+
+
+def _send(request: BaseHTTPRequestHandler, served: FileServer, content: bytes, fault: str, etag: str) -> None:
+    headers = {"ETag": etag, "Last-Modified": "Mon, 23 Nov 2026 05:00:00 GMT"}
+    wanted = re.fullmatch(r"bytes=(\d+)-(\d+)", request.headers.get("Range", ""))
+    body, status = content, 200
+    if wanted and served.has_ranges and fault != "whole":
+        begin, end = int(wanted[1]) + (fault == "shifted"), min(int(wanted[2]) + 1, len(content))
+        if begin >= len(content):
+            _say(request, 416, **{"Content-Range": f"bytes */{len(content)}"})
+            return
+        body, status = content[begin:end], 206
+        headers["Content-Range"] = f"bytes {begin}-{end - 1}/{len(content)}"
+    if fault == "short":
+        body = body[: len(body) // 2]
+    headers |= {"Connection": "close"} if fault == "endless" else {"Content-Length": str(len(body))}
+    request.send_response(status)
+    for name, value in headers.items():
+        request.send_header(name, value)
+    request.end_headers()
+    if request.command == "HEAD":
+        return
+    if fault == "cut":
+        body = body[: len(body) // 2]
+    with suppress(OSError):
+        request.wfile.write(body)
+        with served.lock:
+            served.sent += len(body)
+    if fault in ("cut", "endless"):
+        _close(request)
+
+
+def _say(request: BaseHTTPRequestHandler, status: int, **headers: str) -> None:
+    request.send_response(status)
+    for name, value in {**headers, "Content-Length": "0"}.items():
+        request.send_header(name, value)
+    request.end_headers()
+
+
+def _close(request: BaseHTTPRequestHandler) -> None:
+    """Break the connection off."""
+    request.close_connection = True
+    with suppress(OSError):
+        request.wfile.flush()
+    request.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    request.connection.close()
