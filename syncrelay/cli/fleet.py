@@ -91,7 +91,7 @@ def _tell(finished: Finished, run: Run, shown: "_Shown") -> int:
         shown.clear()
         if outcome.is_bug:
             say(outcome.why)
-            remark(f"this is a bug in syncrelay; it happened with the recording {job.source.words[0]}")
+            remark(f"this is a bug in syncrelay; it happened with the recording {job.source.shown[0]}")
             return OUR_BUG
         remark(outcome.why)
         if outcome.ends_all:
@@ -100,7 +100,7 @@ def _tell(finished: Finished, run: Run, shown: "_Shown") -> int:
     problems = _problems(run, job)
     for problem in problems:
         shown.clear()
-        remark(f"{job.source.words[0]}: {problem}")
+        remark(f"{job.source.shown[0]}: {problem}")
     return AT_FAULT if problems else DONE
 
 

@@ -87,12 +87,12 @@ class AnalyzeTask:
         """See Task."""
         with closing(open_recording(source.words)) as recording, eased_collector():
             if self.asked.text is None and not self.asked.topics:
-                document = inventory_as_json(source.words[0], recording, inventory(recording))
+                document = inventory_as_json(source.shown[0], recording, inventory(recording))
                 facts = about(recording, ())
             else:
                 text, bindings = bound(recording, self.asked)
                 analysis = measured(recording, text, bindings, self.asked)
-                document = as_json(source.words[0], analysis)
+                document = as_json(source.shown[0], analysis)
                 groups: list[JSON] = [
                     {
                         "name": each.group.name,

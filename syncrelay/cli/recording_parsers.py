@@ -70,8 +70,8 @@ def export() -> Parser:
     parser = Parser(
         "syncrelay export",
         description="Writes the sets that the groups of a file make of recordings as a dataset: in Parquet, a row a "
-        "set, with the messages decoded. They are the sets of `syncrelay replay`. Exit code 1 if a recording cannot be read "
-        "or lacks a required topic.",
+        "set, with the messages decoded. They are the sets of `syncrelay replay`. Exit code 1 if a recording cannot be "
+        "read or lacks a required topic.",
     )
     parser.add_argument("bags", metavar="BAG", nargs="+", help="a recording as for replay; each is exported by itself")
     parser.add_argument(

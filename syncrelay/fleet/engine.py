@@ -32,4 +32,4 @@ class Engine(Protocol):
 
 def given_up(job: Job, why: str) -> str:
     """Return the sentence for a job whose workers died."""
-    return f"{job.source.words[0]}: {why} {TRIES} times: check whether there is enough memory, or use fewer --jobs"
+    return f"{job.source.shown[0]}: {why} {TRIES} times: check whether there is enough memory, or use fewer --jobs"

@@ -97,7 +97,7 @@ class Run:
         return Entry(
             name=source.name,
             state=State.DONE,
-            recording=source.words,
+            recording=source.shown,
             fingerprint=self._fingerprint,
             content=done.content.hash,
             size=done.content.size,
@@ -107,7 +107,7 @@ class Run:
 
     def _failed(self, source: Source, failed: Failed) -> Entry:
         why = failed.why
-        return Entry(source.name, State.FAILED, source.words, self._fingerprint, failed.content, error=why)
+        return Entry(source.name, State.FAILED, source.shown, self._fingerprint, failed.content, error=why)
 
     def _take_over(self, names: set[str], others: Others) -> None:
         """Refuse results that another command gave, or remove those of them that this one will not replace."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final, Protocol, TypeAlias
 
 from syncrelay import own_version
+from syncrelay.bag.attempts import redacted
 from syncrelay.config import Config
 from syncrelay.config.document import plain
 
@@ -27,6 +28,11 @@ class Source:
 
     name: str
     words: tuple[str, ...]
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The words as people and ledgers may see them: URLs without logins and signatures."""
+        return tuple(map(redacted, self.words))
 
 
 class Task(Protocol):

@@ -89,7 +89,7 @@ def perform(job: Job) -> Outcome:
     except SyncRelayError as error:
         failed = Failed(str(error), content)
     except MemoryError:
-        failed = Failed(f"{job.source.words[0]}: takes more memory than a worker has: use fewer --jobs", content)
+        failed = Failed(f"{job.source.shown[0]}: takes more memory than a worker has: use fewer --jobs", content)
     except OSError as error:
         if error.errno not in _NO_SPACE:
             failed = Failed(traceback.format_exc(), content, is_bug=True)
@@ -125,5 +125,5 @@ def _result(job: Job, content: Content, folder: Path) -> Done:
     folder.mkdir(parents=True)
     facts = job.task.run(job.source, folder)
     if marks_of(job.source.words) != content.marks:
-        raise BagError(f"{job.source.words[0]}: was changed while it was read: is it still being recorded?")
+        raise BagError(f"{job.source.shown[0]}: was changed while it was read: is it still being recorded?")
     return Done(content, facts, results_in(folder), folder)
