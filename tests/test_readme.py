@@ -91,6 +91,7 @@ def _is_known_install(words):
         "install '.[ros]'",
         "install '.[kilted]'",
         "install '.[ros,test,lint]'",
+        "install '.[datasets,fleet]'",
         "install '.[datasets]'",
     }
 

@@ -73,14 +73,14 @@ def test_a_list_names_a_recording_on_each_line(folder, monkeypatch):
     odd = os.fsencode(folder / "a") + b"/\xff\xfe.mcap"
     with open(odd, "wb"):  # noqa: PTH123  a name that is no text
         pass
-    (folder / "list.txt").write_bytes(b"# monday\n\n a/x.mcap \nb/*\ns3://day/one.mcap\n" + odd + b"\r\n")
+    (folder / "list.txt").write_bytes(b"# monday\n\n a/x.mcap \nb/*\nhttps://day.example/one.mcap\n" + odd + b"\r\n")
     sources = find_sources(["@list.txt"], into=folder / "out")
     places = [os.fsencode(source.words[0]) for source in sources]
     assert places == [
         os.fsencode(folder / "a/x.mcap"),
         os.fsencode(folder / "b/deep/x.mcap"),
         os.fsencode(folder / "b/z.bag.zst"),
-        b"s3://day/one.mcap",
+        b"https://day.example/one.mcap",
         odd,
     ]
 
