@@ -60,9 +60,9 @@ class ReplayTask:
                     writer.begin(binding)
                 results = replay_groups(recording, bindings, listeners=[writer.take])
             return {
-                **_about(recording, bindings),
+                **about(recording, bindings),
                 "messages": writer.messages,
-                "groups": [_counts(result) for result in results],
+                "groups": [counts_of(result) for result in results],
             }
 
 
@@ -88,7 +88,7 @@ class AnalyzeTask:
         with closing(open_recording(source.words)) as recording, eased_collector():
             if self.asked.text is None and not self.asked.topics:
                 document = inventory_as_json(source.words[0], recording, inventory(recording))
-                facts = _about(recording, ())
+                facts = about(recording, ())
             else:
                 text, bindings = bound(recording, self.asked)
                 analysis = measured(recording, text, bindings, self.asked)
@@ -101,12 +101,12 @@ class AnalyzeTask:
                     }
                     for each in analysis.groups
                 ]
-                facts = {**_about(recording, bindings), "groups": groups}
+                facts = {**about(recording, bindings), "groups": groups}
         (folder / ANALYSIS).write_text(f"{json.dumps(document, indent=2)}\n")
         return facts
 
 
-def _about(recording: Recording, bindings: Sequence[GroupBinding]) -> dict[str, JSON]:
+def about(recording: Recording, bindings: Sequence[GroupBinding]) -> dict[str, JSON]:
     """Return when a recording was made, and what is wrong with it: what it lacks, and what could not be read."""
     lacking = [problem for binding in bindings if not binding.is_complete for problem in binding.problems]
     facts: dict[str, JSON] = {"begin": recording.begin, "end": recording.end}
@@ -118,7 +118,7 @@ def _unless_empty(name: str, sentences: Iterable[str]) -> dict[str, JSON]:
     return {name: found} if found else {}
 
 
-def _counts(result: GroupResult) -> dict[str, JSON]:
+def counts_of(result: GroupResult) -> dict[str, JSON]:
     """Return what became of the messages of a group, in the words of an analysis."""
     inputs: list[JSON] = [
         {
