@@ -198,6 +198,8 @@ COMPLETERS: Final[Mapping[str, _Completer]] = {
     "NAME": _groups,
     "BAG": _files(_RECORDING),
     "OUT": _files(_RECORDING),
+    # No file's name is empty: only folders are left.
+    "FOLDER": _files(""),
     "BAG|TOPIC": _recordings_and_topics,
     "REPORT": _files(r".*\.html"),
 }

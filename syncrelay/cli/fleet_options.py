@@ -13,16 +13,16 @@ def add_fleet_options(parser: Parser, *into: str) -> None:
         *(into or ("--into",)),
         dest="into",
         metavar="FOLDER",
-        help="do each recording by itself, each with a folder in FOLDER, and only those that are not done yet; BAG is"
-        " then also a pattern, a folder of recordings, a URL, or @FILE that lists them",
+        help="do each recording by itself, with its result in FOLDER, unless it is done; BAG may then be a pattern, a"
+        " folder of recordings, a URL, or @FILE that lists them",
     )
     add(
         "--engine",
         choices=("local", "ray"),
         default="local",
         metavar="ENGINE",
-        help="local (default): this machine's cores; ray: the cluster that RAY_ADDRESS names, else one started here",
+        help="local (default), or ray: the cluster of RAY_ADDRESS, or one here",
     )
     add("--jobs", metavar="N", type=count, help="recordings at a time; default: one for each core")
     add("--strict", action="store_true", help="end at the first recording that is at fault")
-    add("--overwrite", action="store_true", help="replace what FOLDER holds of another file, version or options")
+    add("--overwrite", action="store_true", help="replace results of another file, version or options")

@@ -5,6 +5,7 @@ A recording is a Ray task. Ray places it, and begins it again where a worker or 
 
 import os
 import signal
+import socket
 import threading
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ MEMORY: Final = 1_000_000_000
 """What each task declares to take, in bytes: Ray begins no more tasks on a node than fit."""
 
 ADDRESS: Final = "RAY_ADDRESS"
+
+_PATIENCE_S: Final = 10
 
 # For each core, so that one that is done finds the next at hand.
 _AHEAD: Final = 2
@@ -88,6 +91,8 @@ class RayEngine:
         if not address:
             options |= {"num_cpus": self._jobs, "include_dashboard": False}
         try:
+            if address:
+                _require_listener(address)
             with _own_signals():
                 ray.init(address=address or "local", **options)
         except (ConnectionError, OSError, RuntimeError, ValueError) as error:
@@ -98,6 +103,13 @@ class RayEngine:
         finally:
             with _own_signals():
                 ray.shutdown()
+
+
+def _require_listener(address: str) -> None:
+    """Raise OSError where nobody listens: Ray itself would try for very long, and hear no signal meanwhile."""
+    host, _, port = address.rpartition("://")[2].rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE_S).close()
 
 
 @contextmanager
