@@ -221,7 +221,7 @@ def test_what_stays_wrong_is_tried_so_often_and_then_said(fault, why, server):
     assert str(raised.value).startswith(f"{server.url('/rig.mcap')}?...: {why}")
     assert "(3 attempts): try again later" in str(raised.value)
     # aiohttp itself asks once more where a connection that it kept is gone.
-    assert 3 <= len(server.requests) <= 4
+    assert 3 <= len(server.requests) <= 6
 
 
 def test_a_server_that_never_answers_is_not_waited_for_without_end(server):
