@@ -4,6 +4,7 @@ import os
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from struct import Struct
 from typing import Final
@@ -25,7 +26,7 @@ from syncrelay.bag.mcap_records import (
 )
 from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import read_profiles
-from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
+from syncrelay.bag.recording import AFTER_ALL, Channel, Definition, Encoding, RawMessage, is_part
 from syncrelay.bag.segments import Segment, extent, read_in_order
 from syncrelay.errors import BagError
 
@@ -68,14 +69,18 @@ class McapFile:
         """See Recording."""
         return self._losses.sentences
 
-    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+    def batches(
+        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
+    ) -> Iterator[list[RawMessage]]:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
-        for segment, found in read_in_order(self._segments, lambda each: self._read(each, chosen), self._losses):
+        read = partial(self._read, channels=chosen)
+        for segment, found in read_in_order(self._segments, read, self._losses, begin=begin, end=end):
             self.position += segment.size
             yield found
-        self.position = self.size
+        if not is_part(begin, end):
+            self.position = self.size
 
     def close(self) -> None:
         """See Recording."""
