@@ -69,7 +69,7 @@ def is_part(begin: int, end: int) -> bool:
 
 
 class Recording(Protocol):
-    """A recording that is open for reading. Batches are read once, from the begin to the end."""
+    """A recording that is open for reading: as a whole once, from the begin to the end, or part after part."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:

@@ -35,12 +35,16 @@ class StretchReplay:
 
         Raises BagError for a stamp or key that a recorded type does not have.
         """
+        if stretch.begin > recording.end:
+            # What waits at the end would leave before it, and what is left then at another time.
+            raise ValueError(f"{stretch} begins after the recording's end, {recording.end}")
         self._recording = recording
         self._bindings = bindings
         self._stretch = stretch
         self._listeners = listeners
         self._channels = {channel: place for place, channel in enumerate(recording.channels)}
         self._read_from = stretch.read_from if after is None else stretch.begin
+        self._opening_end = min(stretch.opening_end, stretch.read_from) if after is None else 0
         engines = None if after is None else [self._thawed(each.engine) for each in after.groups]
         self._is_within = False
         self._replay = Replay(recording, bindings, listeners=[self._take] if listeners else (), engines=engines)
@@ -53,8 +57,9 @@ class StretchReplay:
         Raises BagError where messages do not come in the order of receipt, so that no time parts them.
         """
         stretch = self._stretch
-        batches = self._recording.batches(self._replay.channels, begin=self._read_from, end=stretch.end)
-        rows = _Rows(_in_order(batches) if is_part(self._read_from, stretch.end) else batches)
+        if self._opening_end:
+            yield from self._feed(self._batches(0, self._opening_end))
+        rows = _Rows(self._batches(self._read_from, stretch.end))
         yield from self._feed(rows.until(stretch.begin))
         # What was due before the stretch left before it.
         self._replay.expire(stretch.begin - 1)
@@ -73,6 +78,10 @@ class StretchReplay:
         engines = [b"" if self._stretch.is_last else self._frozen(each) for each in self._replay.engines]
         groups = map(GroupStretch, self._entry, self._states(), counts, engines)
         return StretchResult(self._stretch, tuple(groups))
+
+    def _batches(self, begin: int, end: int) -> Iterator[list[RawMessage]]:
+        batches = self._recording.batches(self._replay.channels, begin=begin, end=end)
+        return _in_order(batches) if is_part(begin, end) else batches
 
     def _feed(self, batches: Iterable[Sequence[RawMessage]]) -> Iterator[None]:
         for rows in batches:

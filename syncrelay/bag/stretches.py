@@ -20,11 +20,16 @@ _LEAD_PER_PLACE_NS: Final = 100_000_000
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """What was received from `begin` to before `end`; what from `read_from` on is read, to be in the midst of it."""
+    """What was received from `begin` to before `end`.
+
+    To be in the midst of it at `begin`, two parts are fed before: the recording's opening, up to before `opening_end`,
+    for what a group keeps from its first set or message on; and the lead-in, from `read_from` on.
+    """
 
     begin: int
     end: int
     read_from: int
+    opening_end: int = 0
 
     @property
     def is_last(self) -> bool:
@@ -80,18 +85,24 @@ def lead_in(bindings: Iterable[GroupBinding]) -> int:
 
 
 def cut(recording: Recording, *, length_ns: int, lead_in_ns: int) -> tuple[Stretch, ...]:
-    """Return stretches of equal length, `length_ns` at most, that together are all of a recording."""
+    """Return stretches of equal length, `length_ns` at most, that together are all of a recording.
+
+    `lead_in_ns` is the length of the lead-in and of the opening.
+    """
     if length_ns < 1 or lead_in_ns < 0:
         raise ValueError(f"length_ns {length_ns} must be 1 or more, lead_in_ns {lead_in_ns} 0 or more")
     span = recording.end - recording.begin
     count = min(max(1, -(-span // length_ns)), _MOST_STRETCHES)
-    return cut_at([recording.begin + span * number // count for number in range(1, count)], lead_in_ns=lead_in_ns)
+    borders = [recording.begin + span * number // count for number in range(1, count)]
+    return cut_at(borders, lead_in_ns=lead_in_ns, opening_end=recording.begin + lead_in_ns)
 
 
-def cut_at(borders: Iterable[int], *, lead_in_ns: int) -> tuple[Stretch, ...]:
-    """Return the stretches that rising times of receipt cut a recording into."""
+def cut_at(borders: Iterable[int], *, lead_in_ns: int, opening_end: int = 0) -> tuple[Stretch, ...]:
+    """Return the stretches that times of receipt cut a recording into, none of them after its end."""
     begins = sorted({0, *borders})
-    return tuple(Stretch(begin, end, max(0, begin - lead_in_ns)) for begin, end in pairwise([*begins, AFTER_ALL]))
+    return tuple(
+        Stretch(begin, end, max(0, begin - lead_in_ns), opening_end) for begin, end in pairwise([*begins, AFTER_ALL])
+    )
 
 
 def settled(results: Iterable[StretchResult], again: Again) -> Iterator[StretchResult]:

@@ -69,7 +69,7 @@ def test_every_policy_of_a_file_is_among_those_tested():
 
 
 @every_policy
-@settings(REPEATABLE, max_examples=200)
+@settings(REPEATABLE, max_examples=150)
 @given(data=st.data())
 def test_engines_of_equal_state_give_and_count_the_same_from_then_on(policy, data):
     chosen = data.draw(options())
