@@ -3,6 +3,7 @@
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import suppress
+from functools import partial
 from struct import Struct
 from typing import Final
 
@@ -24,7 +25,7 @@ from syncrelay.bag.mcap_records import (
 )
 from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import read_profiles
-from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
+from syncrelay.bag.recording import AFTER_ALL, Channel, Definition, Encoding, RawMessage, is_part
 from syncrelay.bag.segments import PIECE, Pieces, Segment, extent, read_in_order
 from syncrelay.bag.sources import NoIndexError, Source
 from syncrelay.errors import BagError
@@ -72,7 +73,9 @@ class McapFile:
         """See Recording."""
         return self._losses.sentences
 
-    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+    def batches(
+        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
+    ) -> Iterator[list[RawMessage]]:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
@@ -86,14 +89,17 @@ class McapFile:
             numbers = [number for number, channel in chosen.items() if channel is not None]
             parts = Parts(self._file, needed, plain, numbers)
         said, count = self.faults, 0
-        for segment, found in read_in_order(needed, lambda each: self._read(each, chosen, parts), self._losses):
+        read = partial(self._read, channels=chosen, parts=parts)
+        for segment, found in read_in_order(needed, read, self._losses, begin=begin, end=end):
             self.position += segment.size
             count += len(found)
             yield found
+        if is_part(begin, end):
+            return
         self.position = self.size
         told = sum(self._counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
-        is_part = parts is not None or len(needed) < len(self._segments)
-        if is_part and count < told and said == self.faults:
+        is_chosen = parts is not None or len(needed) < len(self._segments)
+        if is_chosen and count < told and said == self.faults:
             self._losses.say(f"its statistics tell of {told} messages, of which the index leads to {count}")
 
     def close(self) -> None:

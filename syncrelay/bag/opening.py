@@ -19,7 +19,7 @@ import zstandard
 from syncrelay.bag import mcap_file, ros1_file, sqlite_file
 from syncrelay.bag.batching import batched, filled
 from syncrelay.bag.names import METADATA, SUFFIXES, is_recording_name, natural
-from syncrelay.bag.recording import Channel, RawMessage, Recording
+from syncrelay.bag.recording import AFTER_ALL, Channel, RawMessage, Recording
 from syncrelay.bag.sources import LocalFile, NoIndexError
 from syncrelay.bag.storage import files_of, is_url, open_url
 from syncrelay.config.wording import did_you_mean
@@ -113,9 +113,11 @@ class Files:
         """See Recording."""
         return sum(file.position for file in self._files)
 
-    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+    def batches(
+        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
+    ) -> Iterator[list[RawMessage]]:
         """See Recording."""
-        parts = [file.batches(wanted) for file in self._files]
+        parts = [file.batches(wanted, begin=begin, end=end) for file in self._files]
         if any(earlier.end > later.begin for earlier, later in pairwise(self._files)):
             return batched(heapq.merge(*map(chain.from_iterable, parts), key=itemgetter(1)))
         return filled(chain.from_iterable(parts))

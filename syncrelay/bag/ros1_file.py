@@ -7,6 +7,7 @@ import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from struct import Struct
 from typing import Final
@@ -14,7 +15,7 @@ from typing import Final
 from syncrelay.bag.losses import Losses
 from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import Profile
-from syncrelay.bag.recording import Channel, Definition, Encoding, RawMessage
+from syncrelay.bag.recording import AFTER_ALL, Channel, Definition, Encoding, RawMessage, is_part
 from syncrelay.bag.ros1_records import (
     CHUNK,
     CHUNK_INFO,
@@ -64,14 +65,18 @@ class Ros1File:
         """See Recording."""
         return self._losses.sentences
 
-    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+    def batches(
+        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
+    ) -> Iterator[list[RawMessage]]:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
-        for segment, found in read_in_order(self._segments, lambda each: self._read(each, chosen), self._losses):
+        read = partial(self._read, channels=chosen)
+        for segment, found in read_in_order(self._segments, read, self._losses, begin=begin, end=end):
             self.position += segment.size
             yield found
-        self.position = self.size
+        if not is_part(begin, end):
+            self.position = self.size
 
     def close(self) -> None:
         """See Recording."""

@@ -17,7 +17,7 @@ from zstandard import ZstdError
 from syncrelay.bag.batching import batched
 from syncrelay.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.bag.qos import read_profiles
-from syncrelay.bag.recording import LATEST, Channel, Definition, Encoding, RawMessage
+from syncrelay.bag.recording import AFTER_ALL, LATEST, Channel, Definition, Encoding, RawMessage, is_part
 from syncrelay.bag.unpacking import zstd_unpacker
 from syncrelay.errors import BagError
 
@@ -27,7 +27,7 @@ MAGIC: Final = b"SQLite format 3\0"
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 # Those of no known topic too, so that they are missed.
 _BY_TIME: Final = """
-SELECT topic_id, timestamp, data FROM messages WHERE topic_id IS NULL OR topic_id NOT IN ({}) ORDER BY timestamp"""
+SELECT topic_id, timestamp, data FROM messages WHERE (topic_id IS NULL OR topic_id NOT IN ({})){} ORDER BY timestamp"""
 # By the index of the times: no scan.
 _END_OF: Final = """
 SELECT timestamp FROM messages WHERE timestamp BETWEEN 0 AND ? AND typeof(timestamp) = 'integer'
@@ -65,21 +65,26 @@ class SqliteFile:
         """See Recording."""
         return self._losses.sentences
 
-    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+    def batches(
+        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
+    ) -> Iterator[list[RawMessage]]:
         """See Recording."""
-        return batched(self._messages(wanted))
+        return batched(self._messages(wanted, begin, end))
 
     def close(self) -> None:
         """See Recording."""
         self._database.close()
 
-    def _messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
+    def _messages(self, wanted: Collection[Channel], begin: int, end: int) -> Iterator[RawMessage]:
         among = frozenset(wanted)
         chosen = {channel.id: channel for channel in self.channels if channel in among}
         others = [channel.id for channel in self.channels if channel.id not in chosen]
         unpack, leave_out = self._unpack, self._losses.leave_out
+        # What is of no time is left out where all is read.
+        part = " AND timestamp >= ? AND timestamp < ?" if is_part(begin, end) else ""
+        query = _BY_TIME.format(_marks(len(others)), part)
         try:
-            for number, time, payload in self._database.execute(_BY_TIME.format(_marks(len(others))), others):
+            for number, time, payload in self._database.execute(query, [*others, begin, end] if part else others):
                 channel = chosen.get(number)
                 if channel is None or type(time) is not int or type(payload) is not bytes or not 0 <= time <= LATEST:
                     leave_out(_why(channel, time, payload))

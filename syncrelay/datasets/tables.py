@@ -1,9 +1,10 @@
 """Sets of a group as rows of a table: when they were, and each input's message.
 
-Columns: `set` (from 1), `stamp_ns` (what restamping gave it, else the newest), `left_ns`, `span_ns` (with the inputs'
-offsets), `latency_ns` (since its last message was received), `recording`, `stamps_ns` and `received_ns` (structs with a
-field for each input), and a column for each input, named as its topic, null where the set lacks an optional one. Times
-are nanoseconds since 1970 (UTC), or of whatever clock the recording has.
+Columns: `set` (from 1), `stamp_ns` (what restamping gave it, else the tick of the clock that triggered it, else the
+newest), `left_ns`, `span_ns` (with the inputs' offsets), `latency_ns` (since its last message was received),
+`recording`, `stamps_ns` and `received_ns` (structs with a field for each input), and a column for each input, named as
+its topic, null where the set lacks an optional one. Times are nanoseconds since 1970 (UTC), or of whatever clock the
+recording has.
 """
 
 import json
@@ -234,7 +235,8 @@ class _InputColumn:
 
 
 def _stamp_of(match: Match) -> int:
-    return max([each for each in match.stamps if each is not None]) if match.stamp is None else match.stamp
+    told = match.tick if match.stamp is None else match.stamp
+    return max([each for each in match.stamps if each is not None]) if told is None else told
 
 
 def _times(names: Sequence[str], rows: Sequence[Sequence[int | None]]) -> pa.StructArray:

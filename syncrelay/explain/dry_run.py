@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeAlias
 
 from syncrelay.config import GroupConfig
-from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome
+from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome, SyncGroup
 
 Take: TypeAlias = Callable[[Sequence[Outcome], int], None]
 """Told of what leaves together, and at what time, in nanoseconds of receipt."""
@@ -23,14 +23,14 @@ class _Add(Protocol):
 class EngineDriver:
     """Drives an engine of its own through one group's messages; times of receipt are the only clock."""
 
-    def __init__(self, group: GroupConfig, take: Take | None) -> None:
-        """Take None where nobody is to be told."""
-        self.engine: Final = group.engine()
+    def __init__(self, group: GroupConfig, take: Take | None, engine: SyncGroup | None = None) -> None:
+        """Take None where nobody is to be told; an `engine` of this group goes on where it was."""
+        self.engine: Final = engine or group.engine()
         # Else nothing is ever due, and asking for each message costs a tenth of a replay.
         self.has_deadlines: Final = group.has_deadlines
         # Ticks go on for a while after the last message: those of the time after it are nobody's.
         self._last_wait = (group.options.max_wait or 0) if group.ticks is not None else None
-        self._due: int | None = None
+        self._due = self.engine.next_deadline()
         self._take = take or _take_nothing
         # Every message would pay for a call between.
         self.add: Final[_Add] = self._add if take is not None or self.has_deadlines else self.engine.add

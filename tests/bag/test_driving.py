@@ -13,7 +13,7 @@ from syncrelay.bag.analysis.streams import read_streams
 from syncrelay.bag.analysis.watching import watch_group
 from syncrelay.bag.bindings import bind
 from syncrelay.bag.payloads import message_reader
-from syncrelay.bag.recording import Definition, RawMessage
+from syncrelay.bag.recording import AFTER_ALL, Definition, RawMessage
 from syncrelay.bag.replay import replay
 from syncrelay.cli.analysis_html import as_html
 from syncrelay.cli.analysis_json import as_json
@@ -45,10 +45,13 @@ class Made:
         self.end = rows[-1][2] if rows else 0
         self.faults = ()
 
-    def batches(self, channels: Collection[Channel]) -> Iterator[list[RawMessage]]:
+    def batches(
+        self, channels: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
+    ) -> Iterator[list[RawMessage]]:
         """Give the rows of some channels in the order of receipt, and a batch of none."""
-        for begin in range(0, len(self.rows) + _BATCH, _BATCH):
-            yield list(self._messages(channels, self.rows[begin : begin + _BATCH]))
+        rows = [row for row in self.rows if begin <= row[2] < end]
+        for first in range(0, len(rows) + _BATCH, _BATCH):
+            yield list(self._messages(channels, rows[first : first + _BATCH]))
 
     def _messages(self, channels: Collection[Channel], rows) -> Iterator[RawMessage]:
         for row in rows:

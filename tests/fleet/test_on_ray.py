@@ -1,4 +1,4 @@
-"""A fleet on a Ray cluster. Each has network, processes and shared memory of its own: Ray would show itself to others."""
+"""A fleet on a Ray cluster: with network, processes and shared memory of its own, as Ray shows itself to all others."""
 
 import importlib.util
 import os
@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +14,7 @@ from syncrelay.cli.demo import shipped_config
 from syncrelay.cli.demo_recording import record
 from tests.cli.command import ROOT, run
 from tests.faults.extent import IS_LONG
-from tests.fleet.fleets import FILE, entries, make_fleet, replay_into, tree
+from tests.fleet.fleets import FILE, make_fleet, replay_into, tree
 
 pytestmark = [
     pytest.mark.ray,
