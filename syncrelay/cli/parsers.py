@@ -23,7 +23,7 @@ def relay() -> Parser:
         usage=_RELAY_USAGE,
         epilog=f"commands:\n{commands_help()}\n\n{_EXIT_CODES}",
     )
-    add = parser.add_argument_group("the relay").add_argument
+    add = parser.add_argument
     add(
         "--config",
         metavar="FILE",
