@@ -10,7 +10,7 @@ from typing import Final
 
 from syncrelay.bag.opening import is_named_as_recording
 from syncrelay.errors import BagError
-from syncrelay.fleet.remote import is_url
+from syncrelay.fleet.remote import find, is_url
 from syncrelay.fleet.task import Source
 
 _EXPECTED: Final = "expected files that end in .mcap, .db3 or .bag, compressed or not"
@@ -84,7 +84,7 @@ def _listed(name: str) -> Iterator[str]:
 def _places(word: str) -> list[str]:
     """Return the absolute paths of the recordings that a word names, or the URL that it is."""
     if is_url(word):
-        return [word]
+        return find(word)
     try:
         found = _matching(word) if has_magic(word) and not os.path.lexists(word) else _named(Path(word))
     except OSError as error:

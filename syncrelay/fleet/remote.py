@@ -13,6 +13,11 @@ def is_url(word: str) -> bool:
     return _URL.match(word) is not None
 
 
+def find(word: str) -> list[str]:
+    """Return the recordings that a URL names."""
+    return [word]
+
+
 def content_of_url(url: str) -> tuple[str, int]:
     """Return what changes when the content of a URL does, by its ETag and size, and its size in bytes.
 
