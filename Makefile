@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container test-workspace faults soak lint schema bench wheel clean
+.PHONY: demo test test-kilted test-container test-workspace test-fleet faults soak lint schema bench wheel clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -30,6 +30,11 @@ test-container: $(VENV)/test
 # Builds a colcon workspace with this clone in it, and runs what it installs.
 test-workspace: $(VENV)/test $(VENV)/colcon/done
 	SYNCRELAY_COLCON=$(VENV)/colcon $(BIN)/python -m pytest tests/workspace $(ARGS)
+
+# Many recordings on Ray clusters, each in namespaces of its own; SYNCRELAY_FAULTS=long takes 1,000 recordings.
+test-fleet: $(VENV)/fleet
+	.ci/network-tools
+	$(BIN)/python -m pytest -m ray tests/fleet $(ARGS)
 
 # Breaks what a robot breaks, at length, and prints what was survived; `make test` has the short form of each.
 faults: $(VENV)/test
@@ -72,6 +77,10 @@ $(VENV)/demo: $(BIN)/python $(BUILT_OF)
 
 $(VENV)/test: $(BIN)/python $(BUILT_OF)
 	$(BIN)/python -m pip install -q -e '.[$(ROS),test]'
+	touch $@
+
+$(VENV)/fleet: $(VENV)/test
+	$(BIN)/python -m pip install -q -e '.[fleet]'
 	touch $@
 
 # What ros-dev-tools and a sourced ROS bring on a robot: colcon, CMake, and of ament_cmake what the wheels forget to ask for.

@@ -4,7 +4,6 @@ Modules are imported before, once. A process ends with its recording: its memory
 as the kernel when memory runs out, breaks nothing else.
 """
 
-import ctypes
 import os
 import pickle
 import resource
@@ -17,13 +16,10 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from syncrelay.fleet.engine import TICK_S, TRIES, Finished, given_up
-from syncrelay.fleet.work import Failed, Job, Outcome, perform, remove_scratch_of
+from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform, remove_scratch_of
 
 LEAST_MEMORY: Final = 1_000_000_000
 """What a worker may take in bytes, however many work at a time."""
-
-# Of prctl(2): the signal that the kernel sends when the parent ends, however it ends.
-_PR_SET_PDEATHSIG: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +107,7 @@ def _work(job: Job, parent: int, told: int, memory: int) -> NoReturn:
         # Ctrl-C comes from the terminal to all of us: what it means, the parent says.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        end_with_parent()
         if os.getppid() == parent:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
             with os.fdopen(told, "wb") as file:

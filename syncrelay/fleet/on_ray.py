@@ -6,14 +6,15 @@ A recording is a Ray task. Ray places it, and begins it again where a worker or 
 import os
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from typing import Any, Final
 
 from syncrelay.errors import SyncRelayError
 from syncrelay.fleet.engine import TICK_S, TRIES, Finished, given_up
-from syncrelay.fleet.work import Failed, Job, perform, remove_scratch_of
+from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform, remove_scratch_of
 
 MEMORY: Final = 1_000_000_000
 """What each task declares to take, in bytes: Ray begins no more tasks on a node than fit."""
@@ -48,7 +49,7 @@ class RayEngine:
         ray = self._ray
         waiting = iter(jobs)
         with self._connected():
-            task = ray.remote(num_cpus=1, memory=MEMORY, max_retries=TRIES - 1)(perform)
+            task = ray.remote(num_cpus=1, memory=MEMORY, max_retries=TRIES - 1)(_perform)
             running: dict[Any, Job] = {}
             try:
                 while True:
@@ -98,11 +99,19 @@ class RayEngine:
         except (ConnectionError, OSError, RuntimeError, ValueError) as error:
             where = f"the Ray cluster {address} of {ADDRESS} cannot be reached" if address else "Ray cannot be started"
             raise SyncRelayError(f"{where}: {error}") from error
-        try:
-            yield
-        finally:
-            with _own_signals():
-                ray.shutdown()
+        # Ray prints what befalls a worker, and where data is expected.
+        with redirect_stdout(sys.stderr):
+            try:
+                yield
+            finally:
+                with _own_signals():
+                    ray.shutdown()
+
+
+def _perform(job: Job) -> Outcome:
+    """Do a job in a Ray worker, which ends with its node: a run that is killed leaves none at work."""
+    end_with_parent()
+    return perform(job)
 
 
 def _require_listener(address: str) -> None:

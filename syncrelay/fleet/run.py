@@ -43,7 +43,8 @@ class Run:
         except BaseException:
             self._ledger.__exit__(None, None, None)
             raise
-        jobs = [self._job(source, into) for source in sources]
+        version = own_version()
+        jobs = [self._job(source, into, version) for source in sources]
         # The longest first: none of them is begun when all others are done.
         self.jobs: Final = tuple(sorted(jobs, key=lambda job: -job.size))
         """What there is to do or to look at, in the order in which it is begun."""
@@ -70,10 +71,10 @@ class Run:
         """Return what the ledger tells of a job."""
         return self._ledger.entries.get(job.source.name)
 
-    def _job(self, source: Source, into: Path) -> Job:
+    def _job(self, source: Source, into: Path, version: str) -> Job:
         entry = self._ledger.entries.get(source.name)
         done = entry if entry is not None and self._is_ours(entry) else None
-        return Job(source, self._task, into, done, size_of(source.words), own_version())
+        return Job(source, self._task, into, done, size_of(source.words), version)
 
     def _is_ours(self, entry: Entry) -> bool:
         return entry.state is State.DONE and entry.fingerprint == self._fingerprint

@@ -1,6 +1,8 @@
 """What a worker does with one recording, wherever it works."""
 
+import ctypes
 import shutil
+import signal
 import socket
 import traceback
 from collections.abc import Mapping
@@ -19,6 +21,7 @@ from syncrelay.fleet.task import JSON, Source, Task
 SCRATCH: Final = ".partial"
 """The folder in OUT where results are written before they are put in place."""
 
+_PR_SET_PDEATHSIG: Final = 1
 _NO_SPACE: Final = (ENOSPC, EDQUOT, EROFS)
 
 
@@ -99,6 +102,11 @@ def perform(job: Job) -> Outcome:
         failed = Failed(traceback.format_exc(), content, is_bug=True)
     shutil.rmtree(folder, ignore_errors=True)
     return failed
+
+
+def end_with_parent() -> None:
+    """Have the kernel end this process when its parent ends, however that ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def remove_scratch_of(job: Job) -> None:
