@@ -399,3 +399,20 @@ def test_whatever_is_planned_what_is_read_is_what_is_there(planned: Sequence, ot
 
 def _is_near(place: int, spans: Sequence[tuple[int, int]]) -> bool:
     return any(begin - 32_000 <= place <= begin + size + 32_000 for begin, size in spans)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    "bag",
+    [
+        "event_camera_mcap/test_events_2/test_events_2_0.mcap",
+        "gps_odom_uf_rosbag2/bag/bag_0.db3",
+        "husky_jackal_robot_localization/test1.bag",
+        "multicam_tagslam/test_2.tag_detections.bag.bz2",
+    ],
+)
+def test_real_recordings_are_the_same_behind_a_url(bag, server, real_data: Path):
+    path = real_data / bag
+    far, faults, _ = read(served_as(server, path))
+    assert (far, faults) == read(str(path))[:2]
+    assert server.sent < 1.02 * path.stat().st_size
