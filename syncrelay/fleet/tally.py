@@ -1,0 +1,191 @@
+"""Sums over recordings that can be added to each other in any order, and give the same whatever the order."""
+
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import dataclass, field
+from math import ceil
+from typing import Final, Generic, Protocol, Self, TypeVar
+
+from syncrelay.bag.analysis.buckets import floor_of, middle_of
+
+WHOLE_PPM: Final = 1_000_000
+"""A share is a whole number of millionths: sums of these do not depend on the order, as those of floats do."""
+
+MOST_ROWS: Final = 5000
+"""More robots, topics or days are not told apart."""
+
+
+class Addable(Protocol):
+    """What takes another of its kind into itself."""
+
+    def add(self, other: Self) -> None:
+        """Add the other's counts to the own."""
+        ...
+
+
+Key = TypeVar("Key", bound=Hashable)
+Cell = TypeVar("Cell", bound=Addable)
+
+
+class Cells(Generic[Key, Cell]):
+    """A sum for each key, which begins as `empty` gives it; none at all once there are more than `most` keys."""
+
+    def __init__(self, empty: Callable[[], Cell], most: int = MOST_ROWS) -> None:
+        self._empty = empty
+        self._most = most
+        self._cells: dict[Key, Cell] | None = {}
+
+    @property
+    def is_told(self) -> bool:
+        """Whether there are no more keys than can be told apart."""
+        return self._cells is not None
+
+    def items(self) -> Iterator[tuple[Key, Cell]]:
+        """Yield the keys and their sums."""
+        yield from (self._cells or {}).items()
+
+    def put(self, key: Key, cell: Cell) -> None:
+        """Add to the sum of a key."""
+        if self._cells is None:
+            return
+        if key not in self._cells:
+            if len(self._cells) == self._most:
+                self._cells = None
+                return
+            self._cells[key] = self._empty()
+        self._cells[key].add(cell)
+
+    def add(self, other: Self) -> None:
+        """Add the sums of another one."""
+        if other._cells is None:
+            self._cells = None
+        for key, cell in other.items():
+            self.put(key, cell)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantiles:
+    """A quantity in nanoseconds. Median and 95th percentile are within a sixteenth, the greatest is exact."""
+
+    median: int
+    high: int
+    greatest: int
+
+
+@dataclass(slots=True)
+class Buckets:
+    """How often a quantity was in which bucket, and its bounds."""
+
+    counts: Counter[int] = field(default_factory=Counter)
+    least: int = 0
+    greatest: int = 0
+
+    def count(self, counts: Mapping[int, int], least: int, greatest: int) -> None:
+        """Add counts by the floors of buckets, and the bounds of what they count."""
+        self.least = min(self.least, least) if self.counts else least
+        self.greatest = max(self.greatest, greatest) if self.counts else greatest
+        self.counts.update(counts)
+
+    def add(self, other: Self) -> None:
+        """Add counts."""
+        # Of an empty one the bounds mean nothing.
+        if other.counts:
+            self.count(other.counts, other.least, other.greatest)
+
+    def count_one(self, value: int, *, least: int, greatest: int) -> None:
+        """Add one value that stands for many, and the bounds of these."""
+        self.count({floor_of(value): 1}, least, greatest)
+
+    def quantiles(self) -> Quantiles | None:
+        """Return the quantiles; None where nothing was counted."""
+        if not self.counts:
+            return None
+        return Quantiles(self._quantile(0.5), self._quantile(0.95), self.greatest)
+
+    def _quantile(self, share: float) -> int:
+        left = ceil(share * self.counts.total())
+        for floor in sorted(self.counts):
+            left -= self.counts[floor]
+            if left <= 0:
+                return min(max(middle_of(floor), self.least), self.greatest)
+        return self.greatest
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Drift:
+    """How much slower than the recorder's clock the stamps of a topic run, in which recording; ordered by how far."""
+
+    size: float
+    ppm: float
+    topic: str
+    recording: str
+
+
+@dataclass(slots=True)
+class Tally:
+    """What recordings, or a group or a topic of each, add up to; Figures says what it all means."""
+
+    recordings: int = 0
+    lasts: int = 0
+    judged: int = 0
+    without: int = 0
+    rated: int = 0
+    rate_ppm: int = 0
+    sets: int = 0
+    now: int = 0
+    possible: int = 0
+    span: Buckets = field(default_factory=Buckets)
+    latency: Buckets = field(default_factory=Buckets)
+    received: int = 0
+    matched: int = 0
+    unneeded: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
+    gaps: int = 0
+    longest_gap: int = 0
+    other_clock: int = 0
+    drift: Drift | None = None
+    codes: Counter[str] = field(default_factory=Counter)
+
+    def add(self, other: Self) -> None:
+        """Add counts."""
+        for name in _SUMS:
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for name in _COUNTERS:
+            if found := getattr(other, name):
+                getattr(self, name).update(found)
+        self.span.add(other.span)
+        self.latency.add(other.latency)
+        self.longest_gap = max(self.longest_gap, other.longest_gap)
+        self.drift = max(filter(None, (self.drift, other.drift)), default=None)
+
+    def rate(self, ppm: int | None) -> None:
+        """Take a share of 1 in millionths into the mean; None where it cannot be known."""
+        if ppm is not None:
+            self.rated += 1
+            self.rate_ppm += ppm
+
+    def copy(self) -> "Tally":
+        """Return a tally of the same counts, for others to be added to."""
+        copied = Tally()
+        copied.add(self)
+        return copied
+
+
+_SUMS: Final = (
+    "recordings",
+    "lasts",
+    "judged",
+    "without",
+    "rated",
+    "rate_ppm",
+    "sets",
+    "now",
+    "possible",
+    "received",
+    "matched",
+    "unneeded",
+    "gaps",
+    "other_clock",
+)
+_COUNTERS: Final = ("dropped", "faults", "codes")
