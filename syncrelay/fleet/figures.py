@@ -4,6 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Final
 
+from syncrelay.fleet.suggestions import Gain, Suggested
 from syncrelay.fleet.tally import WHOLE_PPM, Drift, Quantiles, Tally
 
 RULE: Final = "the lowest match rate, then the most recordings with findings, then the name"
@@ -26,6 +27,9 @@ class Figures:
 
     `dropped` is by reason, `codes` counts the recordings with a finding, the most first. `faults` counts what is wrong
     with stamps; `other_clock` how often a topic of a recording was stamped more than a second off its receipt.
+
+    `values` were suggested for some of the recordings, those for most of them first, of a topic those at the topic;
+    `gain` is of all recordings that any were suggested for.
     """
 
     recordings: int
@@ -48,6 +52,8 @@ class Figures:
     other_clock: int
     drift: Drift | None
     codes: Counts
+    values: tuple[Suggested, ...]
+    gain: Gain
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +95,8 @@ def figures_of(tally: Tally) -> Figures:
         other_clock=tally.other_clock,
         drift=tally.drift,
         codes=most_first(tally.codes),
+        values=tally.values.suggested(),
+        gain=tally.values.gain(),
     )
 
 

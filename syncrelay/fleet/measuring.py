@@ -8,6 +8,7 @@ from typing import Final
 
 from syncrelay.bag.analysis.buckets import floor_of
 from syncrelay.fleet.documents import Document, Group, Input, Quantity, Spread, Topic
+from syncrelay.fleet.suggestions import values_of
 from syncrelay.fleet.tally import WHOLE_PPM, Buckets, Drift, Tally
 
 _SECOND: Final = 1_000_000_000
@@ -52,6 +53,13 @@ def measured(name: str, document: Document) -> Measured:
         of_group = Tally()
         _count_group(of_group, group)
         whole.add(of_group)
+    for group in document.groups:
+        values = values_of(group)
+        groups[group.name].values.count(values, group)
+        whole.values.count(values, group)
+        for topic_name in set(_inputs(group)):
+            at_topic = [value for value in values if value.where.topic == topic_name]
+            topics[topic_name].values.count(at_topic, group)
     _count_codes(document, whole, groups, topics)
     return Measured(name, document.begin, day_of(document.begin), whole, groups, topics)
 

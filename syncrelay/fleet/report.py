@@ -6,12 +6,13 @@ from heapq import nsmallest
 from typing import Final, Self
 
 from syncrelay.errors import BagError
+from syncrelay.fleet.cells import Cells
 from syncrelay.fleet.documents import Document, read_document
 from syncrelay.fleet.figures import Figures, Ranking, Row, figures_of, worst_first
 from syncrelay.fleet.measuring import Measured, measured, worst_severity
-from syncrelay.fleet.report_findings import Findings, Found, Suggested
+from syncrelay.fleet.report_findings import Findings, Found
 from syncrelay.fleet.robots import RobotPattern, common_folders, folder_below, folders_of
-from syncrelay.fleet.tally import WHOLE_PPM, Cells, Drift, Quantiles, Tally
+from syncrelay.fleet.tally import WHOLE_PPM, Drift, Quantiles, Tally
 
 MOST_RECORDINGS: Final = 10_000
 """Of more, the worst are listed one by one."""
@@ -66,7 +67,6 @@ class FleetReport:
     by_group: Ranking
     by_topic: Ranking
     findings: tuple[Found, ...]
-    suggested: tuple[Suggested, ...]
     are_findings_told: bool
     recordings: tuple[Recording, ...]
     failures: tuple[Failure, ...]
@@ -165,8 +165,7 @@ class Fleet:
             by_group=_ranked(self._groups),
             by_topic=_ranked(self._topics),
             findings=self._findings.found(),
-            suggested=self._findings.suggested(),
-            are_findings_told=self._findings.is_told,
+            are_findings_told=self._findings.is_told and self._whole.values.is_told,
             recordings=tuple(listed),
             failures=tuple(sorted(self._failures)[:_MOST_FAILURES]),
             failed=self._failed,

@@ -1,66 +1,16 @@
 """Sums over recordings that can be added to each other in any order, and give the same whatever the order."""
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import ceil
-from typing import Final, Generic, Protocol, Self, TypeVar
+from typing import Final, Self
 
 from syncrelay.bag.analysis.buckets import floor_of, middle_of
+from syncrelay.fleet.suggestions import Values
 
 WHOLE_PPM: Final = 1_000_000
 """A share is a whole number of millionths: sums of these do not depend on the order, as those of floats do."""
-
-MOST_ROWS: Final = 5000
-"""More robots, topics or days are not told apart."""
-
-
-class Addable(Protocol):
-    """What takes another of its kind into itself."""
-
-    def add(self, other: Self) -> None:
-        """Add the other's counts to the own."""
-        ...
-
-
-Key = TypeVar("Key", bound=Hashable)
-Cell = TypeVar("Cell", bound=Addable)
-
-
-class Cells(Generic[Key, Cell]):
-    """A sum for each key, which begins as `empty` gives it; none at all once there are more than `most` keys."""
-
-    def __init__(self, empty: Callable[[], Cell], most: int = MOST_ROWS) -> None:
-        self._empty = empty
-        self._most = most
-        self._cells: dict[Key, Cell] | None = {}
-
-    @property
-    def is_told(self) -> bool:
-        """Whether there are no more keys than can be told apart."""
-        return self._cells is not None
-
-    def items(self) -> Iterator[tuple[Key, Cell]]:
-        """Yield the keys and their sums."""
-        yield from (self._cells or {}).items()
-
-    def put(self, key: Key, cell: Cell) -> None:
-        """Add to the sum of a key."""
-        if self._cells is None:
-            return
-        if key not in self._cells:
-            if len(self._cells) == self._most:
-                self._cells = None
-                return
-            self._cells[key] = self._empty()
-        self._cells[key].add(cell)
-
-    def add(self, other: Self) -> None:
-        """Add the sums of another one."""
-        if other._cells is None:
-            self._cells = None
-        for key, cell in other.items():
-            self.put(key, cell)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +96,7 @@ class Tally:
     other_clock: int = 0
     drift: Drift | None = None
     codes: Counter[str] = field(default_factory=Counter)
+    values: Values = field(default_factory=Values)
 
     def add(self, other: Self) -> None:
         """Add counts."""
@@ -156,6 +107,7 @@ class Tally:
                 getattr(self, name).update(found)
         self.span.add(other.span)
         self.latency.add(other.latency)
+        self.values.add(other.values)
         self.longest_gap = max(self.longest_gap, other.longest_gap)
         self.drift = max(filter(None, (self.drift, other.drift)), default=None)
 
@@ -164,12 +116,6 @@ class Tally:
         if ppm is not None:
             self.rated += 1
             self.rate_ppm += ppm
-
-    def copy(self) -> "Tally":
-        """Return a tally of the same counts, for others to be added to."""
-        copied = Tally()
-        copied.add(self)
-        return copied
 
 
 _SUMS: Final = (

@@ -13,8 +13,8 @@ from syncrelay.errors import SyncRelayError, UsageError
 from syncrelay.fleet import report as fleet_module
 from syncrelay.fleet.documents import documents_in
 from syncrelay.fleet.report import Failure, Fleet, fleet_report
-from syncrelay.fleet.report_findings import Gain
 from syncrelay.fleet.robots import RobotPattern
+from syncrelay.fleet.suggestions import Gain
 from tests.cli.html_reports import analyzed, drive
 from tests.fleet.documents import MAY_1, MS, SECOND, an_input, change, document, finding, group, quantity, topic
 from tests.fleet.documents import spread as a_spread
@@ -161,18 +161,22 @@ def test_a_finding_is_told_with_the_values_suggested_where_it_was_found_and_what
     assert (first.code, first.where.group, first.where.topic) == ("over_slop", "front", "")
     assert (first.severity, first.recordings, first.seconds) == ("error", 4, 89)
     assert (first.text, first.advice, first.example) == ("over_slop for 50 s", "mend `over_slop`", "/b")
-    assert [(value.where.topic, value.written, count) for value, count in first.values] == [
-        ("", "slop: 6ms", 2),
-        ("", "slop: 9ms", 1),
-        ("/lidar", "min_period: 84ms", 1),
+    assert [(each.value.where.topic, each.value.written, each.gain) for each in first.values] == [
+        ("", "slop: 6ms", Gain(2, 90, 189, 200)),
+        ("", "slop: 9ms", Gain(1, 10, 80, 100)),
+        ("/lidar", "min_period: 84ms", Gain(1, 50, 99, 100)),
     ]
     assert first.gain == Gain(recordings=3, now=100, then=269, possible=300)
     assert (second.code, second.where.topic, second.values, second.gain) == ("gaps", "/lidar", (), Gain(0, 0, 0, 0))
-    assert [(each.value.written, each.gain) for each in report.suggested] == [
+    assert [(each.value.written, each.gain) for each in report.whole.values] == [
         ("slop: 6ms", Gain(2, 90, 189, 200)),
         ("slop: 9ms", Gain(2, 108, 180, 200)),
         ("min_period: 84ms", Gain(1, 50, 99, 100)),
     ]
+    assert report.whole.gain == Gain(4, 198, 369, 400)
+    lidar = _figures(report.by_topic, "/lidar")
+    assert [(each.value.written, each.gain.recordings) for each in lidar.values] == [("min_period: 84ms", 1)]
+    assert _figures(report.by_topic, "/camera").gain == Gain(0, 0, 0, 0)
     assert report.whole.codes == (("over_slop", 4), ("gaps", 1))
     assert _figures(report.by_topic, "/lidar").codes == (("gaps", 1),)
     assert _figures(report.by_topic, "/camera").codes == ()
