@@ -55,9 +55,14 @@ def drift_text(drift: Drift | None) -> str:
 
 
 def clock_lines(figures: Figures) -> Iterator[str]:
-    """Yield what is wrong with clocks and stamps."""
+    """Yield the largest drift, and what else is wrong with clocks and stamps."""
     if figures.drift is not None:
         yield f"largest drift {drift_text(figures.drift)}"
+    yield from fault_lines(figures)
+
+
+def fault_lines(figures: Figures) -> Iterator[str]:
+    """Yield what is wrong with clocks and stamps, drift aside."""
     if figures.other_clock:
         yield f"{counted(figures.other_clock, 'clock')} more than 1 s off the recorder's"
     for what, count in figures.faults:

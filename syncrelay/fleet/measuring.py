@@ -36,23 +36,22 @@ def measured(name: str, document: Document) -> Measured:
     groups = {group.name: Tally(recordings=1, lasts=lasts) for group in document.groups}
     whole = Tally(recordings=1, lasts=lasts)
     for group in document.groups:
-        tally = groups[group.name]
-        _count_group(tally, group)
+        # Before the clocks, of which the whole counts those of a topic of two groups once.
+        of_group = _of_group(group)
+        groups[group.name].add(of_group)
+        whole.add(of_group)
         for each in group.inputs:
             _count_input(topics[each.topic], each)
         _count_distances(topics, group)
     for topic in document.topics:
-        clock = _clock(name, topic)
-        topics[topic.topic].add(clock)
         topics[topic.topic].latency.add(_delay(topic.delay))
+        clock = _clock(name, topic)
+        if clock is None:
+            continue
+        topics[topic.topic].add(clock)
         for group_name in {group.name for group in document.groups if topic.topic in _inputs(group)}:
             groups[group_name].add(clock)
         whole.add(clock)
-    for group in document.groups:
-        # Not what is of the group's tally: the clocks of a topic of two groups are counted once.
-        of_group = Tally()
-        _count_group(of_group, group)
-        whole.add(of_group)
     for group in document.groups:
         values = values_of(group)
         groups[group.name].values.count(values, group)
@@ -82,8 +81,8 @@ def _inputs(group: Group) -> Iterator[str]:
     return (each.topic for each in group.inputs)
 
 
-def _count_group(tally: Tally, group: Group) -> None:
-    suggestion = group.suggestion
+def _of_group(group: Group) -> Tally:
+    suggestion, tally = group.suggestion, Tally()
     tally.judged += 1
     tally.without += not group.sets
     tally.rate(_rate(group))
@@ -94,6 +93,7 @@ def _count_group(tally: Tally, group: Group) -> None:
     _count_quantity(tally.latency, group.latency)
     for each in group.inputs:
         _count_messages(tally, each)
+    return tally
 
 
 def _rate(group: Group) -> int | None:
@@ -137,7 +137,8 @@ def _count_distances(topics: dict[str, Tally], group: Group) -> None:
             topics[topic].span.count_one(found.median, least=found.least, greatest=found.greatest)
 
 
-def _clock(name: str, topic: Topic) -> Tally:
+def _clock(name: str, topic: Topic) -> Tally | None:
+    """Return what is wrong with the stamps of a topic; None where that is nothing, as with most."""
     faults = {
         "stamp 0": topic.unstamped,
         "no readable stamp": topic.unreadable,
@@ -145,11 +146,14 @@ def _clock(name: str, topic: Topic) -> Tally:
         "out of order": topic.out_of_order,
     }
     ppm = topic.drift_ppm
+    is_other = topic.delay is not None and abs(topic.delay.median) >= _OTHER_CLOCK
+    if not (any(faults.values()) or topic.gaps or is_other or ppm):
+        return None
     return Tally(
         faults=Counter({word: count for word, count in faults.items() if count}),
         gaps=topic.gaps,
         longest_gap=topic.longest_gap or 0,
-        other_clock=int(topic.delay is not None and abs(topic.delay.median) >= _OTHER_CLOCK),
+        other_clock=int(is_other),
         drift=Drift(abs(ppm), ppm, topic.topic, name) if ppm else None,
     )
 

@@ -34,7 +34,10 @@ class Buckets:
         """Add counts by the floors of buckets, and the bounds of what they count."""
         self.least = min(self.least, least) if self.counts else least
         self.greatest = max(self.greatest, greatest) if self.counts else greatest
-        self.counts.update(counts)
+        # As Counter.update, which asks first what it is given, and takes twice as long.
+        own = self.counts
+        for floor, count in counts.items():
+            own[floor] = own.get(floor, 0) + count
 
     def add(self, other: Self) -> None:
         """Add counts."""
