@@ -1,12 +1,19 @@
 """An analysis for programs. All times and durations are nanoseconds, shares are of 1."""
 
+from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from syncrelay.bag.analysis import Analysis, GroupAnalysis
+from syncrelay.bag.analysis.buckets import counted_in_buckets
 from syncrelay.bag.analysis.nearest import Pair
 from syncrelay.bag.analysis.suggest import Suggestion
+from syncrelay.bag.analysis.topics import spread
 from syncrelay.bag.analysis.watching import LastingFinding
+
+_LONGEST: Final = 2**63 - 1
 
 
 def as_json(name: str, analysis: Analysis) -> dict[str, Any]:
@@ -25,6 +32,8 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
         "name": each.group.name,
         "policy": each.group.options.policy,
         "sets": len(each.evaluation.sets),
+        "span": _quantity(one.span for one in each.evaluation.sets),
+        "latency": _quantity(one.latency for one in each.evaluation.sets),
         "inputs": [
             {
                 "topic": topic.topic,
@@ -40,6 +49,15 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
         "findings": [_finding(lasting) for lasting in each.findings],
         "suggestion": suggestion_as_json(each.suggestion),
     }
+
+
+def _quantity(values: Iterable[int]) -> dict[str, Any] | None:
+    """Return the spread of a quantity, and how often it was in which bucket; None where there are no values."""
+    every = np.array([max(-_LONGEST, min(_LONGEST, value)) for value in values], dtype=np.int64)
+    if not len(every):
+        return None
+    # A bucket goes from its floor, which names it, to the next floor that floor_of gives.
+    return {**asdict(spread(every)), "counts": counted_in_buckets(every.tolist())}
 
 
 def suggestion_as_json(suggestion: Suggestion) -> dict[str, Any]:

@@ -1,31 +1,21 @@
 """The page: words and tables from a template that escapes all it is given, drawings from data that is no script."""
 
-import hashlib
-from base64 import b64encode
-from datetime import UTC, datetime
-from importlib.resources import files
 from typing import Any, Final
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup, escape
 
 from syncrelay.bag.analysis import Analysis, file_with_changes
 from syncrelay.cli.analysis_html.drawings import drawings_of
 from syncrelay.cli.analysis_html.words import TopicRow, group_words, topic_row
+from syncrelay.cli.pages import MARK, content_hash, joined, template, when
 from syncrelay.errors import BagError
 from syncrelay.explain import words
 from syncrelay.printable import printable, printable_lines
 from syncrelay.status.fates import FATES, Fate
 
-MARK: Final = '<meta name="generator" content="syncrelay">'
-"""Stands near the begin of every page, and in no other file."""
-
-_FOLDER: Final = files("syncrelay.cli.analysis_html")
+_PACKAGE: Final = "syncrelay.cli.analysis_html"
 _STYLES: Final = ("uplot/uPlot.min.css", "../../status/page/colours.css", "page/report.css")
 _SCRIPTS: Final = ("uplot/uPlot.iife.min.js", "page/unpack.js", "page/plots.js", "page/lanes.js", "page/report.js")
 # Up to 10 characters each: below 6 MB, however long the recording.
 _MOST_MESSAGES: Final = 500_000
-_SECOND: Final = 1_000_000_000
 
 
 def as_html(name: str, analysis: Analysis) -> str:
@@ -33,11 +23,11 @@ def as_html(name: str, analysis: Analysis) -> str:
     most = _MOST_MESSAGES // max(1, len(analysis.groups))
     drawings = [drawings_of(group, analysis, most=most) for group in analysis.groups]
     told = [group_words(group, drawing) for group, drawing in zip(analysis.groups, drawings, strict=True)]
-    script, style = _joined(_SCRIPTS), _joined(_STYLES)
-    page: str = _template().render(
+    script, style = joined(_PACKAGE, _SCRIPTS), joined(_PACKAGE, _STYLES)
+    page: str = template(_PACKAGE, "report.html.jinja").render(
         mark=MARK,
         name=printable(name),
-        began=_when(analysis.begin),
+        began=when(analysis.begin),
         lasts=words.seconds(analysis.end - analysis.begin),
         messages=sum(topic.messages for topic in analysis.topics),
         topics=[topic_row(topic) for topic in analysis.topics],
@@ -48,8 +38,8 @@ def as_html(name: str, analysis: Analysis) -> str:
         file=_file(analysis),
         script=script,
         style=style,
-        script_hash=_hash(script),
-        style_hash=_hash(style),
+        script_hash=content_hash(script),
+        style_hash=content_hash(style),
     )
     return page
 
@@ -63,38 +53,3 @@ def _file(analysis: Analysis) -> str:
 
 def _fate(fate: Fate) -> dict[str, Any]:
     return {"name": fate.name, "word": fate.word, "path": fate.path, "filled": fate.is_filled}
-
-
-def _template() -> Any:
-    # What a recording names comes from strangers: all is escaped, and a name that the template has wrong is an error.
-    environment = Environment(
-        loader=PackageLoader("syncrelay.cli.analysis_html", "page"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["coded"] = _coded
-    return environment.get_template("report.html.jinja")
-
-
-def _coded(text: str) -> Markup:
-    """Return a sentence, escaped, with what stands between backticks as code."""
-    parts = text.split("`")
-    wrapped = (Markup("<code>{}</code>").format(part) if at % 2 else escape(part) for at, part in enumerate(parts))
-    return Markup("").join(wrapped)
-
-
-def _joined(names: tuple[str, ...]) -> str:
-    return "\n" + "\n".join(_FOLDER.joinpath(name).read_text(encoding="utf-8").strip() for name in names) + "\n"
-
-
-def _hash(text: str) -> str:
-    return f"sha256-{b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}"
-
-
-def _when(nanoseconds: int) -> str:
-    try:
-        return f"{datetime.fromtimestamp(nanoseconds / _SECOND, tz=UTC):%Y-%m-%d %H:%M:%S} UTC"
-    except (OverflowError, ValueError):
-        return f"{nanoseconds} ns"
