@@ -71,10 +71,19 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     if arguments.into is not None:
         from syncrelay.cli.fleet_tasks import AnalyzeTask
 
-        for name in ("write", "html", "json"):
-            if getattr(asked, name):
-                parser.error(f"--{name} is for what is printed, and --into prints nothing: it writes JSON")
-        return do_on_many(AnalyzeTask.of(asked), bags, arguments)
+        if asked.write:
+            parser.error("--write is for one recording, and --into is for many")
+        task = AnalyzeTask.of(asked)
+        if asked.text is None and not asked.topics:
+            if asked.html or asked.json or arguments.robot:
+                parser.error("--html, --json and --robot tell of groups: name a file with --config FILE, or topics")
+            return do_on_many(task, bags, arguments)
+        from syncrelay.cli.fleet_report import Views, tell_report
+
+        views = Views(asked.html, asked.json, arguments.robot)
+        return do_on_many(task, bags, arguments, then=lambda folder: tell_report(folder, views))
+    if arguments.robot:
+        parser.error("--robot goes with --into")
     if len(bags) == 1:
         return analyze_bag(bags[0], asked)
     if asked.text is not None:

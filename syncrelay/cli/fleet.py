@@ -5,7 +5,7 @@ import signal
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,9 +39,12 @@ def require_into(parser: Parser, arguments: Namespace) -> None:
             parser.error("--engine goes with --into")
 
 
-def do_on_many(task: Task, words: Sequence[str], arguments: Namespace) -> int:
+def do_on_many(
+    task: Task, words: Sequence[str], arguments: Namespace, *, then: Callable[[Path], object] | None = None
+) -> int:
     """Do a task on all recordings that words name, into a folder, as the options of add_fleet_options say.
 
+    `then` is called with the folder when nothing is left to do, and what it prints is the outcome, else a line is.
     Returns the exit code: 1 where a recording is at fault. Raises SyncRelayError where a word names no recording, or
     the folder cannot be used; with --strict also for the first recording that is at fault.
     """
@@ -70,7 +73,12 @@ def do_on_many(task: Task, words: Sequence[str], arguments: Namespace) -> int:
             if stop.asked is signal.SIGINT:
                 raise KeyboardInterrupt
             return DONE
-    put(printable(f"{arguments.into}: {shown.left()}"))
+    summary = printable(f"{arguments.into}: {shown.left()}")
+    if then is None:
+        put(summary)
+    else:
+        say(summary)
+        then(into)
     return code
 
 

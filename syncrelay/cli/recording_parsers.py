@@ -23,6 +23,12 @@ def analyze() -> Parser:
     parser.add_argument(
         "--json", action="store_true", help="print all figures as JSON; of several recordings, each in one line"
     )
+    parser.add_argument(
+        "--robot",
+        metavar="PATTERN",
+        help="with --into: where in a path the robot's name is, as in '{robot}/{day}/*.mcap'; default: the first folder"
+        " in which paths differ",
+    )
     add_fleet_options(parser)
     return parser
 
