@@ -1,9 +1,12 @@
 """`syncrelay replay --into` and `syncrelay analyze --into`."""
 
+import sys
+
 import pytest
 
 from tests.bag.making import rig, write_mcap, write_rosbag2
 from tests.cli.command import run, run_python
+from tests.cli.terminals import on_terminal
 from tests.fleet.fleets import FILE, TOPICS, entries, file_text, make_fleet, replay_into, result
 
 
@@ -142,3 +145,13 @@ def test_ray_that_is_missing_is_told(done, tmp_path):
     ended = run_python("-c", script, *words, folder=done)
     assert ended.returncode == 1
     assert ended.stderr == "syncrelay: --engine ray needs Ray, which is not installed: pip install 'syncrelay[fleet]'\n"
+
+
+def test_on_a_terminal_progress_is_one_line_that_is_gone_at_the_end(done, tmp_path):
+    words = ("replay", str(done / "bags"), "--config", str(done / FILE), "--into", "out")
+    with on_terminal([sys.executable, "-m", "syncrelay", *words], folder=tmp_path, environ={}) as terminal:
+        assert terminal.wait_for_end() == 0
+    shown = terminal.written.partition("out:")[0]
+    assert "\r\x1b[K3 of 3 recordings" in shown
+    assert "\n" not in shown
+    assert shown.endswith("\r\x1b[K")
