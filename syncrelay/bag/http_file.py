@@ -67,6 +67,10 @@ class HttpFile:
             done: _Done = sync(self._files.loop, work)
         except aiohttp.InvalidURL as error:
             raise LastingError("is no URL of a server: check it") from error
+        except aiohttp.ClientSSLError as error:
+            raise LastingError(
+                "the server's certificate is not trusted here: check the URL, and SSL_CERT_FILE"
+            ) from error
         except (aiohttp.ClientError, IncompleteReadError, OSError, EOFError) as error:
             if isinstance(error, OSError) and error.errno == ENOSPC:
                 raise
@@ -157,6 +161,6 @@ def _why(error: Exception, patience: Patience) -> str:
         return f"cannot connect to the server: {error.os_error.strerror or type(error).__name__}"
     if isinstance(error, aiohttp.ClientPayloadError | EOFError):
         return "the connection was lost in the middle of an answer"
-    if isinstance(error, aiohttp.ServerDisconnectedError | ConnectionError):
+    if isinstance(error, aiohttp.ServerDisconnectedError | aiohttp.ClientOSError | ConnectionError):
         return "the server closed the connection without an answer"
     return f"the server cannot be read ({type(error).__name__})"
