@@ -18,7 +18,7 @@ from syncrelay.config.difference import difference
 from syncrelay.config.file import file_format
 from syncrelay.explain import Code
 from syncrelay.sync import DropReason
-from tests.sync.support.timeline import play_policy
+from tests.sync.support.timeline import play_group
 from tests.test_launch_files import declared
 
 _ROOT = Path(__file__).parents[1]
@@ -174,7 +174,7 @@ def test_every_drawing_of_a_policy_is_what_the_policy_does(text):
     policy, *options = keys.split(", ")
     group = {"policy": policy, **dict(option.split(": ") for option in options), "topics": topics}
     (resolved,) = load_text(json.dumps({"version": 1, "groups": {"drawn": group}})).groups
-    left, drawn = play_policy(resolved.options.build_policy(resolved.inputs), drawing)
+    left, drawn = play_group(resolved.engine(), drawing)
     assert drawn
     assert left == drawn
 

@@ -156,6 +156,8 @@ def _told(outcome: Outcome) -> str:
     text = "".join("-" if message is None else message.payload or "*" for message in outcome.messages)
     if outcome.stamp is None:
         return text
+    if outcome.stamp == outcome.tick:
+        return f"{text} stamped tick"
     stamped = next((str(message.payload) for message in there if message.stamp == outcome.stamp), "?")
     return f"{text} stamped {stamped}"
 

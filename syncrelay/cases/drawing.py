@@ -187,6 +187,8 @@ def _wrong(drawing: Drawing, words: Sequence[str], did_you_mean: DidYouMean) -> 
     match words:
         case [letters]:
             return _undrawn(drawing, letters)
+        case [letters, "stamped", "tick"]:
+            return _undrawn(drawing, letters)
         case [letters, "stamped", stamped]:
             return _undrawn(drawing, letters + stamped)
         case [letter, reason]:

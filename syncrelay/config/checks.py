@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode, SequenceNode
+from syncrelay.config.keys import MOST
 from syncrelay.config.models import NodeConfig
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Problem, Severity
@@ -10,11 +11,14 @@ from syncrelay.config.resolved import GroupConfig
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
 from syncrelay.config.wording import all_of, or_nearest, quoted
 
+_OF_WAITS = ("queue_size", "max_wait", "trigger")
+# Beside those of the ticks that have come: what was held for the tick before, and what is for the next.
+_HELD_BESIDE = 2
 # The longest of what every node offers below its name.
 _LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
 # What is longer is refused as out of range.
 _LONGEST_S = MAX_NS // NS_PER_UNIT["s"]
-_RESTAMP_WORDS = ("none", "earliest", "latest")
+_RESTAMP_WORDS = ("none", "earliest", "latest", "trigger")
 
 
 def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[Problem]:
@@ -26,6 +30,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield from _too_few(group, document)
         yield from _restamp(group, document)
         yield from _trigger(group, document)
+        yield from _clock(group, document)
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
         yield from _unit(group, document)
@@ -53,12 +58,15 @@ def _too_few(group: GroupConfig, document: Document) -> Iterator[Problem]:
 
 
 def _restamp(group: GroupConfig, document: Document) -> Iterator[Problem]:
-    restamp = group.options.restamp
-    if restamp not in _RESTAMP_WORDS and group.restamp is None:
+    restamp, path = group.options.restamp, (*group.path, "restamp")
+    if restamp == "trigger" and group.restamp is None and "trigger" not in type(group.options).model_fields:
+        text = f"{group.options.policy} has no trigger: expected none, earliest, latest or an input of this group"
+        yield document.problem(path, text, code="bad_value")
+    elif restamp not in _RESTAMP_WORDS and group.restamp is None:
         below = [name for name in _inputs(group) if name.startswith(f"{restamp}/")]
         likely = below[0] if len(below) == 1 else document.nearest(restamp, (*_RESTAMP_WORDS, *_inputs(group)))
         text = f"expected none, earliest, latest or an input of this group, found {quoted(restamp)}{or_nearest(likely)}"
-        yield document.problem((*group.path, "restamp"), text, code="bad_value")
+        yield document.problem(path, text, code="bad_value")
 
 
 def _unwritten_types(group: GroupConfig, document: Document) -> Iterator[Problem]:
@@ -86,6 +94,22 @@ def _trigger(group: GroupConfig, document: Document) -> Iterator[Problem]:
     elif not group.topics[group.trigger].required:
         text = f"{quoted(named)} triggers every set, so it cannot be optional (`required: false`)"
         yield document.problem(path, text, code="conflict")
+
+
+def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    """Yield a queue that overflows while sets wait: it holds one message for each tick, and the latest before them."""
+    ticks, max_wait, size = group.ticks, group.options.max_wait, group.options.queue_size
+    if ticks is None or max_wait is None or {(*group.path, key) for key in _OF_WAITS} & document.faulty:
+        return
+    needed = -(-max_wait // ticks.period_ns) + _HELD_BESIDE
+    if needed > size:
+        text = (
+            f"queue_size {size} is too short for this max_wait at {ticks}: up to {needed} messages of an input wait for"
+            f" their ticks, write {'`queue_size: ' + str(needed) + '`' if needed <= MOST else 'a shorter max_wait'}"
+        )
+        path = (*group.path, "queue_size")
+        at = path if document.has(path) else (*group.path, "max_wait")
+        yield document.problem(at, text, code="conflict")
 
 
 def _inputs(group: GroupConfig) -> list[str]:

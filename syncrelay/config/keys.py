@@ -2,7 +2,15 @@
 
 from typing import Annotated, Any, Final
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    PlainValidator,
+    WithJsonSchema,
+    model_validator,
+)
 
 from syncrelay.config.document import EXTENSION
 from syncrelay.config.listen import check_listen, parse_host
@@ -15,8 +23,9 @@ from syncrelay.config.names import (
     check_topic_name,
     check_type_name,
 )
-from syncrelay.config.units import parse_duration, parse_rate
+from syncrelay.config.units import parse_clock_rate, parse_duration, parse_rate
 from syncrelay.config.wording import describe
+from syncrelay.sync import Ticks
 
 
 class Keys(BaseModel):
@@ -101,22 +110,39 @@ ShortDuration = Annotated[
 SignedDuration = Annotated[int, BeforeValidator(parse_duration), WithJsonSchema(duration_schema(sign="[+-]?"))]
 """A duration of either sign, in nanoseconds."""
 
+_RATE_TEXT: Final = {"type": "string", "pattern": rf"^\s*\+?{_NUMBER}\s*([Hh]z|kHz)\s*$"}
+
 Rate = Annotated[
     int,
     BeforeValidator(parse_rate),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0},
-                {"type": "string", "pattern": rf"^\s*\+?{_NUMBER}\s*([Hh]z|kHz)\s*$"},
-            ]
-        }
-    ),
+    WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, _RATE_TEXT]}),
 ]
 """A rate, as the nanoseconds between two events."""
 
-TopicName = Annotated[str, BeforeValidator(check_topic_name), _text(rf"^(~?/)?{_TOKENS}$", maxLength=LONGEST_TOPIC)]
+_TOPIC_NAME: Final = {"type": "string", "pattern": rf"^(~?/)?{_TOKENS}$", "maxLength": LONGEST_TOPIC}
+
+TopicName = Annotated[str, BeforeValidator(check_topic_name), WithJsonSchema(_TOPIC_NAME)]
 """A topic name: absolute, relative to the node's namespace, or private (`~/`)."""
+
+
+def _trigger(value: object) -> str | Ticks:
+    """Tell a rate from a topic, whose name begins with no digit."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"expected an input topic or a rate such as 30 Hz, found {describe(value)}")  # noqa: TRY004
+    if isinstance(value, str) and not value.lstrip().startswith((*"+-.0123456789",)):
+        return check_topic_name(value)
+    rate = parse_clock_rate(value)
+    return Ticks(rate.numerator, rate.denominator)
+
+
+Trigger = Annotated[
+    str | Ticks,
+    PlainValidator(_trigger),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number", "minimum": 0.001, "maximum": 10_000}, _RATE_TEXT, _TOPIC_NAME]},
+    ),
+]
+"""What makes sets: the messages of a topic, or a clock at a rate."""
 
 OutputPrefix = Annotated[str, AfterValidator(check_output_prefix), _text(rf"^(/|~|(~?/)?{_TOKENS})?$")]
 """What stands before an input's name in its output's."""

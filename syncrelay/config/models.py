@@ -27,7 +27,7 @@ from syncrelay.config.keys import (
 from syncrelay.config.names import expand
 from syncrelay.config.qos import AUTO, Qos
 from syncrelay.config.wording import describe
-from syncrelay.sync import Policy
+from syncrelay.sync import Policy, Ticks
 
 Transport: TypeAlias = Literal["default", "large_messages"]
 
@@ -213,7 +213,7 @@ class PacedTopic(Topic):
 def _restamp(value: Any) -> str:
     """Return a text; which texts are inputs only the group can tell."""
     if not isinstance(value, str):
-        raise ValueError(f"expected none, earliest, latest or an input topic, found {describe(value)}")  # noqa: TRY004
+        raise ValueError(f"expected none, earliest, latest, trigger or an input topic, found {describe(value)}")  # noqa: TRY004
     return value
 
 
@@ -291,7 +291,8 @@ class Group(Keys):
         description=(
             "How long a set may wait, once its required messages are there, for optional ones or for a closer match;"
             " then it leaves as it is. Needed if an input is optional, except with latest_time, which never waits for"
-            " one. A number is seconds, a string has a unit (ns, us, ms, s, min). Default: no limit."
+            " one. Where a clock is the trigger: how long after its tick a set leaves, always. A number is seconds, a"
+            " string has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["100ms"],
     )
@@ -314,9 +315,10 @@ class Group(Keys):
         default="none",
         description=(
             "Stamp of all messages of a set as they leave: `none` (each keeps its own), `earliest` or `latest` of the"
-            " set, or the name of an input topic, whose stamp all get. Default: none."
+            " set, the name of an input topic, whose stamp all get, or, with latest_time, `trigger`: that of the"
+            " trigger's message, or the time of the clock's tick. Default: none."
         ),
-        examples=["none", "earliest", "latest", "/lidar/points"],
+        examples=["none", "earliest", "latest", "trigger", "/lidar/points"],
     )
     lazy: bool = Field(
         default=False,
@@ -347,6 +349,11 @@ class Group(Keys):
     @property
     def trigger_topic(self) -> str | None:
         """The input whose every message makes a set; None where all inputs are alike."""
+        return None
+
+    @property
+    def ticks(self) -> Ticks | None:
+        """The ticks of the clock that makes the sets; None where messages do."""
         return None
 
     def key_of(self, _topic: Topic) -> str | None:

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
-from syncrelay.config.keys import NOT_NULL, Duration, FieldPath, TopicName
+from syncrelay.config.keys import NOT_NULL, Duration, FieldPath, Trigger
 from syncrelay.config.models import Group, Inputs, KeyedTopic, PacedTopic, Tolerance, Topic, Topics
 from syncrelay.sync import (
     ApproximateEpsilonTime,
@@ -15,7 +15,9 @@ from syncrelay.sync import (
     ApproximateTimeEager,
     EqualKey,
     ExactTime,
+    LatestAtTicks,
     LatestTime,
+    Ticks,
 )
 
 Slop = Field(
@@ -111,20 +113,26 @@ class ApproximateEpsilonTimeGroup(SlopGroup):
 
 
 class LatestTimeGroup(Group):
-    """At each message of one input, the latest of every other."""
+    """At each message of one input, or at each tick of a clock, the latest of every other."""
 
     repeats = LatestTime.repeats
     waits_for_optional = False
     matched_by = ("trigger", "max_age")
 
     policy: Literal["latest_time"] = Field(
-        description="At each message of the trigger, the latest not newer one of every other input."
+        description="At each message of the trigger, or each tick of a clock, the latest not newer one of every input."
     )
-    trigger: TopicName = Field(description="Input whose every message makes a set.", examples=["/camera/image_raw"])
+    trigger: Trigger = Field(
+        description=(
+            "Input whose every message makes a set; or a rate, at which the clock does: then a set leaves at each tick,"
+            " `max_wait` after it, of what has come by then. A number is Hz, a string has a unit (Hz, kHz)."
+        ),
+        examples=["/camera/image_raw", "30 Hz"],
+    )
     max_age: Annotated[Duration | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "How much older than the trigger's message another may be. A number is seconds, a string has a unit"
+            "How much older than the trigger's message or tick another may be. A number is seconds, a string has a unit"
             " (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["500ms"],
@@ -133,18 +141,28 @@ class LatestTimeGroup(Group):
 
     @property
     def tolerance(self) -> Tolerance | None:
-        """How much older than the trigger's message another may be."""
+        """How much older than the trigger's message or tick another may be."""
         return None if self.max_age is None else Tolerance("max_age", self.max_age)
 
     @property
-    def trigger_topic(self) -> str:
-        """The trigger."""
-        return self.trigger
+    def trigger_topic(self) -> str | None:
+        """The trigger, where it is an input."""
+        return self.trigger if isinstance(self.trigger, str) else None
 
-    def build_policy(self, inputs: Inputs) -> LatestTime:
+    @property
+    def ticks(self) -> Ticks | None:
+        """The trigger, where it is a clock."""
+        return self.trigger if isinstance(self.trigger, Ticks) else None
+
+    def build_policy(self, inputs: Inputs) -> LatestTime | LatestAtTicks:
         """Return a new policy of the engine."""
+        n_inputs = len(self.topics)
+        if isinstance(self.trigger, Ticks):
+            return LatestAtTicks(
+                n_inputs=n_inputs, queue_size=self.queue_size, ticks=self.trigger, max_age_ns=self.max_age
+            )
         return LatestTime(
-            n_inputs=len(self.topics),
+            n_inputs=n_inputs,
             queue_size=self.queue_size,
             trigger=inputs.index_of(self.trigger),
             max_age_ns=self.max_age,

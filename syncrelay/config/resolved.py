@@ -17,7 +17,7 @@ from syncrelay.config.models import (
 from syncrelay.config.names import default_output
 from syncrelay.config.problems import Path
 from syncrelay.config.qos import QosOverrides, QosPreset
-from syncrelay.sync import Restamp, SyncGroup
+from syncrelay.sync import Restamp, SyncGroup, Ticks
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +43,8 @@ class TopicConfig:
 class GroupConfig:
     """A group. `restamp` is the engine's: None, one of Restamp, or an input's index.
 
-    `trigger` is the index of the input whose every message makes a set, None where all inputs are alike. In a faulty
-    file both are also None where what they name is no input.
+    `trigger` is the index of the input whose every message makes a set, None where all inputs are alike or a clock
+    makes them. In a faulty file both are also None where what they name is no input.
     """
 
     name: str
@@ -58,6 +58,21 @@ class GroupConfig:
     def path(self) -> Path:
         """Where it stands in the file."""
         return ("groups", self.name)
+
+    @property
+    def ticks(self) -> Ticks | None:
+        """The ticks of the clock that makes its sets; None where messages do."""
+        return self.options.ticks
+
+    @property
+    def has_deadlines(self) -> bool:
+        """Whether sets may leave because time passes: else `expire` never has anything to do."""
+        return self.options.max_wait is not None or self.ticks is not None
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """The inputs whose latest message is held: it may be in many sets."""
+        return tuple(index for index in range(len(self.topics)) if self.options.repeats and index != self.trigger)
 
     def paths(self) -> Iterator[tuple[Path, TopicConfig]]:
         """Yield its topics, each with the place where it stands in the file."""
@@ -113,7 +128,7 @@ def _group(name: str, group: Group, node: NodeConfig) -> GroupConfig:
     return GroupConfig(
         name=name,
         topics=tuple(_topic(topic, group, prefix=prefix) for topic in group.topics),
-        restamp=_restamp(group.restamp, inputs),
+        restamp=_restamp(group, inputs),
         trigger=_index(group.trigger_topic, inputs),
         options=group,
         inputs=inputs,
@@ -134,14 +149,18 @@ def _topic(topic: Topic, group: Group, *, prefix: str) -> TopicConfig:
     )
 
 
-def _restamp(word: str, inputs: Inputs) -> Restamp | int | None:
-    match word:
+def _restamp(group: Group, inputs: Inputs) -> Restamp | int | None:
+    match group.restamp:
         case "none":
             return None
         case "earliest":
             return Restamp.EARLIEST
         case "latest":
             return Restamp.LATEST
+        case "trigger" if group.ticks is not None:
+            return Restamp.TICK
+        case "trigger" if group.trigger_topic is not None:
+            return _index(group.trigger_topic, inputs)
         case topic:
             return _index(topic, inputs)
 

@@ -3,6 +3,7 @@
 import math
 import re
 from decimal import Decimal
+from fractions import Fraction
 from typing import Final
 
 from syncrelay.config.wording import describe, quoted
@@ -17,6 +18,10 @@ NS_PER_UNIT: Final = {
 }
 _HERTZ: Final = {"Hz": 1, "hz": 1, "kHz": 1_000}
 MAX_NS: Final = 2**63 - 1
+# Slower ones are no rate that anything is sampled at; faster ones would leave a relay no time for messages.
+_SLOWEST_HZ: Final = Decimal("0.001")
+_FASTEST_HZ: Final = 10_000
+_FINEST: Final = 10**9
 _UNITS = "ns, us, ms, s or min"
 # What other programs call the units.
 _MEANT = {
@@ -73,17 +78,33 @@ def parse_rate(value: object) -> int:
 
     Rounded to the nearest nanosecond. Raises ValueError saying what to write instead.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"expected a rate such as 10 Hz, found {describe(value)}")  # noqa: TRY004
-    hertz = _hertz(value) if isinstance(value, str) else Decimal(repr(value))
-    if not hertz.is_finite() or hertz <= 0:
-        raise ValueError(f"expected a rate above 0, such as 10 Hz, found {describe(value)}")
+    hertz = _rate_above_0(value)
     period = NS_PER_UNIT["s"] / hertz
     if period < 1:
         raise ValueError(f"{quoted(str(value))} is out of range, at most 1 GHz")
     if period > MAX_NS:
         raise ValueError(f"{quoted(str(value))} is out of range, at least once in 292 years")
     return round(period)
+
+
+def parse_clock_rate(value: object) -> Fraction:
+    """Return the hertz of a rate at which a clock can trigger, exactly as they are written, to a billionth.
+
+    Raises ValueError saying what to write instead.
+    """
+    hertz = _rate_above_0(value)
+    if not _SLOWEST_HZ <= hertz <= _FASTEST_HZ:
+        raise ValueError(f"{quoted(str(value))} is out of range, from {_SLOWEST_HZ} Hz to {_FASTEST_HZ // 1000} kHz")
+    return Fraction(hertz).limit_denominator(_FINEST)
+
+
+def _rate_above_0(value: object) -> Decimal:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"expected a rate such as 10 Hz, found {describe(value)}")  # noqa: TRY004
+    hertz = _hertz(value) if isinstance(value, str) else Decimal(repr(value))
+    if not hertz.is_finite() or hertz <= 0:
+        raise ValueError(f"expected a rate above 0, such as 10 Hz, found {describe(value)}")
+    return hertz
 
 
 def _hertz(text: str) -> Decimal:

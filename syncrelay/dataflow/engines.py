@@ -1,7 +1,7 @@
 """What stands in for a group's engine while that gives nothing: it failed, is suspended, or the group is paused."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 from syncrelay.sync.counts import InputCounts
@@ -45,22 +45,23 @@ class StoppedEngine:
 class PausedEngine:
     """Stands in for an engine whose group is paused: lets go what waits in it, and all that comes, as `paused`.
 
-    But the latest message of an input that a `trigger` takes the latest of is kept: it may be the only one for long,
-    as a map, and is what the first set after the pause needs.
+    But the latest message of an input that is `held`, as its latest may be in many sets, is kept: it may be the only
+    one for long, as a map, and is what the first set after the pause needs.
     """
 
-    def __init__(self, engine: SyncGroup, *, trigger: int | None) -> None:
+    def __init__(self, engine: SyncGroup, *, held: Collection[int]) -> None:
         self.engine = engine
-        self._trigger = trigger
+        self._held = held
 
     @property
     def sets(self) -> int:
         return self.engine.sets
 
     def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:
-        if self._trigger in (None, message.input):
+        if message.input not in self._held:
             return (self.engine.reject(message, DropReason.PAUSED),)
-        # No set leaves of it: there is no trigger.
+        # No set leaves of it: there is no trigger, and no tick of a clock.
+        self.engine.pass_over(now=now)
         return [*self.engine.add(message, now=now), *self.engine.let_go(DropReason.PAUSED)]
 
     def reject(self, message: Message, reason: DropReason) -> Drop:

@@ -99,13 +99,14 @@ class GroupRelay:
         self.paused_since = time.time_ns()
         self._guarded(lambda: self.flow.conclude(self.engine.let_go(DropReason.PAUSED)))
         if isinstance(self.engine, SyncGroup):
-            self.engine = PausedEngine(self.engine, trigger=self.config.trigger)
+            self.engine = PausedEngine(self.engine, held=self.config.held)
 
     def unpause(self) -> None:
         """Match what comes from now on. No set is older than those before the pause."""
         self.paused_since = None
         if isinstance(self.engine, PausedEngine):
             self.engine = self.engine.engine
+            self.engine.pass_over(now=self._now())
 
     def tell_sets(self, manifests: GroupManifests) -> None:
         """Have a manifest published of each set from now on, while anyone subscribes to it."""

@@ -67,6 +67,6 @@ def check_clock(graph: GraphSnapshot, *, use_sim_time: bool) -> Iterator[Diagnos
         yield info(
             "clock_unused",
             "/clock is published, and use_sim_time is not set",
-            impact="stamps are matched all the same; only max_wait goes by this machine's clock",
+            impact="stamps are matched all the same; only max_wait and a `trigger: 30 Hz` go by this machine's clock",
             fix="with a simulation or a bag, write into the file: node: {use_sim_time: true}",
         )

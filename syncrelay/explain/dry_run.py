@@ -26,8 +26,10 @@ class EngineDriver:
     def __init__(self, group: GroupConfig, take: Take | None, engine: SyncGroup | None = None) -> None:
         """Take None where nobody is to be told; an `engine` of this group goes on where it was."""
         self.engine: Final = engine or group.engine()
-        # Without max_wait nothing is ever due, and asking for each message costs a tenth of a replay.
-        self.has_deadlines: Final = group.options.max_wait is not None
+        # Else nothing is ever due, and asking for each message costs a tenth of a replay.
+        self.has_deadlines: Final = group.has_deadlines
+        # Ticks go on for a while after the last message: those of the time after it are nobody's.
+        self._last_wait = (group.options.max_wait or 0) if group.ticks is not None else None
         self._due = self.engine.next_deadline()
         self._take = take or _take_nothing
         # Every message would pay for a call between.
@@ -73,8 +75,12 @@ class EngineDriver:
             self._take(outcomes, due)
 
     def finish(self, now: int) -> None:
-        """Let all leave that may: what still waits has a deadline, or will never have a partner."""
-        while (deadline := self.engine.next_deadline()) is not None:
+        """Let all leave that may: what still waits has a deadline, or will never have a partner.
+
+        Of the ticks of a clock, those up to `now` do.
+        """
+        last = None if self._last_wait is None else now + self._last_wait
+        while (deadline := self.engine.next_deadline()) is not None and (last is None or deadline <= last):
             self._take(self.engine.expire(now=deadline), deadline)
             now = max(now, deadline)
         self._take(self.engine.flush(DropReason.SHUTDOWN), now)

@@ -176,12 +176,12 @@ class GroupFacts:
 
     `tolerance` is None where stamps may be any distance apart, as where keys are matched. `by_stamp` says whether
     stamps are what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest
-    of the others, which may serve again. `clock` is the simulated one, None without use_sim_time; `clock_set` when
-    and by how much this machine's clock was set of late; `is_recorded` says that a recording is judged and no live
-    graph; `waited` how long its messages at most lay of late before the relay took them; `standstills` those of
-    late; `failure` what stopped the group for good; `pause` since when it is paused, and `unpaused` when the last pause
-    ended; `asleep` that it is lazy and nobody subscribes to what it gives; `empty_graph` the graph, where it holds no
-    node but our own.
+    of the others, which may serve again; `ticks_hz` is the rate of the clock that makes them, where one does. `clock`
+    is the simulated one, None without use_sim_time; `clock_set` when and by how much this machine's clock was set of
+    late; `is_recorded` says that a recording is judged and no live graph; `waited` how long its messages at most lay of
+    late before the relay took them; `standstills` those of late; `failure` what stopped the group for good; `pause`
+    since when it is paused, and `unpaused` when the last pause ended; `asleep` that it is lazy and nobody subscribes to
+    what it gives; `empty_graph` the graph, where it holds no node but our own.
     `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
     the name of a managed node that waits to be activated.
     """
@@ -194,6 +194,7 @@ class GroupFacts:
     tolerance: Tolerance | None = None
     by_stamp: bool = True
     trigger: int | None = None
+    ticks_hz: float | None = None
     max_wait: int | None = None
     every: int = 1
     least_period: int | None = None
@@ -220,7 +221,7 @@ class GroupFacts:
 
     @property
     def possible_hz(self) -> float:
-        """The most sets a second that there could be: one for each message of the input that sets the pace."""
+        """The most sets a second that there could be: one for each message of the input that sets the pace, or tick."""
         possible = self.figures.best_hz / self.every
         return min(possible, _SECOND / self.least_period) if self.least_period else possible
 
@@ -237,7 +238,7 @@ class GroupFacts:
 
     def is_held(self, index: int) -> bool:
         """Whether the latest message of this input is held and serves until there is a newer one."""
-        return self.trigger is not None and index != self.trigger
+        return self.ticks_hz is not None or (self.trigger is not None and index != self.trigger)
 
     @property
     def silent_after(self) -> int:

@@ -84,7 +84,7 @@ def _steps(times: Sequence[int]) -> Sequence[int]:
 
 @dataclass(frozen=True, slots=True)
 class GroupFigures:
-    """A group. `best_hz` is the rate of the input that sets the pace: no more sets are possible.
+    """A group. `best_hz` is the rate of the input, or of the clock, that sets the pace: no more sets are possible.
 
     `spans` and `latencies` are those of the last sets. `nearest` holds the span of the tightest set that each of the
     last messages of the input that sets the pace could have had, measured since `nearest_from`, and since an input last

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from syncrelay.explain import rules_flow, rules_graph, rules_matching, rules_stamps, words
+from syncrelay.explain import rules_clock, rules_flow, rules_graph, rules_matching, rules_stamps, words
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Code, Finding, Rule, Severity, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
@@ -42,6 +42,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     rules_stamps.clock_step,
     rules_stamps.clock_drift,
     rules_stamps.other_clock,
+    rules_clock.off_the_clock,
     rules_stamps.no_common_key,
     of_each_input(rules_flow.slowed),
     rules_flow.bursts,
@@ -52,6 +53,7 @@ _CAUSE_RULES: Final[tuple[Rule, ...]] = (
 
 _MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
     (Code.OVER_SLOP, rules_matching.over_slop),
+    (Code.OVER_SLOP, rules_clock.too_old),
     (Code.SHORT_QUEUE, of_each_input(rules_matching.short_queue)),
     (Code.WAITING_FOR_OPTIONAL, of_each_input(rules_matching.waiting_for_optional)),
     (Code.CONSTANT_OFFSET, rules_matching.constant_offset),

@@ -30,16 +30,24 @@ class Observation:
     """Gathers what came and left of one group.
 
     `offsets_ns` are added to stamps as for matching; `trigger` is the index of the input whose messages make the sets,
-    of the latest of the others. All times are of one clock, that of `began` and of the times of receipt.
+    of the latest of the others; `ticks_hz` is the rate of the clock that does, where one does. All times are of one
+    clock, that of `began` and of the times of receipt.
     """
 
     def __init__(
-        self, *, offsets_ns: Sequence[int], required: Sequence[bool], began: int, trigger: int | None = None
+        self,
+        *,
+        offsets_ns: Sequence[int],
+        required: Sequence[bool],
+        began: int,
+        trigger: int | None = None,
+        ticks_hz: float | None = None,
     ) -> None:
         self._began = began
         self._offsets = tuple(offsets_ns)
         self._required = [index for index, needed in enumerate(required) if needed]
         self._trigger = trigger
+        self._ticks_hz = ticks_hz
         self._inputs = [InputObservation() for _ in offsets_ns]
         nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in offsets_ns)
         self._polls = deque([_Poll(began, nothing, 0, 0, (0,) * len(nothing))])
@@ -53,7 +61,7 @@ class Observation:
         self._with_optional = {
             index: NearestSpans(len(self._required) + 1)
             for index, needed in enumerate(required)
-            if not needed and trigger is None
+            if not needed and trigger is None and ticks_hz is None
         }
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
         self._paces: list[float | None] = [None] * len(offsets_ns)
@@ -99,7 +107,7 @@ class Observation:
             began=self._began,
             sets=self._polls[-1].sets if self._polls else 0,
             rate_hz=self._rate_hz(),
-            best_hz=min(inputs[index].rate_hz for index in counted),
+            best_hz=self._ticks_hz or min(inputs[index].rate_hz for index in counted),
             last_set=self._last_set,
             resumed=self._resumed,
             span_histogram=self._span_histogram.histogram(),
@@ -164,7 +172,7 @@ class Observation:
         shifted = [
             [stamp + offset for stamp, _ in came if stamp] for came, offset in zip(arrivals, self._offsets, strict=True)
         ]
-        if len(self._required) > 1:
+        if len(self._required) > 1 and self._ticks_hz is None:
             pivot = self._slowest(self._required) if self._trigger is None else self._trigger
             measured = self._nearest_spans.add(
                 [shifted[index] for index in self._required], pivot=self._required.index(pivot)

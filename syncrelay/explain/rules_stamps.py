@@ -95,7 +95,7 @@ def _blocks_if_most(facts: GroupFacts, an_input: InputFacts, count: int) -> Seve
 
 def other_clock(facts: GroupFacts) -> Found:
     """Find an input whose stamps, against the time of their receipt, are far off those of the others."""
-    if not facts.by_stamp or not facts.is_silent or facts.is_new:
+    if not facts.by_stamp or facts.ticks_hz is not None or not facts.is_silent or facts.is_new:
         return
     delays = {
         index: each.figures.delay for index, each in enumerate(facts.inputs) if each.required and each.figures.rate_hz

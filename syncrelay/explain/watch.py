@@ -29,6 +29,7 @@ class GroupWatch:
 
     def __init__(self, config: GroupConfig, *, began: int, budget: TryBudget | None = None) -> None:
         self.config = config
+        self._ticks_hz = None if config.ticks is None else config.ticks.hz
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
         self._keys: Sequence[Hashable] = (None,) * len(config.topics)
         self._publishers = [0] * len(config.topics)
@@ -41,10 +42,12 @@ class GroupWatch:
             required=[topic.required for topic in config.topics],
             began=began,
             trigger=config.trigger,
+            ticks_hz=self._ticks_hz,
         )
-        # Keys are not kept: what is matched by them cannot be run again.
-        by_stamp = config.options.by_stamp
-        self._evaluator = Evaluator(config, self._observation.recent, budget) if by_stamp else None
+        # Keys are not kept: what is matched by them cannot be run again. Nor can what a clock triggered: it may have
+        # been a simulated one, and times of receipt are this machine's.
+        can_run = config.options.by_stamp and config.ticks is None
+        self._evaluator = Evaluator(config, self._observation.recent, budget) if can_run else None
 
     def add(
         self,
@@ -122,6 +125,7 @@ class GroupWatch:
             tolerance=options.tolerance,
             by_stamp=options.by_stamp,
             trigger=self.config.trigger,
+            ticks_hz=self._ticks_hz,
             max_wait=options.max_wait,
             every=options.every,
             least_period=options.max_rate,

@@ -1,4 +1,7 @@
-"""The clock by which messages wait: ROS time where that is simulated, else one that never jumps."""
+"""The clocks of a node: by one messages wait, by the other sets are triggered. Both are ROS time if that is simulated.
+
+Else the first never jumps, and the second tells the time that messages are stamped with.
+"""
 
 import time
 from collections.abc import Callable
@@ -21,6 +24,8 @@ class WaitingClock:
         self.is_simulated = bool(node.get_parameter("use_sim_time").value)
         self.now: Callable[[], int] = self._simulated_now if self.is_simulated else time.monotonic_ns
         """The time in nanoseconds, to measure waiting only."""
+        self.stamping: Callable[[], int] = self._simulated_now if self.is_simulated else time.time_ns
+        """The time in nanoseconds that messages of now are stamped with."""
 
     def _simulated_now(self) -> int:
         return int(self._clock.now().nanoseconds)

@@ -151,7 +151,7 @@ class Groups:
         limited = self._limited
         # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
         asks = bool(limited) and not self._clock.is_simulated
-        self._loop.deadline = (lambda: _next_deadline(limited)) if asks else None
+        self._loop.deadline = (lambda: self._next_deadline(limited)) if asks else None
         self._loop.wake()
         self._changed(config)
         return changed
@@ -169,7 +169,8 @@ class Groups:
         self.manifests.begin(groups)
 
     def _begun(self, config: GroupConfig) -> GroupRelay:
-        group = GroupRelay(config, now=self._clock.now, flow=self._flow, tape=self._tape)
+        now = self._clock.now if config.ticks is None else self._clock.stamping
+        group = GroupRelay(config, now=now, flow=self._flow, tape=self._tape)
         if self.is_paused:
             group.pause()
         return group
@@ -196,7 +197,7 @@ class Groups:
 
     @property
     def _limited(self) -> list[GroupRelay]:
-        return [group for group in self.bindings.groups if group.config.options.max_wait is not None]
+        return [group for group in self.bindings.groups if group.config.has_deadlines]
 
     def announce(self) -> None:
         """Log once what each group waits for, and once that it runs."""
@@ -218,7 +219,22 @@ class Groups:
     def expire(self, now: int) -> None:
         """Let go what has waited long enough. On the loop's thread."""
         for group in self.bindings.groups:
-            group.expire(now)
+            group.expire(now if group.config.ticks is None else self._clock.stamping())
+
+    def _next_deadline(self, groups: Sequence[GroupRelay]) -> int | None:
+        """Return when the first of these wants `expire` to be called, by the clock that messages wait by."""
+        try:
+            deadlines = [group.engine.next_deadline() for group in groups]
+        except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
+            deadlines = [group.next_deadline() for group in groups]
+        first = None
+        for group, deadline in zip(groups, deadlines, strict=True):
+            if deadline is None:
+                continue
+            if group.config.ticks is not None:
+                deadline += self._clock.now() - self._clock.stamping()  # noqa: PLW2901
+            first = deadline if first is None else min(first, deadline)
+        return first
 
     def flush(self, reason: DropReason) -> None:
         """Drop all that is buffered. On the loop's thread, or after it."""
@@ -255,11 +271,3 @@ def _require_same_node(running: Config, asked: Config) -> None:
     for key in needs_restart(running, asked):
         changes = ", ".join(str(each) for each in section_changes(running, asked) if each.key.split(".")[0] == key)
         raise ReloadError(f"`{key}` cannot change while the relay runs ({changes}): restart it")
-
-
-def _next_deadline(groups: Sequence[GroupRelay]) -> int | None:
-    try:
-        deadlines = [group.engine.next_deadline() for group in groups]
-    except Exception:  # noqa: BLE001  one call more for each group would be paid at every turn
-        deadlines = [group.next_deadline() for group in groups]
-    return min((deadline for deadline in deadlines if deadline is not None), default=None)

@@ -7,10 +7,12 @@ from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.equal_key import EqualKey
 from syncrelay.sync.exact_time import ExactTime
 from syncrelay.sync.group import SyncGroup
+from syncrelay.sync.latest_at_ticks import LatestAtTicks
 from syncrelay.sync.latest_time import LatestTime
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.restamp import Restamp
+from syncrelay.sync.ticks import Ticks
 
 __all__ = [
     "ApproximateEpsilonTime",
@@ -21,6 +23,7 @@ __all__ = [
     "EqualKey",
     "ExactTime",
     "InputCounts",
+    "LatestAtTicks",
     "LatestTime",
     "Match",
     "Message",
@@ -28,4 +31,5 @@ __all__ = [
     "Policy",
     "Restamp",
     "SyncGroup",
+    "Ticks",
 ]

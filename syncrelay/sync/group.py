@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 
 from syncrelay.sync.arrivals import Arrivals
 from syncrelay.sync.counts import InputCounts, Ledger
-from syncrelay.sync.matching import Limited, Matching, Unlimited
+from syncrelay.sync.matching import ByClock, Limited, Matching, Unlimited
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.restamp import Restamp, common_stamp
@@ -24,6 +24,9 @@ class SyncGroup:
     - `max_wait_ns` after its first complete set came together, the best one so far leaves. Without it, sets
       wait as long as the policy would have them wait, and every input is required but with latest_time, whose
       sets don't wait for others.
+    - Where a clock triggers, `now` is that clock's: in nanoseconds since the epoch that stamps count from. The set of
+      a tick leaves `max_wait_ns` after the tick (0 without it), of what was added before: what is on its way longer
+      comes too late for it.
     - `restamp` gives sets a common stamp, of what they came in with. `every` and `min_set_period_ns` thin them.
 
     `add` lets go first what was due before it: calling `expire` more often changes nothing.
@@ -62,6 +65,8 @@ class SyncGroup:
             raise ValueError(f"max_wait_ns {max_wait_ns} must be 0 or more")
         if isinstance(restamp, int) and not 0 <= restamp < n_inputs:
             raise ValueError(f"restamp {restamp} must be one of {n_inputs} inputs")
+        if restamp is Restamp.TICK and not policy.by_clock:
+            raise ValueError("restamp TICK must have a policy with a clock")
         self._by_stamp = policy.by_stamp
         self._required = [index for index, needed in enumerate(required) if needed]
         self._offsets = offsets
@@ -74,9 +79,11 @@ class SyncGroup:
             self._thinning = Thinning(
                 n_inputs=n_inputs, repeats=policy.repeats, every=every, min_set_period_ns=min_set_period_ns
             )
-        self._is_limited = max_wait_ns is not None
+        self._is_limited = max_wait_ns is not None or policy.by_clock
         self._matching: Matching
-        if max_wait_ns is None:
+        if policy.by_clock:
+            self._matching = ByClock(policy, required=required, max_wait_ns=max_wait_ns or 0)
+        elif max_wait_ns is None:
             self._matching = Unlimited(policy, required=required)
         else:
             self._matching = Limited(
@@ -119,6 +126,10 @@ class SyncGroup:
         """Give what leaves because it has waited long enough."""
         outcomes = self._matching.due(now)
         return self._leave(outcomes, now) if outcomes else outcomes
+
+    def pass_over(self, *, now: int) -> None:
+        """Let time pass without sets that only the clock triggers: nobody wanted them."""
+        self._matching.pass_over(now)
 
     def flush(self, reason: DropReason) -> Sequence[Drop]:
         """Drop all that is buffered and start afresh. The counts go on."""
@@ -188,7 +199,7 @@ class SyncGroup:
         if self._restamp is None:
             return outcomes
         return [
-            Match(outcome.messages, common_stamp(outcome.messages, self._restamp))
+            Match(outcome.messages, common_stamp(outcome, self._restamp), outcome.tick)
             if isinstance(outcome, Match)
             else outcome
             for outcome in outcomes
@@ -198,16 +209,18 @@ class SyncGroup:
         left: list[Outcome] = []
         for outcome in outcomes:
             if isinstance(outcome, Match):
-                left += thinning.thin(outcome, self._moment(outcome.messages, now))
+                left += thinning.thin(outcome, self._moment(outcome, now))
             else:
                 left.append(outcome)
         return left
 
-    def _moment(self, messages: Sequence[Message | None], now: int) -> int:
-        """Give a stamp that rises from set to set: the latest of the required inputs, `now` if none is set."""
+    def _moment(self, match: Match, now: int) -> int:
+        """Give a stamp that rises from set to set: the tick, or the latest of the required inputs, `now` if none."""
+        if match.tick is not None:
+            return match.tick
         stamps = [
             message.stamp + self._offsets[message.input]
-            for message in messages
+            for message in match.messages
             if message is not None and message.stamp and message.input in self._required
         ]
         return max(stamps, default=now)

@@ -1,4 +1,4 @@
-"""A policy at work in a group: at once, or with a limit to what may wait."""
+"""A policy at work in a group: at once, with a limit to what may wait, or by the clock."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -24,6 +24,10 @@ class Matching(Protocol):
 
     def next_deadline(self) -> int | None:
         """When something will have waited long enough, if nothing else comes."""
+        ...
+
+    def pass_over(self, now: int) -> None:
+        """Let time pass without the sets that only the clock would have given."""
         ...
 
     def flush(self, reason: DropReason) -> list[Drop]:
@@ -61,6 +65,46 @@ class Unlimited:
 
     def next_deadline(self) -> int | None:
         return None
+
+    def pass_over(self, now: int) -> None:
+        del now
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        return self._policy.flush(reason)
+
+    def let_go(self, reason: DropReason) -> list[Drop]:
+        return self._policy.let_go(reason)
+
+    def buffered(self, index: int) -> int:
+        return self._policy.buffered(index)
+
+    def needed_queue(self, index: int) -> int | None:
+        return self._policy.needed_queue(index)
+
+
+class ByClock(Matching):
+    """A policy that makes its sets as time passes: those of a time leave `max_wait_ns` after it."""
+
+    __slots__ = ("_max_wait", "_policy")
+
+    def __init__(self, policy: Policy, *, required: Sequence[bool], max_wait_ns: int) -> None:
+        self._policy, stage = policy.for_required(required)
+        if stage.inputs:
+            raise ValueError("a policy that is by the clock deals with optional inputs itself")
+        self._max_wait = max_wait_ns
+
+    def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
+        return self._policy.feed(index, stamp, message)
+
+    def due(self, now: int) -> Sequence[Outcome]:
+        return self._policy.advance(now - self._max_wait)
+
+    def next_deadline(self) -> int | None:
+        tick = self._policy.next_tick()
+        return None if tick is None else tick + self._max_wait
+
+    def pass_over(self, now: int) -> None:
+        self._policy.pass_over(now - self._max_wait)
 
     def flush(self, reason: DropReason) -> list[Drop]:
         return self._policy.flush(reason)
@@ -143,6 +187,9 @@ class Limited(Matching):
         if since is None and self._since:
             since = self._since[0]
         return None if since is None else since + self._max_wait
+
+    def pass_over(self, now: int) -> None:
+        del now
 
     def flush(self, reason: DropReason) -> list[Drop]:
         drops = self._policy.flush(reason) + self._stage.flush(reason)

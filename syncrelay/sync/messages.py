@@ -71,11 +71,12 @@ class Match:
     """A set: one message per input in input order, None where an optional one is missing.
 
     `stamp` is the common stamp in nanoseconds that the group's restamping gives the set; None leaves each
-    message its own.
+    message its own. `tick` is the tick of the clock that triggered it, None where no clock did.
     """
 
     messages: tuple[Message | None, ...]
     stamp: int | None = None
+    tick: int | None = None
 
     @property
     def stamps(self) -> tuple[int | None, ...]:

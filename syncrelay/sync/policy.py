@@ -45,12 +45,18 @@ class OptionalStage(Protocol):
 
 
 class Policy(Protocol):
-    """Matches the messages of `n_inputs` inputs. Knows stamps and order of arrival, never a clock."""
+    """Matches the messages of `n_inputs` inputs. Knows stamps and order of arrival, never a clock.
+
+    But one that is `by_clock` makes its sets as time passes, and is told so by `advance`.
+    """
 
     __slots__ = ()
 
     by_stamp: bool = True
     """Whether a stamp must be set, and two of one input that are equal mean the same message."""
+
+    by_clock: bool = False
+    """Whether it makes its sets when time has passed, by `advance`, and none when a message is fed."""
 
     repeats: bool = False
     """Whether a message may be in more than one set."""
@@ -79,6 +85,19 @@ class Policy(Protocol):
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         """Take a message to be matched at `place` and `stamp`; its own input and stamp are not looked at."""
         ...
+
+    def advance(self, until: int) -> Sequence[Outcome]:
+        """Give the sets of all times up to this one, if it is `by_clock`; in nanoseconds, in which stamps are too."""
+        del until
+        return ()
+
+    def next_tick(self) -> int | None:
+        """Up to when to `advance` for the next set, if no other message is fed."""
+        return None
+
+    def pass_over(self, until: int) -> None:
+        """Let time pass up to this one without giving its sets."""
+        del until
 
     def release_oldest(self) -> Sequence[Outcome]:
         """End the oldest wait: what it is for leaves as it is, as a set if it can be one."""

@@ -34,6 +34,11 @@ class StampQueue:
         self.messages.insert(position, message)
         return None
 
+    def remove(self, position: int) -> Message:
+        """Remove one message and give it."""
+        del self.stamps[position]
+        return self.messages.pop(position)
+
     def take(self, count: int) -> list[Message]:
         """Remove the oldest `count` messages and give them."""
         taken = self.messages[:count]

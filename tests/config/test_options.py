@@ -1,7 +1,7 @@
 """No option without an effect: each is changed, and what comes out has to change with it."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
@@ -10,13 +10,15 @@ from syncrelay.config import Config, load_text
 from syncrelay.config.file import file_format
 from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.qos import QosOverrides
-from syncrelay.sync import Match, Message
+from syncrelay.explain.dry_run import EngineDriver
+from syncrelay.sync import Match, Message, Outcome
 
 MS = 1_000_000
 IMAGE = "sensor_msgs/msg/Image"
 APPROXIMATE = {"policy": "approximate_time", "slop": "20ms"}
 EXACT = {"policy": "exact_time"}
 LATEST = {"policy": "latest_time", "trigger": "/a"}
+CLOCK = {"policy": "latest_time", "trigger": "20 Hz"}
 KEYED = {"policy": "equal_key", "key": "header.stamp"}
 OPTIONAL = {"required": False}
 
@@ -39,6 +41,21 @@ def sets_of(*arrivals: tuple[int, int]) -> Callable[[Config], object]:
             for outcome in outcomes
             if isinstance(outcome, Match)
         ]
+
+    return sets
+
+
+def sets_by_clock(*arrivals: tuple[int, int]) -> Callable[[Config], object]:
+    """The stamps of sets of messages that arrive as they are stamped, in milliseconds, and when each left."""
+
+    def sets(config: Config) -> object:
+        left: list[object] = []
+
+        def take(outcomes: Sequence[Outcome], now: int) -> None:
+            left.extend((now // MS, each.stamps, each.stamp) for each in outcomes if isinstance(each, Match))
+
+        EngineDriver(config.groups[0], take).run(Message(index, ms * MS, ms * MS) for index, ms in arrivals)
+        return left
 
     return sets
 
@@ -75,6 +92,7 @@ ONE_INPUT_AHEAD = sets_of((0, 10), (0, 20), (1, 10))
 TWO_SPANS_TO_CHOOSE_FROM = sets_of((0, 8), (1, 11), (0, 13), (0, 19))
 
 EXACT_PAIRS = sets_of((0, 10), (1, 10), (0, 20), (1, 20), (0, 200), (1, 200))
+BY_CLOCK = sets_by_clock((0, 10), (1, 20), (0, 40), (1, 45), (0, 190))
 LATEST_OF_BOTH = sets_of((1, 10), (0, 100), (1, 110), (0, 120))
 OPEN_PAIR = sets_after(50, (0, 100), (1, 101))
 
@@ -112,6 +130,15 @@ OPTIONS = {
     "max_rate": (file(EXACT), file({**EXACT, "max_rate": "10 Hz"}), EXACT_PAIRS),
     "every": (file(EXACT), file({**EXACT, "every": 2}), EXACT_PAIRS),
     "trigger": (file(LATEST), file({**LATEST, "trigger": "/b"}), LATEST_OF_BOTH),
+    "trigger: a clock": (file({**LATEST, "trigger": "30 Hz"}), file({**LATEST, "trigger": 20}), BY_CLOCK),
+    "max_wait: by a clock": (file(CLOCK), file({**CLOCK, "max_wait": "30ms"}), BY_CLOCK),
+    "max_age: by a clock": (file(CLOCK), file({**CLOCK, "max_age": "20ms"}), BY_CLOCK),
+    "restamp: trigger": (file(CLOCK), file({**CLOCK, "restamp": "trigger"}), BY_CLOCK),
+    "restamp: trigger of an input": (
+        file({**LATEST, "restamp": "earliest"}),
+        file({**LATEST, "restamp": "trigger"}),
+        LATEST_OF_BOTH,
+    ),
     "max_age": (file(LATEST), file({**LATEST, "max_age": "50ms"}), LATEST_OF_BOTH),
     "key": (file(KEYED), file({**KEYED, "key": "header.frame_id"}), of_first_topic("key")),
     "key: own": (file(KEYED), file(KEYED, first={"key": "header.frame_id"}), of_first_topic("key")),

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import DiagnosticsConfig, Listen, QosOverrides, QosPreset, Severity, load, load_text
-from syncrelay.sync import Restamp
+from syncrelay.sync import Restamp, Ticks
 
 FOLDER = Path(__file__).parent / "valid"
 EXAMPLES = Path(__file__).parents[2] / "configs"
@@ -51,6 +51,17 @@ def test_every_key_arrives_where_it_is_used(environ):
     assert dock.stamp.field == "trigger.time"
     assert chatter.stamp == "receive"
     assert back.topics[0].qos == QosOverrides() == back.topics[1].qos
+
+
+def test_a_trigger_is_a_clock_where_it_is_a_rate(environ):
+    dataset, controller, film, labelled = load(str(FOLDER / "clock_trigger.yaml"), environ=environ).groups
+    assert [each.ticks for each in (dataset, controller, film)] == [Ticks(30), Ticks(500), Ticks(2997, 100)]
+    assert [each.trigger for each in (dataset, controller, film)] == [None] * 3
+    assert (labelled.ticks, labelled.trigger, labelled.restamp) == (None, 1, 1)
+    assert dataset.restamp is Restamp.TICK
+    assert [each.held for each in (dataset, labelled)] == [(0, 1), (0,)]
+    assert all(each.has_deadlines for each in (dataset, controller))
+    assert not labelled.has_deadlines
 
 
 def test_a_file_that_says_nothing_of_it_listens_on_this_machine_alone(environ):

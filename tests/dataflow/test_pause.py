@@ -30,9 +30,9 @@ class _Outlet:
         self.sent.append(payload.name)
 
 
-def _group(**keys) -> tuple[GroupRelay, list[_Outlet]]:
+def _group(*, now=lambda: 0, **keys) -> tuple[GroupRelay, list[_Outlet]]:
     text = config({"front": {"policy": "exact_time", "topics": inputs(_PAIR), **keys}})
-    group = GroupRelay(load_text(text).groups[0], now=lambda: 0)
+    group = GroupRelay(load_text(text).groups[0], now=now)
     outlets = [_Outlet() for _ in group.config.topics]
     for index, outlet in enumerate(outlets):
         group.connect(index, outlet, restamped=False)
@@ -130,6 +130,30 @@ def _take(step: str | tuple[int, int], group: GroupRelay, outlets: list[_Outlet]
             getattr(group, step)()
         case index, ahead:
             _give(group, index % len(outlets), 20 * (at + ahead) // 2)
+
+
+def test_ticks_of_a_pause_give_no_sets_and_what_came_in_it_serves_those_after():
+    now = [BEGIN]
+    group, outlets = _group(policy="latest_time", trigger="20 Hz", now=lambda: now[0])
+
+    def until(ms: int) -> None:
+        now[0] = BEGIN + ms * MS
+        group.expire(now[0])
+
+    for index in range(2):
+        _give(group, index, 10)
+    until(50)
+    assert _sent(outlets) == [[10], [10]]
+    group.pause()
+    until(100)
+    for ms in (110, 120):
+        _give(group, 1, ms)
+    assert group.next_deadline() is None
+    now[0] = BEGIN + 210 * MS
+    group.unpause()
+    until(250)
+    assert _sent(outlets) == [[10, 10], [10, 120]]
+    assert [dict(each.dropped) for each in group.counts()] == [{}, {DropReason.SUPERSEDED: 1}]
 
 
 @given(policy=st.sampled_from(sorted(_KINDS)), steps=_STEPS, optional=st.booleans())

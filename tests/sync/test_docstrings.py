@@ -3,7 +3,8 @@
 import textwrap
 
 import pytest
-from timeline import TICK_NS, play_policy
+from grouped import grouped
+from timeline import TICK_NS, play_group, play_policy
 
 from syncrelay.sync import (
     ApproximateEpsilonTime,
@@ -11,7 +12,9 @@ from syncrelay.sync import (
     ApproximateTimeEager,
     EqualKey,
     ExactTime,
+    LatestAtTicks,
     LatestTime,
+    Ticks,
 )
 
 SIZES = {"n_inputs": 2, "queue_size": 10}
@@ -34,5 +37,11 @@ def drawing_in(docstring):
 @pytest.mark.parametrize("policy", POLICIES, ids=lambda policy: type(policy).__name__)
 def test_the_drawing_of_a_policy_is_what_it_does(policy):
     left, drawn = play_policy(policy, drawing_in(type(policy).__doc__))
+    assert left == drawn
+    assert len(left) > 0
+
+
+def test_the_drawing_of_a_clock_as_trigger_is_what_it_does():
+    left, drawn = play_group(grouped(LatestAtTicks(**SIZES, ticks=Ticks(20))), drawing_in(LatestAtTicks.__doc__))
     assert left == drawn
     assert len(left) > 0

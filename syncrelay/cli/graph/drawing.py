@@ -115,7 +115,8 @@ def _group_box(group: GroupConfig, order: dict[str, int], config: Config, live: 
         _output_box(config.node.absolute(topic.output), _input_of(live, name, index, len(inputs)))
         for index, (name, topic) in enumerate(inputs)
     )
-    lines = (group.options.policy, *_options(group, config))
+    clock = () if group.ticks is None else (f"trigger {group.ticks}",)
+    lines = (group.options.policy, *clock, *_options(group, config))
     if live is None:
         return GroupBox(Box(group.name, lines), links, outputs)
     rate = f"{figure(live.rate_hz)} of {figure(max(live.possible_hz, live.rate_hz))} sets/s"

@@ -12,10 +12,12 @@ from syncrelay.sync import (
     DropReason,
     EqualKey,
     ExactTime,
+    LatestAtTicks,
     LatestTime,
     Message,
     Restamp,
     SyncGroup,
+    Ticks,
 )
 
 TICK = 10_000_000
@@ -58,12 +60,18 @@ POLICIES = {
     ),
     "equal_key": lambda sizes, _: EqualKey(**sizes),
 }
+# Sets leave as time passes: what is promised of the others as a message comes is not promised of it.
+BY_CLOCK = {
+    "latest_at_ticks": lambda sizes, options: LatestAtTicks(
+        **sizes, ticks=Ticks(10**9, 3 * TICK), max_age_ns=None if options.slop > 4 else options.slop * TICK
+    )
+}
 BY_STAMP = [name for name in POLICIES if name != "equal_key"]
 ONCE = [name for name in POLICIES if name != "latest_time"]
 
 
 def make_policy(name, options):
-    return POLICIES[name]({"n_inputs": options.n_inputs, "queue_size": options.queue_size}, options)
+    return {**POLICIES, **BY_CLOCK}[name]({"n_inputs": options.n_inputs, "queue_size": options.queue_size}, options)
 
 
 def make_group(name, options):
@@ -107,7 +115,7 @@ def options(draw, *, optional=True, limited=True, thinned=True, offset=False):
         min_periods=draw(st.just(()) | st.tuples(*[few(0, 4)] * n_inputs)),
         max_wait=draw(waits),
         offsets=draw(shifts if offset else st.just(()) | shifts),
-        restamp=draw(st.none() | st.sampled_from(Restamp) | few(0, n_inputs - 1)),
+        restamp=draw(st.none() | st.sampled_from((Restamp.EARLIEST, Restamp.LATEST)) | few(0, n_inputs - 1)),
         every=draw(few(1, 3)) if thinned else 1,
         min_set_period=draw(st.none() | few(1, 6)) if thinned else None,
     )

@@ -1,0 +1,101 @@
+"""Findings about sets that a clock triggers: stamps that are off the clock, messages too old at its ticks."""
+
+from statistics import median_low
+from typing import Final
+
+from syncrelay.explain import words
+from syncrelay.explain.facts import GroupFacts, InputFacts
+from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity
+from syncrelay.explain.rules_flow import waited_for_relay
+
+_OFF: Final = SECOND
+_NEARLY_ALL: Final = 0.95
+_WATCHED: Final = 10 * SECOND
+_HEADROOM: Final = 1.25
+
+
+def off_the_clock(facts: GroupFacts) -> Found:
+    """Find required inputs whose stamps are so far off the clock that triggers that no tick can use them."""
+    if facts.ticks_hz is None or not facts.is_silent or facts.is_new:
+        return
+    limit = max(_OFF, 2 * max(waited_for_relay(facts)))
+    oldest = None if facts.tolerance is None else max(limit, facts.tolerance.ns + (facts.max_wait or 0))
+    required = [(index, each) for index, each in enumerate(facts.inputs) if each.required]
+    late = {index: lag - each.offset for index, each in required if (lag := facts.lag(index)) is not None}
+    off = {index: by for index, by in late.items() if by < -limit or (oldest is not None and by > oldest)}
+    if not off:
+        return
+    index = max(off, key=lambda each: abs(off[each]))
+    by = off[index]
+    are_all = len(off) == len(required) > 1 and max(off.values()) - min(off.values()) < _OFF
+    whose = "all inputs" if are_all else facts.inputs[index].name
+    yield Finding(
+        Code.OTHER_CLOCK,
+        Severity.ERROR,
+        f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} {_clock(facts)},"
+        " which triggers the sets",
+        _to_one_clock(facts),
+        None if are_all else index,
+    )
+
+
+def _clock(facts: GroupFacts) -> str:
+    if facts.is_recorded:
+        return "the recorder's clock"
+    return "this machine's clock" if facts.clock is None else "/clock"
+
+
+def _to_one_clock(facts: GroupFacts) -> str:
+    if facts.is_recorded:
+        return (
+            "record what a simulation publishes with `ros2 bag record --use-sim-time`, or let an input be the `trigger`"
+        )
+    if facts.clock is None:
+        return (
+            "with a simulation or a recording, write `node: {use_sim_time: true}` and play it with --clock; else"
+            " synchronize the clocks of the machines"
+        )
+    return "check whether what publishes these topics uses simulated time as well"
+
+
+def too_old(facts: GroupFacts) -> Found:
+    """Find the required input whose latest message is too old for ticks, by how late and how seldom it comes."""
+    if facts.ticks_hz is None or facts.tolerance is None or (not facts.is_silent and not _lacks_sets(facts)):
+        return
+    max_age, found = facts.tolerance.ns, [(_ages(facts, each), each) for each in facts.inputs if each.required]
+    known = [(ages, each) for ages, each in found if ages is not None]
+    if not known:
+        return
+    (least, most), an_input = max(known, key=lambda each: each[0][1])
+    if most <= max_age:
+        return
+    yield Finding(
+        Code.OVER_SLOP,
+        Severity.ERROR if facts.is_silent else Severity.WARN,
+        f"at a tick, the latest message of {an_input.name} is {words.duration(least)} to {words.duration(most)} old,"
+        f" max_age is {words.duration(max_age)}",
+        f"write `max_age: {words.at_least(round(_HEADROOM * most))}`{_or_wait(facts, an_input, most - least)}",
+    )
+
+
+def _lacks_sets(facts: GroupFacts) -> bool:
+    figures = facts.figures
+    was_watched = figures.now - max(figures.began, figures.resumed or 0) >= _WATCHED
+    return was_watched and figures.rate_hz < _NEARLY_ALL * facts.possible_hz
+
+
+def _ages(facts: GroupFacts, an_input: InputFacts) -> tuple[int, int] | None:
+    """Return how old its latest message is at ticks, at least and at most; None of too few to tell."""
+    figures = an_input.figures
+    if not figures.delays or not figures.pace_hz:
+        return None
+    late = max(0, median_low(figures.delays) - an_input.offset - (facts.max_wait or 0))
+    return late, late + round(SECOND / figures.pace_hz)
+
+
+def _or_wait(facts: GroupFacts, an_input: InputFacts, period: int) -> str:
+    """Offer to wait for messages that come late, where that alone would do."""
+    late = (an_input.figures.delay or 0) - an_input.offset
+    if late <= (facts.max_wait or 0) or facts.tolerance is None or period > facts.tolerance.ns:
+        return ""
+    return f", or `max_wait: {words.at_least(round(_HEADROOM * late))}`, which delays every set by that"

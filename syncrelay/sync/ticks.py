@@ -1,0 +1,47 @@
+"""The grid on which a clock triggers: its ticks, in whole nanoseconds, without drift."""
+
+from dataclasses import dataclass
+
+_NS_PER_SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Ticks:
+    """Ticks at `numerator` / `denominator` Hz. Tick k is at k * 10**9 * denominator // numerator nanoseconds.
+
+    They are counted from the epoch, not from when anybody began: whoever has the time has the ticks, be it the relay
+    that runs, one that was started later, or a replay. k * period with a rounded period would drift: at 30 Hz by a
+    whole tick in 39 days.
+    """
+
+    numerator: int
+    denominator: int = 1
+
+    def __post_init__(self) -> None:
+        if self.numerator < 1 or self.denominator < 1:
+            raise ValueError(f"numerator {self.numerator} and denominator {self.denominator} must be 1 or more")
+
+    @property
+    def hz(self) -> float:
+        """How many there are a second."""
+        return self.numerator / self.denominator
+
+    @property
+    def period_ns(self) -> int:
+        """The time between two, rounded up."""
+        return -(-_NS_PER_SECOND * self.denominator // self.numerator)
+
+    def at(self, index: int) -> int:
+        """When a tick is."""
+        return index * _NS_PER_SECOND * self.denominator // self.numerator
+
+    def last_until(self, time: int) -> int:
+        """The index of the last tick that is not after a time."""
+        return -(-(time + 1) * self.numerator // (_NS_PER_SECOND * self.denominator)) - 1
+
+    def first_from(self, time: int) -> int:
+        """The index of the first tick that is not before a time."""
+        return self.last_until(time - 1) + 1
+
+    def __str__(self) -> str:
+        return f"{self.hz:.10g} Hz"

@@ -1,0 +1,104 @@
+"""A clock as trigger on a recording: sets at a fixed rate, the same whatever makes them."""
+
+import json
+
+import pytest
+from rosbags.highlevel import AnyReader
+
+from syncrelay.cdr import read_stamp
+from syncrelay.config import load_text
+from syncrelay.rig.schedule import SENSORS
+from syncrelay.sync import Match, Message, Ticks
+from tests.cli.command import run
+from tests.ros.configs import config
+
+_TOPICS = [sensor.topic for sensor in SENSORS.values()]
+_WAIT = 60_000_000
+_TEXT = config(
+    {
+        "fixed": {
+            "policy": "latest_time",
+            "trigger": "29.97 Hz",
+            "max_age": "200ms",
+            "max_wait": "60ms",
+            "restamp": "trigger",
+            "topics": [{"topic": topic} for topic in _TOPICS],
+        }
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("clock")
+    (made / "f.yaml").write_text(_TEXT)
+    assert run("demo", "--record", "rig.mcap", "--seconds", "4", folder=made).returncode == 0
+    return made
+
+
+@pytest.fixture(scope="module")
+def lines(folder):
+    done = run("replay", "rig.mcap", "--config", "f.yaml", "--json", "-o", "out.mcap", folder=folder)
+    assert done.returncode == 0
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def test_there_is_a_set_at_every_tick_of_none_newer_than_it(lines):
+    grid = Ticks(2997, 100)
+    ticks = [line["time"] - _WAIT for line in lines]
+    first = grid.first_from(ticks[0])
+    assert ticks == [grid.at(first + number) for number in range(len(ticks))]
+    # From when all sensors have begun to the end.
+    assert len(ticks) == pytest.approx(4 * 29.97, rel=0.1)
+    for tick, line in zip(ticks, lines, strict=True):
+        assert all(0 <= tick - stamp <= 200_000_000 for stamp in line["stamps"].values())
+
+
+def test_they_are_those_of_the_engine_fed_with_the_arrivals_as_it_is_live(folder, lines):
+    engine = load_text(_TEXT).groups[0].engine()
+    sets = []
+
+    def note(outcomes):
+        sets.extend(outcome.stamps for outcome in outcomes if isinstance(outcome, Match))
+
+    with AnyReader([folder / "rig.mcap"]) as reader:
+        for connection, received, raw in reader.messages():
+            # A loop that wakes when something comes, and seldom besides.
+            note(engine.add(Message(_TOPICS.index(connection.topic), read_stamp(raw), None), now=received))
+        end = received
+    note(engine.expire(now=end + _WAIT))
+    assert sets == [tuple(line["stamps"][topic] for topic in _TOPICS) for line in lines]
+
+
+def test_what_is_written_has_the_stamps_of_the_ticks(folder, lines):
+    with AnyReader([folder / "out.mcap"]) as reader:
+        written = [read_stamp(raw) for connection, _, raw in reader.messages() if "lidar" in connection.topic]
+    assert written == [line["time"] - _WAIT for line in lines]
+
+
+def test_the_drawing_of_a_file_tells_the_clock(folder):
+    assert "trigger 29.97 Hz" in run("graph", "f.yaml", folder=folder).stdout
+
+
+def test_another_rate_is_told_by_diff(folder):
+    (folder / "g.yaml").write_text(_TEXT.replace("29.97 Hz", "10 Hz"))
+    assert "trigger: 29.97 Hz -> 10 Hz" in run("diff", "f.yaml", "g.yaml", folder=folder).stdout
+
+
+def test_a_drawn_case_tells_the_stamp_of_the_tick(folder):
+    case = """
+version: 1
+config: drawn.yaml
+cases:
+  by the clock:
+    drawing: |
+      a |.a.......
+      b |..b......
+      -> @5: ab stamped tick
+"""
+    (folder / "tests.yaml").write_text(case)
+    drawn = {"policy": "latest_time", "trigger": "20 Hz", "restamp": "trigger"}
+    topics = [{"topic": f"/{name}", "type": "sensor_msgs/msg/Imu"} for name in "ab"]
+    (folder / "drawn.yaml").write_text(config({"drawn": {**drawn, "topics": topics}}))
+    done = run("test", "tests.yaml", folder=folder)
+    assert done.returncode == 0, done.stdout + done.stderr

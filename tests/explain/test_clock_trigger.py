@@ -1,0 +1,116 @@
+"""What is found of a group that a clock triggers: its rate, inputs that stop, stamps off the clock or too old."""
+
+import pytest
+from cases import LIDAR, camera
+from groups import BEGAN, MS, S, a_group, a_silent_group, an_input
+
+from syncrelay.config import load_text
+from syncrelay.explain import Code, GroupWatch, InputGraph, Judge, Severity, Tolerance, judge, with_ok
+from syncrelay.explain.dry_run import EngineDriver
+from syncrelay.explain.facts import ClockState, Endpoint
+from syncrelay.sync import Match, Message
+
+IMAGE = "sensor_msgs/msg/Image"
+CLOCKED = {"policy": "latest_time", "ticks_hz": 30.0, "tolerance": Tolerance("max_age", 200 * MS)}
+
+
+def figures_of(delay, pace_hz=10.0):
+    return {"delay": None, "delays": (delay,) * 20, "pace_hz": pace_hz}
+
+
+def watched(keys, streams, *, until_s):
+    """The findings of each second, of messages that are `streams` of period, delay and end in milliseconds."""
+    topics = "".join(f"      - {{topic: /{name}, type: {IMAGE}}}\n" for name in streams)
+    text = f"version: 1\ngroups:\n  fixed:\n    policy: latest_time\n    {keys}\n    topics:\n{topics}"
+    config = load_text(text).groups[0]
+    messages = sorted(
+        (BEGAN + (ms + delay) * MS, index, BEGAN + ms * MS)
+        for index, (period, delay, end) in enumerate(streams.values())
+        for ms in range(0, end, period)
+    )
+    sets = []
+
+    def take(outcomes, _now):
+        sets.extend((each.stamps, 0) for each in outcomes if isinstance(each, Match))
+
+    driver, watch, judge_of = EngineDriver(config, take), GroupWatch(config, began=BEGAN), Judge()
+    publisher = (Endpoint("/driver", IMAGE),)
+    graph = [InputGraph(f"/{name}", f"/fixed/{name}", publisher) for name in streams]
+    told = []
+    for second in range(1, until_s + 1):
+        now = BEGAN + second * S
+        came = [each for each in messages if now - S <= each[0] < now]
+        for received, index, stamp in came:
+            driver.add(Message(index, stamp, received), now=received)
+        driver.expire(now)
+        arrivals = [[(stamp, received) for received, at, stamp in came if at == index] for index in range(len(streams))]
+        watch.add(arrivals, list(sets), driver.engine.counts(), driver.engine.sets, now=now)
+        sets.clear()
+        facts = watch.facts(graph, now=now)
+        told.append(with_ok(facts, judge_of.judge(facts)))
+    return told
+
+
+def test_a_group_that_is_well_runs_at_the_rate_of_its_clock():
+    (finding,) = watched("trigger: 30 Hz", {"camera": (33, 5, 30_000), "lidar": (100, 20, 30_000)}, until_s=20)[-1]
+    assert finding.code is Code.HEALTHY
+    assert finding.text.startswith("30 of 30 possible sets a second")
+
+
+def test_an_input_that_stopped_is_why_no_set_leaves():
+    keys = "trigger: 30 Hz\n    max_age: 500ms"
+    (finding,) = watched(keys, {"camera": (33, 5, 30_000), "lidar": (100, 20, 10_000)}, until_s=20)[-1]
+    assert (finding.code, finding.severity, finding.input) == (Code.SILENT, Severity.ERROR, 1)
+
+
+@pytest.mark.parametrize(
+    ("max_age", "code"), [("20ms", Severity.ERROR), ("50ms", Severity.WARN)], ids=["at every tick", "at some"]
+)
+def test_messages_that_are_too_old_at_ticks_are_found_and_the_value_that_is_told_cures(max_age, code):
+    streams = {"camera": (33, 5, 40_000), "lidar": (100, 30, 40_000)}
+    (finding,) = watched(f"trigger: 30 Hz\n    max_age: {max_age}", streams, until_s=30)[-1]
+    assert (finding.code, finding.severity) == (Code.OVER_SLOP, code)
+    assert finding.text.startswith("at a tick, the latest message of /lidar is 30 ms to 130 ms old, max_age is")
+    assert finding.suggestion == "write `max_age: 180ms`"
+    assert watched("trigger: 30 Hz\n    max_age: 180ms", streams, until_s=30)[-1][0].code is Code.HEALTHY
+
+
+def test_a_longer_wait_is_offered_where_messages_are_only_late():
+    streams = {"camera": (33, 5, 40_000), "lidar": (100, 150, 40_000)}
+    (finding,) = watched("trigger: 30 Hz\n    max_age: 120ms", streams, until_s=30)[-1]
+    assert finding.suggestion == "write `max_age: 350ms`, or `max_wait: 200ms`, which delays every set by that"
+    cured = watched("trigger: 30 Hz\n    max_age: 120ms\n    max_wait: 200ms", streams, until_s=30)[-1]
+    assert cured[0].code is Code.HEALTHY
+
+
+@pytest.mark.parametrize(
+    ("delay", "facts", "text"),
+    [
+        (3 * 86_400 * S, {}, "stamps of all inputs are 3 days behind this machine's clock, which triggers the sets"),
+        (-40 * S, {}, "stamps of all inputs are 40 s ahead of this machine's clock, which triggers the sets"),
+        (40 * S, {"is_recorded": True}, "stamps of all inputs are 40 s behind the recorder's clock, which triggers"),
+        (40 * S, {"clock": ClockState(received=True)}, "stamps of all inputs are 40 s behind /clock, which triggers"),
+    ],
+)
+def test_stamps_that_are_off_the_clock_are_found(delay, facts, text):
+    inputs = [an_input(name, figures=figures_of(delay)) for name in ("/camera", "/lidar")]
+    (finding,) = judge(a_silent_group(*inputs, **CLOCKED, **facts))
+    assert (finding.code, finding.severity, finding.input) == (Code.OTHER_CLOCK, Severity.ERROR, None)
+    assert finding.text.startswith(text)
+
+
+def test_of_one_input_off_the_clock_its_name_is_told():
+    (finding,) = judge(a_silent_group(camera(figures=figures_of(40 * S)), LIDAR, **CLOCKED))
+    assert (finding.code, finding.input) == (Code.OTHER_CLOCK, 0)
+    assert "/camera are 40 s behind" in finding.text
+
+
+def test_old_stamps_do_not_matter_where_any_age_will_do():
+    inputs = [an_input(name, figures=figures_of(40 * S)) for name in ("/camera", "/lidar")]
+    found = judge(a_silent_group(*inputs, **{**CLOCKED, "tolerance": None}))
+    assert Code.OTHER_CLOCK not in [each.code for each in found]
+
+
+def test_every_input_is_held_so_one_that_repeats_its_stamp_is_no_fault():
+    repeating = camera(figures={"duplicates": 50})
+    assert judge(a_group(repeating, LIDAR, **{**CLOCKED, "tolerance": None})) == ()

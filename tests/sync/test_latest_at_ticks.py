@@ -1,0 +1,510 @@
+from collections import Counter
+from dataclasses import dataclass
+from functools import partial
+
+import pytest
+from drawn import group_cases
+from grouped import grouped
+from hypothesis import given
+from hypothesis import strategies as st
+from rigs import REPEATABLE, START, TICK, Step, few, finish, run, steps, take
+from timeline import START_NS, TICK_NS
+
+from syncrelay.sync import Drop, DropReason, LatestAtTicks, LatestTime, Match, Message, Restamp, SyncGroup, Ticks
+from syncrelay.sync.latest_at_ticks import REST_NS
+
+
+def by_clock(inputs=2, queue=10, age=None, hz=20, **options):
+    """Ticks at columns 0, 5, 10, ..."""
+    max_age_ns = None if age is None else age * TICK_NS
+    return grouped(LatestAtTicks(n_inputs=inputs, queue_size=queue, ticks=Ticks(hz), max_age_ns=max_age_ns), **options)
+
+
+third_optional = {"inputs": 3, "required": (True, True, False)}
+
+test_drawn = group_cases(
+    {
+        "at each tick the latest of every input leaves, be it the same as before": (
+            by_clock,
+            """
+            lidar |.a.....b........
+            odom  |..A.............
+            -> @5: aA
+            -> @10: bA
+            -> @15: bA
+            """,
+        ),
+        "a message newer than the tick does not serve it": (
+            partial(by_clock, max_wait=3),
+            """
+            lidar |.a....b........
+            odom  |A..............
+            -> @8: aA
+            -> @13: bA
+            """,
+        ),
+        "max_wait is how long a message may be on its way": (
+            partial(by_clock, max_wait=3),
+            """
+            lidar |.a..b..........
+            odom  |..A..c.........
+            arrive: a A c b
+            -> c: A superseded
+            -> b: a superseded
+            -> @8: bc
+            -> @13: bc
+            """,
+        ),
+        "a message that comes when its tick has left serves the next": (
+            by_clock,
+            """
+            lidar |.a..b......
+            odom  |..A...c....
+            arrive: a A c b
+            -> @5: aA
+            -> @10: bc
+            """,
+        ),
+        "a message that comes at its tick comes too late for it": (
+            by_clock,
+            """
+            lidar |.a...b.....
+            odom  |A..........
+            -> @5: aA
+            -> @10: bA
+            """,
+        ),
+        "no set leaves before every required input has had a message": (
+            by_clock,
+            """
+            lidar |.a..........
+            odom  |.......A....
+            -> @10: aA
+            """,
+        ),
+        "no set leaves when a required input has nothing young enough": (
+            partial(by_clock, age=5),
+            """
+            lidar |.a..b.......c.d.
+            odom  |..A...........B.
+            -> b: a superseded
+            -> @5: bA
+            -> d: c superseded
+            -> @15: dB
+            """,
+        ),
+        "what is too old for the next tick when it comes expires": (
+            partial(by_clock, age=3),
+            """
+            lidar |.a...
+            odom  |....A.
+            -> a: a expired
+            """,
+        ),
+        "a message of just the greatest age still serves": (
+            partial(by_clock, age=4),
+            """
+            lidar |.a....
+            odom  |.A....
+            -> @5: aA
+            """,
+        ),
+        "a set leaves without an optional input that has nothing": (
+            partial(by_clock, age=4, **third_optional),
+            """
+            lidar |.a.....b...c....
+            odom  |.A.....B...C....
+            gps   |...G............
+            -> @5: aAG
+            -> @10: bB-
+            -> @15: cC-
+            """,
+        ),
+        "of the messages between two ticks only the last is kept": (
+            partial(by_clock, queue=1),
+            """
+            lidar |abcd..
+            odom  |.A....
+            -> b: a superseded
+            -> c: b superseded
+            -> d: c superseded
+            -> @5: dA
+            """,
+        ),
+        "an older message is of no use beside a newer one of its tick": (
+            by_clock,
+            """
+            lidar |.ab...
+            odom  |A.....
+            arrive: A b a
+            -> a: a superseded
+            -> @5: bA
+            """,
+        ),
+        "what waits for more ticks than the queue is long overflows": (
+            partial(by_clock, queue=2, max_wait=16),
+            """
+            lidar |a....b....c....d....e
+            odom  |.....A...............
+            -> c: a overflow
+            -> d: b overflow
+            -> e: c overflow
+            """,
+        ),
+        "what is not newer than a message that has served is late": (
+            by_clock,
+            """
+            lidar |..b....
+            lidar |.a.....
+            odom  |A......
+            arrive: A b a
+            -> a: a superseded
+            -> @5: bA
+            """,
+        ),
+        "a later message of a stamp that is queued replaces the one before": (
+            by_clock,
+            """
+            lidar |.a....
+            lidar |.b....
+            odom  |A.....
+            arrive: A a b
+            -> b: a duplicate
+            -> @5: bA
+            """,
+        ),
+        "only every second set leaves, by ticks": (
+            partial(by_clock, every=2),
+            """
+            lidar |.a......b.......
+            odom  |.A..............
+            -> @5: aA
+            -> @15: bA
+            """,
+        ),
+        "max_rate thins by the times of ticks, not by the stamps that are held": (
+            partial(by_clock, min_set_period_ns=10 * TICK_NS),
+            """
+            lidar |.a..................
+            odom  |.A..................
+            -> @5: aA
+            -> @15: aA
+            """,
+        ),
+    }
+)
+
+
+def at(ms):
+    return START_NS + ms * 1_000_000
+
+
+def message(index, ms):
+    return Message(index, at(ms), None)
+
+
+def sets_of(outcomes):
+    return [outcome for outcome in outcomes if isinstance(outcome, Match)]
+
+
+@pytest.mark.parametrize(
+    ("ticks", "index", "expected"),
+    [
+        (Ticks(30), 1, 33_333_333),
+        (Ticks(30), 3, 100_000_000),
+        (Ticks(2997, 100), 2997, 100_000_000_000),
+        (Ticks(1, 10), 1, 10_000_000_000),
+        (Ticks(10_000), 17_000_000_000_001, 1_700_000_000_000_100_000),
+    ],
+)
+def test_ticks_are_whole_nanoseconds_that_do_not_drift(ticks, index, expected):
+    assert ticks.at(index) == expected
+
+
+@REPEATABLE
+@given(
+    numerator=st.integers(1, 10**10),
+    denominator=st.integers(1, 10**9),
+    time=st.integers(-(10**18), 4 * 10**18),
+)
+def test_every_time_lies_between_two_ticks(numerator, denominator, time):
+    ticks = Ticks(min(numerator, 10_000 * denominator), denominator)
+    last = ticks.last_until(time)
+    assert ticks.at(last) <= time < ticks.at(last + 1)
+    first = ticks.first_from(time)
+    assert ticks.at(first - 1) < time <= ticks.at(first)
+
+
+@pytest.mark.parametrize(("numerator", "denominator"), [(0, 1), (-1, 1), (1, 0)])
+def test_a_rate_that_is_not_above_0_is_refused(numerator, denominator):
+    with pytest.raises(ValueError, match="must be 1 or more"):
+        Ticks(numerator, denominator)
+
+
+@pytest.mark.parametrize("wrong", [{"required": (False, False)}, {"required": (True,)}, {"max_age_ns": -1}])
+def test_options_out_of_range_are_refused(wrong):
+    with pytest.raises(ValueError, match="must be"):
+        LatestAtTicks(**{"n_inputs": 2, "queue_size": 1, "ticks": Ticks(20), **wrong})
+
+
+def test_a_stamp_of_ticks_needs_a_clock():
+    with pytest.raises(ValueError, match="clock"):
+        grouped(LatestTime(n_inputs=2, queue_size=1, trigger=0), restamp=Restamp.TICK)
+
+
+@pytest.mark.parametrize(
+    ("restamp", "expected"), [(None, None), (Restamp.TICK, at(50)), (Restamp.EARLIEST, at(10)), (0, at(20))]
+)
+def test_a_set_may_have_the_stamp_of_its_tick_and_always_tells_it(restamp, expected):
+    group = by_clock(restamp=restamp)
+    for each in (message(0, 20), message(1, 10)):
+        group.add(each, now=at(30))
+    (match,) = group.expire(now=at(50))
+    assert (match.tick, match.stamp) == (at(50), expected)
+
+
+def test_an_hour_in_which_nothing_came_costs_no_work_and_gives_no_more_sets_than_its_first_seconds():
+    group = by_clock(hz=10_000, queue=10)
+    for index in range(2):
+        group.add(message(index, 0), now=at(0))
+    hour = 3_600_000
+    left = sets_of(group.expire(now=at(hour)))
+    assert len(left) == REST_NS // 100_000
+    assert group.next_deadline() is None
+    group.add(message(0, hour), now=at(hour))
+    assert group.next_deadline() == at(hour) + 100_000
+    (match,) = group.expire(now=at(hour) + 100_000)
+    assert match.stamps == (at(hour), at(0))
+
+
+def test_ticks_of_the_time_before_the_first_message_give_no_sets():
+    group = by_clock(max_wait=10)
+    assert group.expire(now=at(0)) == []
+    for index in range(2):
+        assert not sets_of(group.add(message(index, 20), now=at(1000)))
+    # Those from 900 ms on are still waited for.
+    assert [match.tick for match in sets_of(group.expire(now=at(1100)))] == [at(950), at(1000)]
+
+
+def test_no_tick_comes_twice_when_the_clock_is_corrected_and_all_come_again_when_it_starts_again():
+    group = by_clock()
+    for index in range(2):
+        group.add(message(index, 0), now=at(0))
+    assert [match.tick for match in group.expire(now=at(2000))] == [at(50 * n) for n in range(1, 41)]
+    assert group.expire(now=at(1500)) == []
+    assert group.next_deadline() == at(2050)
+    # A reset simulation, which also flushes.
+    group.flush(DropReason.TIME_JUMP)
+    for index in range(2):
+        group.add(message(index, 10), now=at(20))
+    assert [match.tick for match in group.expire(now=at(100))] == [at(50), at(100)]
+
+
+def test_time_that_is_passed_over_gives_no_sets():
+    group = by_clock()
+    for index in range(2):
+        group.add(message(index, 0), now=at(0))
+    group.pass_over(now=at(100))
+    assert [match.tick for match in group.expire(now=at(200))] == [at(150), at(200)]
+
+
+def test_what_is_let_go_is_all_but_the_latest_of_each_input():
+    group = by_clock(max_wait=100)
+    for each in (message(0, 0), message(0, 60), message(1, 10)):
+        group.add(each, now=at(70))
+    assert list(group.let_go(DropReason.PAUSED)) == [Drop(message(0, 0), DropReason.PAUSED)]
+    assert [counts.buffered for counts in group.counts()] == [1, 1]
+
+
+def test_the_queue_that_is_needed_has_room_for_every_tick_that_is_waited_for():
+    def overflowed(queue):
+        group = by_clock(queue=queue, max_wait=50)
+        left = []
+        for ms in range(0, 2000, 10):
+            for index in range(2):
+                left += group.add(message(index, ms), now=at(ms))
+        return group.counts()[0].needed_queue, len(sets_of(left))
+
+    assert overflowed(4) == (12, 0)
+    needed, sets = overflowed(12)
+    assert needed is None
+    assert sets == 30
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Times in steps of 10 ms."""
+
+    required: tuple
+    hz: Ticks
+    max_age: int | None
+    max_wait: int | None
+    offsets: tuple
+    every: int = 1
+    queue: int = 1000
+
+    def group(self):
+        inputs = len(self.required)
+        policy = LatestAtTicks(
+            n_inputs=inputs,
+            queue_size=self.queue,
+            ticks=self.hz,
+            max_age_ns=None if self.max_age is None else self.max_age * TICK,
+        )
+        return SyncGroup(
+            policy,
+            required=self.required,
+            max_wait_ns=None if self.max_wait is None else self.max_wait * TICK,
+            offsets_ns=[offset * TICK for offset in self.offsets],
+            every=self.every,
+            restamp=Restamp.TICK,
+        )
+
+    @property
+    def wait_ns(self):
+        return (self.max_wait or 0) * TICK
+
+
+RATES = (Ticks(100), Ticks(20), Ticks(30), Ticks(2997, 100), Ticks(300), Ticks(3, 2))
+
+
+@st.composite
+def rigs(draw, *, disorder=True, jumps=True, **chosen):
+    inputs = draw(few(1, 3))
+    rig = Rig(
+        required=draw(st.tuples(*[st.booleans()] * inputs).filter(any)),
+        hz=draw(st.sampled_from(RATES)),
+        max_age=draw(st.none() | few(0, 20)),
+        max_wait=draw(st.none() | few(0, 20)),
+        offsets=draw(st.tuples(*[few(-5, 5)] * inputs)),
+        **{key: draw(each) for key, each in chosen.items()},
+    )
+    taken = draw(steps(inputs, disorder=disorder, jumps=jumps))
+    return rig, taken
+
+
+def flat(left):
+    return [outcome for outcomes in left for outcome in outcomes]
+
+
+def slow_sets(rig, taken):
+    """The rule itself: at each tick, of what was added before it, the latest not newer one of every input."""
+    now = taken[0].now
+    last = taken[-1].now
+    first = rig.hz.last_until(now - rig.wait_ns) + 1
+    for index in range(first, rig.hz.last_until(last - rig.wait_ns) + 1):
+        tick = rig.hz.at(index)
+        came = [step.message for step in taken if step.message is not None and step.now < tick + rig.wait_ns]
+        members = []
+        for place in range(len(rig.required)):
+            stamps = [
+                stamp
+                for each in came
+                if each.input == place and (stamp := each.stamp + rig.offsets[place] * TICK) <= tick
+            ]
+            latest = max(stamps, default=None)
+            is_young = latest is not None and (rig.max_age is None or tick - latest <= rig.max_age * TICK)
+            members.append(latest - rig.offsets[place] * TICK if is_young else None)
+        if all(stamp is not None for stamp, needed in zip(members, rig.required, strict=True) if needed):
+            yield tick, tuple(members)
+
+
+@REPEATABLE
+@given(drawn=rigs(disorder=False))
+def test_sets_are_those_of_the_rule(drawn):
+    rig, taken = drawn
+    if taken:
+        left = sets_of(flat(run(rig.group(), taken)))
+        assert [(match.tick, match.stamps) for match in left] == list(slow_sets(rig, taken))
+
+
+@REPEATABLE
+@given(drawn=rigs(queue=few(1, 4), every=few(1, 3)))
+def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(drawn):
+    rig, taken = drawn
+    group = rig.group()
+    fed, matched, dropped = Counter(), set(), Counter()
+    for step in taken:
+        if step.message is not None:
+            fed[step.message.input] += 1
+        for outcome in take(group, step):
+            if isinstance(outcome, Match):
+                matched |= {each for each in outcome.messages if each is not None}
+            else:
+                dropped[outcome.message.input, outcome.reason] += 1
+        for index, counts in enumerate(group.counts()):
+            assert counts.fed == fed[index] == counts.matched + sum(counts.dropped.values()) + counts.buffered
+            assert counts.matched == sum(each.input == index for each in matched)
+            assert all(dropped[index, reason] == count for reason, count in counts.dropped.items())
+            # And what thinning may yet let pass.
+            assert counts.buffered <= rig.queue + 1
+    group.flush(DropReason.SHUTDOWN)
+    assert [counts.buffered for counts in group.counts()] == [0] * len(rig.required)
+
+
+@REPEATABLE
+@given(drawn=rigs(queue=few(1, 4), every=few(1, 3)))
+def test_each_message_leaves_in_sets_or_once_as_a_drop(drawn):
+    rig, taken = drawn
+    left = flat(finish(rig.group(), taken))
+    dropped = Counter(outcome.message for outcome in left if isinstance(outcome, Drop))
+    matched = {each for match in sets_of(left) for each in match.messages if each is not None}
+    assert dropped + Counter(matched) == Counter(step.message for step in taken if step.message is not None)
+
+
+@REPEATABLE
+@given(drawn=rigs(queue=few(1, 4)))
+def test_no_message_is_newer_than_its_tick_or_too_old_and_all_required_are_there(drawn):
+    rig, taken = drawn
+    for match in sets_of(flat(run(rig.group(), taken))):
+        assert rig.hz.at(rig.hz.last_until(match.tick)) == match.tick == match.stamp
+        for stamp, needed, offset in zip(match.stamps, rig.required, rig.offsets, strict=True):
+            assert stamp is not None or not needed
+            if stamp is not None:
+                age = match.tick - stamp - offset * TICK
+                assert age >= 0
+                assert rig.max_age is None or age <= rig.max_age * TICK
+
+
+@REPEATABLE
+@given(drawn=rigs(jumps=False, queue=few(1, 4)))
+def test_no_input_ever_goes_back(drawn):
+    rig, taken = drawn
+    left = sets_of(flat(run(rig.group(), taken)))
+    for index in range(len(rig.required)):
+        stamps = [match.stamps[index] for match in left if match.stamps[index] is not None]
+        assert stamps == sorted(stamps)
+
+
+@REPEATABLE
+@given(drawn=rigs(queue=few(1, 4), every=few(1, 3)), data=st.data())
+def test_calling_expire_more_often_changes_nothing(drawn, data):
+    rig, taken = drawn
+    seldom, often = rig.group(), rig.group()
+    clock = START
+    for step in taken:
+        before = clock
+        clock = max(clock, step.now)
+        expected = list(take(seldom, Step(clock, step.message)))
+        moments = sorted(data.draw(st.lists(st.integers(before, clock), max_size=4)))
+        found = [outcome for moment in moments for outcome in often.expire(now=moment)]
+        while (deadline := often.next_deadline()) is not None and deadline <= clock:
+            found += often.expire(now=deadline)
+        assert [*found, *take(often, Step(clock, step.message))] == expected
+        assert list(often.expire(now=clock)) == []
+
+
+@REPEATABLE
+@given(drawn=rigs(queue=few(1, 4)))
+def test_the_next_deadline_is_when_the_next_set_leaves(drawn):
+    rig, taken = drawn
+    group = rig.group()
+    clock = START
+    for step in taken:
+        clock = max(clock, step.now)
+        take(group, Step(clock, step.message))
+    deadline = group.next_deadline()
+    if deadline is not None:
+        assert deadline > clock
+        assert list(group.expire(now=deadline - 1)) == []
+        assert [match.tick + rig.wait_ns for match in sets_of(group.expire(now=deadline))] == [deadline]
