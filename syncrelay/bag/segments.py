@@ -87,7 +87,7 @@ def _truthful(read: Callable[[Segment], list[RawMessage]], losses: Losses) -> Ca
     def read_truthful(segment: Segment) -> list[RawMessage]:
         found = read(segment)
         times = [time for _, time, _ in found if 0 <= time <= LATEST]
-        if segment.begin > segment.end or (times and not segment.begin <= min(times) <= max(times) <= segment.end):
+        if times and not segment.begin <= min(times) <= max(times) <= segment.end:
             raise losses.not_in_parts(segment.offset)
         return found
 

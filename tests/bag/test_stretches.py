@@ -180,6 +180,39 @@ def test_the_opening_has_what_was_sent_only_once():
         assert len(task.redone) == redone
 
 
+def test_what_waits_when_a_stretch_goes_on_leaves_when_it_is_due():
+    """/c is optional and sends nothing: set 39, which passes, waits from 3.905 s to 3.995 s, over the border."""
+    recording = drive(1, 10, 0, 0)
+    recording.rows = [row for row in recording.rows if row[0] < 2]
+    topics = inputs(dict.fromkeys(_TOPICS, VECTOR))
+    topics[2]["required"] = False
+    text = config({"front": {"policy": "exact_time", "max_wait": "90ms", "every": 3, "topics": topics}})
+    task = Stretches(lambda: recording, text)
+    stretches = cut_at([BEGIN + 3950 * MS], lead_in_ns=1100 * MS)
+    assert task.joined(stretches) == one_pass(lambda: recording, text)
+    assert task.redone == [*stretches[1:]]
+    first = next(left for left in task.left(stretches[1:])["front"] if left[1] is None)
+    assert first[2] == BEGIN + 3995 * MS
+
+
+def test_a_stretch_that_goes_on_reads_nothing_before_it():
+    recording, begins = drive(1, 10, 0, 0), []
+    batches = recording.batches
+    recording.batches = lambda channels, *, begin, end: begins.append(begin) or batches(channels, begin=begin, end=end)
+    text = config(
+        {"front": {"policy": "equal_key", **_KEYS["equal_key"], "topics": inputs(dict.fromkeys(_TOPICS[:2], VECTOR))}}
+    )
+    task = Stretches(lambda: recording, text)
+    first, second = cut_at([BEGIN + 5 * _SECOND], lead_in_ns=_SECOND, opening_end=BEGIN + _SECOND)
+    before = task.run(first)
+    begins.clear()
+    task.run(second)
+    assert begins == [0, second.read_from]
+    begins.clear()
+    task.run(second, before)
+    assert begins == [second.begin]
+
+
 def test_only_groups_in_another_state_make_a_stretch_be_replayed_again():
     recording = drive(1, 12, 0, 4)
     pair = inputs(dict.fromkeys(_TOPICS[:2], VECTOR))

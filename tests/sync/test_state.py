@@ -210,10 +210,14 @@ def changed(value):
 
 
 @every_policy
-@pytest.mark.parametrize("optional", [False, True], ids=["required", "optional"])
-def test_a_change_of_any_slot_is_a_change_of_state(policy, optional):
+@pytest.mark.parametrize(
+    ("optional", "max_wait"),
+    [(False, None), (False, 9), (True, 9)],
+    ids=["without max_wait", "with max_wait", "with an optional input"],
+)
+def test_a_change_of_any_slot_is_a_change_of_state(policy, optional, max_wait):
     """So nothing that a policy keeps can be forgotten: what is left out has to stand in this file."""
-    chosen = Options(required=(True, True, not optional), max_wait=9, every=2, min_set_period=3)
+    chosen = Options(required=(True, True, not optional), max_wait=max_wait, every=2, min_set_period=3)
     group = make_group(policy, chosen)
     for step in pairs_for(policy)(3)[:-1]:
         take(group, step)
@@ -235,6 +239,55 @@ def test_a_change_of_any_slot_is_a_change_of_state(policy, optional):
     assert unseen <= _ASIDE | _SOMETIMES
     assert unseen - _SOMETIMES == found & _ASIDE
     assert state(group) == before
+
+
+def test_all_that_a_candidate_is_known_by_is_state():
+    group = make_group("approximate_time", Options(required=(True, True)))
+    for step in regular(1):
+        take(group, step)
+    before = state(group)
+    (policy,) = (part for part in parts_of(group, set()) if type(part).__name__ == "ApproximateTime")
+    for slot in ("_candidate_start", "_candidate_end", "_pivot_stamp", "_proof_end"):
+        value = getattr(policy, slot)
+        setattr(policy, slot, value + 1)
+        assert state(group) != before
+        setattr(policy, slot, value)
+    assert state(group) == before
+
+
+def fed(group, *messages):
+    for index, stamp in messages:
+        group.add(Message(index, stamp, (index, stamp)), now=START + 999 * TICK)
+    return group
+
+
+def test_what_was_given_to_a_set_is_state_while_it_makes_a_message_late():
+    chosen = Options(required=(True, True), queue_size=1)
+    after = [(0, START + 1), (1, START + 2)]
+    matched = fed(make_group("exact_time", chosen), (0, START), (1, START), *after)
+    not_matched = fed(make_group("exact_time", chosen), (1, START), *after)
+    assert state(matched) != state(not_matched)
+    late = Message(0, START, "late")
+    assert [drop.reason for drop in matched.add(late, now=START)] == [DropReason.LATE]
+    assert [drop.reason for drop in not_matched.add(late, now=START)] == [DropReason.OVERFLOW]
+
+
+def test_which_input_jumped_is_state_while_others_have_something_left_over():
+    chosen = Options(required=(True, True, True), queue_size=1)
+    before = [(index, START) for index in range(3)]
+    first, second = (0, START // 2), (1, START // 2 + TICK)
+    groups = [fed(make_group("exact_time", chosen), *before, *after) for after in ((first, second), (second, first))]
+    assert state(groups[0]) != state(groups[1])
+    groups = [fed(group, (2, START // 2 + 2 * TICK)) for group in groups]
+    assert state(groups[0]) == state(groups[1])
+
+
+def test_which_optional_input_came_first_is_no_state():
+    chosen = Options(required=(True, False, False), max_wait=9)
+    messages = (1, START), (2, START)
+    assert state(fed(make_group("exact_time", chosen), *messages)) == state(
+        fed(make_group("exact_time", chosen), *reversed(messages))
+    )
 
 
 def test_messages_of_other_names_are_another_state():
