@@ -59,6 +59,8 @@ class LatestAtTicks(Policy):
         "ticks",
     )
 
+    aside = frozenset({"_needed"})
+
     by_clock = True
     repeats = True
 

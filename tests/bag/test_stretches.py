@@ -1,6 +1,7 @@
 """Stretches of a recording, put together, are one pass: every set, drop and count, wherever it is cut."""
 
 import random
+from itertools import product
 
 import pytest
 from hypothesis import given, settings
@@ -45,6 +46,9 @@ def texts(draw, policy):
     if draw(st.integers(0, 4)) == 0:
         keys["max_rate"] = "5 Hz"
     if policy == "latest_time":
+        keys["trigger"] = draw(st.sampled_from(("/a", "10 Hz", "30 Hz")))
+        # As long as max_wait asks for.
+        keys["queue_size"] = 10 if "Hz" in keys["trigger"] else keys["queue_size"]
         topics[2]["required"] = draw(st.booleans())
         if draw(st.booleans()):
             del keys["max_age"]
@@ -55,6 +59,8 @@ def texts(draw, policy):
         topics[1]["offset"] = f"{draw(st.sampled_from((0, -12, 30)))}ms"
     if draw(st.integers(0, 5)) == 0 and policy != "equal_key":
         topics[1]["stamp"] = "receive"
+    if "Hz" in keys.get("trigger", "") and draw(st.booleans()):
+        keys["restamp"] = "trigger"
     plain = {"policy": policy, "topics": inputs(dict.fromkeys(_TOPICS[:2], VECTOR)), **_KEYS[policy]}
     return config({"front": keys, "back": plain})
 
@@ -122,8 +128,14 @@ def test_stretches_are_one_pass_wherever_a_recording_is_cut(policy, data):
     assert Stretches(lambda: recording, text).joined(stretches) == one_pass(lambda: recording, text)
 
 
-@every_policy
-@pytest.mark.parametrize("more", [{}, {"max_wait": "90ms"}, {"max_rate": "7 Hz"}], ids=str)
+_MORE = [{}, {"max_wait": "90ms"}, {"max_rate": "7 Hz"}]
+
+
+@pytest.mark.parametrize(
+    ("policy", "more"),
+    [*product(_KEYS, _MORE), *(("latest_time", {"trigger": "10 Hz", **more}) for more in _MORE)],
+    ids=str,
+)
 def test_a_lead_in_makes_it_needless_to_replay_a_stretch_of_a_healthy_drive_again(policy, more):
     recording = drive(1, 20, 0, 0 if policy == "exact_time" else 4)
     text = config(

@@ -12,10 +12,12 @@ from syncrelay.sync import (
     DropReason,
     EqualKey,
     ExactTime,
+    LatestAtTicks,
     LatestTime,
     Message,
     Restamp,
     SyncGroup,
+    Ticks,
 )
 
 TICK = 10_000_000
@@ -58,12 +60,18 @@ POLICIES = {
     ),
     "equal_key": lambda sizes, _: EqualKey(**sizes),
 }
+# Sets leave as time passes: what is promised of the others as a message comes is not promised of it.
+BY_CLOCK = {
+    "latest_at_ticks": lambda sizes, options: LatestAtTicks(
+        **sizes, ticks=Ticks(10**9, 3 * TICK), max_age_ns=None if options.slop > 4 else options.slop * TICK
+    )
+}
 BY_STAMP = [name for name in POLICIES if name != "equal_key"]
 ONCE = [name for name in POLICIES if name != "latest_time"]
 
 
 def make_policy(name, options):
-    return POLICIES[name]({"n_inputs": options.n_inputs, "queue_size": options.queue_size}, options)
+    return {**POLICIES, **BY_CLOCK}[name]({"n_inputs": options.n_inputs, "queue_size": options.queue_size}, options)
 
 
 def make_group(name, options):
