@@ -39,7 +39,7 @@ _HARD_SPACE: Final = "\N{NO-BREAK SPACE}"
 # A path may be 4096 characters long; its end tells it from others.
 _LONGEST_NAME: Final = 64
 _FAILURES: Final = 5
-_VALUES_TITLE: Final = "suggested values, those for most recordings first; sets are with all that each was suggested"
+_VALUES_TITLE: Final = "suggested values, those for most recordings first; each recording with all of its own"
 # Neither a value as it stands in the file nor a figure and its unit are torn apart.
 _TOGETHER: Final = re.compile(r"`[^`]*`|\d (?:%|s|ms|us|ns|min|h|ppm)\b|\d %")
 _VALUES: Final = 6
@@ -104,7 +104,7 @@ def _row(row: Row) -> Iterator[str]:
 
 
 def _about(figures: Figures) -> str:
-    without = f", {counted(figures.without, 'time')} no set" if figures.without else ""
+    without = f", {counted(figures.without, 'time')} without a set" if figures.without else ""
     return f"{counted(figures.recordings, 'recording')}{without}"
 
 

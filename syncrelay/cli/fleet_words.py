@@ -73,7 +73,7 @@ def gaps_text(figures: Figures) -> str:
     """Return how many gaps there are, and the longest; nothing where there is none."""
     if not figures.gaps:
         return ""
-    return f"{counted(figures.gaps, 'gap')}, longest {words.duration(figures.longest_gap)}"
+    return f"{figures.gaps}, longest {words.duration(figures.longest_gap)}"
 
 
 def counts_text(counts: Counts) -> str:
@@ -125,7 +125,7 @@ def found_text(found: Found) -> str:
 
 def suggested_text(suggested: Suggested) -> str:
     """Return for how many recordings a value was suggested, and what they give with all that was suggested for each."""
-    return f"for {counted(suggested.gain.recordings, 'recording')}, which give {gain_text(suggested.gain)}"
+    return f"for {counted(suggested.gain.recordings, 'recording')}: {gain_text(suggested.gain)}"
 
 
 def span_of_days(report: FleetReport) -> str:

@@ -1,5 +1,7 @@
 """Small documents as `analyze --json` prints them, made from what a test says of a recording."""
 
+import random
+from collections.abc import Iterator
 from typing import Any
 
 from syncrelay.bag.analysis.buckets import counted_in_buckets
@@ -121,3 +123,22 @@ def document(
         "topics": topics if topics is not None else [topic("/camera"), topic("/lidar")],
         "groups": list(groups),
     }
+
+
+def fleet(count: int, *, days: int = 30) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Recordings of 40 robots on some days, each a little different: robot 3 is bad, robot 7 drifts."""
+    chance = random.Random(19)
+    spans = [quantity([chance.randrange(1, 9 * MS) for _ in range(60)]) for _ in range(20)]
+    wider = {value: [change("slop", value)] for value in ("6ms", "7ms", "9ms")}
+    for number in range(count):
+        robot, day = number % 40, number // 40 % days
+        now = 100 - chance.randrange(20) - (50 if robot == 3 else 0)
+        values = wider[chance.choice(list(wider))] if now < 90 else []
+        found = [finding("over_slop", chance.randrange(4, 90))] if values else []
+        if robot == 7:
+            found.append(finding("clock_drift", 60, about=1))
+        made = group(now, 100, *values, then=99 if values else now, findings=found, spans=[MS], latencies=[MS])
+        made["span"] = chance.choice(spans)
+        clocks = [topic("/camera"), topic("/lidar", drift_ppm=chance.uniform(30, 40) if robot == 7 else None)]
+        place = f"/data/fleet/robot_{robot:02}/2024-05-{day + 1:02}/run_{chance.randrange(10**8):08}.mcap"
+        yield place, document(made, begin=MAY_1 + day * 86_400 * SECOND + number, topics=clocks)

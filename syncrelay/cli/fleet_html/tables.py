@@ -33,7 +33,7 @@ from syncrelay.printable import printable
 
 _QUANTILES: Final = "median / 95 % / most"
 _SHARED: Final = ("Drift", "Clocks and stamps", "Dropped", "Recordings with findings", "Suggested values")
-_VALUES: Final = 6
+_VALUES: Final = 3
 _ARROW: Final = "\N{RIGHTWARDS ARROW}"
 # A row with a path of 4096 characters helps nobody, and a thousand of them fill the page.
 _LONGEST_CELL: Final = 600

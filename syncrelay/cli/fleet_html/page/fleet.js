@@ -73,16 +73,19 @@ class Table {
     const row = document.createElement("tr");
     cells.forEach((text, at) => {
       const cell = document.createElement(at ? "td" : "th");
+      const length = [...text].length <= this.short ? "short" : "long";
       if (!at) {
         cell.scope = "row";
-        cell.className = tone;
+        cell.className = `${tone} ${length}`;
+        cell.textContent = text;
       } else if (String(at) === this.bar) {
         cell.className = `rate ${tone}`;
         if (percent !== null) cell.append(bar(percent), " ");
       } else {
-        cell.className = text.length <= this.short ? "short" : "long";
+        cell.className = length;
       }
-      coded(cell, text);
+      // A name is no sentence of ours: backticks in it are its own.
+      if (at) coded(cell, text);
       row.append(cell);
     });
     return row;
