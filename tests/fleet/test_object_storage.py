@@ -182,6 +182,33 @@ def test_recordings_are_found_below_folders_and_by_patterns(folder, relay):  # n
     assert [line.split() for line in done.stdout.splitlines()] == list(found.values()), done.stderr
 
 
+@pytest.mark.parametrize("command", [["export", "--output", "out"], ["replay", "--into", "out"]])
+def test_many_are_done_by_workers_once_and_again_only_when_they_change(command, folder, relay):  # noqa: ARG001
+    below = f"many_{command[0]}"
+    for name in ("a", "b"):
+        write_mcap(folder / f"{name}.mcap", rig())
+        put(folder / f"{name}.mcap", below)
+    words = [command[0], f"s3://fleet/{below}/*.mcap", "--config", "f.yaml", *command[1:], "--jobs", "2"]
+    done = run(*words, folder=folder)
+    assert (done.returncode, done.stdout) == (0, "out: 2 recordings: 2 done\n"), done.stderr
+    ours = run(command[0], "a.mcap", "b.mcap", "--config", "f.yaml", command[1], "here", folder=folder)
+    assert ours.returncode == 0
+    counts = [
+        [
+            entry["facts"]["groups"]
+            for entry in map(json.loads, (folder / into / "ledger.jsonl").read_text().splitlines()[1:])
+        ]
+        for into in ("out", "here")
+    ]
+    assert counts[0] == counts[1]
+    assert counts[0][0][0]["sets"] > 30
+    assert run(*words, folder=folder).stdout == "out: 2 recordings: 2 done before\n"
+    write_mcap(folder / "b.mcap", rig(20))
+    put(folder / "b.mcap", below)
+    assert run(*words, folder=folder).stdout == "out: 2 recordings: 1 done, 1 done before\n"
+    assert _KEY not in (folder / "out" / "ledger.jsonl").read_text()
+
+
 def test_google_cloud_storage_gives_the_same_sets(folder, monkeypatch):
     pytest.importorskip("gcsfs", reason="the extra `fleet` is not installed")
     emulator = pytest.importorskip(
