@@ -13,6 +13,7 @@ from syncrelay.cli.fleet_words import (
     found_text,
     gaps_text,
     head_text,
+    middle_text,
     name_text,
     quantiles_text,
     rate_text,
@@ -140,8 +141,8 @@ def _topic(row: Row) -> Iterator[str]:
     used = f"{figures.matched} of {counted(figures.received - figures.unneeded, 'needed message')} in sets"
     lines = {
         "match rate": f"{rate_text(figures.match_rate)}, {used}" if figures.judged else "",
-        "distance": f"to the nearest of the others {quantiles_text(figures.span)}" if figures.span else "",
-        "delay": f"received after the stamp {quantiles_text(figures.latency)}" if figures.latency else "",
+        "distance": f"to the nearest of the others {middle_text(figures.span)}" if figures.span else "",
+        "delay": f"received after the stamp {middle_text(figures.latency)}" if figures.latency else "",
         "gaps": gaps_text(figures),
         **_messages(figures),
     }

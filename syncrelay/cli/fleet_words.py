@@ -49,6 +49,11 @@ def quantiles_text(found: Quantiles) -> str:
     return f"median {median}, 95 % within {high}, at most {greatest}"
 
 
+def middle_text(found: Quantiles) -> str:
+    """Return the quantiles of what recordings told only the medians of: their 95th percentile is that of no message."""
+    return f"median {words.duration(found.median)}, at most {words.duration(found.greatest)}"
+
+
 def drift_text(drift: Drift | None) -> str:
     """Return the largest drift, and whose it is; nothing where there is none."""
     return "" if drift is None else f"{words.figure(drift.ppm)} ppm ({printable(drift.topic)})"

@@ -32,6 +32,7 @@ from syncrelay.fleet.tally import Quantiles
 from syncrelay.printable import printable
 
 _QUANTILES: Final = "median / 95 % / most"
+_MIDDLE: Final = "median / most"
 _SHARED: Final = ("Drift", "Clocks and stamps", "Dropped", "Recordings with findings", "Suggested values")
 _VALUES: Final = 3
 _ARROW: Final = "\N{RIGHTWARDS ARROW}"
@@ -100,8 +101,8 @@ def _ranking(key: str, title: str, note: str, ranking: Ranking) -> PageTable:
 
 def _topics(ranking: Ranking) -> PageTable:
     columns = (
-        *("Topic", "Match rate", "Of needed messages", "Recordings", "No message", f"Distance: {_QUANTILES}"),
-        *(f"Delay: {_QUANTILES}", "Gaps", *_SHARED),
+        *("Topic", "Match rate", "Of needed messages", "Recordings", "No message", f"Distance: {_MIDDLE}"),
+        *(f"Delay: {_MIDDLE}", "Gaps", *_SHARED),
     )
     note = "Distance is to the nearest message of the other topics, delay from stamp to receipt."
     rows = _rows(ranking, _of_topic)
@@ -132,7 +133,7 @@ def _figures(figures: Figures) -> tuple[str, ...]:
 def _of_topic(figures: Figures) -> tuple[str, ...]:
     used = f"{figures.matched} of {figures.received - figures.unneeded}"
     numbers = (used, str(figures.recordings), str(figures.without or ""))
-    quantiles = (_quantiles(figures.span), _quantiles(figures.latency))
+    quantiles = (_middle(figures.span), _middle(figures.latency))
     return (*numbers, *quantiles, gaps_text(figures), *_shared(figures))
 
 
@@ -159,6 +160,10 @@ def _quantiles(found: Quantiles | None) -> str:
     if found is None:
         return ""
     return " / ".join(words.duration(each) for each in (found.median, found.high, found.greatest))
+
+
+def _middle(found: Quantiles | None) -> str:
+    return "" if found is None else f"{words.duration(found.median)} / {words.duration(found.greatest)}"
 
 
 def _findings(report: FleetReport) -> PageTable:
