@@ -27,6 +27,7 @@ from syncrelay.config.source import read_source
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, UsageError
 from syncrelay.fleet.recordings import names_recordings
+from syncrelay.fleet.robots import RobotPattern
 from syncrelay.printable import printable
 
 _GROUP = "matched"
@@ -69,19 +70,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     if config is not None:
         asked = replace(asked, text=read_source(config).text)
     if arguments.into is not None:
-        from syncrelay.cli.fleet_tasks import AnalyzeTask
-
-        if asked.write:
-            parser.error("--write is for one recording, and --into is for many")
-        task = AnalyzeTask.of(asked)
-        if asked.text is None and not asked.topics:
-            if asked.html or asked.json or arguments.robot:
-                parser.error("--html, --json and --robot tell of groups: name a file with --config FILE, or topics")
-            return do_on_many(task, bags, arguments)
-        from syncrelay.cli.fleet_report import Views, tell_report
-
-        views = Views(asked.html, asked.json, arguments.robot)
-        return do_on_many(task, bags, arguments, then=lambda folder: tell_report(folder, views))
+        return _analyze_many(parser, arguments, bags, asked)
     if arguments.robot:
         parser.error("--robot goes with --into")
     if len(bags) == 1:
@@ -90,6 +79,23 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         load_text(asked.text, name=config)
     works = [Work(redacted(bag), partial(analyze_bag, bag, asked)) for bag in bags]
     return side_by_side(works, jobs=arguments.jobs or len(os.sched_getaffinity(0)))
+
+
+def _analyze_many(parser: Parser, arguments: Namespace, bags: Sequence[str], asked: Asked) -> int:
+    """Leave an analysis of each recording in a folder, and tell of all of them where there are groups to tell of."""
+    from syncrelay.cli.fleet_report import Views, tell_report
+    from syncrelay.cli.fleet_tasks import AnalyzeTask
+
+    if asked.write:
+        parser.error("--write is for one recording, and --into is for many")
+    if asked.text is None and not asked.topics:
+        if asked.html or asked.json or arguments.robot:
+            parser.error("--html, --json and --robot tell of groups: name a file with --config FILE, or topics")
+        return do_on_many(AnalyzeTask.of(asked), bags, arguments)
+    if arguments.robot is not None:
+        RobotPattern.parse(arguments.robot)
+    views = Views(asked.html, asked.json, arguments.robot)
+    return do_on_many(AnalyzeTask.of(asked), bags, arguments, then=lambda folder: tell_report(folder, views))
 
 
 def analyze_bag(bag: str, asked: Asked) -> int:
