@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final, TypeAlias
 
@@ -11,8 +11,8 @@ from syncrelay.bag.recording import AFTER_ALL, Recording
 from syncrelay.bag.replay import GroupResult, InputResult
 from syncrelay.sync import DropReason, InputCounts
 
-# An end that lies asks for more than there are messages.
-_MOST_STRETCHES: Final = 10_000
+# An end that lies asks for more than there are messages. Names of files have four digits for them.
+_MOST_STRETCHES: Final = 9_999
 # Of inputs that send more seldom, more than one message should come; of queues that are full, all.
 _LEAST_LEAD_NS: Final = 10_000_000_000
 _LEAD_PER_PLACE_NS: Final = 100_000_000
@@ -64,6 +64,10 @@ class StretchResult:
         """
         states = [each.exit for each in before.groups]
         return before.stretch.end == self.stretch.begin and [each.entry for each in self.groups] == states
+
+    def without_engines(self) -> "StretchResult":
+        """Return the same, with nothing left to go on from: an engine has all bytes of the messages that it holds."""
+        return replace(self, groups=tuple(replace(each, engine=b"") for each in self.groups))
 
 
 Again: TypeAlias = Callable[[Stretch, StretchResult], StretchResult]

@@ -40,10 +40,16 @@ def require_into(parser: Parser, arguments: Namespace) -> None:
 
 
 def do_on_many(
-    task: Task, words: Sequence[str], arguments: Namespace, *, then: Callable[[Path], object] | None = None
+    task: Task,
+    words: Sequence[str],
+    arguments: Namespace,
+    *,
+    then: Callable[[Path], object] | None = None,
+    engine: Engine | None = None,
 ) -> int:
     """Do a task on all recordings that words name, into a folder, as the options of add_fleet_options say.
 
+    `engine` is another than engine_of gives.
     `then` is called with the folder when nothing is left to do, and what it prints is the outcome, else a line is.
     Returns the exit code: 1 where a recording is at fault. Raises SyncRelayError where a word names no recording, or
     the folder cannot be used; with --strict also for the first recording that is at fault.
@@ -51,7 +57,7 @@ def do_on_many(
     into = Path(os.path.abspath(arguments.into))  # noqa: PTH100  what a user named as a link stays one
     with _Stop() as stop:
         sources = find_sources(words, into=into)
-        engine = _engine(arguments)
+        engine = engine or engine_of(arguments)
         others = Others.REPLACED if arguments.overwrite else Others.REFUSED
         with Run(task, sources, into=into, others=others) as run:
             if run.unreadable:
@@ -82,7 +88,8 @@ def do_on_many(
     return code
 
 
-def _engine(arguments: Namespace) -> Engine:
+def engine_of(arguments: Namespace) -> Engine:
+    """Return what options say that works on recordings. Raises SyncRelayError where it is not installed."""
     jobs = arguments.jobs or len(os.sched_getaffinity(0))
     if arguments.engine == "local":
         return LocalEngine(jobs=jobs)

@@ -1,6 +1,6 @@
 """Sets as Parquet files: one for each group of a recording, in row groups of bounded size."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final
@@ -17,33 +17,29 @@ SUFFIX: Final = ".parquet"
 _ZSTD_LEVEL: Final = 1
 
 
-def write_parquet(sets: SetsOf, folder: Path) -> dict[str, int]:
-    """Write the sets of each group as GROUP.parquet into a folder, a row group at a time; how many of each group.
+def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path, *, ending: str = SUFFIX) -> None:
+    """Write the sets of each group that leave in the steps of a replay, a row group at a time.
 
-    Raises BagError where a file cannot be written.
+    Each group has a file in the folder, its name and `ending`. Raises BagError where a file cannot be written.
     """
     with ExitStack() as opened:
-        writers: dict[str, pq.ParquetWriter] = {}
+        writers: dict[SetTable, pq.ParquetWriter] = {}
+
+        def write(group: SetTable, table: pa.Table, **options: int) -> None:
+            if group not in writers:
+                path = folder / f"{group.binding.group.name}{ending}"
+                writers[group] = opened.enter_context(_open(path, table.schema))
+            writers[group].write_table(table, **options)
+
         try:
-            for group, table in sets.parts():
-                _writer(group, table.schema, folder, writers, opened).write_table(table, row_group_size=len(table))
+            for group, table in sets.parts(steps):
+                write(group, table, row_group_size=len(table))
             for group in sets.groups:
                 # A group without a set has a file too: it says which columns there would be.
-                if not group.count:
-                    table = group.table()
-                    _writer(group, table.schema, folder, writers, opened).write_table(table)
+                if group not in writers:
+                    write(group, group.table())
         except OSError as error:
             raise BagError(f"{folder}: cannot be written: {error.strerror or error}") from error
-    return {group.binding.group.name: group.count for group in sets.groups}
-
-
-def _writer(
-    group: SetTable, schema: pa.Schema, folder: Path, writers: dict[str, pq.ParquetWriter], opened: ExitStack
-) -> pq.ParquetWriter:
-    name = group.binding.group.name
-    if name not in writers:
-        writers[name] = opened.enter_context(_open(folder / f"{name}{SUFFIX}", schema))
-    return writers[name]
 
 
 def _open(path: Path, schema: pa.Schema) -> pq.ParquetWriter:

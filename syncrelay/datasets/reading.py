@@ -1,15 +1,15 @@
 """Sets of recordings as tables, read as they are asked for: memory holds some, whatever the recording's size."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from os import PathLike, fspath
 from typing import Final, NamedTuple
 
 import pyarrow as pa
 
-from syncrelay.bag import Recording, open_recording
+from syncrelay.bag import open_recording
 from syncrelay.bag.bindings import GroupBinding, bind, full_name
-from syncrelay.bag.replay import GroupResult, Replay
+from syncrelay.bag.replay import Listener, Replay
 from syncrelay.config import Config, load
 from syncrelay.config.wording import all_of, did_you_mean
 from syncrelay.datasets.images import ImageFormat
@@ -31,19 +31,26 @@ class Part(NamedTuple):
 
 
 class SetsOf:
-    """The sets of a recording, group by group as tables; what became of all messages when they have been read."""
+    """The sets that leave in a replay, group by group as tables."""
 
-    def __init__(self, recording: Recording, bindings: Sequence[GroupBinding], content: Content, *, name: str) -> None:
-        """`name` is what the sets' column `recording` says.
+    def __init__(
+        self, bindings: Sequence[GroupBinding], content: Content, *, name: str, before: Sequence[int] = ()
+    ) -> None:
+        """`name` is what the sets' column `recording` says; `before` is how many sets each group gave before, if any.
 
-        Raises BagError for a stamp, key or field that a recorded type does not have.
+        Raises BagError for a field that a recorded type does not have.
         """
-        self.groups: Final = tuple(SetTable(binding, content, recording=name) for binding in bindings)
-        self._replay = Replay(recording, bindings, listeners=[group.take for group in self.groups])
+        counts = before or [0] * len(bindings)
+        self.groups: Final = tuple(
+            SetTable(binding, content, recording=name, before=count)
+            for binding, count in zip(bindings, counts, strict=True)
+        )
+        self.listeners: Final[tuple[Listener, ...]] = tuple(group.take for group in self.groups)
+        """What the replay has to tell."""
 
-    def parts(self, *, most_bytes: int = MOST_BYTES) -> Iterator[Part]:
-        """Yield the sets of all groups; those of a group in their order."""
-        for _ in self._replay.steps():
+    def parts(self, steps: Iterable[None], *, most_bytes: int = MOST_BYTES) -> Iterator[Part]:
+        """Yield the sets of all groups, as they leave in the steps of a replay; those of a group in their order."""
+        for _ in steps:
             is_full = sum(group.bytes for group in self.groups) >= most_bytes
             for group in self.groups:
                 if group.gathered and (is_full or group.gathered >= _MOST_SETS):
@@ -51,10 +58,6 @@ class SetsOf:
         for group in self.groups:
             if group.gathered:
                 yield Part(group, group.table())
-
-    def results(self) -> list[GroupResult]:
-        """Give what became of all messages, in the order of the groups."""
-        return self._replay.results()
 
     def faults(self) -> list[str]:
         """Return a sentence for each input of which messages could not be decoded."""
@@ -90,7 +93,9 @@ def read_sets(
         with closing(open_recording([word])) as recording:
             (binding,) = (each for each in bind(loaded, recording) if each.group.name == chosen)
             require_complete([binding])
-            for part in SetsOf(recording, [binding], content, name=word).parts(most_bytes=most_bytes):
+            sets = SetsOf([binding], content, name=word)
+            steps = Replay(recording, [binding], listeners=sets.listeners).steps()
+            for part in sets.parts(steps, most_bytes=most_bytes):
                 yield from part.table.combine_chunks().to_batches()
 
 

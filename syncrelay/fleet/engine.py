@@ -22,10 +22,11 @@ class Finished(NamedTuple):
 class Engine(Protocol):
     """Does jobs, several at a time and in any order."""
 
-    def run(self, jobs: Iterable[Job]) -> Generator[Finished | None, None, None]:
+    def run(self, jobs: Iterable[Job | None]) -> Generator[Finished | None, None, None]:
         """Yield each job when it has ended, and None at least every TICK_S; jobs are taken as there is room for them.
 
-        To close the generator ends all that is at work. A worker that dies costs its own job a try and no other's.
+        None among the jobs says that the next one depends on those that are at work. To close the generator ends all
+        that is at work. A worker that dies costs its own job a try and no other's.
         """
         ...
 

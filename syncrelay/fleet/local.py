@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from syncrelay.fleet.engine import TICK_S, TRIES, Finished, given_up
-from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform, remove_scratch_of
+from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform
 
 LEAST_MEMORY: Final = 1_000_000_000
 """What a worker may take in bytes, however many work at a time."""
@@ -40,7 +40,7 @@ class LocalEngine:
         self._jobs = jobs
         self._memory = max(LEAST_MEMORY, machine_memory() // jobs) if memory is None else memory
 
-    def run(self, jobs: Iterable[Job]) -> Generator[Finished | None, None, None]:
+    def run(self, jobs: Iterable[Job | None]) -> Generator[Finished | None, None, None]:
         """See Engine."""
         waiting = iter(jobs)
         running: dict[int, _Worker] = {}
@@ -125,5 +125,5 @@ def _outcome(worker: _Worker) -> Outcome | None:
             file.seek(0)
             outcome: Outcome = pickle.load(file)  # noqa: S301  written by a process of ours
             return outcome
-    remove_scratch_of(worker.job)
+    worker.job.remove_scratch()
     return None

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from syncrelay.errors import SyncRelayError
 from syncrelay.fleet.engine import TICK_S, TRIES, Finished, given_up
-from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform, remove_scratch_of
+from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform
 
 MEMORY: Final = 1_000_000_000
 """What each task declares to take, in bytes: Ray begins no more tasks on a node than fit."""
@@ -44,7 +44,7 @@ class RayEngine:
         self._ray: Any = ray
         self._jobs = jobs
 
-    def run(self, jobs: Iterable[Job]) -> Generator[Finished | None, None, None]:
+    def run(self, jobs: Iterable[Job | None]) -> Generator[Finished | None, None, None]:
         """See Engine. Raises SyncRelayError where the cluster cannot be reached, or has no room for any task."""
         ray = self._ray
         waiting = iter(jobs)
@@ -78,7 +78,7 @@ class RayEngine:
         except self._ray.exceptions.RayTaskError as error:
             return Finished(job, Failed(str(error), is_bug=True))
         except self._ray.exceptions.RayError as error:
-            remove_scratch_of(job)
+            job.remove_scratch()
             why = f"its worker was lost ({type(error).__name__})"
             return Finished(job, Failed(given_up(job, why)))
 

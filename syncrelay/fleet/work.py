@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from errno import EDQUOT, ENOSPC, EROFS
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 from uuid import uuid4
 
 from syncrelay import own_version
@@ -25,11 +25,27 @@ _PR_SET_PDEATHSIG: Final = 1
 _NO_SPACE: Final = (ENOSPC, EDQUOT, EROFS)
 
 
+class Work(Protocol):
+    """What is done to a recording once its content is known: to all of it, or to a stretch. It can be pickled."""
+
+    def __call__(self, job: "Job", content: Content, folder: Path, /) -> "Outcome":
+        """Do it, with results in a folder that is made here and of its own; raises what Task.run does."""
+        ...
+
+
+def whole(job: "Job", content: Content, folder: Path) -> "Outcome":
+    """Do the task of a job to all of its recording."""
+    folder.mkdir(parents=True)
+    facts = job.task.run(job.source, folder)
+    return finished(job, content, facts, folder)
+
+
 @dataclass(frozen=True, slots=True)
 class Job:
     """One recording of a run: its source, where results go, and what the ledger tells of a result that should be there.
 
-    `version` is the driver's: a worker of another would give other results. `size` is in bytes, 0 where not known.
+    `version` is the driver's: a worker of another would give other results. `size` is in bytes, 0 where not known. Of
+    several jobs on a recording at a time, each has a `part` of its own. `content` is given where it has been read.
     """
 
     source: Source
@@ -38,11 +54,28 @@ class Job:
     done: Entry | None
     size: int
     version: str
+    work: Work = whole
+    part: str = ""
+    content: Content | None = None
 
     @property
     def scratch(self) -> Path:
         """The folder for results that are not finished."""
         return self.into / SCRATCH
+
+    def scratch_folder(self) -> Path:
+        """Return a new name for a result: a worker that was given up for lost may still be writing."""
+        return self.scratch / f"{self._prefix}{uuid4().hex}"
+
+    def remove_scratch(self) -> None:
+        """Remove what lost workers left of it."""
+        for folder in self.scratch.iterdir():
+            if folder.name.startswith(self._prefix):
+                shutil.rmtree(folder, ignore_errors=True)
+
+    @property
+    def _prefix(self) -> str:
+        return f"{self.source.name}.{self.part}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,22 +106,28 @@ class Failed:
     ends_all: bool = False
 
 
-Outcome: TypeAlias = Done | Kept | Failed
+@dataclass(frozen=True, slots=True)
+class Midway:
+    """What work on a part of a recording has found, for whoever gave it; the recording is not done by it."""
+
+    told: Any
+
+
+Outcome: TypeAlias = Done | Kept | Failed | Midway
 
 
 def perform(job: Job) -> Outcome:
     """Do a job; whatever goes wrong is its outcome."""
-    # Of its own: a worker that was given up for lost may still be writing.
-    folder = job.scratch / f"{job.source.name}.{uuid4().hex}"
+    folder = job.scratch_folder()
     if (why := _unfit(job)) is not None:
         return Failed(why, ends_all=True)
-    content = ""
+    content = "" if job.content is None else job.content.hash
     try:
-        found = content_of(job.source.words)
+        found = content_of(job.source.words) if job.content is None else job.content
         content = found.hash
-        if job.done is not None and job.done.content == content and _is_there(job, job.done):
+        if job.content is None and job.done is not None and job.done.content == content and _is_there(job, job.done):
             return Kept()
-        return _result(job, found, folder)
+        return job.work(job, found, folder)
     except SyncRelayError as error:
         failed = Failed(str(error), content)
     except MemoryError:
@@ -109,13 +148,6 @@ def end_with_parent() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def remove_scratch_of(job: Job) -> None:
-    """Remove what lost workers left of a job."""
-    for folder in job.scratch.iterdir():
-        if folder.name.startswith(f"{job.source.name}."):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
 def _unfit(job: Job) -> str | None:
     """Say why no job can be done here, as on another machine that is set up in another way."""
     if own_version() != job.version:
@@ -129,9 +161,8 @@ def _is_there(job: Job, done: Entry) -> bool:
     return are_intact(job.into / job.source.name, done.files.items())
 
 
-def _result(job: Job, content: Content, folder: Path) -> Done:
-    folder.mkdir(parents=True)
-    facts = job.task.run(job.source, folder)
+def finished(job: Job, content: Content, facts: Mapping[str, JSON], folder: Path) -> Done:
+    """Have a result outlast a loss of power; raises BagError where the recording has changed meanwhile."""
     if marks_of(job.source.words) != content.marks:
         raise BagError(f"{job.source.shown[0]}: was changed while it was read: is it still being recorded?")
     return Done(content, facts, results_in(folder), folder)

@@ -280,7 +280,7 @@ def test_a_recording_is_cut_into_equal_stretches_that_are_all_of_it():
     assert {each.opening_end for each in stretches} == {recording.begin + _SECOND}
     assert [each.is_last for each in stretches] == [False, False, False, True]
     assert cut(Made([]), length_ns=_SECOND, lead_in_ns=0) == (Stretch(0, AFTER_ALL, 0, 0),)
-    assert len(cut(recording, length_ns=1, lead_in_ns=0)) == 10_000
+    assert len(cut(recording, length_ns=1, lead_in_ns=0)) == 9_999
     for wrong in ({"length_ns": 0, "lead_in_ns": 0}, {"length_ns": 1, "lead_in_ns": -1}):
         with pytest.raises(ValueError, match="must be"):
             cut(recording, **wrong)

@@ -42,8 +42,10 @@ def test_every_set_is_a_row_and_every_message_is_decoded(name, real_data):
             pass
     rows: dict[str, list[tuple[object, ...]]] = {group.name: [] for group in config.groups}
     with closing(open_recording([str(real_data / name)])) as recording:
-        sets = SetsOf(recording, bind(config, recording), Content(), name=name)
-        for group, table in sets.parts(most_bytes=100_000):
+        bindings = bind(config, recording)
+        sets = SetsOf(bindings, Content(), name=name)
+        steps = Replay(recording, bindings, listeners=sets.listeners).steps()
+        for group, table in sets.parts(steps, most_bytes=100_000):
             inputs = [each.topic for each in group.binding.inputs]
             stamps = table["stamps_ns"].combine_chunks()
             for topic in inputs:
