@@ -15,9 +15,9 @@ from syncrelay.datasets.lerobot.vectors import NAME, VectorSource, field_of, has
 from syncrelay.datasets.tables import Content
 from syncrelay.errors import BagError
 
-INCOMPLETE: Final = "lacks a message"
-NOT_FINITE: Final = "has a value that is no finite number"
-NO_IMAGE: Final = "has an image that cannot be decoded"
+INCOMPLETE: Final = "with a message missing"
+NOT_FINITE: Final = "with a value that is no finite number"
+NO_IMAGE: Final = "with an image that cannot be decoded"
 
 
 class FrameSet(NamedTuple):
