@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container test-workspace faults soak lint schema bench wheel clean
+.PHONY: demo test test-kilted test-container test-workspace test-lerobot faults soak lint schema bench wheel clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -30,6 +30,12 @@ test-container: $(VENV)/test
 # Builds a colcon workspace with this clone in it, and runs what it installs.
 test-workspace: $(VENV)/test $(VENV)/colcon/done
 	SYNCRELAY_COLCON=$(VENV)/colcon $(BIN)/python -m pytest tests/workspace $(ARGS)
+
+# Has lerobot's own loader read what `export --format lerobot` writes. Not in CI: lerobot needs PyTorch, which comes with
+# CUDA, 5.5 GB on the disk. Needs Python 3.12 or later, as lerobot does.
+test-lerobot:
+	$(MAKE) .venv-lerobot/lerobot VENV=.venv-lerobot
+	.venv-lerobot/bin/python -m pytest tests/datasets/test_lerobot_loader.py tests/datasets/test_lerobot.py $(ARGS)
 
 # Breaks what a robot breaks, at length, and prints what was survived; `make test` has the short form of each.
 faults: $(VENV)/test
@@ -72,6 +78,10 @@ $(VENV)/demo: $(BIN)/python $(BUILT_OF)
 
 $(VENV)/test: $(BIN)/python $(BUILT_OF)
 	$(BIN)/python -m pip install -q -e '.[$(ROS),test]'
+	touch $@
+
+$(VENV)/lerobot: $(BIN)/python $(BUILT_OF)
+	$(BIN)/python -m pip install -q -e '.[datasets]' 'lerobot[dataset]>=0.6.1,<0.7' hypothesis pytest pytest-timeout
 	touch $@
 
 # What ros-dev-tools and a sourced ROS bring on a robot: colcon, CMake, and of ament_cmake what the wheels forget to ask for.

@@ -122,7 +122,7 @@ def test_its_statistics_are_those_that_lerobot_computes(load, root):
     assert dataset.meta.stats[FRONT]["mean"].shape == (3, 1, 1)
 
 
-def test_it_goes_together_with_another_by_lerobots_own_tools(load, root, tmp_path):
+def test_it_goes_together_with_another_by_lerobots_own_tools(load, tmp_path):
     from lerobot.datasets.dataset_tools import merge_datasets  # noqa: PLC0415  as above
 
     merged = merge_datasets([load(), load()], "syncrelay/merged", tmp_path / "merged")
