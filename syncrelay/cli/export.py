@@ -10,6 +10,7 @@ from typing import Self
 
 from syncrelay.bag import open_recording
 from syncrelay.bag.bindings import bind
+from syncrelay.cli.export_lerobot import export_lerobot
 from syncrelay.cli.fleet import do_on_many
 from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of
 from syncrelay.cli.parser import Parser
@@ -36,6 +37,10 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         if arguments.raw or arguments.fields or arguments.images:
             parser.error("--fields, --images and --raw are for tables: --format mcap writes whole messages")
         return do_on_many(ReplayTask.of(config, (), 0), arguments.bags, arguments)
+    if arguments.format == "lerobot":
+        if arguments.raw or arguments.fields or arguments.images:
+            parser.error("--fields, --images and --raw are for tables: `export:` in the file says what LeRobot gets")
+        return export_lerobot(config, arguments.bags, arguments)
     if arguments.images:
         # In a worker it would be a bug.
         import_module("PIL.Image")

@@ -5,12 +5,12 @@ import signal
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Any, Final, Self
+from typing import Any, Final, Self, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, OUR_BUG, put, remark, say
 from syncrelay.cli.parser import Parser
@@ -21,12 +21,15 @@ from syncrelay.fleet.local import LocalEngine
 from syncrelay.fleet.progress import Progress
 from syncrelay.fleet.recordings import find_sources
 from syncrelay.fleet.run import Others, Run
-from syncrelay.fleet.task import PROBLEMS, Task
+from syncrelay.fleet.task import PROBLEMS, Source, Task
 from syncrelay.fleet.work import Failed, Job
 from syncrelay.printable import printable
 
 _EVERY_S: Final = 10.0
 _CLEARED: Final = "\r\033[K"
+
+Finish: TypeAlias = Callable[[Run, Sequence[Source]], int]
+"""What is done with the results of all recordings, named in their order; returns an exit code."""
 
 
 def require_into(parser: Parser, arguments: Namespace) -> None:
@@ -39,8 +42,10 @@ def require_into(parser: Parser, arguments: Namespace) -> None:
             parser.error("--engine goes with --into")
 
 
-def do_on_many(task: Task, words: Sequence[str], arguments: Namespace) -> int:
+def do_on_many(task: Task, words: Sequence[str], arguments: Namespace, *, finish: Finish | None = None) -> int:
     """Do a task on all recordings that words name, into a folder, as the options of add_fleet_options say.
+
+    `finish` is called once nothing is left to do, while the folder is still held.
 
     Returns the exit code: 1 where a recording is at fault. Raises SyncRelayError where a word names no recording, or
     the folder cannot be used; with --strict also for the first recording that is at fault.
@@ -65,6 +70,8 @@ def do_on_many(task: Task, words: Sequence[str], arguments: Namespace) -> int:
                     shown.show()
                     if stop.asked is not None:
                         break
+            if finish is not None and stop.asked is None:
+                code = max(code, finish(run, sources))
         if stop.asked is not None:
             remark(f"ended by {stop.asked.name}: {shown.left()}; the same command does the rest")
             if stop.asked is signal.SIGINT:

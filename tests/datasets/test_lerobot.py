@@ -79,6 +79,8 @@ def test_a_dataset_has_the_files_that_its_readers_look_for(tmp_path):
         "total_episodes": 2,
         "total_frames": 29,
         "total_tasks": 1,
+        "held": 0,
+        "left_out": 0,
         "problems": [],
     }
     info = about(tmp_path)

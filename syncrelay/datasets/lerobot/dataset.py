@@ -73,9 +73,9 @@ def write_lerobot(recordings: Sequence[NamedRecording], config: Config, folder: 
 def join_episodes(episodes: Mapping[str, Path], folder: Path) -> dict[str, Any]:
     """Join what write_episode wrote to one LeRobotDataset in a folder, in this order; return facts.
 
-    The facts: `total_episodes`, `total_frames`, `total_tasks`, and `problems`, a sentence for each episode that has
-    other features than the first and was left out. meta/info.json is written last. The same episodes give the same
-    bytes. Raises BagError where the folder cannot be written.
+    The facts: `total_episodes`, `total_frames`, `total_tasks`, `held` and `left_out` as of write_episode, and
+    `problems`, a sentence for each episode that has other features than the first and was left out. meta/info.json is
+    written last. The same episodes give the same bytes. Raises BagError where the folder cannot be written.
     """
     try:
         with ExitStack() as opened:
@@ -106,6 +106,7 @@ class _Dataset:
         self._problems: list[str] = []
         self._episode_count = 0
         self._frames = 0
+        self._sums = {"held": 0, "left_out": 0}
 
     def append(self, name: str, place: Path) -> None:
         about = json.loads((place / ABOUT).read_text(encoding="utf-8"))
@@ -134,6 +135,7 @@ class _Dataset:
         if len(self._rows) == _EPISODES_AT_ONCE:
             self.end()
         self._stats = {key: together(self._stats[key], of) if self._stats else of for key, of in stats.items()}
+        self._sums = {key: number + about[key] for key, number in self._sums.items()}
         self._episode_count += 1
         self._frames += count
 
@@ -173,6 +175,7 @@ class _Dataset:
             "total_episodes": self._episode_count,
             "total_frames": self._frames,
             "total_tasks": len(self._tasks),
+            **self._sums,
             "problems": self._problems,
         }
 
