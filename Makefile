@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container test-workspace test-fleet faults soak lint schema bench wheel clean
+.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot faults soak lint schema bench wheel clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -35,6 +35,12 @@ test-workspace: $(VENV)/test $(VENV)/colcon/done
 test-fleet: $(VENV)/fleet
 	.ci/network-tools
 	$(BIN)/python -m pytest -m ray tests/fleet $(ARGS)
+
+# Has lerobot's own loader read what `export --format lerobot` writes. Not in CI: lerobot needs PyTorch, which comes with
+# CUDA, 5.5 GB on the disk. Needs Python 3.12 or later, as lerobot does.
+test-lerobot:
+	$(MAKE) .venv-lerobot/lerobot VENV=.venv-lerobot
+	.venv-lerobot/bin/python -m pytest tests/datasets/test_lerobot_loader.py tests/datasets/test_lerobot.py $(ARGS)
 
 # Breaks what a robot breaks, at length, and prints what was survived; `make test` has the short form of each.
 faults: $(VENV)/test
@@ -81,6 +87,10 @@ $(VENV)/test: $(BIN)/python $(BUILT_OF)
 
 $(VENV)/fleet: $(VENV)/test
 	$(BIN)/python -m pip install -q -e '.[fleet]'
+	touch $@
+
+$(VENV)/lerobot: $(BIN)/python $(BUILT_OF)
+	$(BIN)/python -m pip install -q -e '.[datasets]' 'lerobot[dataset]>=0.6.1,<0.7' hypothesis pytest pytest-timeout
 	touch $@
 
 # What ros-dev-tools and a sourced ROS bring on a robot: colcon, CMake, and of ament_cmake what the wheels forget to ask for.

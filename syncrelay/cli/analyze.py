@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 from syncrelay.bag import Channel, Recording, is_recording, open_recording
 from syncrelay.bag.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
@@ -95,7 +96,9 @@ def _analyze_many(parser: Parser, arguments: Namespace, bags: Sequence[str], ask
     if arguments.robot is not None:
         RobotPattern.parse(arguments.robot)
     views = Views(asked.html, asked.json, arguments.robot)
-    return do_on_many(AnalyzeTask.of(asked), bags, arguments, then=lambda folder: tell_report(folder, views))
+    return do_on_many(
+        AnalyzeTask.of(asked), bags, arguments, finish=lambda *_: tell_report(Path(arguments.into), views)
+    )
 
 
 def analyze_bag(bag: str, asked: Asked) -> int:

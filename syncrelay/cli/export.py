@@ -13,6 +13,7 @@ from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.bag.replay import Replay
 from syncrelay.bag.stretch_replay import StretchReplay, run_stretch
 from syncrelay.bag.stretches import Stretch, StretchResult, cut, lead_in, total
+from syncrelay.cli.export_lerobot import export_lerobot
 from syncrelay.cli.fleet import do_on_many, engine_of
 from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of
 from syncrelay.cli.parser import Parser
@@ -46,6 +47,10 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         if arguments.stretch is not None:
             parser.error("--stretch goes with --format parquet: --format mcap writes one file")
         return do_on_many(ReplayTask.of(config, (), 0), arguments.bags, arguments)
+    if arguments.format == "lerobot":
+        if arguments.raw or arguments.fields or arguments.images:
+            parser.error("--fields, --images and --raw are for tables: `export:` in the file says what LeRobot gets")
+        return export_lerobot(config, arguments.bags, arguments)
     if arguments.images:
         # In a worker it would be a bug.
         import_module("PIL.Image")

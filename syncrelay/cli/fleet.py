@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Any, Final, Self
+from typing import Any, Final, Self, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, OUR_BUG, put, remark, say
 from syncrelay.cli.parser import Parser
@@ -21,12 +21,15 @@ from syncrelay.fleet.local import LocalEngine
 from syncrelay.fleet.progress import Progress
 from syncrelay.fleet.recordings import find_sources
 from syncrelay.fleet.run import Others, Run
-from syncrelay.fleet.task import PROBLEMS, Task
+from syncrelay.fleet.task import PROBLEMS, Source, Task
 from syncrelay.fleet.work import Failed, Job
 from syncrelay.printable import printable
 
 _EVERY_S: Final = 10.0
 _CLEARED: Final = "\r\033[K"
+
+Finish: TypeAlias = Callable[[Run, Sequence[Source]], int]
+"""What is done with the results of all recordings, named in their order; returns an exit code."""
 
 
 def require_into(parser: Parser, arguments: Namespace) -> None:
@@ -44,13 +47,13 @@ def do_on_many(
     words: Sequence[str],
     arguments: Namespace,
     *,
-    then: Callable[[Path], object] | None = None,
     engine: Engine | None = None,
+    finish: Finish | None = None,
 ) -> int:
     """Do a task on all recordings that words name, into a folder, as the options of add_fleet_options say.
 
-    `engine` is another than engine_of gives.
-    `then` is called with the folder when nothing is left to do, and what it prints is the outcome, else a line is.
+    `engine` is another than engine_of gives. `finish` is called once nothing is left to do, while the folder is still
+    held; what it prints is the outcome, else a line is.
     Returns the exit code: 1 where a recording is at fault. Raises SyncRelayError where a word names no recording, or
     the folder cannot be used; with --strict also for the first recording that is at fault.
     """
@@ -74,17 +77,17 @@ def do_on_many(
                     shown.show()
                     if stop.asked is not None:
                         break
+            summary = printable(f"{arguments.into}: {shown.left()}")
+            if finish is not None and stop.asked is None:
+                say(summary)
+                code = max(code, finish(run, sources))
         if stop.asked is not None:
             remark(f"ended by {stop.asked.name}: {shown.left()}; the same command does the rest")
             if stop.asked is signal.SIGINT:
                 raise KeyboardInterrupt
             return DONE
-    summary = printable(f"{arguments.into}: {shown.left()}")
-    if then is None:
+    if finish is None:
         put(summary)
-    else:
-        say(summary)
-        then(into)
     return code
 
 

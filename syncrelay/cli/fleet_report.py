@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from syncrelay.cli.boundary import put
+from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.fleet_json import fleet_as_json
 from syncrelay.cli.fleet_text import fleet_lines
 from syncrelay.cli.new_file import write_again
@@ -22,8 +22,8 @@ class Views:
     robot: str | None
 
 
-def tell_report(folder: Path, views: Views) -> None:
-    """Tell of all recordings that a folder has analyses of. Raises UsageError for a pattern that is none."""
+def tell_report(folder: Path, views: Views) -> int:
+    """Tell of all recordings that a folder has analyses of; 0. Raises UsageError for a pattern that is none."""
     failed = [Failure(entry.recording[0], entry.error) for entry in read_ledger(folder) if entry.state is State.FAILED]
     report = fleet_report(documents_in(folder), robot=views.robot, failed=failed)
     if views.html is not None:
@@ -33,6 +33,7 @@ def tell_report(folder: Path, views: Views) -> None:
         write_again(views.html, fleet_as_html(report), mark=MARK)
     if views.json:
         put(json.dumps(fleet_as_json(report), indent=2))
-        return
+        return DONE
     for line in fleet_lines(report):
         put(line)
+    return DONE

@@ -89,10 +89,11 @@ def export() -> Parser:
     )
     parser.add_argument(
         "--format",
-        choices=("parquet", "mcap"),
+        choices=("parquet", "mcap", "lerobot"),
         default="parquet",
         metavar="FORMAT",
-        help="parquet (default): BAG/GROUP.parquet in FOLDER; mcap: the sets as a recording, as replay -o writes them",
+        help="parquet (default): BAG/GROUP.parquet in FOLDER; mcap: the sets as a recording, as replay -o writes them;"
+        " lerobot: FOLDER is one LeRobotDataset v3.0, as `export:` in the file says",
     )
     parser.add_argument(
         "--group", metavar="NAME", action="append", default=[], help="export this group only; may be repeated"

@@ -1,5 +1,6 @@
 """The file: read with positions, checked as a whole, and turned into what the relay is told."""
 
+from syncrelay.config.export import ExportFeature, ExportSource, LerobotConfig
 from syncrelay.config.listen import Listen
 from syncrelay.config.load import Config, load, load_text
 from syncrelay.config.models import DiagnosticsConfig, NodeConfig, StampField, StampSource, Tolerance, Transport
@@ -12,7 +13,10 @@ __all__ = [
     "Config",
     "ConfigError",
     "DiagnosticsConfig",
+    "ExportFeature",
+    "ExportSource",
     "GroupConfig",
+    "LerobotConfig",
     "Listen",
     "NodeConfig",
     "Problem",

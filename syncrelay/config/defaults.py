@@ -10,7 +10,7 @@ from syncrelay.config.problems import ConfigError, Path, Problem
 from syncrelay.config.wording import quoted
 from syncrelay.printable import printable
 
-_ONE_FOR_ALL = ("node", "metrics", "diagnostics")
+_ONE_FOR_ALL = ("node", "metrics", "diagnostics", "export")
 
 
 def with_defaults(document: Document) -> Document:

@@ -12,7 +12,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, 
 from pydantic.fields import FieldInfo
 
 from syncrelay.config import policies
-from syncrelay.config.keys import Keys
+from syncrelay.config.export import ExportKeys, LerobotKeys
+from syncrelay.config.keys import NOT_NULL, Keys
 from syncrelay.config.models import DiagnosticsConfig, Group, MetricsConfig, NodeConfig, Topic, Topics
 from syncrelay.config.names import check_group_name
 from syncrelay.config.wording import describe
@@ -45,6 +46,9 @@ class FileKeys(Keys):
         default_factory=DiagnosticsConfig,
         description="What the relay publishes about itself, null for nothing.",
         json_schema_extra={"nullable": True},
+    )
+    export: Annotated[ExportKeys | None, NOT_NULL] = Field(
+        default=None, description="What `syncrelay export` makes of the sets. Default: nothing but tables."
     )
     defaults: Keys | None = None
     groups: dict[str, Group]
@@ -183,7 +187,12 @@ def _partial_format_of(models: tuple[type[Group], ...]) -> type[FileKeys]:
     form = _format_of(models)
     by_policy = {policy: _partial_group(model) for policy, model in form.groups.items()}
     group = _by_policy(by_policy, _partial_group(form.any_group))
-    return _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, group), {}))
+    return _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, group), {}), export=(_partial_export(), None))
+
+
+def _partial_export() -> Any:
+    lerobot = _partial(LerobotKeys, features=(LerobotKeys.model_fields["features"].annotation, {}))
+    return _partial(ExportKeys, lerobot=(lerobot | None, None)) | None
 
 
 def _partial_group(model: type[Group]) -> type[Group]:

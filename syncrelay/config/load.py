@@ -12,6 +12,8 @@ from pydantic import ValidationError
 from syncrelay.config.checks import check_groups, check_node
 from syncrelay.config.defaults import merged_documents, merged_files, with_defaults
 from syncrelay.config.document import Document, flow, plain
+from syncrelay.config.export import LerobotConfig, resolve_lerobot
+from syncrelay.config.export_checks import check_export
 from syncrelay.config.file import FileKeys, file_format
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.listen import Listen
@@ -37,7 +39,7 @@ class Config:
 
     `names` tells what is wrong with it once remaps have made others of its topics' names.
     `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published. `sources` are its files
-    as they were read.
+    as they were read. `lerobot` is for `export` alone.
     """
 
     node: NodeConfig
@@ -47,6 +49,7 @@ class Config:
     names: NamesInFile = field(compare=False, repr=False)
     notes: tuple[Problem, ...] = ()
     sources: tuple[Source, ...] = field(default=(), compare=False, repr=False)
+    lerobot: LerobotConfig | None = None
 
     def written(self, path: Path) -> str | None:
         """Return the value at a path as it is written there or in `defaults`, on one line; None where it is not."""
@@ -117,12 +120,15 @@ def _config(parts: Sequence[_Part], environ: Mapping[str, str]) -> Config:
     problems += check_node(file.node, document)
     problems += check_groups(groups, document)
     problems += names.problems(file.node.absolute, groups=file.groups)
-    problems += _types(groups, document, environ)
+    interfaces = Interfaces.find(environ)
+    problems += _types(groups, document, interfaces)
+    problems += check_export(file.export, file.node, groups, document, interfaces)
     found = _in_order(problems, files=[source.name for source in document.sources.values()])
     if document.faulty or any(problem.severity is Severity.ERROR for problem in found):
         raise ConfigError(found)
     sources = tuple(document.sources.values())
-    return Config(file.node, groups, resolve_listen(file.metrics), file.diagnostics, names, found, sources)
+    lerobot = resolve_lerobot(file.export, file.node, [group.name for group in groups])
+    return Config(file.node, groups, resolve_listen(file.metrics), file.diagnostics, names, found, sources, lerobot)
 
 
 def _parts(reads: Sequence[Callable[[], Source]], environ: Mapping[str, str]) -> list[_Part]:
@@ -155,8 +161,7 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
         return _Part(*partial_file(document, faults), problems + translate(faults, document, RelayForm()))
 
 
-def _types(groups: Sequence[GroupConfig], document: Document, environ: Mapping[str, str]) -> Iterator[Problem]:
-    interfaces = Interfaces.find(environ)
+def _types(groups: Sequence[GroupConfig], document: Document, interfaces: Interfaces | None) -> Iterator[Problem]:
     if interfaces is None:
         first = document.sources[0]
         yield first.problem(_NO_INDEX, code="not_checked", span=None, severity=Severity.NOTE)

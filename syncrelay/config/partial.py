@@ -25,11 +25,15 @@ def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Do
 
 
 def _key(path: Path) -> Path:
-    """Return the key of the file, a group or a topic that a path is below of; it is faulty as a whole."""
+    """Return the key of the file, a group, a topic or `export` that a path is below of; it is faulty as a whole."""
     match path:
         case ("groups", _, "topics", *_):
             return path[:5]
         case ("groups", *_):
+            return path[:3]
+        case ("export", "lerobot", "features", *_):
+            return path[:4]
+        case ("export", "lerobot", *_):
             return path[:3]
         case _:
             return path[:2]

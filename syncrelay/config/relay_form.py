@@ -5,6 +5,7 @@ from typing import Final
 
 from pydantic import BaseModel
 
+from syncrelay.config.export import ExportKeys, LerobotKeys, TaskTopic
 from syncrelay.config.file import file_format
 from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.problems import Path
@@ -16,6 +17,11 @@ _SECTIONS: Final[dict[str, type[BaseModel]]] = {
     "node": NodeConfig,
     "metrics": MetricsConfig,
     "diagnostics": DiagnosticsConfig,
+    "export": ExportKeys,
+}
+_BELOW_EXPORT: Final[dict[Location, type[BaseModel]]] = {
+    ("export", "lerobot"): LerobotKeys,
+    ("export", "lerobot", "task", "<mapping>"): TaskTopic,
 }
 _WHAT_IS_MISSING: Final = {
     "groups": "expected one group or more",
@@ -46,13 +52,14 @@ class RelayForm:
             case (str(key),):
                 return _SECTIONS.get(key, form.defaults)
             case _:
-                return form.file
+                return _BELOW_EXPORT.get(loc, form.file)
 
     def levels(self) -> Iterator[tuple[str, type[BaseModel]]]:
         """See Form."""
         form = file_format()
         yield "the file", form.file
         yield from ((f"`{key}`", model) for key, model in _SECTIONS.items())
+        yield "`export.lerobot`", LerobotKeys
         yield "a group", form.any_group
         yield "a topic", form.any_topic
         yield "a topic's `qos`", QosOverrides
@@ -87,11 +94,15 @@ def _policy(loc: Location) -> str:
 
 
 def path_of(loc: Location) -> Path:
-    """Return the path of a place of pydantic's, which has tags too: at a group, and below `qos` and `stamp`."""
+    """Return the path of a place of pydantic's, which has tags too: at a group, and below keys of several forms."""
     match loc:
         case ("groups", name, _, "topics", index, ("qos" | "stamp") as key, _, *rest):
             return ("groups", name, "topics", index, key, *rest)
         case ("groups", name, _, *rest):
             return ("groups", name, *rest)
+        case ("export", "lerobot", "features", name, _, *rest):
+            return ("export", "lerobot", "features", name, *rest)
+        case ("export", "lerobot", "task", _, *rest):
+            return ("export", "lerobot", "task", *rest)
         case _:
             return loc

@@ -147,6 +147,9 @@ class _InputColumn:
         if content.raw:
             return
         paths = content.fields.get(each.topic)
+        if paths is not None and not paths:
+            # No field is asked for: a column of nulls, of whatever type the messages are.
+            return
         if content.images is not None and self.type == IMAGE and (paths is None or "data" in paths):
             self._images = ImageColumn(each.topic, content.images)
         by_definition: dict[Any, Decoder] = {}
@@ -171,6 +174,8 @@ class _InputColumn:
 
     def column(self, messages: Sequence[tuple[Message | None, int | None]]) -> pa.ChunkedArray:
         """Return the column of some messages, each with its set's common stamp."""
+        if pa.types.is_null(self.arrow):
+            return pa.chunked_array([pa.nulls(len(messages))])
         payloads = [None if message is None else self._payload(message, stamp) for message, stamp in messages]
         if not self._decoders:
             return pa.chunked_array([pa.array(payloads, type=self.arrow)])

@@ -46,6 +46,9 @@ def test_a_group_that_a_bug_stopped_is_rebuilt_though_its_keys_are_the_same(envi
         file(REAR, FRONT),
         "# a comment\n" + file(FRONT, REAR, top="x-note: 1\nnode: {name: syncrelay}\nmetrics: {}\n"),
         file(FRONT, REAR, top="defaults: {queue_size: 10, slop: 1s}\n"),
+        file(
+            FRONT, REAR, top="export: {lerobot: {group: rear, fps: 10, task: pick, features: {action: '/a:height'}}}\n"
+        ),
         file(FRONT, REAR.replace("/a,", "/a, qos: auto, offset: 0,")),
     ],
 )

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from syncrelay.config import Config, load_text
+from syncrelay.config.export import ExportKeys, LerobotKeys, TaskTopic
 from syncrelay.config.file import file_format
 from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
 from syncrelay.config.qos import QosOverrides
@@ -170,6 +171,28 @@ OPTIONS = {
     "scalars": (file(), file(diagnostics={"scalars": True}), lambda config: config.diagnostics),
     "defaults": (file(), file(defaults={"output_prefix": "/z"}), outputs),
 }
+LEROBOT = {"fps": 10, "task": "pick", "features": {"action": "/a:height"}}
+
+
+def _of_two_groups(group: str) -> str:
+    """A file of which one group's sets become a LeRobotDataset."""
+    groups = {name: json.loads(file())["groups"]["front"] for name in ("front", "back")}
+    return json.dumps({"version": 1, "groups": groups, "export": {"lerobot": LEROBOT | {"group": group}}})
+
+
+OPTIONS |= {
+    key: (file(export={"lerobot": LEROBOT}), file(export={"lerobot": LEROBOT | keys}), lambda config: config.lerobot)
+    for key, keys in {
+        "fps": {"fps": 20},
+        "task": {"task": "place"},
+        "max_gap": {"max_gap": "3s"},
+        "features": {"features": {"action": "/b:height"}},
+    }.items()
+}
+OPTIONS |= {
+    key: (file(), file(export={"lerobot": LEROBOT}), lambda config: config.lerobot) for key in ("export", "lerobot")
+}
+OPTIONS["group"] = (*(_of_two_groups(group) for group in ("front", "back")), lambda config: config.lerobot)
 QOS_POLICIES = {
     "history": "keep_all",
     "depth": 5,
@@ -202,6 +225,9 @@ def test_every_key_of_the_file_is_an_option_under_test():
         file_format().any_topic,
         StampField,
         QosOverrides,
+        ExportKeys,
+        LerobotKeys,
+        TaskTopic,
     )
     keys = {key for model in models for key in model.model_fields}
     assert keys - OPTIONS.keys() == {"version"}

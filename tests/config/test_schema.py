@@ -25,6 +25,7 @@ BEYOND_A_SCHEMA = {
     "alias_of_a_topic",
     "coalesce_too_long",
     "default_of_another_policy_does_not_help",
+    "export_lerobot_task",
     "key",
     "slop_not_a_number",
     "slop_without_end",

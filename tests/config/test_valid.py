@@ -3,7 +3,18 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.config import DiagnosticsConfig, Listen, QosOverrides, QosPreset, Severity, load, load_text
+from syncrelay.config import (
+    DiagnosticsConfig,
+    ExportFeature,
+    ExportSource,
+    LerobotConfig,
+    Listen,
+    QosOverrides,
+    QosPreset,
+    Severity,
+    load,
+    load_text,
+)
 from syncrelay.sync import Restamp, Ticks
 
 FOLDER = Path(__file__).parent / "valid"
@@ -51,6 +62,18 @@ def test_every_key_arrives_where_it_is_used(environ):
     assert dock.stamp.field == "trigger.time"
     assert chatter.stamp == "receive"
     assert back.topics[0].qos == QosOverrides() == back.topics[1].qos
+    covariance = ExportSource("/back/imu", "orientation_covariance")
+    assert config.lerobot == LerobotConfig(
+        group="back",
+        fps=10,
+        task=ExportSource("/back/task", "data"),
+        max_gap_ns=300_000_000,
+        features=(
+            ExportFeature("observation.images.back", (ExportSource("/back/image", None),)),
+            ExportFeature("observation.state", (covariance, ExportSource("/back/image", "height"))),
+            ExportFeature("action", (covariance,)),
+        ),
+    )
 
 
 def test_a_trigger_is_a_clock_where_it_is_a_rate(environ):
@@ -78,6 +101,7 @@ def test_outputs_are_named_by_prefix_and_input_unless_they_have_a_name(environ):
         "synced/chatter",
         "/fused/back/image",
         "/fused/back/imu",
+        "/fused/back/task",
     ]
 
 

@@ -1,0 +1,101 @@
+"""`syncrelay export --format lerobot`: one dataset in the folder, and the episodes that it was made of."""
+
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from tests.cli.command import run
+from tests.datasets.drives import drive
+
+FILE = """
+version: 1
+groups:
+  robot:
+    policy: exact_time
+    topics: [{topic: /camera}, {topic: /joints}, {topic: /cmd}]
+export:
+  lerobot:
+    fps: 10
+    task: pick up the cube
+    features:
+      observation.images.front: /camera
+      observation.state: /joints:position
+      action: /cmd:twist.linear
+"""
+COMMAND = ("--config", "file.yaml", "--format", "lerobot", "-o", "out")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "file.yaml").write_text(FILE)
+    drive(tmp_path / "b.mcap")
+    drive(tmp_path / "a.mcap", range(0, 900, 100))
+    return tmp_path
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    """The dataset's files, without what it was made of."""
+    files = [path for path in out.rglob("*") if path.is_file() and ".episodes" not in path.parts]
+    return {str(path.relative_to(out)): path.read_bytes() for path in files}
+
+
+def lengths(out: Path) -> list[int]:
+    return pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet")["length"].to_pylist()
+
+
+def test_recordings_are_episodes_in_their_order_and_are_not_done_again(folder):
+    done = run("export", "b.mcap", "a.mcap", *COMMAND, folder=folder)
+    assert done.returncode == 0
+    (told,) = done.stdout.splitlines()
+    assert told.endswith("/out: 2 episodes with 29 frames; 0 frames repeated, 0 sets between frames left out")
+    assert done.stderr.endswith("/out/.episodes: 2 recordings: 2 done\n")
+    first = contents(folder / "out")
+    assert (len(first), lengths(folder / "out")) == (6, [20, 9])
+    again = run("export", "b.mcap", "a.mcap", *COMMAND, "--jobs", "1", folder=folder)
+    assert again.stderr.endswith("2 recordings: 2 done before\n")
+    assert contents(folder / "out") == first
+
+
+def test_a_recording_more_is_an_episode_more(folder):
+    run("export", "a.mcap", *COMMAND, folder=folder)
+    done = run("export", "b.mcap", "a.mcap", *COMMAND, folder=folder)
+    assert done.stderr.endswith("2 recordings: 1 done, 1 done before\n")
+    assert lengths(folder / "out") == [20, 9]
+    assert json.loads((folder / "out/meta/info.json").read_text())["total_frames"] == 29
+
+
+def test_a_recording_that_cannot_be_an_episode_is_told_and_left_out(folder):
+    drive(folder / "gap.mcap", [0, 100, 5000])
+    done = run("export", "gap.mcap", "a.mcap", *COMMAND, folder=folder)
+    assert done.returncode == 1
+    assert "no set for 4.9 s after 0.1 s, expected 0.5 s at most" in done.stderr
+    assert lengths(folder / "out") == [9]
+    alone = run("export", "gap.mcap", *COMMAND[:-1], "other", folder=folder)
+    assert (alone.returncode, contents(folder / "other")) == (1, {})
+    assert "no recording gave an episode, so there is no dataset" in alone.stderr
+
+
+def test_what_the_recording_does_not_have_is_an_error_of_the_recording(folder):
+    (folder / "file.yaml").write_text(FILE.replace("twist.linear", "twist.lin"))
+    done = run("export", "a.mcap", *COMMAND, folder=folder)
+    assert done.returncode == 1
+    assert "/cmd: geometry_msgs/msg/Twist has no field `lin`, did you mean `linear`?" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "file", "code", "told"),
+    [
+        (("--images", "png"), FILE, 2, "`export:` in the file says what LeRobot gets"),
+        ((), FILE[: FILE.index("export:")], 2, "write fps, task and features below `export:` `lerobot:`"),
+        ((), FILE.replace("/joints:", "/joint:"), 1, "`/joint` is not an input of the group robot"),
+        (("-o", "."), FILE, 1, "holds something else: name another folder, or an empty one"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(folder, words, file, code, told):
+    (folder / "file.yaml").write_text(file)
+    done = run("export", "a.mcap", *COMMAND, *words, folder=folder)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert told in done.stderr
+    assert not (folder / "out").exists()
