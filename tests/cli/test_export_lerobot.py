@@ -70,7 +70,7 @@ def test_a_recording_that_cannot_be_an_episode_is_told_and_left_out(folder):
     drive(folder / "gap.mcap", [0, 100, 5000])
     done = run("export", "gap.mcap", "a.mcap", *COMMAND, folder=folder)
     assert done.returncode == 1
-    assert "no set for 4.9 s after 0.1 s, expected 0.5 s at most" in done.stderr
+    assert "gap.mcap: no set for 4.9 s after 0.1 s, expected 0.5 s at most" in done.stderr
     assert lengths(folder / "out") == [9]
     alone = run("export", "gap.mcap", *COMMAND[:-1], "other", folder=folder)
     assert (alone.returncode, contents(folder / "other")) == (1, {})
@@ -81,7 +81,7 @@ def test_what_the_recording_does_not_have_is_an_error_of_the_recording(folder):
     (folder / "file.yaml").write_text(FILE.replace("twist.linear", "twist.lin"))
     done = run("export", "a.mcap", *COMMAND, folder=folder)
     assert done.returncode == 1
-    assert "/cmd: geometry_msgs/msg/Twist has no field `lin`, did you mean `linear`?" in done.stderr
+    assert "a.mcap: /cmd: geometry_msgs/msg/Twist has no field `lin`, did you mean `linear`?" in done.stderr
 
 
 @pytest.mark.parametrize(

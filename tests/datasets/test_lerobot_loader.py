@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from syncrelay.datasets.lerobot import write_lerobot
-from tests.datasets.drives import JOINTS, config, drive, picture
+from tests.datasets.drives import INPUTS, JOINTS, config, drive, picture, task
 
 pytest.importorskip("lerobot")
 # What others warn of is theirs.
@@ -36,15 +36,15 @@ def root(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def load(root, monkeypatch):
-    """What opens the dataset, with no hub to ask."""
+def load(root, monkeypatch, tmp_path):
+    """What opens the dataset, or another, with no hub to ask."""
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
-    monkeypatch.setenv("HF_DATASETS_CACHE", str(root.parent / "cache"))
+    monkeypatch.setenv("HF_DATASETS_CACHE", str(tmp_path / "cache"))
     from lerobot.datasets import LeRobotDataset  # noqa: PLC0415  as above
 
-    def opened(**options):
+    def opened(folder=root, **options):
         # torchcodec needs FFmpeg's libraries on the machine; PyAV brings its own.
-        return LeRobotDataset("syncrelay/test", root=root, video_backend="pyav", **options)
+        return LeRobotDataset("syncrelay/test", root=folder, video_backend="pyav", **options)
 
     return opened
 
@@ -93,6 +93,33 @@ def test_one_episode_can_be_asked_for(load):
     assert len(dataset) == 9
     assert dataset[0]["action"][0].item() == pytest.approx(0.5)
     assert np.abs(shown(dataset[8][FRONT]) - picture(850)).mean() < 2.5
+
+
+def test_single_values_single_frames_and_tasks_of_a_topic_are_read(load, tmp_path):
+    inputs = INPUTS + "      - {topic: /task, type: std_msgs/msg/String, stamp: receive}\n"
+    features = "\n      action: /cmd:twist.linear.x\n      observation.state: [/joints:position]\n"
+    loaded = config(
+        inputs=inputs,
+        features=features,
+        group="latest_time\n    trigger: /camera",
+        more="task: {topic: /task, field: data}",
+    )
+    topics = ("/task", "/wrist", "/joints", "/cmd", "/camera")
+    words = {("/task", stamp): task(stamp, words="close it") for stamp in range(300, 900, 100)}
+    bags = [
+        drive(tmp_path / "one.mcap", [0, 1], topics=topics),
+        drive(tmp_path / "many.mcap", range(0, 900, 100), topics=topics, instead=words),
+    ]
+    (tmp_path / "dataset").mkdir()
+    write_lerobot([Recorded(bag.stem, (str(bag),)) for bag in bags], loaded, tmp_path / "dataset")
+    dataset = load(tmp_path / "dataset")
+    lengths = [each["length"] for each in dataset.meta.episodes]
+    assert lengths[0] == 1
+    assert len(dataset) == sum(lengths)
+    assert [dataset[place]["task"] for place in (0, len(dataset) - 1)] == ["open the door", "close it"]
+    assert dataset[len(dataset) - 1]["action"].shape in ((), (1,))
+    assert dataset.meta.stats["action"]["mean"].shape == (1,)
+    assert len(load(tmp_path / "dataset", delta_timestamps={"action": [0.0, 0.1]})[0]["action"]) == 2
 
 
 def test_a_data_loader_makes_batches(load):

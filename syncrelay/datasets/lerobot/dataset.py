@@ -61,7 +61,7 @@ def write_lerobot(recordings: Sequence[NamedRecording], config: Config, folder: 
                 episodes[each.name] = place
                 problems += [f"{each.name}: {problem}" for problem in facts["problems"]]
             except BagError as error:
-                problems.append(f"{each.name}: {error}")
+                problems.append(str(error))
         if not episodes:
             raise BagError("\n".join(problems) or "no recordings, expected one or more")
         facts = join_episodes(episodes, folder)

@@ -10,8 +10,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from syncrelay.bag import open_recording
-from syncrelay.bag.bindings import bind
+from syncrelay.bag import Recording, open_recording
+from syncrelay.bag.attempts import redacted
+from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.bag.replay import Replay
 from syncrelay.config import Config, LerobotConfig
 from syncrelay.config.wording import counted
@@ -53,22 +54,33 @@ def write_episode(name: str, words: Sequence[str], config: Config, folder: Path)
     Raises UsageError where the file says nothing of LeRobot, and BagError for a recording that cannot be an episode.
     """
     lerobot = lerobot_of(config)
-    with closing(open_recording(words)) as recording:
-        (binding,) = (each for each in bind(config, recording) if each.group.name == lerobot.group)
-        require_complete([binding])
-        sets = FrameSets(lerobot, binding)
-        source = SetsOf([binding], sets.content, name=name)
-        replay = Replay(recording, [binding], listeners=source.listeners)
-        with ExitStack() as opened:
-            episode = _Episode(lerobot, sets, folder, opened)
-            for part in source.parts(replay.steps()):
-                for each in sets.read(part.table):
-                    episode.add(each)
-            episode.end()
-        if not episode.grid.frames:
-            raise BagError(_no_frames(source.groups[0].count, sets.unusable))
-        facts = episode.write_table()
-        return {**facts, "problems": source.faults()}
+    try:
+        with closing(open_recording(words)) as recording:
+            (binding,) = (each for each in bind(config, recording) if each.group.name == lerobot.group)
+            require_complete([binding])
+            return _write(lerobot, recording, binding, name, folder)
+    except BagError as error:
+        # What is wrong with a topic is said without the recording.
+        text, shown = str(error), redacted(words[0])
+        raise BagError(text if text.startswith(shown) else f"{shown}: {text}") from error
+
+
+def _write(
+    lerobot: LerobotConfig, recording: Recording, binding: GroupBinding, name: str, folder: Path
+) -> dict[str, Any]:
+    sets = FrameSets(lerobot, binding)
+    source = SetsOf([binding], sets.content, name=name)
+    replay = Replay(recording, [binding], listeners=source.listeners)
+    with ExitStack() as opened:
+        episode = _Episode(lerobot, sets, folder, opened)
+        for part in source.parts(replay.steps()):
+            for each in sets.read(part.table):
+                episode.add(each)
+        episode.end()
+    if not episode.grid.frames:
+        raise BagError(_no_frames(source.groups[0].count, sets.unusable))
+    facts = episode.write_table()
+    return {**facts, "problems": source.faults()}
 
 
 class _Episode:

@@ -16,6 +16,9 @@ COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
 FIELDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({IMAGE: NEEDED, COMPRESSED: ("data",)})
 """The fields that are needed of each type that can become video."""
 
+# What cameras send: Pillow runs other programs for some of the others.
+_FORMATS: Final = ("JPEG", "PNG", "WEBP", "TIFF")
+
 
 class PictureSource:
     """The topic of a video; its images have one size."""
@@ -62,7 +65,7 @@ class PictureSource:
         from PIL import Image, UnidentifiedImageError  # noqa: PLC0415  needed here alone
 
         try:
-            with Image.open(io.BytesIO(message["data"].as_buffer())) as picture:
+            with Image.open(io.BytesIO(message["data"].as_buffer()), formats=_FORMATS) as picture:
                 if picture.mode.startswith(("I", "F")):
                     raise BagError(f"{self.topic}: {picture.format} images of mode {picture.mode} are no 8 bit colours")
                 return np.asarray(picture.convert("RGB"))
