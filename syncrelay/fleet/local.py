@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NoReturn
 
+from syncrelay.bag.definitions import jazzy_definition
 from syncrelay.fleet.engine import TICK_S, TRIES, Finished, given_up
 from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform
 
@@ -42,6 +43,8 @@ class LocalEngine:
 
     def run(self, jobs: Iterable[Job | None]) -> Generator[Finished | None, None, None]:
         """See Engine."""
+        # ROS types are loaded at their first use, which takes longer than a short recording: here, once for all.
+        jazzy_definition("std_msgs/msg/Header")
         waiting = iter(jobs)
         running: dict[int, _Worker] = {}
         ended = select.poll()
