@@ -19,8 +19,8 @@ from tests.ros.stage import Stage
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
 
 _HZ = 100
-_KILLS = chosen(short=8, long=100)
-_RELAY_KILLS = chosen(short=3, long=20)
+_KILLS = chosen(short=5, long=100)
+_RELAY_KILLS = chosen(short=2, long=20)
 
 
 class _Crew:

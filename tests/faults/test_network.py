@@ -18,8 +18,8 @@ from tests.ros.status import address
 pytestmark = [pytest.mark.ros, pytest.mark.faults]
 
 _HZ = 100
-_FAULT_S = chosen(short=4, long=20)
-_CUT_S = chosen(short=3, long=10)
+_FAULT_S = chosen(short=2, long=20)
+_CUT_S = chosen(short=2, long=10)
 # Packets that are lost; with fast heartbeats hardly anything comes of it.
 _TOLD = {"reliable": "bursts", "best_effort": "messages_lost"}
 _GET = "import sys, urllib.request; print(urllib.request.urlopen(sys.argv[1], timeout=90).read().decode())"

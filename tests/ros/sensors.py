@@ -56,10 +56,11 @@ def play(stage: Stage, frames: Sequence[Frame], *, node: str = "driver", **qos: 
     return player
 
 
-def logged_findings(relay: Process) -> set[str]:
-    """The codes of all that a relay has warned of, whose log is in JSON."""
-    lines = [json.loads(line) for line in relay.said]
-    return {str(line.get("finding")) for line in lines if line["level"] not in ("info", "debug")}
+def warnings_of(relay: Process, group: str) -> list[dict[str, Any]]:
+    """What a relay whose log is in JSON has warned of that is about this group, or about none."""
+    *lines, _ = relay.stderr.split("\n")
+    said = [json.loads(line) for line in lines if line.startswith("{")]
+    return [line for line in said if line["level"] not in ("info", "debug") and line.get("group", group) == group]
 
 
 def assert_looked_at_a_healthy_rig(look: Process) -> None:

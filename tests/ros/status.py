@@ -45,9 +45,14 @@ def first_group(relay: Process) -> dict[str, Any]:
     return groups[0]
 
 
+def groups_of(relay: Process) -> dict[str, dict[str, Any]]:
+    """What is told of the groups that were looked at, by their names."""
+    return {each["name"]: each for each in status(relay)["groups"]}
+
+
 def findings(relay: Process, group: str = "front") -> dict[str, dict[str, Any]]:
     """The findings of a group by their codes, the last of each."""
-    groups = {each["name"]: each for each in status(relay)["groups"]}
+    groups = groups_of(relay)
     return {each["code"]: each for each in groups[group]["findings"]} if group in groups else {}
 
 

@@ -53,6 +53,8 @@ class Scenario:
     """The keys of the suggestion that are written into the file for act 3."""
     heals: bool = True
     """Whether all is well in act 3."""
+    over: str = ""
+    """What is noted when it is over, as a pattern; empty where that does not matter."""
 
     @property
     def begins_well(self) -> bool:
@@ -175,6 +177,12 @@ class Watch:
     def has_warned_of(self, name: str, finding: str) -> bool:
         return any((line.group, line.finding) == (name, finding) and level != "info" for level, line in self.lines)
 
+    def has_noted(self, name: str, pattern: str) -> bool:
+        """Whether a note of the group matches a pattern somewhere; the empty one needs none."""
+        return not pattern or any(
+            line.group == name and level == "info" and re.search(pattern, line.message) for level, line in self.lines
+        )
+
     def is_well(self, name: str) -> bool:
         return any(finding["code"] == "healthy" for finding in self.last.get(name, {"findings": []})["findings"])
 
@@ -234,7 +242,11 @@ def play(stage: Stage, scenarios: Mapping[str, Scenario]) -> Played:
         write(theatre.groups[name], changes)
     theatre.begin("3")
     theatre.file.reload(**theatre.groups)
-    watch.wait(lambda: all(watch.is_well(name) for name, each in scenarios.items() if each.heals))
+    watch.wait(
+        lambda: all(
+            watch.is_well(name) and watch.has_noted(name, each.over) for name, each in scenarios.items() if each.heals
+        )
+    )
     # Its last words are of the groups, too.
     theatre.file.relay.send(signal.SIGTERM)
     theatre.file.relay.wait()

@@ -7,6 +7,8 @@ from tests.scenarios.streams import Stream
 CAMERA = {"wobble_ms": 1}
 LIDAR = {"phase_ms": 7, "wobble_ms": 1}
 
+RECOVERED = r"recovered after [\d.]+ s"
+
 RIGS = {
     "well": Scenario(streams=[Stream("camera", 30, **CAMERA), Stream("lidar", 10, **LIDAR)]),
     "well_with_map": Scenario(
@@ -26,7 +28,9 @@ RIGS = {
             Stream("lidar", 10, **LIDAR),
         ],
         first="slowed",
-        says=r"/camera_halves/camera has slowed from (29|3[01])[\d.]* Hz to 1[3-6][\d.]* Hz",
+        says=r"/camera_halves/camera has slowed from (29|3[01])[\d.]* Hz to 1[3-6][\d.]* Hz; check"
+        r" /camera_halves/camera_driver: its settings, its load, and the network to it$",
+        over=r"^camera_halves: resolved [\d.]+ (s|min) ago: /camera_halves/camera has slowed",
     ),
     "lidar_halves": Scenario(
         streams=[
@@ -81,7 +85,10 @@ RIGS = {
             Stream("lidar", 0, "2", **LIDAR),
         ],
         first="silent",
-        says=r"/lidar_silent/lidar has been silent for [\d.]+ s",
+        says=r"no more sets for [\d.]+ (s|min): /lidar_silent/lidar has been silent for [\d.]+ (s|min); before that its"
+        r" rate was [\d.]+ Hz; check /lidar_silent/lidar_driver, which publishes it or has died: a dead node stays in"
+        r" the graph for 20 s$",
+        over=RECOVERED,
     ),
     # A recorder that pauses.
     "all_silent": Scenario(
@@ -89,5 +96,6 @@ RIGS = {
         + [Stream("lidar", hz, acts, **LIDAR) for hz, acts in ((10, "13"), (0, "2"))],
         first="silent",
         says=r"/all_silent/camera.*/all_silent/lidar|all inputs",
+        over=RECOVERED,
     ),
 }

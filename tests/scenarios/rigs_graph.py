@@ -1,7 +1,7 @@
 """Rigs whose nodes are missing, die, or come back as others."""
 
 from tests.scenarios.play import Scenario
-from tests.scenarios.rigs_flow import CAMERA, LIDAR
+from tests.scenarios.rigs_flow import CAMERA, LIDAR, RECOVERED
 from tests.scenarios.streams import POINT, Stream
 
 RIGS = {
@@ -21,6 +21,7 @@ RIGS = {
         first="no_publisher",
         says=r"/lidar_dies/lidar",
         never_says=r"since [\d.]+ s",
+        over=RECOVERED,
     ),
     "camera_returns_best_effort": Scenario(
         streams=[

@@ -65,10 +65,10 @@ def test_a_cause_of_all_inputs_is_said_once(played: Played):
         assert len(set(said[:2])) == 1, told(played, name)
 
 
-def test_recovery_is_said(played: Played):
-    for name in ("lidar_silent", "lidar_dies", "all_silent"):
-        said = [line.message for line in played.notes_of(name)]
-        assert any(re.search(r"recovered after [\d.]+ s", message) for message in said), told(played, name)
+@pytest.mark.parametrize("name", [name for name, rig in RIGS.items() if rig.over])
+def test_the_end_of_it_is_said(played: Played, name: str):
+    said = [line.message for line in played.notes_of(name)]
+    assert any(re.search(RIGS[name].over, message) for message in said), [told(played, name), said]
 
 
 def test_an_offset_pairs_the_frames_that_belong_together(played: Played):
