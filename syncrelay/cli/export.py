@@ -40,12 +40,12 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         parser.error("the following arguments are required: -o/--output")
     if arguments.raw and (arguments.fields or arguments.images):
         parser.error("--raw keeps each message as it is: --fields and --images do not go with it")
+    if arguments.stretch is not None and arguments.format != "parquet":
+        parser.error(f"--stretch goes with --format parquet: --format {arguments.format} does not cut recordings")
     config = _of_groups(load(*arguments.config), arguments.group)
     if arguments.format == "mcap":
         if arguments.raw or arguments.fields or arguments.images:
             parser.error("--fields, --images and --raw are for tables: --format mcap writes whole messages")
-        if arguments.stretch is not None:
-            parser.error("--stretch goes with --format parquet: --format mcap writes one file")
         return do_on_many(ReplayTask.of(config, (), 0), arguments.bags, arguments)
     if arguments.format == "lerobot":
         if arguments.raw or arguments.fields or arguments.images:

@@ -162,8 +162,8 @@ class Decoder:
         return pa.array([self._value(payload) for payload in payloads], type=self.arrow)
 
     def _value(self, payload: bytes) -> dict[str, Any] | None:
-        # As in layouts: a count beyond the message's own bytes is a lie.
-        self._store.max_sequence_length = max(1, len(payload))
+        # As in layouts: a count beyond the message's own bytes is a lie. Others use the store too.
+        unlimited, self._store.max_sequence_length = self._store.max_sequence_length, max(1, len(payload))
         try:
             if payload[0] or payload[1] > 1:
                 raise ValueError("it is not plain CDR")
@@ -172,6 +172,8 @@ class Decoder:
         except _NOT_ONE:
             self.undecodable += 1
             return None
+        finally:
+            self._store.max_sequence_length = unlimited
         return value
 
 
