@@ -47,7 +47,9 @@ class _View(NamedTuple):
         more = () if count is None else (count,)
         kind = np.dtype(self.order + code) if size > 1 else np.dtype("u1" if code == "?1" else code)
         shape, strides = self.shape + more, self.strides + (size,) * len(more)
-        found: np.ndarray[Any, Any] = np.ndarray(shape, kind, self.buffer, self.base + offset, strides).reshape(-1)
+        whole: np.ndarray[Any, Any] = np.ndarray(shape, kind, self.buffer, self.base + offset, strides)
+        # Of one element each, numpy's reshape leaves the distances between them.
+        found = np.ascontiguousarray(whole.reshape(-1))
         return found if found.dtype.isnative else found.astype(found.dtype.newbyteorder("="))
 
     @property
@@ -155,7 +157,11 @@ class Decoder:
         return layout
 
     def _columns(self, layout: Layout, buffer: bytes, count: int, size: int) -> pa.Array:
-        return _column(self._tree, layout.root, _View(buffer, layout.order, (count,), (size,), 0))
+        """Decode payloads that stand side by side, one by one if there is one among them that cannot be."""
+        try:
+            return _column(self._tree, layout.root, _View(buffer, layout.order, (count,), (size,), 0))
+        except UnfitError:
+            return self._singly([buffer[begin : begin + size] for begin in range(0, count * size, size)])
 
     def _singly(self, payloads: Sequence[bytes]) -> pa.Array:
         """Decode one by one."""
@@ -182,10 +188,12 @@ def _is_laid_out(payload: bytes, layout: Layout) -> bool:
 
 
 def _laid_out(joined: bytes, count: int, size: int, layout: Layout) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Tell which of payloads that stand side by side have the lengths of a layout."""
+    """Tell which of payloads that stand side by side are laid out so."""
     fits = np.ones(count, np.bool_)
     for offset, length in layout.lengths:
         fits &= np.ndarray((count,), layout.order + "u4", joined, offset, (size,)) == length
+    for offset in layout.ends:
+        fits &= np.ndarray((count,), _OF_BYTES, joined, offset, (size,)) == 0
     return fits
 
 
@@ -247,8 +255,8 @@ def _texts(place: Characters, view: _View) -> pa.Array:
     found = _binary(pa.binary(), content, place.length, view.messages)
     try:
         return found.cast(pa.string())
-    except pa.ArrowInvalid:
-        return pa.array([each.decode(errors="replace") for each in found.to_pylist()], type=pa.string())
+    except pa.ArrowInvalid as error:
+        raise UnfitError("a string in it is not UTF-8") from error
 
 
 def _binary(kind: pa.DataType, content: np.ndarray[Any, Any], length: int, count: int) -> pa.Array:

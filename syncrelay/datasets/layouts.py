@@ -21,7 +21,7 @@ _COUNTS: Final = {"<": Packed("<I"), ">": Packed(">I")}
 
 
 class UnfitError(Exception):
-    """A payload that ends too soon, or that is laid out too irregularly to be gone through as columns."""
+    """A payload that is no such message, or is laid out too irregularly to be gone through as columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +68,15 @@ Place: TypeAlias = Numbers | Characters | Parts | Repeated | Listed
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where all fields lie, and the lengths, as (offset, value), that a payload must hold to be laid out so."""
+    """Where all fields lie, and what a payload must hold to be laid out so.
+
+    That is the lengths, as (offset, value), and at `ends` the zeros that strings end with.
+    """
 
     order: str
     root: Parts
     lengths: tuple[tuple[int, int], ...]
+    ends: tuple[int, ...]
 
 
 def layout_of(tree: Struct, payload: bytes | memoryview) -> Layout:
@@ -85,7 +89,9 @@ def layout_of(tree: Struct, payload: bytes | memoryview) -> Layout:
         raise UnfitError("it ends too soon")
     if walk.at + _MOST_PADDING < len(payload):
         raise UnfitError("it is longer than the message in it")
-    return Layout(walk.order, root, tuple(walk.lengths))
+    if any(payload[end] for end in walk.ends):
+        raise UnfitError("a string in it has no end")
+    return Layout(walk.order, root, tuple(walk.lengths), tuple(walk.ends))
 
 
 class _Walk:
@@ -93,6 +99,7 @@ class _Walk:
         self.order = order
         self.at = ENCAPSULATION
         self.lengths: list[tuple[int, int]] = []
+        self.ends: list[int] = []
         self._payload = payload
 
     def struct(self, tree: Struct) -> Parts:
@@ -108,6 +115,8 @@ class _Walk:
             case Text():
                 length = self._length()
                 self.at += length
+                if length:
+                    self.ends.append(self.at - 1)
                 return Characters(self.at - length, max(0, length - 1))
             case Struct():
                 return self.struct(node)

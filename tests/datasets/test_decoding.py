@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from syncrelay.bag.definitions import typestore
 from syncrelay.datasets import decoding
@@ -69,6 +70,19 @@ def test_what_cannot_be_decoded_is_counted():
     assert found.undecodable == 3
 
 
+def test_a_string_that_is_not_utf_8_is_null_whatever_stands_beside_it():
+    header, time = STORE.types["std_msgs/msg/Header"], STORE.types["builtin_interfaces/msg/Time"]
+    payloads = [
+        bytes(STORE.serialize_cdr(header(time(n, 0), "base"), "std_msgs/msg/Header")).replace(b"base", b"b\xe4se"[:4])
+        if n == 3
+        else bytes(STORE.serialize_cdr(header(time(n, 0), "base"), "std_msgs/msg/Header"))
+        for n in range(8)
+    ]
+    found = decoder(STORE, "std_msgs/msg/Header")
+    assert [row and row["stamp"]["sec"] for row in found.decode(payloads).to_pylist()] == [0, 1, 2, None, 4, 5, 6, 7]
+    assert found.undecodable == 1
+
+
 def test_messages_that_are_alike_are_decoded_at_once(monkeypatch):
     # Else the columns are only as fast as rosbags, and this is what they are for.
     monkeypatch.setattr(decoding.Decoder, "_singly", lambda *_: pytest.fail("one by one"))
@@ -96,6 +110,22 @@ def test_elements_of_a_fixed_size_are_not_gone_through_one_by_one():
     assert layout.root.parts[1].count == 1000
     (row,) = decoder(STORE, "geometry_msgs/msg/PoseArray").decode([payload]).to_pylist()
     assert [each["position"]["x"] for each in row["poses"]] == list(range(1000))
+
+
+@pytest.mark.parametrize("length", [0, 1, 2])
+def test_bytes_of_any_length_are_decoded_at_once(length, monkeypatch):
+    monkeypatch.setattr(decoding.Decoder, "_singly", lambda *_: pytest.fail("one by one"))
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg("uint8[] content\nstring text\n", "made_msgs/msg/Packet"))
+    packet = store.types["made_msgs/msg/Packet"]
+    values = [{"content": bytes([n] * length), "text": "x" * length} for n in range(6)]
+    payloads = [
+        bytes(
+            store.serialize_cdr(packet(np.frombuffer(each["content"], np.uint8), each["text"]), "made_msgs/msg/Packet")
+        )
+        for each in values
+    ]
+    assert decoder(store, "made_msgs/msg/Packet").decode(payloads).to_pylist() == values
 
 
 def test_a_length_that_lies_is_refused_at_once():
