@@ -1,9 +1,9 @@
-"""Compare tools that cut datasets from recordings: `python bench/peers.py --help`; what came of it: docs/peers.md.
+"""Compare tools that cut datasets from recordings: `python bench/peers.py --help`; the results: docs/peers.md.
 
-Each is asked for every message of the first topic with the nearest one of the second. The truth is their header stamps.
-CPU is user and system time of the whole process, as a ratio to `syncrelay export` in the same round. VENVS has a folder
-for each tool, a venv where it is installed; one that is missing is left out. hephaes 0.3.0 also needs `pillow` and
-`pyarrow<20`, rosbags-dataframe `pyarrow`, forge-robotics its extra `mcap`.
+Each is asked for every message of the first topic with the nearest one of the second; header stamps are the truth.
+CPU is user and system time of the whole process, as a ratio to `syncrelay export` in the same round. VENVS holds a venv
+by the name of each tool; one that is missing is left out. Beside what pip installs by itself, hephaes 0.3.0 needs
+`pillow` and `pyarrow<20`, rosbags-dataframe `pyarrow`, forge-robotics its extra `mcap`.
 """
 
 import argparse
@@ -20,6 +20,14 @@ import pyarrow.parquet as pq
 from peer_jobs import JOBS
 from rosbags.highlevel import AnyReader
 
+# What a process had before its exec counts as its own memory: start it from a small one.
+METER = """import resource, subprocess, sys
+code = subprocess.call(sys.argv[1:], stdout=sys.stderr)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)
+sys.exit(code)
+"""
+
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -34,7 +42,6 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     asked = parser.parse_args()
     topics = [(topic, fields.split(",")) for topic, _, fields in (word.partition(":") for word in asked.topics)]
-    names = [topic for topic, _ in topics]
     given = {"recording": asked.recording, "topics": topics, "tolerance": asked.tolerance, "offset": asked.offset}
     export = [sys.executable, "-m", "syncrelay", "export", asked.recording, "--config", asked.config, "--jobs", "1"]
     export += ["--group", asked.group, *(f"--fields={word}" for word in asked.topics if ":" in word)]
@@ -46,8 +53,8 @@ def main():
             with tempfile.TemporaryDirectory() as out:
                 job = [Path(__file__).with_name("peer_jobs.py"), tool, json.dumps({**given, "out": out})]
                 spent[tool].append(run([*export, "-o", out] if tool == "syncrelay" else [pythons[tool], *job]))
-                found[tool] = pairs(Path(out), names)
-    stamps = [stamps_of(asked.recording, topic) for topic in names]
+                found[tool] = pairs(Path(out), [topic for topic, _ in topics])
+    stamps = [stamps_of(asked.recording, topic) for topic, _ in topics]
     for tool, runs in spent.items():
         ratio = statistics.median(cpu / base for (cpu, _), (base, _) in zip(runs, spent["syncrelay"], strict=True))
         cpu, memory = (statistics.median(column) for column in zip(*runs, strict=True))
@@ -60,11 +67,10 @@ def main():
 def run(command):
     """Return the CPU in seconds and the memory in MB that a command took; raise RuntimeError if it failed."""
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(command, stdout=said, stderr=said)
-        _, status, usage = os.wait4(process.pid, 0)
-        if status:
+        done = subprocess.run([sys.executable, "-c", METER, *command], stdout=subprocess.PIPE, stderr=said, check=False)
+        if done.returncode:
             raise RuntimeError(os.pread(said.fileno(), 10_000, 0).decode())
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return tuple(map(float, done.stdout.split()))
 
 
 def pairs(out, topics):
