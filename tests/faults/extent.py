@@ -1,4 +1,4 @@
-"""How long the tests of faults run: short beside all others, long in `make faults` and `make soak`."""
+"""How long tests of faults and of the C++ peer run: short beside all others, long in `make faults` and `make soak`."""
 
 import os
 from typing import TypeVar

@@ -10,10 +10,11 @@ import pytest
 from streams import AGE_PENALTIES, MS, in_order
 
 from syncrelay.sync import ApproximateTime, ExactTime, Match, Message, SyncGroup
+from tests.faults.extent import chosen
 
 DRIVER = Path(__file__).parent / "peer" / "message_filters_driver.cpp"
 HEADER = Path("/usr/include/message_filters/sync_policies/approximate_time.h")
-STREAMS = 2_000
+STREAMS = chosen(short=500, long=2_000)
 
 
 @pytest.fixture
