@@ -50,7 +50,7 @@ class Examined(NamedTuple):
 
 
 def examine(
-    stage: Stage, text: str, *words: str, seconds: int = 5, until: Callable[[Examined], bool] = lambda _: True
+    stage: Stage, text: str, *words: str, seconds: int = 3, until: Callable[[Examined], bool] = lambda _: True
 ) -> Examined:
     """What the doctor says; it looks for longer where a busy machine showed it too little of what there is."""
     path = stage.folder / "doctor.yaml"
@@ -65,7 +65,7 @@ def examine(
 
 
 def longer(seconds: int) -> list[int]:
-    return [seconds, 3 * seconds, 8 * seconds]
+    return [seconds, 2 * seconds, max(15, 3 * seconds), max(40, 8 * seconds)]
 
 
 def run(argv: Sequence[str], environment: Mapping[str, str]) -> Examined:
@@ -183,7 +183,8 @@ def test_nodes_of_another_user_are_told_from_nodes_that_are_not_there(stage: Sta
 
 
 def test_alone_on_a_domain_it_says_so_once(stage: Stage):
-    code, problems, report, _ = examine(stage, config({"front": group("/camera", "/lidar")}))
+    text = config({"front": group("/camera", "/lidar")})
+    code, problems, report, _ = examine(stage, text, until=lambda seen: codes(seen.problems) == ["alone"])
     assert code == 1
     assert codes(problems) == ["alone"]
     assert problems[0]["what"] == f"no other node was found on domain {stage.domain} (discovery range LOCALHOST)"
@@ -301,7 +302,7 @@ def test_the_relay_who_observes_and_the_doctor_agree_on_each_group_of_one_rig(st
         # What a busy machine adds, it adds to one and not to another.
         return {name: each - OF_A_BUSY_MACHINE or {"healthy"} for name, each in found.items()}
 
-    for look_s in longer(8):
+    for look_s in longer(5):
         look = stage.observe(config(groups), "--seconds", f"{look_s}", "--json")
         report = examine(stage, config(groups), seconds=look_s).report
         look.wait()
