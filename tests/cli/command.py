@@ -1,10 +1,16 @@
-"""The command line as a user starts it: a process of its own."""
+"""The command line as a user starts it: a process of its own, or here where that is not what is tested."""
 
 import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
+from unittest.mock import patch
+
+from syncrelay.cli import main
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,6 +31,22 @@ def run(
 ) -> subprocess.CompletedProcess[str]:
     """Run syncrelay in a folder to its end."""
     return run_python("-m", "syncrelay", *words, folder=folder, stdin=stdin, environ=environ)
+
+
+def run_here(*words: str, folder: Path, environ: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    """Run syncrelay in a folder to its end, without a process and its imports.
+
+    For commands that read no standard input, start no thread, set up no log and leave signals alone.
+    """
+    with TemporaryFile("w+", newline="") as out, TemporaryFile("w+", newline="") as talk:
+        with chdir(folder), patch.dict(os.environ, environ or {}), redirect_stdout(out), redirect_stderr(talk):
+            code = main(words)
+        return subprocess.CompletedProcess(words, code, _text(out), _text(talk))
+
+
+def _text(file: IO[str]) -> str:
+    file.seek(0)
+    return file.read()
 
 
 def run_python(

@@ -5,7 +5,7 @@ import pytest
 
 from syncrelay.cli.demo import shipped_config
 from tests.bag.making import rig, write_mcap
-from tests.cli.command import run
+from tests.cli.command import run, run_here
 from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
@@ -54,14 +54,14 @@ def test_types_that_the_file_leaves_out_change_nothing(folder):
         config({"front": {"policy": "approximate_time", "slop": "1ms", "topics": topics}})
     )
     typed, untyped = (
-        run("analyze", "rig.mcap", "--config", file, folder=folder) for file in ("f.yaml", "untyped.yaml")
+        run_here("analyze", "rig.mcap", "--config", file, folder=folder) for file in ("f.yaml", "untyped.yaml")
     )
     assert (untyped.returncode, untyped.stderr) == (0, "")
     assert untyped.stdout == typed.stdout.replace("f.yaml", "untyped.yaml")
 
 
 def test_the_json_holds_the_same_for_programs(folder):
-    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
+    done = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
     found = json.loads(done.stdout)
     (group,) = found["groups"]
     assert (found["recording"], [topic["messages"] for topic in found["topics"]]) == ("rig.mcap", [100, 100])
@@ -79,39 +79,39 @@ def test_the_json_holds_the_same_for_programs(folder):
 
 def test_the_written_file_gives_what_was_promised(folder, tmp_path):
     written = str(tmp_path / "better.yaml")
-    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--write", written, folder=folder)
+    done = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--write", written, folder=folder)
     assert (done.returncode, done.stderr) == (0, f"syncrelay: wrote {written}\n")
-    assert run("validate", written, folder=folder).returncode == 0
-    replayed = run("replay", "rig.mcap", "--config", written, folder=folder)
+    assert run_here("validate", written, folder=folder).returncode == 0
+    replayed = run_here("replay", "rig.mcap", "--config", written, folder=folder)
     assert read_summary(replayed.stdout)["front"].sets == 100
-    again = run("analyze", "rig.mcap", "--config", "f.yaml", "--write", written, folder=folder)
+    again = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--write", written, folder=folder)
     assert (again.returncode, again.stderr) == (1, f"syncrelay: {written}: already exists and is not overwritten\n")
 
 
 def test_comments_of_the_file_stay(folder, tmp_path):
-    run("demo", "--record", str(tmp_path / "demo.mcap"), "--seconds", "10", folder=folder)
+    run_here("demo", "--record", str(tmp_path / "demo.mcap"), "--seconds", "10", folder=folder)
     written = tmp_path / "better.yaml"
-    run("analyze", str(tmp_path / "demo.mcap"), "--config", "demo.yaml", "--write", str(written), folder=folder)
+    run_here("analyze", str(tmp_path / "demo.mcap"), "--config", "demo.yaml", "--write", str(written), folder=folder)
     before = {line.partition("#")[2] for line in shipped_config().splitlines() if "#" in line}
     assert before <= {line.partition("#")[2] for line in written.read_text().splitlines()}
-    assert run("validate", str(written), folder=folder).returncode == 0
+    assert run_here("validate", str(written), folder=folder).returncode == 0
 
 
 def test_where_there_is_nothing_to_change_no_file_is_written(folder, tmp_path):
-    run("analyze", "rig.mcap", "--config", "f.yaml", "--write", "fits.yaml", folder=folder)
+    run_here("analyze", "rig.mcap", "--config", "f.yaml", "--write", "fits.yaml", folder=folder)
     written = tmp_path / "new.yaml"
-    done = run("analyze", "rig.mcap", "--config", "fits.yaml", "--write", str(written), folder=folder)
+    done = run_here("analyze", "rig.mcap", "--config", "fits.yaml", "--write", str(written), folder=folder)
     assert (done.returncode, done.stderr) == (0, f"syncrelay: no values to change: {written} was not written\n")
     assert not written.exists()
 
 
 def test_topics_without_a_file_get_one(folder, tmp_path):
     written = tmp_path / "new.yaml"
-    done = run("analyze", "rig.mcap", *_TOPICS, "--write", str(written), folder=folder)
+    done = run_here("analyze", "rig.mcap", *_TOPICS, "--write", str(written), folder=folder)
     assert done.returncode == 0
     text = done.stdout.partition("A file that gives these sets:\n\n")[2]
     assert text == written.read_text()
-    replayed = run("replay", "rig.mcap", "--config", str(written), folder=folder)
+    replayed = run_here("replay", "rig.mcap", "--config", str(written), folder=folder)
     assert read_summary(replayed.stdout)["matched"].sets == 100
 
 
@@ -140,7 +140,7 @@ def other_rig(folder):
 
 
 def test_a_recording_alone_gets_its_topics_listed_and_what_to_type_next(folder, other_rig):
-    done = run("analyze", other_rig.name, folder=folder)
+    done = run_here("analyze", other_rig.name, folder=folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, _INVENTORY, "")
     commands = [shlex.split(line) for line in done.stdout.splitlines() if line.startswith("  syncrelay ")]
     for _, *words in commands:
@@ -148,7 +148,7 @@ def test_a_recording_alone_gets_its_topics_listed_and_what_to_type_next(folder, 
 
 
 def test_the_list_is_there_for_programs_too(folder, other_rig):
-    found = json.loads(run("analyze", other_rig.name, "--json", folder=folder).stdout)
+    found = json.loads(run_here("analyze", other_rig.name, "--json", folder=folder).stdout)
     assert found["groups"] == []
     assert {topic["topic"]: (topic["messages"], topic["unfit"]) for topic in found["topics"]} == {
         "/camera": (100, None),
@@ -160,7 +160,7 @@ def test_the_list_is_there_for_programs_too(folder, other_rig):
 
 def test_of_a_recording_with_nothing_to_match_no_command_is_shown(folder):
     write_mcap(folder / "one.mcap", at("/lidar", *range(0, 2000, 100)))
-    done = run("analyze", "one.mcap", folder=folder)
+    done = run_here("analyze", "one.mcap", folder=folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert "equal to receipt" in done.stdout
     assert done.stdout.splitlines()[-1].startswith("No two topics have stamps and enough messages")
@@ -177,7 +177,7 @@ def test_keys_that_no_two_inputs_have_in_common_are_found(folder):
     (folder / "keys.yaml").write_text(
         config({"seen": {"policy": "equal_key", "key": "header.frame_id", "topics": topics}})
     )
-    done = run("analyze", "keys.mcap", "--config", "keys.yaml", "--json", folder=folder)
+    done = run_here("analyze", "keys.mcap", "--config", "keys.yaml", "--json", folder=folder)
     (group,) = json.loads(done.stdout)["groups"]
     (found,) = (finding for finding in group["findings"] if finding["code"] == "no_common_key")
     assert "the newest are 'left_" in found["text"]
@@ -202,6 +202,6 @@ def test_keys_that_no_two_inputs_have_in_common_are_found(folder):
     ],
 )
 def test_what_is_wrong_is_said(words, code, said, folder):
-    done = run("analyze", *words, folder=folder)
+    done = run_here("analyze", *words, folder=folder)
     assert (done.returncode, done.stdout) == (code, "")
     assert done.stderr.startswith(f"syncrelay: {said}")

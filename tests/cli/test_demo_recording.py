@@ -6,7 +6,7 @@ from rosbags.highlevel import AnyReader
 from syncrelay.cdr import read_stamp
 from syncrelay.cli.demo import shipped_config
 from syncrelay.rig.schedule import SENSORS
-from tests.cli.command import run, run_python
+from tests.cli.command import run_here, run_python
 from tests.ros.summary import read_summary
 
 _WITHOUT_ROS = "import sys; sys.modules['rclpy'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
@@ -37,19 +37,19 @@ def test_it_holds_what_the_rig_sends(folder):
 
 
 def test_the_shipped_file_gives_sets_of_it(folder):
-    done = run("replay", "rig.mcap", "--config", "demo.yaml", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "demo.yaml", folder=folder)
     assert done.returncode == 0
     assert all(group.sets > 90 for group in read_summary(done.stdout).values())
 
 
 def test_a_seed_repeats_it(folder, tmp_path):
-    run("demo", "--record", str(tmp_path / "same.mcap"), "--seconds", "10", folder=folder)
-    run("demo", "--record", str(tmp_path / "other.mcap"), "--seconds", "10", "--seed", "1", folder=folder)
+    run_here("demo", "--record", str(tmp_path / "same.mcap"), "--seconds", "10", folder=folder)
+    run_here("demo", "--record", str(tmp_path / "other.mcap"), "--seconds", "10", "--seed", "1", folder=folder)
     content = (folder / "rig.mcap").read_bytes()
     assert (tmp_path / "same.mcap").read_bytes() == content
     assert (tmp_path / "other.mcap").read_bytes() != content
 
 
 def test_nothing_is_overwritten(folder):
-    done = run("demo", "--record", "rig.mcap", folder=folder)
+    done = run_here("demo", "--record", "rig.mcap", folder=folder)
     assert (done.returncode, done.stderr) == (1, "syncrelay: rig.mcap: already exists and is not overwritten\n")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.cli.command import BAD, GOOD, run
+from tests.cli.command import BAD, GOOD, run, run_here
 
 _NEW = GOOD.replace("exact_time", "exact_time\n    queue_size: 5").replace("/b,", "/b, qos: sensor_data,")
 
@@ -19,7 +19,7 @@ def folder(tmp_path):
 def test_two_files_that_say_the_same_differ_in_nothing(folder):
     (folder / "conf").mkdir()
     (folder / "conf/front.yaml").write_text(f"# the same\n{GOOD}")
-    done = run("diff", "good.yaml", "conf", folder=folder)
+    done = run_here("diff", "good.yaml", "conf", folder=folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, "a reload changes nothing: 1 group unchanged\n", "")
 
 
@@ -41,7 +41,7 @@ def test_what_a_reload_would_do_is_told_in_lines(folder):
 
 
 def test_what_needs_a_restart_is_told_first(folder):
-    done = run("diff", "good.yaml", "node.yaml", folder=folder)
+    done = run_here("diff", "good.yaml", "node.yaml", folder=folder)
     assert done.stdout.splitlines()[:3] == [
         "a reload would be refused: `node` cannot change while the relay runs; after a restart:",
         "  node.name: not set -> other",
@@ -51,7 +51,7 @@ def test_what_needs_a_restart_is_told_first(folder):
 
 
 def test_programs_get_json(folder):
-    done = run("diff", "good.yaml", "node.yaml", "--json", folder=folder)
+    done = run_here("diff", "good.yaml", "node.yaml", "--json", folder=folder)
     told = json.loads(done.stdout)
     assert (done.returncode, told["reload"], told["restart"]) == (1, "refused", ["node"])
     assert told["groups"]["rebuilt"][0]["keys"] == [
@@ -63,9 +63,9 @@ def test_programs_get_json(folder):
 
 
 def test_a_faulty_file_is_an_error_and_not_a_difference(folder):
-    done = run("diff", "good.yaml", "bad.yaml", folder=folder)
+    done = run_here("diff", "good.yaml", "bad.yaml", folder=folder)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("bad.yaml:4:13: groups.front.policy: unknown value `exact_tim`")
-    both = run("diff", "bad.yaml", "missing.yaml", folder=folder)
+    both = run_here("diff", "bad.yaml", "missing.yaml", folder=folder)
     assert both.stderr == f"{done.stderr}missing.yaml: no such file\n"
     assert run("diff", "-", "-", folder=folder, stdin=GOOD).returncode == 2

@@ -19,7 +19,7 @@ from syncrelay.cli.graph.svg import as_svg
 from syncrelay.config import load, load_text
 from syncrelay.status import document
 from syncrelay.top.state import read_state
-from tests.cli.command import ROOT, run
+from tests.cli.command import ROOT, run, run_here
 from tests.top import states
 from tests.top.relay_server import serving
 
@@ -215,19 +215,19 @@ def test_the_command_draws_files_together_and_says_what_the_relay_does_not_run(t
     assert (alone.returncode, alone.stderr) == (0, "")
     assert alone.stdout.startswith('---\ntitle: "fusion.yaml"\n---\nflowchart LR\n')
     with serving(states.rig()) as server:
-        live = run("graph", "fusion.yaml", "--format", "svg", "--url", server.url, folder=tmp_path)
+        live = run_here("graph", "fusion.yaml", "--format", "svg", "--url", server.url, folder=tmp_path)
     assert live.returncode == 0
     assert live.stderr == "syncrelay: /syncrelay does not run new: drawn without figures\n"
     assert "OK, 10 of 10 sets/s" in texts(live.stdout)
     (tmp_path / "old.yaml").write_text(states.file(front=states.group({"/old": states.IMAGE, "/lidar/points": None})))
     with serving(states.rig()) as server:
-        other = run("graph", "old.yaml", "--url", server.url, folder=tmp_path)
+        other = run_here("graph", "old.yaml", "--url", server.url, folder=tmp_path)
     assert "<br/>as /camera/image_raw<br/>" in other.stdout
     assert other.stderr.splitlines()[-1] == (
         "syncrelay: front of /syncrelay matches /camera/image_raw, which the files do not have there: a remap, or it"
         " runs another version of them"
     )
-    gone = run("graph", "fusion.yaml", "--url", server.url, folder=tmp_path)
+    gone = run_here("graph", "fusion.yaml", "--url", server.url, folder=tmp_path)
     assert (gone.returncode, gone.stdout) == (1, "")
     assert gone.stderr.startswith(f"syncrelay: no relay answers at {server.url}\n")
 

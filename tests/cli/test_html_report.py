@@ -16,7 +16,7 @@ from syncrelay.cli.analysis_html.packing import pack
 from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 from tests.bag.making import rig, write_mcap
-from tests.cli.command import run
+from tests.cli.command import run_here
 from tests.cli.html_reports import HOSTILE, analyzed, drawings_in, drive, renamed, unpacked
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
@@ -183,8 +183,8 @@ def folder(tmp_path_factory):
 
 
 def test_the_command_writes_it_beside_what_it_prints(folder):
-    plain = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
-    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--json", "--html", "report.html", folder=folder)
+    plain = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
+    done = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--json", "--html", "report.html", folder=folder)
     assert (done.returncode, done.stderr) == (0, "syncrelay: wrote report.html\n")
     assert done.stdout == plain.stdout
     assert (folder / "report.html").read_text().startswith("<!doctype html>")
@@ -192,10 +192,10 @@ def test_the_command_writes_it_beside_what_it_prints(folder):
 
 def test_a_former_report_is_replaced_and_nothing_else_is(folder):
     (folder / "again.html").write_text(_FORMER)
-    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--html", "again.html", folder=folder)
+    done = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--html", "again.html", folder=folder)
     assert (done.returncode, done.stderr) == (0, "syncrelay: wrote again.html\n")
     (folder / "mine.html").write_text("<!doctype html><title>mine</title>")
-    done = run("analyze", "rig.mcap", "--config", "f.yaml", "--html", "mine.html", folder=folder)
+    done = run_here("analyze", "rig.mcap", "--config", "f.yaml", "--html", "mine.html", folder=folder)
     assert (done.returncode, done.stderr) == (1, "syncrelay: mine.html: already exists and is not overwritten\n")
     assert (folder / "mine.html").read_text() == "<!doctype html><title>mine</title>"
 
@@ -204,7 +204,7 @@ _FORMER = '<!doctype html>\n<html lang="en">\n<head>\n<meta name="generator" con
 
 
 def test_topics_without_a_file_are_drawn_too(folder):
-    done = run("analyze", "rig.mcap", "/camera", "/lidar", "--html", "topics.html", folder=folder)
+    done = run_here("analyze", "rig.mcap", "/camera", "/lidar", "--html", "topics.html", folder=folder)
     assert done.returncode == 0
     page = (folder / "topics.html").read_text()
     assert "100 of 100 possible sets come together" in page

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from tests.bag.making import rig, write_mcap, write_ros1
-from tests.cli.command import ROOT, run
+from tests.cli.command import ROOT, run, run_here
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.summary import read_summary
@@ -39,12 +39,12 @@ def test_it_prints_the_summary_of_the_relay(folder):
 
 def test_several_files_are_replayed_as_one(folder):
     (folder / "g.yaml").write_text(_file().replace("front", "rear"))
-    done = run("replay", "rig.mcap", "--config", "f.yaml", "--config", "g.yaml", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--config", "g.yaml", folder=folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, _SUMMARY + _SUMMARY.replace("front", "rear"), "")
 
 
 def test_with_json_there_is_a_line_a_set_and_the_summary_is_talk(folder):
-    done = run("replay", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
     lines = [json.loads(line) for line in done.stdout.splitlines()]
     assert (len(lines), done.stderr) == (39, _SUMMARY)
     camera, lidar = (frame.time - 5_000_000 for frame in reversed(rig()[:2]))
@@ -61,7 +61,7 @@ def test_with_json_there_is_a_line_a_set_and_the_summary_is_talk(folder):
 
 def test_with_drops_there_is_a_line_a_drop_with_its_reason(folder):
     (folder / "f.yaml").write_text(_file(slop="1ms"))
-    done = run("replay", "rig.mcap", "--config", "f.yaml", "--drops", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--drops", folder=folder)
     lines = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(lines) == 80
     assert lines[0].keys() == {"group", "time", "topic", "stamp", "received", "reason"}
@@ -71,7 +71,7 @@ def test_with_drops_there_is_a_line_a_drop_with_its_reason(folder):
 def test_a_set_without_an_optional_input_says_what_is_missing(folder):
     topics = [*inputs({"/camera": VECTOR, "/lidar": VECTOR}), {"topic": "/imu", "type": VECTOR, "required": False}]
     (folder / "f.yaml").write_text(_file(topics=topics, max_wait="10ms"))
-    done = run("replay", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--json", folder=folder)
     line = json.loads(done.stdout.splitlines()[0])
     assert (line["missing"], line["stamps"]["/imu"], line["latency"]) == (["/imu"], None, 10_000_000)
     assert done.returncode == 0
@@ -80,7 +80,7 @@ def test_a_set_without_an_optional_input_says_what_is_missing(folder):
 
 def test_a_required_topic_that_is_not_there_is_a_fault_of_the_data(folder):
     (folder / "f.yaml").write_text(_file().replace('"/camera"', '"/camra"'))
-    done = run("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
     assert done.returncode == 1
     assert "front: /camra is not in the recording, did you mean `/camera`?" in done.stderr
     assert done.stdout.startswith("front: 0 sets\n")
@@ -88,24 +88,24 @@ def test_a_required_topic_that_is_not_there_is_a_fault_of_the_data(folder):
 
 def test_where_no_set_leaves_it_names_what_tells_why(folder):
     (folder / "f.yaml").write_text(_file(slop="1ns"))
-    done = run("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
     assert (done.returncode, done.stdout.splitlines()[0]) == (0, "front: 0 sets")
     assert "no sets of front: `syncrelay analyze` with this recording and file tells why" in done.stderr
 
 
 @pytest.mark.parametrize("output", ["out.mcap", "out"])
 def test_what_is_written_can_be_replayed(output, folder):
-    done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", output, folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "-o", output, folder=folder)
     said = f"syncrelay: wrote {output}: 78 messages of 39 sets\n"
     assert (done.returncode, done.stdout, done.stderr) == (0, _SUMMARY, said)
     (folder / "g.yaml").write_text(_file().replace('"/', '"/front/'))
-    again = run("replay", output, "--config", "g.yaml", folder=folder)
+    again = run_here("replay", output, "--config", "g.yaml", folder=folder)
     assert read_summary(again.stdout)["front"].inputs["/front/camera"].received == 39
 
 
 def test_that_ros1_is_written_as_ros2_is_said(folder):
     write_ros1(folder / "rig.bag", rig())
-    done = run("replay", "rig.bag", "--config", "f.yaml", "-o", "out.mcap", folder=folder)
+    done = run_here("replay", "rig.bag", "--config", "f.yaml", "-o", "out.mcap", folder=folder)
     assert (done.returncode, done.stdout) == (0, _SUMMARY)
     assert "this is a ROS 1 recording: its messages are written as ROS 2 CDR" in done.stderr
 
@@ -114,7 +114,7 @@ def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
     write_mcap(folder / "rig.mcap", rig(), chunk_size=1000)
     with (folder / "rig.mcap").open("r+b") as file:
         file.truncate(8000)
-    done = run("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", folder=folder)
     assert done.returncode == 0
     assert "syncrelay: rig.mcap: cut off or damaged at byte" in done.stderr
     assert 0 < read_summary(done.stdout)["front"].sets < 39
@@ -133,7 +133,7 @@ def test_a_cut_off_recording_is_replayed_as_far_as_it_goes_and_said(folder):
     ],
 )
 def test_what_is_wrong_is_said(words, code, said, folder):
-    done = run("replay", *words, folder=folder)
+    done = run_here("replay", *words, folder=folder)
     assert (done.returncode, done.stdout) == (code, "")
     assert done.stderr.startswith(said)
 

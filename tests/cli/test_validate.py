@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.cli.command import BAD, GOOD, ROOT, run
+from tests.cli.command import BAD, GOOD, ROOT, run, run_here
 from tests.config.ament import make_index
 
 ERROR = """\
@@ -39,7 +39,7 @@ def test_a_faulty_file_is_shown_on_stderr(folder, environ):
 
 
 def test_several_files_are_all_checked(folder, environ):
-    done = run("validate", "f.yaml", "good.yaml", "missing.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "f.yaml", "good.yaml", "missing.yaml", folder=folder, environ=environ)
     assert done.returncode == 1
     assert done.stdout == "good.yaml: ok, 1 group, 2 topics\n"
     assert done.stderr == ERROR + "missing.yaml: no such file\n"
@@ -50,19 +50,19 @@ def test_a_directory_is_checked_as_what_runs_together(folder, environ):
     (folder / "empty").mkdir()
     (folder / "conf/b.yaml").write_text(GOOD.replace("front", "rear"))
     (folder / "conf/a.yaml").write_text(GOOD)
-    done = run("validate", "conf", "empty", "good.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "conf", "empty", "good.yaml", folder=folder, environ=environ)
     assert done.returncode == 1
     assert (
         done.stdout == "conf/a.yaml, conf/b.yaml: ok together, 2 groups, 2 topics\ngood.yaml: ok, 1 group, 2 topics\n"
     )
     assert done.stderr == "empty: no *.yaml or *.yml file in this directory\n"
-    done = run("validate", "conf", "empty", "--format", "json", folder=folder, environ=environ)
+    done = run_here("validate", "conf", "empty", "--format", "json", folder=folder, environ=environ)
     assert [(each["file"], each["ok"]) for each in json.loads(done.stdout)] == [
         ("conf/a.yaml", True),
         ("conf/b.yaml", True),
         ("empty", False),
     ]
-    done = run("validate", "--together", "conf", "conf/../conf/a.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "--together", "conf", "conf/../conf/a.yaml", folder=folder, environ=environ)
     assert (done.returncode, done.stdout) == (2, "")
     assert "conf/a.yaml and conf/../conf/a.yaml are the same file: name each file once" in done.stderr
 
@@ -70,7 +70,7 @@ def test_a_directory_is_checked_as_what_runs_together(folder, environ):
 def test_a_topic_of_two_groups_is_one_topic(folder, environ):
     second = GOOD.partition("groups:\n")[2].replace("front", "back").replace("/b", "/c")
     (folder / "two.yaml").write_text(GOOD + second)
-    done = run("validate", "two.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "two.yaml", folder=folder, environ=environ)
     assert done.stdout == "two.yaml: ok, 2 groups, 3 topics\n"
 
 
@@ -103,12 +103,12 @@ def test_files_together_are_checked_as_the_relay_takes_them(folder, environ):
     rear = GOOD.replace("front", "rear")
     (folder / "rear.yaml").write_text(rear)
     (folder / "loop.yaml").write_text(rear.replace("/a", "/front/b"))
-    done = run("validate", "--together", "good.yaml", "rear.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "--together", "good.yaml", "rear.yaml", folder=folder, environ=environ)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == "good.yaml, rear.yaml: ok together, 2 groups, 2 topics\n"
-    each = run("validate", "good.yaml", "loop.yaml", folder=folder, environ=environ)
+    each = run_here("validate", "good.yaml", "loop.yaml", folder=folder, environ=environ)
     assert each.stdout == "good.yaml: ok, 1 group, 2 topics\nloop.yaml: ok, 1 group, 2 topics\n"
-    together = run("validate", "--together", "good.yaml", "loop.yaml", folder=folder, environ=environ)
+    together = run_here("validate", "--together", "good.yaml", "loop.yaml", folder=folder, environ=environ)
     assert (together.returncode, together.stdout) == (1, "")
     assert together.stderr.startswith("good.yaml:7:17: groups.front.topics[1].topic: the default output `/front/b` is")
     relayed = run("--config", "good.yaml", "--config", "loop.yaml", folder=folder, environ=environ)
@@ -143,7 +143,7 @@ def test_standard_input_is_read_once(folder, environ, words):
 
 def test_json_tells_of_files_together_in_which_the_problem_is(folder, environ):
     words = ["validate", "--together", "--format=json", "good.yaml", "f.yaml"]
-    good, front = json.loads(run(*words, folder=folder, environ=environ).stdout)
+    good, front = json.loads(run_here(*words, folder=folder, environ=environ).stdout)
     assert (good["file"], good["ok"], good["problems"]) == ("good.yaml", True, [])
     assert (front["file"], front["ok"]) == ("f.yaml", False)
     assert [problem["code"] for problem in front["problems"]] == ["duplicate_key", "bad_value"]
@@ -153,7 +153,7 @@ def test_what_could_not_be_checked_is_noted_beside_the_file(folder, environ):
     (folder / "opaque.yaml").write_text(
         GOOD.replace("/a, type: sensor_msgs/msg/Image", "/a, type: dock_msgs/msg/Opaque")
     )
-    done = run("validate", "opaque.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "opaque.yaml", folder=folder, environ=environ)
     assert (done.returncode, done.stderr) == (0, "")
     first, note = done.stdout.splitlines()[:2]
     assert first == "opaque.yaml: ok, 1 group, 2 topics"
@@ -161,7 +161,7 @@ def test_what_could_not_be_checked_is_noted_beside_the_file(folder, environ):
 
 
 def test_json_holds_every_file_and_every_problem(folder, environ):
-    done = run("validate", "--format", "json", "good.yaml", "f.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "--format", "json", "good.yaml", "f.yaml", folder=folder, environ=environ)
     assert (done.returncode, done.stderr) == (1, "")
     assert json.loads(done.stdout) == [
         {"file": "good.yaml", "ok": True, "problems": []},
@@ -184,13 +184,15 @@ def test_json_holds_every_file_and_every_problem(folder, environ):
 
 
 def test_json_has_no_place_for_the_file_as_a_whole(folder):
-    done = run("validate", "--format=json", "missing.yaml", folder=folder)
+    done = run_here("validate", "--format=json", "missing.yaml", folder=folder)
     (problem,) = json.loads(done.stdout)[0]["problems"]
     assert (problem["code"], problem["line"], problem["column"]) == ("unreadable", None, None)
 
 
 def test_github_gets_workflow_commands(folder, environ):
-    done = run("validate", "--format", "github", "f.yaml", "good.yaml", "missing.yaml", folder=folder, environ=environ)
+    done = run_here(
+        "validate", "--format", "github", "f.yaml", "good.yaml", "missing.yaml", folder=folder, environ=environ
+    )
     assert (done.returncode, done.stderr) == (1, "")
     error, good, missing = done.stdout.splitlines()
     assert error.startswith("::error file=f.yaml,line=4,col=13,endColumn=22::groups.front.policy: unknown value ")
@@ -200,7 +202,7 @@ def test_github_gets_workflow_commands(folder, environ):
 
 def test_github_takes_what_would_end_a_property_or_a_command(folder, environ):
     (folder / "50%,a:b.yaml").write_text(GOOD.replace("exact_time", '"100%\\n::error::"'))
-    done = run("validate", "--format", "github", "50%,a:b.yaml", folder=folder, environ=environ)
+    done = run_here("validate", "--format", "github", "50%,a:b.yaml", folder=folder, environ=environ)
     (line,) = done.stdout.splitlines()
     assert line.startswith("::error file=50%25%2Ca%3Ab.yaml,line=4,")
     assert "found the string `100%25\\n::error::`" in line
@@ -208,7 +210,7 @@ def test_github_takes_what_would_end_a_property_or_a_command(folder, environ):
 
 def test_variables_come_from_the_environment(folder, environ):
     (folder / "v.yaml").write_text(GOOD.replace("exact_time", "${POLICY}"))
-    done = run("validate", "v.yaml", folder=folder, environ={**environ, "POLICY": "exact_time"})
+    done = run_here("validate", "v.yaml", folder=folder, environ={**environ, "POLICY": "exact_time"})
     assert (done.returncode, done.stderr) == (0, "")
 
 
