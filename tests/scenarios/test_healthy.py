@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from tests.ros.stage import Stage
-from tests.scenarios.play import ACT_S, Played, Scenario, Theatre
+from tests.scenarios.play import Played, Scenario, Theatre
 from tests.scenarios.streams import Stream
 from tests.scenarios.told import false_warnings, told
 
@@ -28,7 +28,7 @@ RIGS = {
         options={"queue_size": 100, "slop": "50ms"},
     ),
 }
-_BUSY_S, _QUIET_S = 10, 25
+_QUIET_S, _BUSY_S = 25, 10
 _HOG = "while True: pass"
 
 
@@ -37,7 +37,7 @@ def play(stage: Stage) -> Played:
     # Before that, nobody may have been heard of yet.
     theatre.watch.wait(lambda: all(theatre.watch.is_well(name) for name in RIGS), least_s=0)
     theatre.watch.begin("2")
-    theatre.watch.wait(lambda: True, least_s=ACT_S)
+    theatre.watch.wait(lambda: True, least_s=_QUIET_S)
     hogs = [stage.start("hog", [sys.executable, "-c", _HOG]) for _ in range(4)]
     theatre.watch.wait(lambda: True, least_s=_BUSY_S)
     for hog in hogs:
