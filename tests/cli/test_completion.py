@@ -23,7 +23,7 @@ groups:
   rear: {policy: exact_time, topics: []}
 """
 # What a word of the line may be that no completion knows: a number, a place, a sentence.
-_UNKNOWN = {"N", "URL", "FAULT", "GROUP", "TOPIC", "TOPIC:FIELD,..."}
+_UNKNOWN = {"DURATION", "N", "URL", "FAULT", "GROUP", "TOPIC", "TOPIC:FIELD,..."}
 
 
 # One process for many lines; all that argcomplete is told by a shell but where to write.
