@@ -19,7 +19,7 @@ from tests.fleet.tasks import attempts_of
 
 _DEADLINE_S = 60
 _KILLS = 50 if IS_LONG else 6
-_ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
+ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
 _OBEDIENT = """
 import sys
 from argparse import Namespace
@@ -66,7 +66,7 @@ def at_work(folder):
     for name in ("x", "y"):
         (folder / f"{name}.mcap").write_text("hang")
     words = [sys.executable, "-c", _OBEDIENT, "."]
-    with subprocess.Popen(words, cwd=folder, env=_ENVIRON, stdout=-1, stderr=-1, text=True) as command:
+    with subprocess.Popen(words, cwd=folder, env=ENVIRON, stdout=-1, stderr=-1, text=True) as command:
         try:
             wait_until(lambda: all(map(attempts_of, (folder / "x.mcap", folder / "y.mcap"))))
             yield command, wait_until(lambda: children(command.pid) if len(children(command.pid)) == 2 else None)
@@ -114,7 +114,7 @@ def test_a_run_that_is_killed_at_any_moment_ends_as_an_undisturbed_one(tmp_path,
             # All were done before as many were killed as there shall be.
             assert tree(tmp_path / "out") == tree(tmp_path / "undisturbed")
             shutil.rmtree(tmp_path / "out")
-        with subprocess.Popen(words, cwd=tmp_path, env=_ENVIRON, stderr=subprocess.DEVNULL, stdout=-1) as command:
+        with subprocess.Popen(words, cwd=tmp_path, env=ENVIRON, stderr=subprocess.DEVNULL, stdout=-1) as command:
             awaited = max(1, lines(tmp_path / "out") + chance.randint(0, 2))
             wait_until(lambda: lines(tmp_path / "out") >= awaited or command.poll() is not None)  # noqa: B023
             for pid in children(command.pid)[: chance.randint(0, 1)]:
