@@ -70,7 +70,10 @@ def summed_up(text):
 
 def _of_group(text):
     sets = int(re.search(r"(\d+) sets?, last", text)[1])
-    span = [float(number) / {"us": 1000, "ms": 1}[unit] for number, unit in re.findall(r"p\d\d ([\d.]+) (\w+)", text)]
+    span = [
+        float(number) / {"us": 1000, "ms": 1, "s": 0.001}[unit]
+        for number, unit in re.findall(r"p\d\d ([\d.]+) (\w+)", text)
+    ]
     inputs = re.findall(r"(\d+) received, (\d+) in sets, (\d+) waiting, (\d+) dropped", text)
     return sets, *span[:2], [tuple(map(int, counts)) for counts in inputs]
 
