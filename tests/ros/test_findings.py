@@ -137,5 +137,5 @@ def test_a_relay_that_cannot_keep_up_is_told(stage: Stage):
     group = {**APPROXIMATE, "topics": inputs(PAIR, qos=LOSSLESS)}
     many = {"front": group, **{f"front_{number}": group for number in range(60)}}
     relay = stage.relay(config(many, metrics=ANY_PORT))
-    play(stage, merged(stream("/camera", hz=200), stream("/lidar", hz=200)))
+    play(stage, merged(stream("/camera", hz=600), stream("/lidar", hz=600)))
     wait_for_finding(relay, "too_slow", text=rf"messages waited up to {LASTED} for the relay")
