@@ -20,14 +20,12 @@ from syncrelay.cli.analyze import Asked, bound, measured
 from syncrelay.cli.inventory import inventory_as_json
 from syncrelay.cli.reading import eased_collector
 from syncrelay.config import Config, load_text
+from syncrelay.fleet.documents import ANALYSIS
 from syncrelay.fleet.task import JSON, PROBLEMS, Source, fingerprint_of, text_of
 from syncrelay.rig.what_if import Fault
 
 SETS: Final = "sets.mcap"
 """The file of a recording's sets in the folder of its result, as `replay -o` writes it."""
-
-ANALYSIS: Final = "analysis.json"
-"""The file of a recording's analysis in the folder of its result, as `analyze --json` prints it."""
 
 
 @dataclass(frozen=True, slots=True)
