@@ -1,4 +1,4 @@
-"""Compare tools that cut datasets from recordings: `python bench/peers.py --help`; the results: docs/peers.md.
+"""Compare tools that cut datasets from recordings: `python bench/peers.py --help`; results: docs/explanation/peers.md.
 
 Each is asked for every message of the first topic with the nearest one of the second; header stamps are the truth.
 CPU is user and system time of the whole process, as a ratio to `syncrelay export` in the same round. VENVS holds a venv

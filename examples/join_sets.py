@@ -1,4 +1,4 @@
-"""Joins the outputs of a syncrelay group into its sets, by the group's manifest (docs/manifest.md).
+"""Joins the outputs of a syncrelay group into its sets, by the group's manifest (docs/reference/manifest.md).
 
 python3 join_sets.py /syncrelay/front/sets /front/image sensor_msgs/msg/Image /front/imu sensor_msgs/msg/Imu
 

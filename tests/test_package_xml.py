@@ -23,7 +23,7 @@ def test_both_say_the_same_of_the_package():
 def test_every_dependency_is_a_key_of_rosdep_or_named_where_a_workspace_is_explained():
     names = [re.split(r"[^\w.-]", each)[0].lower() for each in _PROJECT["dependencies"]]
     keys = {name: _KEYS.get(name, f"python3-{name}") for name in names}
-    page = (_ROOT / "docs" / "workspace.md").read_text().lower()
+    page = (_ROOT / "docs" / "howto" / "workspace.md").read_text().lower()
     from_pip = [name for name in names if keys[name] not in _NEEDED]
     assert [name for name in from_pip if f"`{name}`" not in page] == []
     assert {key for key in _NEEDED if key.startswith("python3-")} <= set(keys.values())

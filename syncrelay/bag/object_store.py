@@ -8,7 +8,7 @@ import fsspec
 from syncrelay.bag.attempts import REPLACED, LastingError, PassingError
 
 _Done = TypeVar("_Done")
-_DENIED: Final = "access denied: check the credentials (docs/storage.md)"
+_DENIED: Final = "access denied: check the credentials (docs/howto/storage.md)"
 _NO_CREDENTIALS: Final = ("NoCredentialsError", "PartialCredentialsError", "ProfileNotFound", "DefaultCredentialsError")
 _DENIALS: Final = ("Forbidden", "Anonymous caller", "Invalid Credentials")
 _UNAUTHORIZED, _FORBIDDEN, _NOT_FOUND = 401, 403, 404
@@ -102,7 +102,7 @@ def _tried(work: Callable[[], _Done]) -> _Done:
 def _told(error: Exception) -> Exception:
     kind, code = type(error).__name__, getattr(error, "code", None)
     if kind in _NO_CREDENTIALS:
-        return LastingError(f"no credentials were found ({kind}): docs/storage.md says where they are looked for")
+        return LastingError(f"no credentials were found ({kind}): docs/howto/storage.md says where they are looked for")
     if isinstance(error, PermissionError) or code in (_UNAUTHORIZED, _FORBIDDEN) or str(error).startswith(_DENIALS):
         return LastingError(_DENIED)
     if code == _NOT_FOUND:

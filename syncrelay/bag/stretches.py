@@ -1,4 +1,7 @@
-"""A long recording in stretches that can be replayed side by side, with the sets of one pass: see docs/stretches.md."""
+"""A long recording in stretches that can be replayed side by side, with the sets of one pass.
+
+docs/explanation/stretches.md says why they are the same.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence

@@ -63,7 +63,8 @@ def _guarded(command: Callable[[], int]) -> int:
             needs = "this command" if extra else "syncrelay"
             remark(
                 f"{sys.executable} lacks a Python package that {needs} needs, or has too old a version: {error}; run"
-                f" `python3 -m pip install 'FOLDER-OF-SYNCRELAY{extra}'`, or see docs/workspace.md for a ROS workspace"
+                f" `python3 -m pip install 'FOLDER-OF-SYNCRELAY{extra}'`, or"
+                f" see docs/howto/workspace.md for a ROS workspace"
             )
             return UNAVAILABLE
         say(traceback.format_exc())

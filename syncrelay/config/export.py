@@ -98,7 +98,7 @@ class TaskTopic(Keys):
 
 
 class LerobotKeys(Keys):
-    """How sets become frames of a LeRobotDataset; see docs/lerobot.md."""
+    """How sets become frames of a LeRobotDataset; see docs/howto/lerobot.md."""
 
     group: Annotated[str | None, NOT_NULL] = Field(
         default=None, description="The group whose sets are written. Default: the only group.", examples=["front"]

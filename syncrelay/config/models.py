@@ -331,7 +331,7 @@ class Group(Keys):
         default=True,
         description=(
             "Publish a small message for each set on ~/GROUP/sets, after the set's own: which messages belong together,"
-            " which inputs are missing, span and latency; see docs/manifest.md. Default: true."
+            " which inputs are missing, span and latency; see docs/reference/manifest.md. Default: true."
         ),
     )
     output_prefix: Annotated[OutputPrefix | None, NOT_NULL] = Field(

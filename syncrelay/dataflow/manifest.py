@@ -1,6 +1,6 @@
 """The manifest of each set: a diagnostic_msgs/msg/DiagnosticArray, written as CDR by hand.
 
-docs/manifest.md is its contract. Whatever is the same in every set of a group is serialized once.
+docs/reference/manifest.md is its contract. Whatever is the same in every set of a group is serialized once.
 """
 
 from collections.abc import Mapping, Sequence

@@ -3,7 +3,7 @@
 A stretch is written by going on from where the one before ended. That is known when the one before is written, or when
 it has been scouted: replayed with nothing decoded and nothing written, which takes much less. A scout that did not
 begin in the state in which the stretch before ended is thrown away, and has cost nothing but time. See
-docs/stretches.md.
+docs/explanation/stretches.md.
 """
 
 import shutil

@@ -164,7 +164,7 @@ groups:
     lines = lines_of(group)
     a_set = lines.of_set((_AT, _AT + 7 * _MS), left=_AT + 9_200_000, received=_AT + 8 * _MS)
     a_drop = lines.of_drop(RecentDrop(0, _AT, DropReason.TOO_FAR), left=_AT + 63 * _MS, received=_AT + 2 * _MS)
-    page = (Path(__file__).parents[2] / "docs" / "observe.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "observe.md").read_text()
     for line in (a_set, a_drop):
         assert plain_line(json.loads(line)).split(maxsplit=1)[1] in page
 

@@ -1,4 +1,4 @@
-"""Manifests as their readers see them: by the keys that docs/manifest.md names, deserialized by rosbags."""
+"""Manifests as their readers see them: by the keys that docs/reference/manifest.md names, deserialized by rosbags."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Recordings as a LeRobotDataset v3.0: episodes of a fixed rate, with videos. See docs/lerobot.md.
+"""Recordings as a LeRobotDataset v3.0: episodes of a fixed rate, with videos. See docs/howto/lerobot.md.
 
 `write_lerobot` does it all. In a fleet, `write_episode` is what is done to each recording, and `join_episodes` what is
 done once they are there.

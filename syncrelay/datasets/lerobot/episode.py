@@ -39,7 +39,7 @@ def lerobot_of(config: Config) -> LerobotConfig:
     if config.lerobot is None:
         raise UsageError(
             "the file does not say what becomes a LeRobotDataset: write fps, task and features below `export:`"
-            " `lerobot:`, as docs/lerobot.md shows"
+            " `lerobot:`, as docs/howto/lerobot.md shows"
         )
     return config.lerobot
 

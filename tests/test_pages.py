@@ -23,7 +23,7 @@ from tests.test_launch_files import declared
 
 _ROOT = Path(__file__).parents[1]
 _README = (_ROOT / "README.md").read_text()
-_PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *sorted((_ROOT / "docs").glob("*.md"))]}
+_PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *sorted((_ROOT / "docs").rglob("*.md"))]}
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
 _YAML = [text for kind, text in _BLOCKS if kind == "yaml"]
@@ -31,7 +31,7 @@ _FILES = [text for text in _YAML if text.startswith("version:")]
 _SUITES = [text for text in _YAML if "\ncases:" in text]
 _SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
-_WORKSPACE = _ROOT / "docs" / "workspace.md"
+_WORKSPACE = _ROOT / "docs" / "howto" / "workspace.md"
 _SHELL = [line.split("  #")[0] for kind, text in _BLOCKS if kind == "sh" for line in text.splitlines()]
 _SHOWN += [line.removeprefix("ros2 run syncrelay ") for line in _SHELL if line.startswith("ros2 run syncrelay ")]
 _LAUNCHED = [line.split(maxsplit=3)[3] for line in _SHELL if line.startswith("ros2 launch syncrelay ")]
@@ -167,7 +167,7 @@ def test_a_link_that_leads_nowhere_would_be_noticed():
     assert _leads_somewhere(readme, "#which-queue_size")
     assert not _leads_somewhere(readme, "#which-depth")
     assert not _leads_somewhere(readme, "docs/none.md")
-    assert not _leads_somewhere(readme, "docs/node.md#which-queue_size")
+    assert not _leads_somewhere(readme, "docs/reference/node.md#which-queue_size")
 
 
 _TIMELINES = [text for kind, text in _BLOCKS if kind == "timeline"]
