@@ -1,7 +1,9 @@
 """How nodes find each other: the variables of ROS, as rcl reads them."""
 
+import socket
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from syncrelay.config.wording import did_you_mean, quoted
@@ -14,6 +16,8 @@ _PORTS: Final = 250
 _LOCALHOST_ONLY: Final = "ROS_LOCALHOST_ONLY"
 _RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _PEERS: Final = "ROS_STATIC_PEERS"
+# Linux's own default.
+_EPHEMERAL: Final = (32768, 60999)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,3 +140,23 @@ def _peers(found: Discovery) -> Iterator[Diagnosis]:
             impact="no node starts until every peer has an address",
             fix="write IP addresses, or names that this machine can resolve, separated by ;",
         )
+
+
+def look_at_discovery(environ: Mapping[str, str]) -> Discovery:
+    """Return the variables with what they name, as it is found now."""
+    return Discovery(environ, _ephemeral_ports(), tuple(peer for peer in peers_of(environ) if not _resolves(peer)))
+
+
+def _ephemeral_ports() -> tuple[int, int]:
+    try:
+        low, high = Path("/proc/sys/net/ipv4/ip_local_port_range").read_text(encoding="ascii").split()
+    except OSError:
+        return _EPHEMERAL
+    return int(low), int(high)
+
+
+def _resolves(host: str) -> bool:
+    try:
+        return bool(socket.getaddrinfo(host, None))
+    except (OSError, UnicodeError):
+        return False

@@ -7,25 +7,19 @@ from typing import Final
 from syncrelay.config import Config, ConfigError, Problem, load
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.doctor.config_file import check_files, check_remaps, check_types
-from syncrelay.doctor.container import check_isolation
+from syncrelay.doctor.container import check_isolation, look_at_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, info, worst_first
-from syncrelay.doctor.discovery import check_discovery
-from syncrelay.doctor.folders import check_folders
+from syncrelay.doctor.discovery import check_discovery, look_at_discovery
+from syncrelay.doctor.folders import check_folders, look_at_folders
 from syncrelay.doctor.graph import check_clock, check_graph, check_own_name, check_state
 from syncrelay.doctor.groups import check_groups, check_sizes
-from syncrelay.doctor.installation import Installation, check_installation, middleware_of
+from syncrelay.doctor.installation import Installation, check_installation, look_at_installation, middleware_of
 from syncrelay.doctor.listen import check_listen
-from syncrelay.doctor.machine.discovery import look_at_discovery, look_at_transport
-from syncrelay.doctor.machine.folders import look_at_folders
-from syncrelay.doctor.machine.installation import look_at_installation
-from syncrelay.doctor.machine.isolation import look_at_isolation
-from syncrelay.doctor.machine.network import look_at_interfaces
-from syncrelay.doctor.machine.shared_memory import look_at_shared_memory
-from syncrelay.doctor.network import check_network
-from syncrelay.doctor.shared_memory import check_shared_memory
+from syncrelay.doctor.network import check_network, look_at_interfaces
+from syncrelay.doctor.shared_memory import check_shared_memory, look_at_shared_memory
 from syncrelay.doctor.start import check_start
 from syncrelay.doctor.start_check import Plan, StartResult, start_node
-from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
+from syncrelay.doctor.transport import check_transport, look_at_transport, uses_defaults, uses_shared_memory
 from syncrelay.environment.domain import domain_of, range_of
 from syncrelay.explain import GraphSnapshot, GroupReport
 

@@ -1,11 +1,16 @@
-"""Fast DDS's files in /dev/shm: of whom they are, whether someone lives behind them, and whether there is room."""
+"""Fast DDS's files in /dev/shm: whose they are, whether a process holds them, and whether there is room."""
 
+import os
+import pwd
+import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
 from syncrelay.doctor.discovery import ports_of
+from syncrelay.fastdds_files import FOLDER, NAME, is_locked, locks_of
 
 # One participant with the default segment size of 512 kB, and its ports.
 _NEEDED: Final = 600_000
@@ -120,3 +125,42 @@ def _size(count: int) -> str:
         if count >= size:
             return f"{count / size:.{0 if count >= 10 * size else 1}f} {unit}"
     return f"{count} B"
+
+
+def look_at_shared_memory(folder: Path = FOLDER) -> SharedMemory:
+    """Return how much room there is, and every segment and port with its owner."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        room = os.statvfs(folder)
+    except OSError as error:
+        return SharedMemory(str(folder), error.strerror, total=0, free=0, uid=os.geteuid())
+    total, free = room.f_blocks * room.f_frsize, room.f_bavail * room.f_frsize
+    return SharedMemory(str(folder), None, total=total, free=free, uid=os.geteuid(), files=tuple(_files(folder)))
+
+
+def _files(folder: Path) -> Iterator[ShmFile]:
+    for path in sorted(folder.glob("fast*_*")):
+        found = NAME.fullmatch(path.name)
+        if found is None:
+            continue
+        try:
+            status = path.stat()
+        except FileNotFoundError:
+            # Its process ended just now.
+            continue
+        port = int(found[1]) if found[1] else None
+        yield ShmFile(path.name, status.st_size, status.st_uid, _user(status.st_uid), _is_live(path), port)
+
+
+def _is_live(path: Path) -> bool:
+    """Whether a process holds a lock beside a file; without a lock file that cannot be told, and counts as live."""
+    locks = locks_of(path)
+    return not locks or any(map(is_locked, locks))
+
+
+def _user(uid: int) -> str:
+    try:
+        return pwd.getpwuid(uid).pw_name
+    except KeyError:
+        return f"uid {uid}"

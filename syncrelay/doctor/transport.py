@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
+from xml.parsers import expat
 
 from syncrelay.config.wording import did_you_mean
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
@@ -68,3 +70,19 @@ def check_transport(found: Transport) -> Iterator[Diagnosis]:
             impact="only nodes of the same user on this machine are reached",
             fix=f"nothing if all nodes are; otherwise: unset {_VARIABLE}",
         )
+
+
+def look_at_transport(environ: Mapping[str, str]) -> Transport:
+    """Return Fast DDS's variables, and what is wrong with the files that they name."""
+    named = ((name, Path(environ[name])) for name in PROFILES if environ.get(name))
+    return Transport(environ, tuple((name, fault) for name, path in named if (fault := _xml_fault(path))))
+
+
+def _xml_fault(path: Path) -> str | None:
+    try:
+        expat.ParserCreate().Parse(path.read_bytes(), True)  # noqa: FBT003  expat's signature: this is all of it
+    except OSError as error:
+        return error.strerror
+    except expat.ExpatError as error:
+        return f"is not XML: {error}"
+    return None

@@ -1,6 +1,7 @@
 """Which graph a node joins, as rcl reads it from the environment: its domain, and how far discovery reaches."""
 
-import re
+import ctypes
+import os
 from collections.abc import Mapping
 from typing import Final
 
@@ -10,8 +11,10 @@ from syncrelay.printable import printable
 DISCOVERY_RANGES: Final = ("SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
 DOMAIN_ADVICE: Final = "export ROS_DOMAIN_ID=0    or the number that the other nodes have; 0 to 101 are safe on Linux"
 _LARGEST_DOMAIN: Final = 232
-# rcl reads numbers as C does: a leading 0 is octal, 0x hexadecimal, and what follows the digits is passed over.
-_NUMBER: Final = re.compile(r"\s*\+?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)(.*)", re.DOTALL)
+# rcl reads the number with it, so that here is read what rcl will read: of 010 eight, of 0x1f 31, of "7x" seven.
+_strtoul: Final = ctypes.CDLL(None).strtoul
+_strtoul.argtypes = (ctypes.c_char_p, ctypes.POINTER(ctypes.c_char_p), ctypes.c_int)
+_strtoul.restype = ctypes.c_ulong
 
 
 def domain_of(environ: Mapping[str, str]) -> int | None:
@@ -19,14 +22,10 @@ def domain_of(environ: Mapping[str, str]) -> int | None:
     text = environ.get("ROS_DOMAIN_ID", "")
     if not text:
         return 0
-    found = _NUMBER.fullmatch(text)
-    if found is None:
-        return None
-    digits, rest = found.groups()
-    number = int(digits, 16) if digits[:2].lower() == "0x" else int(digits, 8 if digits[0] == "0" else 10)
-    if (number == 0 and rest) or number > _LARGEST_DOMAIN:
-        return None
-    return number
+    rest = ctypes.c_char_p()
+    number = int(_strtoul(os.fsencode(text), ctypes.byref(rest), 0))
+    # What does not begin with a number is 0 with all of it left over; -1 is the largest number of all.
+    return None if number > _LARGEST_DOMAIN or (number == 0 and rest.value) else number
 
 
 def range_of(environ: Mapping[str, str]) -> str:

@@ -56,6 +56,8 @@ class Server:
         self.place = Place(port, host)
         self._hosts = Hosts.of(listen, host)
         self._announcement: AbstractContextManager[object] = nullcontext()
+        # The sockets that waitress watches, by their descriptors.
+        self._channels: dict[int, Any] = {}
         self._server: Any = None
         self._thread: Thread | None = None
 
@@ -67,7 +69,8 @@ class Server:
     ) -> None:
         self._announcement.__exit__(kind, error, trace)
         if self._thread is not None:
-            self._server.trigger.pull_trigger(lambda: close_all(self._server._map))  # noqa: SLF001  it has no stop of its own
+            # It has no stop of its own.
+            self._server.trigger.pull_trigger(lambda: close_all(self._channels))
             self._thread.join()
             self._server.task_dispatcher.shutdown()
         self._socket.close()
@@ -76,6 +79,7 @@ class Server:
         """Answer from now on; `state` is called on other threads."""
         self._server = create_server(
             _application(state, taps, self._hosts),
+            map=self._channels,
             sockets=[self._socket],
             threads=2,
             connection_limit=_CONNECTIONS,
@@ -87,12 +91,10 @@ class Server:
             ident=None,
             clear_untrusted_proxy_headers=True,
         )
-        self._thread = Thread(target=self._server.asyncore.loop, kwargs=self._loop_settings(), name="syncrelay-http")
+        settings = {"timeout": 1, "map": self._channels, "use_poll": True}
+        self._thread = Thread(target=self._server.asyncore.loop, kwargs=settings, name="syncrelay-http")
         self._thread.start()
         self._announcement = announce(self.place)
-
-    def _loop_settings(self) -> dict[str, Any]:
-        return {"timeout": 1, "map": self._server._map, "use_poll": True}  # noqa: SLF001
 
 
 def _bound(listen: Listen) -> socket.socket:

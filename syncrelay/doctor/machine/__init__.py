@@ -1,1 +1,0 @@
-"""What this machine, this Python and this environment are: looked at once, returned as values."""
