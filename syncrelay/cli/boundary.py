@@ -25,6 +25,8 @@ _EXTRAS: Final = {
     **dict.fromkeys(("PIL", "av", "pyarrow"), "[datasets]"),
     **dict.fromkeys(("fsspec", "pandas", "ray"), "[fleet]"),
 }
+# What the container image goes without, see docker/trim.py.
+_OF_RECORDINGS: Final = ("apsw", "lz4", "mcap", "zstandard")
 # All that our own texts are coloured with (syncrelay.config.render, syncrelay.doctor.text), and nothing else.
 _COLOURS: Final = re.compile("(\033\\[(?:[0-2]|3[134])m)")
 
@@ -59,13 +61,7 @@ def _guarded(command: Callable[[], int]) -> int:
         return AT_FAULT
     except Exception as error:  # noqa: BLE001  the boundary: everything else is our bug
         if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
-            extra = _EXTRAS.get(error.name.partition(".")[0], "")
-            needs = "this command" if extra else "syncrelay"
-            remark(
-                f"{sys.executable} lacks a Python package that {needs} needs, or has too old a version: {error}; run"
-                f" `python3 -m pip install 'FOLDER-OF-SYNCRELAY{extra}'`, or"
-                f" see docs/howto/workspace.md for a ROS workspace"
-            )
+            remark(_lacking(error, error.name.partition(".")[0]))
             return UNAVAILABLE
         say(traceback.format_exc())
         remark("this is a bug in syncrelay, please report it with the lines above and your file")
@@ -153,3 +149,13 @@ def _code(error: SyncRelayError) -> int:
             return UNAVAILABLE
         case _:
             return AT_FAULT
+
+
+def _lacking(error: ImportError, package: str) -> str:
+    extra = _EXTRAS.get(package, "")
+    needs = "this command" if extra or package in _OF_RECORDINGS else "syncrelay"
+    image = " (the container image leaves out what reads recordings)" if package in _OF_RECORDINGS else ""
+    return (
+        f"{sys.executable} lacks a Python package that {needs} needs, or has too old a version: {error}{image}; run"
+        f" `python3 -m pip install 'FOLDER-OF-SYNCRELAY{extra}'`, or see docs/howto/workspace.md for a ROS workspace"
+    )
