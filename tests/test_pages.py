@@ -23,7 +23,10 @@ from tests.test_launch_files import declared
 
 _ROOT = Path(__file__).parents[1]
 _README = (_ROOT / "README.md").read_text()
-_PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *sorted((_ROOT / "docs").rglob("*.md"))]}
+_DOCS = _ROOT / "docs"
+# Of docs/, what `make docs` takes there from elsewhere is no page.
+_OF_DOCS = [page for page in sorted(_DOCS.rglob("*.md")) if not page.is_relative_to(_DOCS / "repository")]
+_PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *_OF_DOCS]}
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
 _YAML = [text for kind, text in _BLOCKS if kind == "yaml"]
