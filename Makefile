@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot faults soak lint schema docs bench wheel clean
+.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot faults soak lint schema reference docs bench wheel clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -63,6 +63,10 @@ lint: $(VENV)/lint
 schema: $(VENV)/test
 	$(BIN)/python -m syncrelay schema > schema/syncrelay-1.json
 	$(BIN)/python -m syncrelay schema --test > schema/syncrelay-test-1.json
+
+# The pages of docs/reference that say what the program knows; a test holds them to it.
+reference: $(VENV)/test
+	$(BIN)/python -m docs.generate
 
 # The pages of docs/ as a site in build/docs, with its search; what a page gets wrong is an error.
 docs: $(VENV)/docs
