@@ -33,6 +33,7 @@ _SUITES = [text for text in _YAML if "\ncases:" in text]
 _SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
 _WORKSPACE = _ROOT / "docs" / "howto" / "workspace.md"
+_CHOICE = _ROOT / "docs" / "howto" / "choose_policy_slop_queue.md"
 _SHELL = [line.split("  #")[0] for kind, text in _BLOCKS if kind == "sh" for line in text.splitlines()]
 _SHOWN += [line.removeprefix("ros2 run syncrelay ") for line in _SHELL if line.startswith("ros2 run syncrelay ")]
 _LAUNCHED = [line.split(maxsplit=3)[3] for line in _SHELL if line.startswith("ros2 launch syncrelay ")]
@@ -114,7 +115,7 @@ def test_a_command_that_does_not_exist_would_be_noticed():
 
 
 def test_the_error_that_a_page_shows_is_the_one_that_comes(tmp_path):
-    shown = {text.strip() for kind, text in _BLOCKS if kind == "text" and "slopp" in text}
+    shown = {text.strip() for _, text in _BLOCKS if text.startswith("fusion.yaml:") and "slopp" in text}
     (tmp_path / "fusion.yaml").write_text(_FILES[0].replace("slop:", "slopp:"))
     run = subprocess.run(
         [sys.executable, "-m", "syncrelay", "validate", "fusion.yaml"],
@@ -124,8 +125,7 @@ def test_the_error_that_a_page_shows_is_the_one_that_comes(tmp_path):
         check=False,
     )
     assert run.returncode == 1
-    assert [text for text in shown if text not in run.stdout + run.stderr] == []
-    assert shown
+    assert shown == {(run.stdout + run.stderr).strip()}
 
 
 def test_the_drawing_and_the_difference_that_a_page_shows_are_those_that_come():
@@ -160,11 +160,10 @@ def _anchors(text):
 
 
 def test_a_link_that_leads_nowhere_would_be_noticed():
-    readme = _ROOT / "README.md"
-    assert _leads_somewhere(readme, "#which-queue_size")
-    assert not _leads_somewhere(readme, "#which-depth")
-    assert not _leads_somewhere(readme, "docs/none.md")
-    assert not _leads_somewhere(readme, "docs/reference/node.md#which-queue_size")
+    assert _leads_somewhere(_CHOICE, "#which-queue_size")
+    assert not _leads_somewhere(_CHOICE, "#which-depth")
+    assert not _leads_somewhere(_CHOICE, "none.md")
+    assert not _leads_somewhere(_CHOICE, "../reference/node.md#which-queue_size")
 
 
 _TIMELINES = [text for kind, text in _BLOCKS if kind == "timeline"]
@@ -186,7 +185,7 @@ def test_every_drawing_of_a_policy_is_what_the_policy_does(text):
 def test_every_policy_has_a_drawing_and_a_row():
     for policy in file_format().groups:
         assert any(text.startswith(policy) for text in _TIMELINES)
-        assert f"| `{policy}` |" in _README
+        assert f"| `{policy}` |" in _PAGES[_CHOICE]
 
 
 def test_every_python_block_that_a_page_shows_is_python():
