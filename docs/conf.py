@@ -10,8 +10,8 @@ project = "syncrelay"
 author = "the authors of syncrelay"
 copyright = "the authors of syncrelay, Apache-2.0"  # noqa: A001  Sphinx's word
 
-# `repository`, `doors` and `lexers` are ours, in _ext.
-extensions = ["myst_parser", "sphinx_copybutton", "repository", "doors", "lexers"]
+# `repository` and what follows it are ours, in _ext.
+extensions = ["myst_parser", "sphinx_copybutton", "repository", "doors", "drawings", "lexers"]
 exclude_patterns = ["_*", "generate"]
 
 nitpicky = True

@@ -144,6 +144,12 @@ def test_every_link_to_a_file_or_heading_of_ours_leads_somewhere(page):
     assert [target for target in targets if not _leads_somewhere(page, target)] == []
 
 
+def test_the_front_page_of_docs_names_every_page():
+    index = _DOCS / "index.md"
+    named = {index.parent / target for target in re.findall(r"\]\(([\w/]+\.md)\)", _PAGES[index])}
+    assert {*_OF_DOCS} - named - {index} == set()
+
+
 def _prose(text):
     return re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
 
