@@ -27,8 +27,8 @@ _PAGES = {path: path.read_text() for path in [_ROOT / "README.md", *sorted((_ROO
 _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
 _YAML = [text for kind, text in _BLOCKS if kind == "yaml"]
-_FILES = [text for text in _YAML if text.startswith("version:")]
 _SUITES = [text for text in _YAML if "\ncases:" in text]
+_FILES = [text for text in _YAML if text.startswith("version:") and text not in _SUITES]
 _SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
 _WORKSPACE = _ROOT / "docs" / "howto" / "workspace.md"
