@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot faults soak lint schema bench wheel clean
+.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot faults soak lint schema reference docs bench wheel clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -64,6 +64,14 @@ schema: $(VENV)/test
 	$(BIN)/python -m syncrelay schema > schema/syncrelay-1.json
 	$(BIN)/python -m syncrelay schema --test > schema/syncrelay-test-1.json
 
+# The pages of docs/reference that say what the program knows; a test holds them to it.
+reference: $(VENV)/test
+	$(BIN)/python -m docs.generate
+
+# The pages of docs/ as a site in build/docs, with its search; what a page gets wrong is an error.
+docs: $(VENV)/docs
+	$(BIN)/python -m sphinx -W --keep-going -n -q docs build/docs
+
 bench: $(VENV)/test
 	$(BIN)/python bench/engine.py
 	$(BIN)/python bench/relay.py
@@ -73,7 +81,7 @@ wheel: $(BIN)/python
 	.ci/wheel $(BIN)/python
 
 clean:
-	rm -rf .venv* build dist *.egg-info syncrelay/ros/compiled/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv* build dist *.egg-info syncrelay/ros/compiled/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache docs/repository
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "Python 3.11 or 3.12 is needed: apt-get install python3 python3-venv" >&2; exit 1; }
@@ -105,4 +113,8 @@ $(VENV)/colcon/done: $(BIN)/python
 
 $(VENV)/lint: $(BIN)/python pyproject.toml
 	$(BIN)/python -m pip install -q -e '.[lint]'
+	touch $@
+
+$(VENV)/docs: $(BIN)/python pyproject.toml
+	$(BIN)/python -m pip install -q -e '.[docs]'
 	touch $@

@@ -1,10 +1,10 @@
 """An analysis as lines of text."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from syncrelay.bag.analysis import Analysis, GroupAnalysis, patch
 from syncrelay.bag.analysis.curves import Curves, Point, slop_key
-from syncrelay.bag.analysis.nearest import Pair
+from syncrelay.bag.analysis.nearest import Pair, worth_seeing
 from syncrelay.bag.analysis.suggest import Suggestion
 from syncrelay.bag.analysis.topics import TopicFigures
 from syncrelay.bag.analysis.unneeded import InputFates
@@ -90,8 +90,12 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
     yield f"  {_sets(each)}"
     for row in each.fates:
         yield f"  {row.topic}: {', '.join(_fates(row))}"
-    for pair in each.pairs:
-        yield f"  {pair_line(pair)}"
+    shown = worth_seeing(each.pairs)
+    for at in shown:
+        yield f"  {pair_line(each.pairs[at])}"
+    others = [pair for at, pair in enumerate(each.pairs) if at not in shown]
+    if others:
+        yield f"  {other_pairs(others)}: --html and --json have them"
     yield from (f"  {line}" for line in _curves(each))
     for lasting in each.findings:
         yield f"  {lasting.finding.severity.name.lower()}, for {lasting.seconds} s: {in_words(lasting.finding)}"
@@ -139,10 +143,9 @@ def unneeded_line(row: InputFates) -> str:
 
 def promise(suggestion: Suggestion) -> str:
     """Return what suggested values give, and what the file's give."""
-    possible = counted(suggestion.possible, "possible set")
     if suggestion.then == suggestion.now:
-        return f"still {suggestion.then} of {possible}"
-    return f"{suggestion.now} -> {suggestion.then} of {possible}"
+        return f"as many sets as now ({suggestion.then} of {suggestion.possible} possible), and the gains listed below,"
+    return f"{suggestion.now} -> {suggestion.then} of {counted(suggestion.possible, 'possible set')}"
 
 
 def slop_text(each: GroupAnalysis, point: Point) -> str:
@@ -166,6 +169,12 @@ def sampled_line(curves: Curves) -> str:
     if curves.is_of_all:
         return ""
     return f"tried on the first {words.seconds(curves.lasts)}: {curves.messages} of {curves.recorded} messages"
+
+
+def other_pairs(pairs: Sequence[Pair]) -> str:
+    """Return how far apart pairs are that are not worth a line each."""
+    most = words.duration(max(pair.distance.high for pair in pairs))
+    return f"{counted(len(pairs), 'more pair')}, less far apart (95 % of the messages within {most})"
 
 
 def pair_line(pair: Pair) -> str:

@@ -5,7 +5,7 @@ import os
 import re
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final, TextIO
 
 from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
@@ -19,6 +19,16 @@ UNAVAILABLE: Final = 69
 """ROS, or a Python package that syncrelay needs, cannot be used here."""
 OUR_BUG: Final = 70
 INTERRUPTED: Final = 130
+
+EXIT_CODES: Final[Mapping[int, str]] = {
+    DONE: "done",
+    AT_FAULT: "a problem in a file or data",
+    USAGE: "wrong usage",
+    UNAVAILABLE: "ROS or a package cannot be used",
+    OUR_BUG: "a bug",
+    INTERRUPTED: "interrupted (a relay: by a 2nd Ctrl-C)",
+}
+"""What help and docs/reference/command_line.md say of them."""
 
 # What brings the packages that only some commands need.
 _EXTRAS: Final = {

@@ -14,6 +14,11 @@ ROS_ARGS: Final = "--ros-args"
 _WIDTH: Final = 78
 
 
+def folded(text: str) -> str:
+    """Return a paragraph of help in lines, the second and later ones indented."""
+    return fill(text, _WIDTH, subsequent_indent="  ")
+
+
 class HelpRequested(Exception):  # noqa: N818  not an error
     """The words ask for help; its text is the only argument."""
 

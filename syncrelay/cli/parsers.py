@@ -5,23 +5,22 @@ A metavar says what kind of word is expected, and so what completes it (syncrela
 
 from typing import Final
 
-from syncrelay.cli.parser import Parser, count, positive
+from syncrelay.cli.boundary import EXIT_CODES
+from syncrelay.cli.parser import Parser, count, folded, positive
 
 _RELAY_USAGE: Final = "syncrelay --config FILE [option ...] | syncrelay COMMAND ..."
-_EXIT_CODES: Final = """\
-exit codes: 0 done, 1 a problem in a file or data, 2 wrong usage, 69 ROS or a
-  package cannot be used, 70 a bug, 130 interrupted (a relay: by a 2nd Ctrl-C)"""
 
 
 def relay() -> Parser:
     """Return the parser of `syncrelay --config FILE`."""
     from syncrelay.cli.dispatch import commands_help
 
+    exit_codes = f"exit codes: {', '.join(f'{code} {means}' for code, means in EXIT_CODES.items())}"
     parser = Parser(
         "syncrelay",
         description="Matches ROS 2 messages by time, as a YAML file says, and republishes the sets.",
         usage=_RELAY_USAGE,
-        epilog=f"commands:\n{commands_help()}\n\n{_EXIT_CODES}",
+        epilog=f"commands:\n{commands_help()}\n\n{folded(exit_codes)}",
     )
     add = parser.add_argument
     add(

@@ -67,7 +67,8 @@ class ApproximateTimeGroup(SlopGroup):
         allow_inf_nan=False,
         description=(
             "How much smaller a later set's span has to be for the later set to be preferred, as a fraction of the"
-            " time that it comes later. Default: 0.1."
+            " time that it comes later: how much closer it must be to be worth waiting for. 0 takes the smallest span,"
+            " 1 mostly the first set. Default: 0.1."
         ),
         examples=[0.1],
     )

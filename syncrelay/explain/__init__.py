@@ -5,6 +5,7 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 
 from syncrelay.config import Tolerance
 from syncrelay.explain.clocks import STEP_NS, Step
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
 from syncrelay.explain.dry_run import UNREADABLE, DryRun, EngineDriver, dry_run
 from syncrelay.explain.facts import (
@@ -21,7 +22,7 @@ from syncrelay.explain.facts import (
 )
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.finding_log import FindingLog, in_words
-from syncrelay.explain.findings import Code, Finding, Severity
+from syncrelay.explain.findings import Finding
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.lines import GroupLines

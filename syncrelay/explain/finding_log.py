@@ -4,8 +4,9 @@ from collections.abc import Collection, Iterator
 from typing import Final, NamedTuple
 
 from syncrelay.explain import words
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.findings import Code, Finding, Severity
+from syncrelay.explain.findings import Finding
 from syncrelay.explain.judge import explanation
 from syncrelay.explain.rules_stamps import may_drift
 

@@ -2,63 +2,12 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from enum import Enum, IntEnum
 from typing import Final, TypeAlias
 
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 
 SECOND: Final = 1_000_000_000
-
-
-class Severity(IntEnum):
-    """How bad it is: nothing to mend, sets suffer, no sets come."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-
-
-class Code(Enum):
-    """What a finding is, for programs. In the order in which findings explain a silence."""
-
-    INTERNAL_ERROR = "internal_error"
-    INACTIVE = "inactive"
-    PAUSED = "paused"
-    REFUSED_BY_DDS = "refused_by_dds"
-    TYPE_NOT_IMPORTABLE = "type_not_importable"
-    OTHER_TYPE = "other_type"
-    SEVERAL_TYPES = "several_types"
-    ALONE = "alone"
-    NO_PUBLISHER = "no_publisher"
-    INCOMPATIBLE_QOS = "incompatible_qos"
-    NOBODY_LISTENS = "nobody_listens"
-    NO_CLOCK = "no_clock"
-    CLOCK_STOPPED = "clock_stopped"
-    TOO_SLOW = "too_slow"
-    SILENT = "silent"
-    MALFORMED = "malformed"
-    UNSTAMPED = "unstamped"
-    SEVERAL_PUBLISHERS = "several_publishers"
-    CLOCK_STEP = "clock_step"
-    CLOCK_DRIFT = "clock_drift"
-    OTHER_CLOCK = "other_clock"
-    NO_COMMON_KEY = "no_common_key"
-    SLOWED = "slowed"
-    BURSTS = "bursts"
-    TIME_JUMP = "time_jump"
-    MESSAGES_LOST = "messages_lost"
-    OVER_SLOP = "over_slop"
-    SHORT_QUEUE = "short_queue"
-    WAITING_FOR_OPTIONAL = "waiting_for_optional"
-    CONSTANT_OFFSET = "constant_offset"
-    OUT_OF_ORDER = "out_of_order"
-    DUPLICATES = "duplicates"
-    FEW_SETS = "few_sets"
-    SUBSCRIBER_QOS = "subscriber_qos"
-    OUTPUT_TAKEN = "output_taken"
-    UNEXPLAINED = "unexplained"
-    STARTING = "starting"
-    HEALTHY = "healthy"
 
 
 @dataclass(frozen=True, slots=True)

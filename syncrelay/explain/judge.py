@@ -16,8 +16,9 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from syncrelay.explain import rules_clock, rules_flow, rules_graph, rules_matching, rules_stamps, words
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
-from syncrelay.explain.findings import Code, Finding, Rule, Severity, of_each_input
+from syncrelay.explain.findings import Finding, Rule, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
@@ -90,7 +91,7 @@ class _Explained(NamedTuple):
     of_input: frozenset[Code] = frozenset()
 
 
-_MATCHING: Final = frozenset(
+MATCHING: Final = frozenset(
     {
         Code.OVER_SLOP,
         Code.SHORT_QUEUE,
@@ -100,9 +101,11 @@ _MATCHING: Final = frozenset(
         Code.UNEXPLAINED,
     }
 )
+"""What most causes explain: that messages do not match, or not enough of them."""
+
 _ORDER: Final = frozenset({Code.TIME_JUMP, Code.OUT_OF_ORDER, Code.DUPLICATES})
 _FLOW: Final = (
-    _MATCHING
+    MATCHING
     | _ORDER
     | {
         Code.NO_CLOCK,
@@ -129,36 +132,36 @@ _SAID_OF_THE_INACTIVE: Final = frozenset(
 )
 
 EXPLAINS: Final[Mapping[Code, _Explained]] = {
-    Code.INTERNAL_ERROR: _Explained(_MATCHING),
+    Code.INTERNAL_ERROR: _Explained(MATCHING),
     # Stamps that are not set are seen by what the policy drops for them.
-    Code.PAUSED: _Explained(_MATCHING | {Code.UNSTAMPED}),
+    Code.PAUSED: _Explained(MATCHING | {Code.UNSTAMPED}),
     Code.INACTIVE: _Explained(frozenset(Code) - _SAID_OF_THE_INACTIVE),
-    Code.ALONE: _Explained(_MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
-    Code.NO_PUBLISHER: _Explained(_MATCHING),
-    Code.TYPE_NOT_IMPORTABLE: _Explained(_MATCHING),
-    Code.OTHER_TYPE: _Explained(_MATCHING),
-    Code.SEVERAL_TYPES: _Explained(_MATCHING),
-    Code.INCOMPATIBLE_QOS: _Explained(_MATCHING),
+    Code.ALONE: _Explained(MATCHING | {Code.NO_PUBLISHER, Code.NO_CLOCK}),
+    Code.NO_PUBLISHER: _Explained(MATCHING),
+    Code.TYPE_NOT_IMPORTABLE: _Explained(MATCHING),
+    Code.OTHER_TYPE: _Explained(MATCHING),
+    Code.SEVERAL_TYPES: _Explained(MATCHING),
+    Code.INCOMPATIBLE_QOS: _Explained(MATCHING),
     Code.NOBODY_LISTENS: _Explained(_FLOW),
     Code.NO_CLOCK: _Explained(frozenset({Code.SILENT, Code.WAITING_FOR_OPTIONAL, Code.FEW_SETS, Code.UNEXPLAINED})),
-    Code.CLOCK_STOPPED: _Explained(_MATCHING | {Code.SILENT, Code.SLOWED}),
+    Code.CLOCK_STOPPED: _Explained(MATCHING | {Code.SILENT, Code.SLOWED}),
     Code.TOO_SLOW: _Explained(
-        _MATCHING | {Code.SILENT, Code.BURSTS, Code.MESSAGES_LOST, Code.CLOCK_DRIFT, Code.CLOCK_STEP}
+        MATCHING | {Code.SILENT, Code.BURSTS, Code.MESSAGES_LOST, Code.CLOCK_DRIFT, Code.CLOCK_STEP}
     ),
-    Code.SILENT: _Explained(_MATCHING),
-    Code.MALFORMED: _Explained(_MATCHING),
-    Code.UNSTAMPED: _Explained(_MATCHING),
+    Code.SILENT: _Explained(MATCHING),
+    Code.MALFORMED: _Explained(MATCHING),
+    Code.UNSTAMPED: _Explained(MATCHING),
     Code.SEVERAL_PUBLISHERS: _Explained(
-        _MATCHING | {Code.OTHER_CLOCK}, _ORDER | {Code.CLOCK_STEP, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}
+        MATCHING | {Code.OTHER_CLOCK}, _ORDER | {Code.CLOCK_STEP, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}
     ),
     Code.TIME_JUMP: _Explained(
-        _MATCHING | {Code.OTHER_CLOCK},
+        MATCHING | {Code.OTHER_CLOCK},
         frozenset({Code.OUT_OF_ORDER, Code.DUPLICATES, Code.CLOCK_DRIFT, Code.SLOWED, Code.BURSTS}),
     ),
-    Code.CLOCK_STEP: _Explained(_MATCHING | {Code.OTHER_CLOCK, Code.CLOCK_DRIFT}, _ORDER | {Code.BURSTS}),
-    Code.CLOCK_DRIFT: _Explained(_MATCHING | {Code.OTHER_CLOCK}),
-    Code.OTHER_CLOCK: _Explained(_MATCHING),
-    Code.SLOWED: _Explained(_MATCHING),
+    Code.CLOCK_STEP: _Explained(MATCHING | {Code.OTHER_CLOCK, Code.CLOCK_DRIFT}, _ORDER | {Code.BURSTS}),
+    Code.CLOCK_DRIFT: _Explained(MATCHING | {Code.OTHER_CLOCK}),
+    Code.OTHER_CLOCK: _Explained(MATCHING),
+    Code.SLOWED: _Explained(MATCHING),
     Code.BURSTS: _Explained(frozenset({Code.SHORT_QUEUE, Code.FEW_SETS, Code.UNEXPLAINED})),
     Code.MESSAGES_LOST: _Explained(frozenset(), frozenset({Code.BURSTS})),
     Code.DUPLICATES: _Explained(frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS, Code.UNEXPLAINED})),

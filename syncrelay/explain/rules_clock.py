@@ -4,8 +4,9 @@ from statistics import median_low
 from typing import Final
 
 from syncrelay.explain import words
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity
+from syncrelay.explain.findings import SECOND, Finding, Found
 from syncrelay.explain.rules_flow import waited_for_relay
 
 _OFF: Final = SECOND

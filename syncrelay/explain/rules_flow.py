@@ -5,8 +5,9 @@ from itertools import pairwise
 from typing import Final
 
 from syncrelay.explain import words
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, nodes
+from syncrelay.explain.findings import SECOND, Finding, Found, nodes
 
 _TOO_SLOW: Final = 500_000_000
 # What would not have brought so many messages in the time of a burst cannot show one.

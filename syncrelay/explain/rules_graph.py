@@ -5,8 +5,9 @@ from typing import Final
 
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import DISCOVERY_NS, Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
-from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks
+from syncrelay.explain.findings import SECOND, Finding, Found, blocks
 
 _NO_MESSAGE: Final = 5 * SECOND
 # Fast DDS's lease: for so long one that was killed is still in the graph.

@@ -8,9 +8,10 @@ from typing import Final
 from syncrelay.config import Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, counted, nodes
+from syncrelay.explain.findings import SECOND, Finding, Found, counted, nodes
 from syncrelay.explain.nearest import signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock

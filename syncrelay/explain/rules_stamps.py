@@ -6,8 +6,9 @@ from typing import Final
 
 from syncrelay.explain import words
 from syncrelay.explain.clocks import Drift, apart
+from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Code, Finding, Found, Severity, blocks, counted, nodes
+from syncrelay.explain.findings import SECOND, Finding, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.suggestions import Change
 from syncrelay.sync.messages import DropReason

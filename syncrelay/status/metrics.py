@@ -73,7 +73,11 @@ def _of_inputs(state: RelayState) -> Iterator[Metric]:
 
 def _of_groups(state: RelayState) -> Iterator[Metric]:
     sets = CounterMetricFamily("syncrelay_sets", "Sets published.", labels=("group",))
-    spans = HistogramMetricFamily("syncrelay_set_span_seconds", "Spans of the sets.", labels=("group",))
+    spans = HistogramMetricFamily(
+        "syncrelay_set_span_seconds",
+        "Spans of the sets: the latest stamp of a set minus the earliest.",
+        labels=("group",),
+    )
     latencies = HistogramMetricFamily(
         "syncrelay_set_latency_seconds",
         "From the receipt of a set's newest message until the set was published.",
@@ -94,7 +98,9 @@ def _add(family: HistogramMetricFamily, group: str, histogram: Histogram) -> Non
 
 
 def _findings(state: RelayState) -> Metric:
-    family = GaugeMetricFamily("syncrelay_finding", "What was found.", labels=("group", "code", "severity", "topic"))
+    family = GaugeMetricFamily(
+        "syncrelay_finding", "1 for each finding that holds.", labels=("group", "code", "severity", "topic")
+    )
     # Of two that differ in their words alone there must be one series.
     for labels in dict.fromkeys(_labels(report, finding) for report in state.groups for finding in report.findings):
         family.add_metric(labels, 1)

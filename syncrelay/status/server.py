@@ -8,7 +8,7 @@ import errno
 import json
 import logging
 import socket
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from threading import Thread
@@ -19,6 +19,7 @@ from waitress.server import create_server
 from waitress.wasyncore import close_all
 
 from syncrelay.config import Listen
+from syncrelay.config.wording import all_of
 from syncrelay.errors import ListenError
 from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
@@ -36,6 +37,22 @@ _CONNECTIONS: Final = 256
 _HEADER_BYTES: Final = 16_384
 
 _JSON: Final = "application/json"
+
+PATHS_TOLD: Final[Mapping[str, str]] = {
+    "/": "A page for browsers that shows what `syncrelay top` shows.",
+    "/status": (
+        "The state of the relay as JSON, in each group with the finding that explains most first. What is not known yet"
+        " is null, such as a `type` that is to come from the graph."
+    ),
+    "/tap": "Each set and each dropped message as it leaves, in JSON; `syncrelay tap` reads it.",
+    "/metrics": "The figures for Prometheus.",
+    "/livez": f"200 while the receive loop turns, 503 once it has not for {_STALLED_S:.0f} s.",
+    "/readyz": (
+        "200 while the relay runs (not paused, not ending, and active if it is a managed node), no group is stopped or"
+        " refused by DDS, and every required input has a publisher that fits; 503 otherwise."
+    ),
+}
+"""What may be asked for, and what it gives; docs/reference/metrics.md is made of this."""
 
 # Probes ask by whatever name they have for the relay, and a refusal would have it restarted. They tell nothing more.
 _PROBES: Final = ("/livez", "/readyz")
@@ -154,7 +171,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
             return _text(start, *refusal)
         answer = answers.get(path)
         if answer is None:
-            return _text(start, "404 Not Found", "there are /, /status, /tap, /metrics, /livez and /readyz")
+            return _text(start, "404 Not Found", f"there are {all_of(PATHS_TOLD)}")
         return answer(environ, start)
 
     def application(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:

@@ -1,18 +1,19 @@
 """A group: what all policies share."""
 
 from collections.abc import Hashable, Sequence
+from typing import Generic
 
 from syncrelay.sync.arrivals import Arrivals
 from syncrelay.sync.counts import InputCounts, Ledger
 from syncrelay.sync.matching import ByClock, Limited, Matching, Unlimited
-from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, T
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.restamp import Restamp, common_stamp
 from syncrelay.sync.state import Name, state_of
 from syncrelay.sync.thinning import Thinning
 
 
-class SyncGroup:
+class SyncGroup(Generic[T]):
     """Runs one policy: feeds it what may be used, lets go what has waited enough, counts where all went.
 
     Messages go in and come out with the stamps they carry; an input's offset counts for matching only.
@@ -50,14 +51,20 @@ class SyncGroup:
         self,
         policy: Policy,
         *,
-        required: Sequence[bool],
+        required: Sequence[bool] | None = None,
         max_wait_ns: int | None = None,
         offsets_ns: Sequence[int] | None = None,
         restamp: Restamp | int | None = None,
         every: int = 1,
         min_set_period_ns: int | None = None,
     ) -> None:
+        """Run a policy that nothing was fed to.
+
+        `required` (default: all), and `offsets_ns`, which is added to the stamps for matching, have a value for each
+        input. Durations are in nanoseconds. Raises ValueError for what is not so, or cannot be.
+        """
         n_inputs = policy.n_inputs
+        required = (True,) * n_inputs if required is None else required
         offsets = (0,) * n_inputs if offsets_ns is None else tuple(offsets_ns)
         if len(required) != n_inputs or len(offsets) != n_inputs or not any(required):
             raise ValueError(f"required {required} and offsets_ns {offsets} must be {n_inputs}, one required")
@@ -96,7 +103,7 @@ class SyncGroup:
         """How many sets have left."""
         return self._ledger.sets
 
-    def add(self, message: Message, *, now: int) -> Sequence[Outcome]:
+    def add(self, message: Message[T], *, now: int) -> Sequence[Outcome[T]]:
         """Take a message that arrives at `now`; give what leaves because of it, in order."""
         index = message.input
         stamp = message.stamp
@@ -111,7 +118,7 @@ class SyncGroup:
             outcomes = self._leave(outcomes, now)
         return [*due, *outcomes] if due else outcomes
 
-    def reject(self, message: Message, reason: DropReason) -> Drop:
+    def reject(self, message: Message[T], reason: DropReason) -> Drop[T]:
         """Count a message that cannot be fed: it has no readable stamp."""
         self._ledger.fed[message.input] += 1
         drop = Drop(message, reason)
@@ -122,7 +129,7 @@ class SyncGroup:
         """When `expire` will have something to do, in the time of `now`; None: not before the next message."""
         return self._matching.next_deadline()
 
-    def expire(self, *, now: int) -> Sequence[Outcome]:
+    def expire(self, *, now: int) -> Sequence[Outcome[T]]:
         """Give what leaves because it has waited long enough."""
         outcomes = self._matching.due(now)
         return self._leave(outcomes, now) if outcomes else outcomes
@@ -131,14 +138,14 @@ class SyncGroup:
         """Let time pass without sets that only the clock triggers: nobody wanted them."""
         self._matching.pass_over(now)
 
-    def flush(self, reason: DropReason) -> Sequence[Drop]:
+    def flush(self, reason: DropReason) -> Sequence[Drop[T]]:
         """Drop all that is buffered and start afresh. The counts go on."""
         drops = self._empty(reason)
         self._arrivals.forget()
         self._ledger.note(drops)
         return drops
 
-    def let_go(self, reason: DropReason) -> Sequence[Drop]:
+    def let_go(self, reason: DropReason) -> Sequence[Drop[T]]:
         """Drop what waits for others, and forget nothing else: what comes next leads to no set older than those before.
 
         The latest messages that serve trigger after trigger stay.

@@ -1,80 +1,138 @@
 """The values that go into the engine and come out of it."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 from dataclasses import dataclass
 from enum import Enum
-from types import MappingProxyType
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeAlias
+
+if TYPE_CHECKING:
+    # A default is what spares those who have payloads of many types from writing Message[Any]. Python 3.13 has it.
+    from typing_extensions import TypeVar
+
+    T = TypeVar("T", default=Any)
+else:
+    from typing import TypeVar
+
+    T = TypeVar("T")
 
 # None of these changes once it is made, so they may be hashed. Frozen ones take three times as long to make,
 # NamedTuples nearly twice: with a message and a drop each, a fifth of what the engine needs.
 
 
+class _Why(NamedTuple):
+    reason: str
+    meaning: str
+    explanation: str
+
+
 class DropReason(Enum):
-    """Why a message left without a set. Each unmatched message has exactly one."""
+    """Why a message left without a set. Each unmatched message has exactly one.
+
+    `meaning` says it in a few words, `explanation` in full: docs/reference/drop_reasons.md is made of these.
+    """
 
     # Enum's own hash is Python code: a third of the time of counting a drop. Members are singletons.
     __hash__ = object.__hash__
 
-    LATE = "late"
-    DUPLICATE = "duplicate"
-    OVERFLOW = "overflow"
-    SUPERSEDED = "superseded"
-    TOO_FAR = "too_far"
-    EXPIRED = "expired"
-    TIME_JUMP = "time_jump"
-    UNSTAMPED = "unstamped"
-    MALFORMED = "malformed"
-    THINNED = "thinned"
-    PAUSED = "paused"
-    SHUTDOWN = "shutdown"
+    _value_: str
+    meaning: str
+    explanation: str
 
-    @property
-    def meaning(self) -> str:
-        """What it says of the message, in a few words."""
-        return _MEANINGS[self]
+    # The defaults are for type checkers, which take DropReason("late") for a call of this.
+    def __new__(cls, reason: str, meaning: str = "", explanation: str = "") -> Self:
+        """Return the member whose value is the reason alone."""
+        member = object.__new__(cls)
+        member._value_ = reason
+        member.meaning, member.explanation = meaning, explanation
+        return member
 
-
-_MEANINGS: Final[Mapping[DropReason, str]] = MappingProxyType(
-    {
-        DropReason.LATE: "older than the last set",
-        DropReason.DUPLICATE: "its stamp came twice",
-        DropReason.OVERFLOW: "its queue was full",
-        DropReason.SUPERSEDED: "a newer set left",
-        DropReason.TOO_FAR: "no partner near enough",
-        DropReason.EXPIRED: "waited too long",
-        DropReason.TIME_JUMP: "timestamps jumped back",
-        DropReason.UNSTAMPED: "its stamp is 0",
-        DropReason.MALFORMED: "no stamp could be read",
-        DropReason.THINNED: "its set was left out",
-        DropReason.PAUSED: "the relay was paused",
-        DropReason.SHUTDOWN: "its group stopped",
-    }
-)
+    LATE = _Why(
+        "late",
+        "older than the last set",
+        "It is older than the last message of its input that went into a set.",
+    )
+    DUPLICATE = _Why(
+        "duplicate",
+        "its stamp came twice",
+        "A later message of the same stamp replaced it.",
+    )
+    OVERFLOW = _Why(
+        "overflow",
+        "its queue was full",
+        "Its queue was full: `queue_size` is too short for the gap in rates, or no partner was left for it, as for most"
+        " of a fast topic beside a slow one: then no set is lost, and `analyze` calls it not needed.",
+    )
+    SUPERSEDED = _Why(
+        "superseded",
+        "a newer set left",
+        "A newer message of its input, one that fits better, went into a set.",
+    )
+    TOO_FAR = _Why(
+        "too_far",
+        "no partner near enough",
+        "Nothing within slop (for a trigger: within `max_age`) could still come: mostly what a fast topic sends between"
+        " two messages of a slow one.",
+    )
+    EXPIRED = _Why(
+        "expired",
+        "waited too long",
+        "It waited, or aged, longer than allowed.",
+    )
+    TIME_JUMP = _Why(
+        "time_jump",
+        "timestamps jumped back",
+        "Stamps of its group or the clock jumped back by more than a second: a recording began again.",
+    )
+    UNSTAMPED = _Why(
+        "unstamped",
+        "its stamp is 0",
+        "Its stamp is zero: the driver does not fill it in.",
+    )
+    MALFORMED = _Why(
+        "malformed",
+        "no stamp could be read",
+        "No stamp could be read from its bytes.",
+    )
+    THINNED = _Why(
+        "thinned",
+        "its set was left out",
+        "Its set was left out by `max_rate` or `every`.",
+    )
+    PAUSED = _Why(
+        "paused",
+        "the relay was paused",
+        "It was waiting when the relay was paused, or came while it was.",
+    )
+    SHUTDOWN = _Why(
+        "shutdown",
+        "its group stopped",
+        "It was waiting when its group stopped: the relay ended or was deactivated, a reload changed the group, or"
+        " nobody listened to a lazy one any more.",
+    )
 
 
 @dataclass(slots=True, unsafe_hash=True)
-class Message:
-    """One message of one input: index from 0, stamp in nanoseconds, a payload that the engine never opens.
+class Message(Generic[T]):
+    """One message of one input: index from 0, stamp in nanoseconds, a payload of type T that the engine never opens.
 
     `key` is what `equal_key` matches by; the other policies leave it alone.
     """
 
     input: int
     stamp: int
-    payload: Any
+    payload: T
     key: Hashable = None
 
 
 @dataclass(slots=True, unsafe_hash=True)
-class Match:
+class Match(Generic[T]):
     """A set: one message per input in input order, None where an optional one is missing.
 
     `stamp` is the common stamp in nanoseconds that the group's restamping gives the set; None leaves each
     message its own. `tick` is the tick of the clock that triggered it, None where no clock did.
     """
 
-    messages: tuple[Message | None, ...]
+    messages: tuple[Message[T] | None, ...]
     stamp: int | None = None
     tick: int | None = None
 
@@ -85,11 +143,12 @@ class Match:
 
 
 @dataclass(slots=True, unsafe_hash=True)
-class Drop:
+class Drop(Generic[T]):
     """A message that leaves unmatched."""
 
-    message: Message
+    message: Message[T]
     reason: DropReason
 
 
-Outcome: TypeAlias = Match | Drop
+Outcome: TypeAlias = Match[T] | Drop[T]
+"""What leaves a group: a set, or a message that found none."""

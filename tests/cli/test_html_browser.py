@@ -12,6 +12,9 @@ from syncrelay.cli.analysis_html import as_html
 from syncrelay.cli.analysis_json import as_json
 from tests.browser import launched, needs_chromium, opened
 from tests.cli.html_reports import HOSTILE, TOPICS, analyzed, drive, renamed
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import inputs
+from tests.ros.streams import jittery, merged
 
 pytestmark = needs_chromium
 
@@ -95,6 +98,31 @@ def test_everything_is_drawn_without_a_complaint_or_a_request(scheme, width, bro
         assert opened.page.evaluate(_HAS_COLOUR, [".by-slop", "now"])
         paper = opened.page.evaluate("getComputedStyle(document.body).backgroundColor")
         assert paper == {"light": "rgb(255, 255, 255)", "dark": "rgb(18, 22, 27)"}[scheme]
+
+
+def test_of_many_pairs_the_farthest_apart_are_seen_first_and_the_rest_is_drawn_when_it_is_unfolded(browser, tmp_path):
+    topics = [f"/sensor_{number}/points" for number in range(5)]
+    streams = [
+        jittery(topic, period_ms=100, jitter_ms=3 + 3 * at, count=100, seed=at) for at, topic in enumerate(topics)
+    ]
+    seven = analyzed(tmp_path, merged(*streams), topics=inputs(dict.fromkeys(topics, VECTOR)), slop="20ms")
+    path = tmp_path / "report.html"
+    path.write_text(as_html("drive.mcap", seven))
+    of_all = [pair.distance.high for pair in seven.groups[0].pairs]
+    with _opened(browser, path, width=360) as opened:
+        page = opened.page
+        seen = page.locator(".histogram:visible").evaluate_all("all => all.map((each) => Number(each.dataset.pair))")
+        assert [of_all[at] for at in seen] == sorted(of_all, reverse=True)[:4]
+        page.get_by_text("6 more pairs, less far apart").click()
+        everywhere = page.locator(".histogram:visible").evaluate_all("all => all.map((each) => each.dataset.pair)")
+        assert sorted(map(int, everywhere)) == list(range(10))
+        # What was folded has the width of its place once it is seen.
+        page.wait_for_function(
+            "() => [...document.querySelectorAll('.histogram')]"
+            ".every((each) => Math.abs(each.querySelector('canvas').clientWidth - each.clientWidth) < 2)"
+        )
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        assert page.locator(".wide").evaluate_all("all => all.every((each) => each.scrollWidth <= each.clientWidth)")
 
 
 def test_a_change_of_scheme_is_drawn_at_once(browser, report):

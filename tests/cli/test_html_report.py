@@ -154,6 +154,16 @@ def test_the_page_says_so_where_the_better_file_cannot_be_written(analysis):
     assert "write them by hand" in as_html("drive", replace(analysis, text=shared))
 
 
+def test_what_is_found_of_several_inputs_is_one_note(tmp_path):
+    frames = drive(seconds=20)
+    end = frames[0].time + 8 * _SECOND
+    page = as_html("x", analyzed(tmp_path, [each for each in frames if each.topic == "/camera" or each.time < end]))
+    notes = re.findall(r'<li class="note.*?</li>\n', page, re.DOTALL)
+    (silent,) = [each for each in notes if "silent" in each]
+    assert "<summary>likewise /imu</summary>" in silent
+    assert silent.count("(for ") == 2
+
+
 def test_nothing_is_fetched_from_anywhere(analysis):
     page = as_html("rig", analysis)
     assert not re.findall(r'(?:src|href|action|data)="(?!#)', page)

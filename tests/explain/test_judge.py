@@ -13,6 +13,7 @@ from cases import (
 from groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 
 from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
+from syncrelay.explain.judge import EXPLAINS
 from syncrelay.sync.messages import DropReason
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND
@@ -28,6 +29,16 @@ def test_it_is_found_and_said(code, severity, facts, text, suggestion):
     found = next((finding for finding in found_in(facts) if finding.code is code), None)
     assert found is not None
     assert (found.severity, found.text, found.suggestion) == (severity, text, suggestion)
+
+
+@pytest.mark.parametrize(("code", "severity"), [case[:2] for case in FOUND.values()], ids=FOUND)
+def test_a_finding_is_as_bad_as_its_code_says_or_an_error_as_the_cause_of_a_silence(code, severity):
+    assert severity in code.severities or (severity is Severity.ERROR and code in EXPLAINS)
+
+
+def test_every_finding_says_what_it_means_and_what_to_do_unless_all_is_well():
+    assert [code for code in Code if not code.meaning.endswith(".") or not (code.remedy or ".").endswith(".")] == []
+    assert {code for code in Code if code.remedy is None} == {Code.NOBODY_LISTENS, Code.STARTING, Code.HEALTHY}
 
 
 @pytest.mark.parametrize(("code", "facts"), QUIETLY.values(), ids=QUIETLY)

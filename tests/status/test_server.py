@@ -15,7 +15,7 @@ from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
 from syncrelay.explain import Endpoint, Mismatch, Refusal, Tape
 from syncrelay.status import Phase, Taps
-from syncrelay.status.server import Server
+from syncrelay.status.server import PATHS_TOLD, Server
 
 HEALTHY = relay(working())
 STOPPED = replace(working(), facts=replace(working().facts, failure="KeyError: 'x'"))
@@ -102,6 +102,11 @@ def test_a_relay_is_ready_while_every_required_input_is_served(state, answer):
 def test_what_is_not_there_is_answered_with_what_is():
     with serving(HEALTHY) as address:
         assert asked(address, "/statsu") == (404, "there are /, /status, /tap, /metrics, /livez and /readyz\n")
+
+
+def test_every_path_that_people_are_told_of_is_there():
+    with serving(HEALTHY) as address:
+        assert [path for path in PATHS_TOLD if asked(address, path)[0] == 404] == []
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE"])

@@ -179,6 +179,8 @@ def _ladder(group: GroupConfig, possible: PossibleSets) -> Iterator[list[Change]
     for slop in dict.fromkeys((spans[ceil(0.995 * len(spans)) - 1], spans[-1])):
         text = words.at_least(slop)
         reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
+        if slop < tolerance.ns:
+            reason += "; a wider slop only lets in worse sets"
         for queue in _queues(group, possible, slop):
             yield [
                 *_policy(group, policy, "the stamps of a set differ"),

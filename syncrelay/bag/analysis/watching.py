@@ -37,6 +37,14 @@ class LastingFinding:
     seconds: int
 
 
+def alike(found: Sequence[LastingFinding]) -> list[list[LastingFinding]]:
+    """Return findings with those that say the same of other inputs beside them; each as in the order that they have."""
+    together: dict[tuple[Code, Severity], list[LastingFinding]] = {}
+    for each in found:
+        together.setdefault((each.finding.code, each.finding.severity), []).append(each)
+    return list(together.values())
+
+
 def watch_group(
     group: GroupConfig, streams: Sequence[Stream], *, until: int | None = None
 ) -> tuple[LastingFinding, ...]:

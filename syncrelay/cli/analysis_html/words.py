@@ -1,18 +1,19 @@
 """What the page says in words and tables."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from syncrelay.bag.analysis import GroupAnalysis, patch
-from syncrelay.bag.analysis.nearest import Pair
+from syncrelay.bag.analysis.nearest import Pair, worth_seeing
 from syncrelay.bag.analysis.topics import TopicFigures
 from syncrelay.bag.analysis.unneeded import InputFates
-from syncrelay.bag.analysis.watching import LastingFinding
+from syncrelay.bag.analysis.watching import LastingFinding, alike
 from syncrelay.cli.analysis_html.drawings import Drawings
 from syncrelay.cli.analysis_text import (
     delay_line,
     faults_of,
+    other_pairs,
     pair_line,
     period_text,
     promise,
@@ -21,7 +22,7 @@ from syncrelay.cli.analysis_text import (
     slop_text,
     unneeded_line,
 )
-from syncrelay.config.wording import counted
+from syncrelay.config.wording import all_of, counted
 from syncrelay.explain import Severity, in_words, words
 from syncrelay.status.fates import FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
@@ -42,12 +43,17 @@ class TopicRow:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A finding: a class of the style sheet, a sign, its severity in a word, what is so."""
+    """A finding: a class of the style sheet, a sign, its severity in a word, what is so.
+
+    `others` is what is so of other inputs that it is found of, and `likewise` a word for them, empty where it is alone.
+    """
 
     tone: str
     sign: str
     word: str
     text: str
+    likewise: str = ""
+    others: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,14 @@ class FateRow:
 
 
 @dataclass(frozen=True, slots=True)
+class PairWords:
+    """How far apart two topics are, and the place of the pair's histogram among those that are drawn."""
+
+    at: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class GroupWords:
     """All that is said of a group."""
 
@@ -86,7 +100,9 @@ class GroupWords:
     reasons: tuple[str, ...]
     fates: tuple[str, ...]
     rows: tuple[FateRow, ...]
-    pairs: tuple[str, ...]
+    pairs: tuple[PairWords, ...]
+    other_pairs: tuple[PairWords, ...]
+    others: str
     unneeded: str
     by_slop: tuple[tuple[str, int, str], ...]
     by_queue_size: tuple[tuple[str, int], ...]
@@ -120,21 +136,29 @@ def group_words(group: GroupAnalysis, drawings: Drawings) -> GroupWords:
     fates = tuple(fate.name for fate in FATES if any(_count(row, fate.name) for row in rows))
     verdict, tone = _verdict(group)
     curves = group.curves
+    pairs = [
+        PairWords(at, _pair(pair, each.outside))
+        for at, (pair, each) in enumerate(zip(group.pairs, drawings.histograms, strict=True))
+    ]
+    seen = worth_seeing(group.pairs)
+    unseen = [pair for at, pair in enumerate(group.pairs) if at not in seen]
     return GroupWords(
         name=config.name,
         policy=config.options.policy,
         sets=len(group.evaluation.sets),
         verdict=verdict,
         tone=tone,
-        notes=tuple(_note(each) for each in group.findings),
+        notes=tuple(_note(each, topics) for each in alike(group.findings)),
         hints=suggestion.hints,
-        promise=promise(suggestion),
+        promise=promise(suggestion).removesuffix(","),
         patch=patch(suggestion.changes, {config.name: topics}).rstrip() if suggestion.changes else "",
         reasons=tuple(dict.fromkeys(f"{change.key}: {change.reason}" for change in suggestion.changes)),
         fates=fates,
         rows=tuple(_fate_row(row, fates) for row in rows),
-        unneeded="; ".join(f"{row.topic}: {unneeded_line(row)}" for row in rows if row.unneeded),
-        pairs=tuple(_pair(pair, each.outside) for pair, each in zip(group.pairs, drawings.histograms, strict=True)),
+        unneeded="; ".join(_unneeded(rows)),
+        pairs=tuple(pairs[at] for at in seen),
+        other_pairs=tuple(each for each in pairs if each.at not in seen),
+        others=other_pairs(unseen) if unseen else "",
         by_slop=tuple(
             (slop_text(group, point), point.sets, words.duration(point.median_span) if point.sets else "")
             for point in (curves.by_slop if curves else ())
@@ -159,10 +183,32 @@ def _verdict(group: GroupAnalysis) -> tuple[str, str]:
     return f"{suggestion.now} of {suggestion.possible} possible sets come together", tone
 
 
-def _note(lasting: LastingFinding) -> Note:
-    severity = lasting.finding.severity
-    text = f"{in_words(lasting.finding)} (for {lasting.seconds} s of the recording)"
-    return Note(severity.name.lower(), _SIGNS[severity], severity.name.lower(), text)
+def _note(found: Sequence[LastingFinding], topics: Sequence[str]) -> Note:
+    first, *others = found
+    severity = first.finding.severity
+    of = [topics[index] for each in others for index in each.finding.about]
+    return Note(
+        severity.name.lower(),
+        _SIGNS[severity],
+        severity.name.lower(),
+        _told(first),
+        f"likewise {all_of(of)}" if of else f"{counted(len(others), 'finding')} like it" if others else "",
+        tuple(_told(each) for each in others),
+    )
+
+
+def _told(lasting: LastingFinding) -> str:
+    return f"{in_words(lasting.finding)} (for {lasting.seconds} s of the recording)"
+
+
+def _unneeded(rows: Sequence[InputFates]) -> Iterator[str]:
+    """Yield why messages were not needed, inputs of one reason together."""
+    of_each: dict[str, list[str]] = {}
+    for row in rows:
+        if row.unneeded:
+            of_each.setdefault(unneeded_line(row), []).append(row.topic)
+    for reason, topics in of_each.items():
+        yield f"{all_of(topics)}: {reason}"
 
 
 def _count(row: InputFates, fate: str) -> int:

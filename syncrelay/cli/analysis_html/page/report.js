@@ -232,4 +232,7 @@ async function start() {
   document.documentElement.dataset.drawn = String(plots.length);
 }
 
+// What is folded is printed too.
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((each) => each.open = true));
+
 start();

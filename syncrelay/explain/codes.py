@@ -1,0 +1,296 @@
+"""Every finding: its code, how bad it is, what it means, and what to do. docs/reference/findings.md is made of this."""
+
+from enum import Enum, IntEnum
+from typing import Final, NamedTuple, Self
+
+
+class Severity(IntEnum):
+    """How bad it is: nothing to mend, sets suffer, no sets come."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+_OK: Final = (Severity.OK,)
+_WARN: Final = (Severity.WARN,)
+_ERROR: Final = (Severity.ERROR,)
+_WARN_OR_ERROR: Final = (Severity.WARN, Severity.ERROR)
+
+
+class _Kind(NamedTuple):
+    code: str
+    severities: tuple[Severity, ...]
+    meaning: str
+    remedy: str | None = None
+
+
+class Code(Enum):
+    """What a finding is, for programs. In the order in which findings explain a silence.
+
+    `severities` are those that it is found with, `meaning` what is so, `remedy` what to do about it, None for nothing.
+    What a finding explains is said by `syncrelay.explain.judge`, as it spans several.
+    """
+
+    _value_: str
+    severities: tuple[Severity, ...]
+    meaning: str
+    remedy: str | None
+
+    # The defaults are for type checkers, which take Code("alone") for a call of this.
+    def __new__(
+        cls, code: str, severities: tuple[Severity, ...] = (), meaning: str = "", remedy: str | None = None
+    ) -> Self:
+        """Return the member whose value is the code alone."""
+        member = object.__new__(cls)
+        member._value_ = code
+        member.severities, member.meaning, member.remedy = severities, meaning, remedy
+        return member
+
+    INTERNAL_ERROR = _Kind(
+        "internal_error",
+        _ERROR,
+        "A bug in syncrelay stopped the group; its traceback is in the log once.",
+        "Report it with the traceback. A reload starts the group again.",
+    )
+    INACTIVE = _Kind(
+        "inactive",
+        _WARN,
+        "The node is managed (`lifecycle: true`) and waits to be activated.",
+        "Activate it: the finding has the `ros2 lifecycle set` command.",
+    )
+    PAUSED = _Kind(
+        "paused",
+        _WARN,
+        "Somebody paused the relay, for so long by now. A warning, because a pause is easily forgotten.",
+        "Call the service `~/resume`: the finding has the command.",
+    )
+    REFUSED_BY_DDS = _Kind(
+        "refused_by_dds",
+        _WARN_OR_ERROR,
+        "DDS refuses to publish an output or to subscribe to an input. It is tried again every 5 s, a message with the"
+        " next set.",
+        "Where the topic's name is in use with another type, give one of the two another name: a process has one type"
+        " for each topic. Otherwise check the limits on memory and open files.",
+    )
+    TYPE_NOT_IMPORTABLE = _Kind(
+        "type_not_importable",
+        _WARN_OR_ERROR,
+        "A message type is not installed where the relay runs, or has no header, or lacks the field that the file names"
+        " at `stamp` or `key`. If the topic is published as another type, the finding says which.",
+        "Install the package where the relay runs, or source the workspace that has it; write the type that is"
+        " published; or name a field that the type has, or `stamp: receive`.",
+    )
+    OTHER_TYPE = _Kind(
+        "other_type",
+        _WARN_OR_ERROR,
+        "A topic is published as another type than the file's, or than the one that was taken from its first"
+        " publisher.",
+        "Write the `type` that is published, or have that publisher use another topic. Where the type was taken from"
+        " the graph, restart the relay, or write the type and reload.",
+    )
+    SEVERAL_TYPES = _Kind(
+        "several_types",
+        _WARN_OR_ERROR,
+        "The file leaves a topic's type to its publishers, and they have different ones: none is taken until only one"
+        " is left. The finding says who publishes what.",
+        "Write the `type` that is meant, or have only one of them publish the topic.",
+    )
+    ALONE = _Kind(
+        "alone",
+        _WARN_OR_ERROR,
+        "There is no other node in the graph: another ROS_DOMAIN_ID, discovery limited to this machine, or nothing runs"
+        " yet.",
+        "Start the robot's nodes. If they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
+        " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`.",
+    )
+    NO_PUBLISHER = _Kind(
+        "no_publisher",
+        _WARN_OR_ERROR,
+        "Nobody publishes a topic, or nobody any more.",
+        "Start the node that publishes it, or correct the topic's name: a topic of that type (of any, where the file"
+        " has none) and a similar name is suggested, or the namespace in which all that are missing are published.",
+    )
+    INCOMPATIBLE_QOS = _Kind(
+        "incompatible_qos",
+        _WARN_OR_ERROR,
+        "A publisher does not offer what `qos` requests: which policy, what is offered and what is requested.",
+        "Write `qos: auto`, or have the publisher offer what is requested.",
+    )
+    NOBODY_LISTENS = _Kind(
+        "nobody_listens",
+        _OK,
+        "Nobody subscribes to what a lazy group publishes, so it receives nothing, as intended.",
+    )
+    NO_CLOCK = _Kind(
+        "no_clock",
+        _WARN_OR_ERROR,
+        "use_sim_time is set, and no /clock has been received: nothing that waits expires.",
+        "Start what publishes /clock, such as `ros2 bag play --clock`, or run without use_sim_time.",
+    )
+    CLOCK_STOPPED = _Kind(
+        "clock_stopped",
+        _WARN_OR_ERROR,
+        "use_sim_time is set, and /clock stands still: nothing that waits expires.",
+        "Start or resume what publishes /clock, or run without use_sim_time.",
+    )
+    TOO_SLOW = _Kind(
+        "too_slow",
+        _WARN,
+        "Messages of the group waited for the relay: it gets less CPU than it needs, or stood still.",
+        "Check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
+        " `--group`.",
+    )
+    SILENT = _Kind(
+        "silent",
+        _WARN_OR_ERROR,
+        "A publisher is there, and sends nothing, or nothing any more; all inputs at once are one finding.",
+        "Check with `ros2 topic hz TOPIC` whether the publisher is sending; if so, run"
+        " `syncrelay doctor --config FILE --live`. A node that was killed stays in the graph for 20 s.",
+    )
+    MALFORMED = _Kind(
+        "malformed",
+        _WARN_OR_ERROR,
+        "Messages are cut short, or not of their type.",
+        "Check that the publisher uses the same version of the type as is installed where the relay runs.",
+    )
+    UNSTAMPED = _Kind(
+        "unstamped",
+        _WARN_OR_ERROR,
+        "Stamps are zero: the driver does not fill them in.",
+        "Have the publisher set header.stamp, or write `stamp: receive` at the topic.",
+    )
+    SEVERAL_PUBLISHERS = _Kind(
+        "several_publishers",
+        _WARN_OR_ERROR,
+        "Several nodes publish an input, and their stamps conflict: who, and how far apart.",
+        "Give each publisher a topic of its own, or stop all but one.",
+    )
+    CLOCK_STEP = _Kind(
+        "clock_step",
+        _WARN_OR_ERROR,
+        "A clock was set: this machine's, or stamps of one input or of all jumped against it.",
+        "Check what set the clock; NTP and chrony can be told to slew it instead.",
+    )
+    CLOCK_DRIFT = _Kind(
+        "clock_drift",
+        _WARN,
+        "Stamps of an input drift away from those of the others, in ppm.",
+        "Synchronize the clocks with PTP or chrony, or have the drivers stamp with the host's time.",
+    )
+    OTHER_CLOCK = _Kind(
+        "other_clock",
+        _ERROR,
+        "Stamps of one input are seconds off those of the others, or off the clock that triggers the sets. Boot time,"
+        " GPS time, TAI and local time are recognized.",
+        "Synchronize the clocks of the machines, have the driver stamp with the host's time, or write the `offset` or"
+        " `stamp: receive` that the finding names. With a simulation or a recording, use_sim_time may be missing.",
+    )
+    NO_COMMON_KEY = _Kind(
+        "no_common_key",
+        _ERROR,
+        "The inputs of `equal_key` have no key in common; the finding has the newest key of each.",
+        "Correct `key`, or write a larger `queue_size` if one input's keys arrive much later.",
+    )
+    SLOWED = _Kind(
+        "slowed",
+        _WARN,
+        "The rate of an input is below 0.7 of the steady rate that it had, until it is back at 0.85.",
+        "Check the publisher: its settings, its load, and the network to it.",
+    )
+    BURSTS = _Kind(
+        "bursts",
+        _WARN,
+        "Messages of an input are held up on their way and arrive at once; several inputs at once are one finding.",
+        "Check whether the publisher sends in bursts, and the network to it: after a loss, reliable publishers send"
+        " again only every 3 s by default, which configs/fast_heartbeats.xml shortens. Where several inputs are held up"
+        " together, check whether this machine, a player or what connects them stood still.",
+    )
+    TIME_JUMP = _Kind(
+        "time_jump",
+        (Severity.OK, *_WARN_OR_ERROR),
+        "Stamps jumped back, as those of a looped recording do, and matching restarted: nothing to mend. Worse than ok"
+        " if they jump back and forth.",
+        "If they jump back and forth, check whether the publisher stamps by two clocks, or two nodes publish the"
+        " topic.",
+    )
+    MESSAGES_LOST = _Kind(
+        "messages_lost",
+        _WARN,
+        "DDS lost messages on their way here.",
+        "Check the network and the CPU load. If the publisher is reliable, `qos: auto` makes it resend them.",
+    )
+    OVER_SLOP = _Kind(
+        "over_slop",
+        _WARN_OR_ERROR,
+        "The nearest sets are wider than `slop` allows, or messages older than `max_age`.",
+        "Write the `slop` (`max_age`) or the `offset` that is suggested: it was tried on the last messages, and the"
+        " finding says how many sets each would give.",
+    )
+    SHORT_QUEUE = _Kind(
+        "short_queue",
+        _WARN_OR_ERROR,
+        "Messages overflowed before their partners came, and sets were missed.",
+        "Write the `queue_size` that is suggested: it was tried on the last messages.",
+    )
+    WAITING_FOR_OPTIONAL = _Kind(
+        "waiting_for_optional",
+        _WARN,
+        "Sets leave without an optional input; why, where that was seen: it is silent, arrives too late, or its stamps"
+        " fit no set.",
+        "Check the publisher, or write what is suggested: a `max_wait`, a `slop` or an `offset` that was tried.",
+    )
+    CONSTANT_OFFSET = _Kind(
+        "constant_offset",
+        _WARN,
+        "Two inputs of one rate have stamps that lie a constant distance apart, so that sets hold messages of different"
+        " moments.",
+        "Check how the publisher stamps. If both are measured at the same time, write the `offset` that is suggested.",
+    )
+    OUT_OF_ORDER = _Kind(
+        "out_of_order",
+        _WARN,
+        "Stamps of an input go back: messages arrive after one of a later stamp.",
+        "Check how the publisher stamps and sends.",
+    )
+    DUPLICATES = _Kind(
+        "duplicates",
+        _WARN,
+        "Stamps of an input repeat.",
+        "Check how the publisher stamps its messages.",
+    )
+    FEW_SETS = _Kind(
+        "few_sets",
+        _WARN,
+        "Far fewer sets leave than the slowest input allows, and nothing else is found.",
+        "Write what is suggested, if anything that was tried helps; the finding says what became of the messages.",
+    )
+    SUBSCRIBER_QOS = _Kind(
+        "subscriber_qos",
+        _WARN,
+        "A subscriber of an output requests what the relay cannot offer, and gets nothing.",
+        "Have the subscriber request what is offered, or the input's publisher offer what is requested.",
+    )
+    OUTPUT_TAKEN = _Kind(
+        "output_taken",
+        _WARN,
+        "Another node publishes an output too, as a second relay of the same file or a recording that is played.",
+        "Stop all publishers but one, or give the output another name with `output`.",
+    )
+    UNEXPLAINED = _Kind(
+        "unexplained",
+        _ERROR,
+        "No set leaves, and none of the above is the reason; the finding says what became of the messages.",
+        "Write what is suggested, or run `syncrelay doctor --config FILE --live`, which checks the graph and the"
+        " stamps.",
+    )
+    STARTING = _Kind(
+        "starting",
+        _OK,
+        "No set yet, or none since an input came back a moment ago.",
+    )
+    HEALTHY = _Kind(
+        "healthy",
+        _OK,
+        "All is well: so many of the possible sets a second, with the 95th percentiles of span and latency.",
+    )
