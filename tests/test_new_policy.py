@@ -1,4 +1,4 @@
-"""A policy that is an engine class and a model of its options, as docs/policies.md has it, is known everywhere."""
+"""A policy that is an engine class and a model of its options, as docs/architecture.md has it, is known everywhere."""
 
 from contextlib import closing
 from pathlib import Path

@@ -1,6 +1,6 @@
 """The keys of a group, one model per policy: it makes the engine's policy from them, and says what is special about it.
 
-To add a policy, see docs/policies.md.
+To add a policy, see docs/architecture.md.
 """
 
 from typing import Annotated, Final, Literal
