@@ -20,7 +20,6 @@ from tests.sync.support.timeline import play_group
 from tests.test_launch_files import declared
 
 _ROOT = Path(__file__).parents[1]
-_README = (_ROOT / "README.md").read_text()
 _DOCS = _ROOT / "docs"
 # Of docs/, what `make docs` takes there from elsewhere is no page.
 _OF_DOCS = [page for page in sorted(_DOCS.rglob("*.md")) if not page.is_relative_to(_DOCS / "repository")]
