@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot faults soak lint schema reference docs bench wheel clean
+.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot test-release faults soak lint schema reference docs bench wheel release clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -30,6 +30,10 @@ test-container: $(VENV)/test
 # Builds a colcon workspace with this clone in it, and runs what it installs.
 test-workspace: $(VENV)/test $(VENV)/colcon/done
 	SYNCRELAY_COLCON=$(VENV)/colcon $(BIN)/python -m pytest tests/workspace $(ARGS)
+
+# Makes a release in a clone of this one, from whatever is committed.
+test-release: $(VENV)/test
+	SYNCRELAY_RELEASE=1 $(BIN)/python -m pytest -s tests/test_release.py $(ARGS)
 
 # Many recordings on Ray clusters, each in namespaces of its own, and from servers of object storage on this machine.
 # SYNCRELAY_FAULTS=long takes 1,000 recordings. Not in CI: what it installs takes two minutes.
@@ -79,6 +83,11 @@ bench: $(VENV)/test
 # What a release hands out, built and tried: an sdist, and a wheel for this machine and this Python.
 wheel: $(BIN)/python
 	.ci/wheel $(BIN)/python
+
+# A commit and a tag v$(VERSION) in this clone, once the sdist, the wheel, the pages and the image are built and tried in
+# another; CONTRIBUTING.md says how. DRY=1 does all of it and leaves this clone as it was.
+release: $(BIN)/python
+	DRY=$(DRY) .ci/release $(BIN)/python "$(VERSION)"
 
 clean:
 	rm -rf .venv* build dist *.egg-info syncrelay/ros/compiled/*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache docs/repository

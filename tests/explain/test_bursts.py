@@ -4,10 +4,10 @@ import random
 from collections import deque
 
 import pytest
-from groups import MS, S
 
 from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.rhythm import Burst, bursts
+from tests.explain.support.groups import MS, S
 
 
 def _stream(first, last, *, period=10 * MS, delay=MS):

@@ -1,8 +1,6 @@
 """Causes and effects: the table itself, and that no arrivals whatever break a watch or its judge."""
 
 import pytest
-from cases import LIDAR, camera, dropped, overflowing, wide
-from groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,6 +22,8 @@ from syncrelay.explain.clocks import Drift, Step
 from syncrelay.explain.judge import EXPLAINS, explained_by
 from syncrelay.sync import Match, Message
 from syncrelay.sync.messages import DropReason
+from tests.explain.support.cases import LIDAR, camera, dropped, overflowing, wide
+from tests.explain.support.groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 
 WIDE = wide(*[5] * 40, *[30] * 60)
 SLOWED = {"pace_hz": 5.0, "slowed_from_hz": 10.0}

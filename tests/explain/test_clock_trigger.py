@@ -1,14 +1,14 @@
 """What is found of a group that a clock triggers: its rate, inputs that stop, stamps off the clock or too old."""
 
 import pytest
-from cases import LIDAR, camera
-from groups import BEGAN, MS, S, a_group, a_silent_group, an_input
 
 from syncrelay.config import load_text
 from syncrelay.explain import Code, GroupWatch, InputGraph, Judge, Severity, Tolerance, judge, with_ok
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.facts import ClockState, Endpoint
 from syncrelay.sync import Match, Message
+from tests.explain.support.cases import LIDAR, camera
+from tests.explain.support.groups import BEGAN, MS, S, a_group, a_silent_group, an_input
 
 IMAGE = "sensor_msgs/msg/Image"
 CLOCKED = {"policy": "latest_time", "ticks_hz": 30.0, "tolerance": Tolerance("max_age", 200 * MS)}

@@ -3,11 +3,11 @@
 import random
 
 import pytest
-from cases import STEADY
-from groups import BEGAN, MS, S, a_group, an_input
 
 from syncrelay.explain.clocks import Drift, apart, drift
 from syncrelay.explain.rules_stamps import clock_drift
+from tests.explain.support.cases import STEADY
+from tests.explain.support.groups import BEGAN, MS, S, a_group, an_input
 
 
 def points(delay, *, n=120, noise=0.0):

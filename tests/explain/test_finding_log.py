@@ -1,10 +1,10 @@
 """What is worth a line in the log, and when."""
 
 import pytest
-from groups import BEGAN, NOW, S, a_group, an_input
 
 from syncrelay.explain import Code, Finding, FindingLog, GroupFacts, Severity, in_words, judge
 from syncrelay.explain.finding_log import Remark
+from tests.explain.support.groups import BEGAN, NOW, S, a_group, an_input
 
 DEAD = {"publishers": (), "figures": {"last_received": None, "rate_hz": 0.0}}
 WHO = "nobody publishes /camera (sensor_msgs/msg/Image)"

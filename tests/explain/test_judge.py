@@ -1,20 +1,18 @@
 """Every finding: the facts that come to it, the nearest that don't, and which of several explains a silence."""
 
-import cases_flow
-import cases_graph
-import cases_stamps
 import pytest
-from cases import (
+
+from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
+from syncrelay.explain.judge import EXPLAINS
+from syncrelay.sync.messages import DropReason
+from tests.explain.support import cases_flow, cases_graph, cases_stamps
+from tests.explain.support.cases import (
     STRANGER,
     UNFIT,
     camera,
     fed,
 )
-from groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
-
-from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, judge, with_ok
-from syncrelay.explain.judge import EXPLAINS
-from syncrelay.sync.messages import DropReason
+from tests.explain.support.groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND
 QUIETLY = cases_graph.QUIETLY | cases_stamps.QUIETLY | cases_flow.QUIETLY

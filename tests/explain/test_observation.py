@@ -3,7 +3,6 @@
 from operator import add
 
 import pytest
-from groups import BEGAN, MS, S
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.observation import Observation
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
+from tests.explain.support.groups import BEGAN, MS, S
 
 
 class Stage:

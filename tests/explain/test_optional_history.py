@@ -5,11 +5,10 @@ import random
 from collections import deque
 from dataclasses import dataclass, field
 
-from groups import BEGAN, MS, S
-
 from syncrelay.config import load_text
 from syncrelay.explain import Code, Endpoint, GroupWatch, InputGraph, judge
 from syncrelay.sync import Match, Message
+from tests.explain.support.groups import BEGAN, MS, S
 
 _SLOP = 20 * MS
 _PERIOD = 100 * MS

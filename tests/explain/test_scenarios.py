@@ -4,10 +4,10 @@ import random
 import re
 
 import pytest
-from groups import S
 
 from syncrelay.explain import ClockState, Endpoint, Standstill, Step
 from tests.explain.scenario import IMU, Source, Told, run
+from tests.explain.support.groups import S
 
 REAL = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
 SLOP = {"slop": "20ms"}

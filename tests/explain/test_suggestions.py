@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from groups import NOW, S, a_group
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from syncrelay.explain import Code, Finding, FindingLog, Severity
 from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, constant_offsets
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run
+from tests.explain.support.groups import NOW, S, a_group
 
 _VALUES = re.compile(r"(`[^`]+: [^`]+`(?: at /\w+)?(?: and `[^`]+: [^`]+`(?: at /\w+)?)*), which would give (\d+)")
 _VALUE = re.compile(r"`(\w+): ([^`]+)`(?: at (/\w+))?")

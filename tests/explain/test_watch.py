@@ -1,11 +1,11 @@
 """A group of a file under observation: what the file says of it becomes facts."""
 
 import pytest
-from groups import BEGAN, IMAGE, MS, S
 
 from syncrelay.config import load_text
 from syncrelay.explain import ClockState, Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
 from syncrelay.sync.counts import InputCounts
+from tests.explain.support.groups import BEGAN, IMAGE, MS, S
 
 REFUSAL = Refusal("publish", "/front/lidar", IMAGE, held_as="std_msgs/msg/Int64")
 GRAPH = (

@@ -1,12 +1,12 @@
 """Figures as people read them, and as they stand in the file."""
 
 import pytest
-from groups import MS, S
 from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
+from tests.explain.support.groups import MS, S
 
 US = 1000
 

@@ -5,11 +5,11 @@ import os
 from dataclasses import replace
 
 import pytest
-from states import BEGAN, MS, relay, started, working
 
 from syncrelay import own_version
 from syncrelay.explain import Endpoint, Mismatch
 from syncrelay.status import Level, Phase, document, level
+from tests.status.support.states import BEGAN, MS, relay, started, working
 
 STATES = {
     "no group": relay(),

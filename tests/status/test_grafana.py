@@ -7,10 +7,10 @@ from itertools import combinations
 import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
-from states import relay, working
 
 from syncrelay.status.metrics import registry
 from tests.dashboard import DASHBOARD, EXPRESSIONS, MATCHERS, TARGETS, series
+from tests.status.support.states import relay, working
 
 _PANELS = DASHBOARD["panels"]
 _VARIABLES = {each["name"]: each for each in DASHBOARD["templating"]["list"]}

@@ -6,10 +6,10 @@ import socket
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from serving import asked, sent, serving
-from states import relay, working
 
 from syncrelay.config.listen import Listen
+from tests.status.support.serving import asked, sent, serving
+from tests.status.support.states import relay, working
 
 HEALTHY = relay(working())
 OPEN = Listen("0.0.0.0", range(1))  # noqa: S104  what a file may say

@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
-from states import relay, started, working
 
 from syncrelay.explain import Code, Finding, Severity
 from syncrelay.status import Phase
 from syncrelay.status.metrics import registry
+from tests.status.support.states import relay, started, working
 
 _SILENT = Finding(Code.SILENT, Severity.WARN, "/camera has been silent for 7 s", None, 0)
 

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
-from serving import ANY
 
 from syncrelay.config import Listen
 from syncrelay.explain import Tape
@@ -14,6 +13,7 @@ from syncrelay.status import RelayState, Taps
 from syncrelay.status.server import Server
 from tests.browser import Opened, launched, needs_chromium, opened
 from tests.hostile_names import FORGED, hostile_name
+from tests.status.support.serving import ANY
 from tests.top import states
 
 pytestmark = needs_chromium

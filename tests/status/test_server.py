@@ -8,14 +8,14 @@ from contextlib import ExitStack, suppress
 from dataclasses import replace
 
 import pytest
-from serving import ANY, asked, connected, sent, serving
-from states import CAMERA, relay, started, working
 
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
 from syncrelay.explain import Endpoint, Mismatch, Refusal, Tape
 from syncrelay.status import Phase, Taps
 from syncrelay.status.server import PATHS_TOLD, Server
+from tests.status.support.serving import ANY, asked, connected, sent, serving
+from tests.status.support.states import CAMERA, relay, started, working
 
 HEALTHY = relay(working())
 STOPPED = replace(working(), facts=replace(working().facts, failure="KeyError: 'x'"))

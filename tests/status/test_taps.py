@@ -7,8 +7,6 @@ from contextlib import ExitStack
 from itertools import pairwise
 
 import pytest
-from serving import asked, connected, serving
-from states import BEGAN, MS, TEXT, relay, working
 
 from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
@@ -18,6 +16,8 @@ from syncrelay.status import Taps
 from syncrelay.status.taps import MOST_TAPS, TapRefusedError
 from syncrelay.sync import DropReason
 from tests.dataflow.payloads import FLOWS, Named
+from tests.status.support.serving import asked, connected, serving
+from tests.status.support.states import BEGAN, MS, TEXT, relay, working
 
 (GROUP,) = load_text(TEXT).groups
 DROP = RecentDrop(1, BEGAN, DropReason.LATE)

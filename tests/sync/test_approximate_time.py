@@ -1,10 +1,10 @@
 from functools import partial
 
 import pytest
-from drawn import policy_cases
-from timeline import TICK_NS, play_policy
 
 from syncrelay.sync import ApproximateTime, Match, Message
+from tests.sync.support.drawn import policy_cases
+from tests.sync.support.timeline import TICK_NS, play_policy
 
 
 def approximate(inputs=2, queue=10, slop=20, periods=None, **options):

@@ -1,10 +1,10 @@
 from functools import partial
 
 import pytest
-from drawn import policy_cases
-from timeline import TICK_NS
 
 from syncrelay.sync import ApproximateTimeEager, Message
+from tests.sync.support.drawn import policy_cases
+from tests.sync.support.timeline import TICK_NS
 
 
 def eager(inputs=2, queue=10, slop=2):

@@ -6,9 +6,9 @@ import sys
 import weakref
 
 import pytest
-from streams import MS, gappy, in_order
 
 from syncrelay.sync import ApproximateTime, ApproximateTimeEager, Message, SyncGroup
+from tests.sync.support.streams import MS, gappy, in_order
 
 WIDE_NS = 10**15
 POLICIES = [ApproximateTime, ApproximateTimeEager]

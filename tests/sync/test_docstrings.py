@@ -3,8 +3,6 @@
 import textwrap
 
 import pytest
-from grouped import grouped
-from timeline import TICK_NS, play_group, play_policy
 
 from syncrelay.sync import (
     ApproximateEpsilonTime,
@@ -16,6 +14,8 @@ from syncrelay.sync import (
     LatestTime,
     Ticks,
 )
+from tests.sync.support.grouped import grouped
+from tests.sync.support.timeline import TICK_NS, play_group, play_policy
 
 SIZES = {"n_inputs": 2, "queue_size": 10}
 POLICIES = [

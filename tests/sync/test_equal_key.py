@@ -1,9 +1,9 @@
 from functools import partial
 
 import pytest
-from drawn import policy_cases
 
 from syncrelay.sync import Drop, DropReason, EqualKey, Message
+from tests.sync.support.drawn import policy_cases
 
 equal_key = partial(EqualKey, n_inputs=2, queue_size=3)
 

@@ -1,9 +1,9 @@
 from functools import partial
 
 import pytest
-from drawn import policy_cases
 
 from syncrelay.sync import Drop, DropReason, ExactTime, Message
+from tests.sync.support.drawn import policy_cases
 
 exact = partial(ExactTime, n_inputs=2, queue_size=10)
 three = partial(ExactTime, n_inputs=3, queue_size=10)

@@ -3,9 +3,9 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rigs import POLICIES, REPEATABLE, TICK, Options, make_policy, options, steps
 
 from syncrelay.sync import Drop, DropReason, Message
+from tests.sync.support.rigs import POLICIES, REPEATABLE, TICK, Options, make_policy, options, steps
 
 every_policy = pytest.mark.parametrize("name", POLICIES)
 

@@ -1,9 +1,6 @@
 """What all policies share: lateness and disorder, drawn; offsets, common stamps, counts, options."""
 
 import pytest
-from drawn import group_cases
-from grouped import GAP, approximate, by_key, exact, latest
-from timeline import START_NS, TICK_NS, play_group, stamp
 
 from syncrelay.sync import (
     Drop,
@@ -12,6 +9,9 @@ from syncrelay.sync import (
     Message,
     Restamp,
 )
+from tests.sync.support.drawn import group_cases
+from tests.sync.support.grouped import GAP, approximate, by_key, exact, latest
+from tests.sync.support.timeline import START_NS, TICK_NS, play_group, stamp
 
 test_disorder = group_cases(
     {

@@ -6,7 +6,9 @@ from dataclasses import replace
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from rigs import (
+
+from syncrelay.sync import Drop, DropReason, Match, Message, Restamp
+from tests.sync.support.rigs import (
     BY_STAMP,
     ONCE,
     POLICIES,
@@ -22,8 +24,6 @@ from rigs import (
     steps,
     take,
 )
-
-from syncrelay.sync import Drop, DropReason, Match, Message, Restamp
 
 every_policy = pytest.mark.parametrize("policy", POLICIES)
 

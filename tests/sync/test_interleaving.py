@@ -6,9 +6,9 @@ Tests over DDS stand on it: how far one topic lags behind another there is the m
 import random
 
 import pytest
-from streams import MS, rising_stamps
 
 from syncrelay.sync import ApproximateTime, ExactTime, Match, Message, SyncGroup
+from tests.sync.support.streams import MS, rising_stamps
 
 _ENOUGH = 1000
 

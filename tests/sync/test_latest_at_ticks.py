@@ -3,15 +3,15 @@ from dataclasses import dataclass
 from functools import partial
 
 import pytest
-from drawn import group_cases
-from grouped import grouped
 from hypothesis import given
 from hypothesis import strategies as st
-from rigs import REPEATABLE, START, TICK, Step, few, finish, run, steps, take
-from timeline import START_NS, TICK_NS
 
 from syncrelay.sync import Drop, DropReason, LatestAtTicks, LatestTime, Match, Message, Restamp, SyncGroup, Ticks
 from syncrelay.sync.latest_at_ticks import REST_NS
+from tests.sync.support.drawn import group_cases
+from tests.sync.support.grouped import grouped
+from tests.sync.support.rigs import REPEATABLE, START, TICK, Step, few, finish, run, steps, take
+from tests.sync.support.timeline import START_NS, TICK_NS
 
 
 def by_clock(inputs=2, queue=10, age=None, hz=20, **options):

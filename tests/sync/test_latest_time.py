@@ -1,10 +1,10 @@
 from functools import partial
 
 import pytest
-from drawn import policy_cases
-from timeline import TICK_NS, play_policy
 
 from syncrelay.sync import Drop, DropReason, LatestTime, Message
+from tests.sync.support.drawn import policy_cases
+from tests.sync.support.timeline import TICK_NS, play_policy
 
 
 def latest(inputs=2, queue=10, age=3, **options):

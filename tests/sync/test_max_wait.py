@@ -3,13 +3,13 @@
 from functools import partial
 
 import pytest
-from drawn import group_cases
-from grouped import approximate, exact, latest
-from timeline import TICK_NS, stamp
 
 from syncrelay.sync import (
     Message,
 )
+from tests.sync.support.drawn import group_cases
+from tests.sync.support.grouped import approximate, exact, latest
+from tests.sync.support.timeline import TICK_NS, stamp
 
 test_max_wait = group_cases(
     {

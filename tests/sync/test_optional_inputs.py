@@ -3,9 +3,6 @@
 from functools import partial
 
 import pytest
-from drawn import group_cases
-from grouped import approximate, by_key, eager, exact, grouped, paced, third_optional
-from timeline import START_NS, TICK_NS, stamp
 
 from syncrelay.sync import (
     ApproximateEpsilonTime,
@@ -15,6 +12,9 @@ from syncrelay.sync import (
     LatestTime,
     Message,
 )
+from tests.sync.support.drawn import group_cases
+from tests.sync.support.grouped import approximate, by_key, eager, exact, grouped, paced, third_optional
+from tests.sync.support.timeline import START_NS, TICK_NS, stamp
 
 test_optional = group_cases(
     {

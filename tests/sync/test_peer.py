@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from streams import AGE_PENALTIES, MS, in_order
 
 from syncrelay.sync import ApproximateTime, ExactTime, Match, Message, SyncGroup
 from tests.faults.extent import chosen
+from tests.sync.support.streams import AGE_PENALTIES, MS, in_order
 
 DRIVER = Path(__file__).parent / "peer" / "message_filters_driver.cpp"
 HEADER = Path("/usr/include/message_filters/sync_policies/approximate_time.h")

@@ -4,9 +4,6 @@ import random
 from collections import Counter
 
 import pytest
-from reference_approximate_time import ReferenceApproximateTime
-from references import ReferenceEager, ReferenceEpsilon, ReferenceEqualKey, ReferenceExactTime, ReferenceLatest
-from streams import AGE_PENALTIES, MS, disordered, gappy
 
 from syncrelay.sync import (
     ApproximateEpsilonTime,
@@ -18,6 +15,15 @@ from syncrelay.sync import (
     Match,
     Message,
 )
+from tests.sync.support.reference_approximate_time import ReferenceApproximateTime
+from tests.sync.support.references import (
+    ReferenceEager,
+    ReferenceEpsilon,
+    ReferenceEqualKey,
+    ReferenceExactTime,
+    ReferenceLatest,
+)
+from tests.sync.support.streams import AGE_PENALTIES, MS, disordered, gappy
 
 
 def approximate_time(rng, sizes):

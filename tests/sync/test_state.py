@@ -7,12 +7,24 @@ from types import MethodType
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rigs import BY_CLOCK, POLICIES, REPEATABLE, START, TICK, Options, Step, make_group, options, steps, take
 
 from syncrelay.config.policies import GROUP_MODELS
 from syncrelay.sync import DropReason, Message
 from syncrelay.sync.messages import Match
 from syncrelay.sync.state import state_of
+from tests.sync.support.rigs import (
+    BY_CLOCK,
+    POLICIES,
+    REPEATABLE,
+    START,
+    TICK,
+    Options,
+    Step,
+    make_group,
+    options,
+    steps,
+    take,
+)
 
 every_policy = pytest.mark.parametrize("policy", [*POLICIES, *BY_CLOCK])
 

@@ -1,9 +1,8 @@
 from functools import partial
 
-from drawn import group_cases
-from timeline import START_NS, TICK_NS, stamp
-
 from syncrelay.sync import ApproximateTimeEager, DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
+from tests.sync.support.drawn import group_cases
+from tests.sync.support.timeline import START_NS, TICK_NS, stamp
 
 
 def grouped(policy, *, period=None, required=(True, True), **options):

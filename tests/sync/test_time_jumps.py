@@ -1,14 +1,14 @@
 """Stamps that fall by more than a second: a new time begins, on all inputs, and nothing of the old one stays."""
 
 import pytest
-from grouped import by_key, exact
-from timeline import START_NS, stamp
 
 from syncrelay.sync import (
     Drop,
     DropReason,
     Message,
 )
+from tests.sync.support.grouped import by_key, exact
+from tests.sync.support.timeline import START_NS, stamp
 
 
 def test_by_key_an_unset_stamp_is_no_jump_and_makes_nothing_less_late():

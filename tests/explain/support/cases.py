@@ -1,11 +1,10 @@
 """Inputs and groups that findings are about."""
 
-from groups import IMAGE, MS, NOW, S, a_group, an_input
-
 from syncrelay.explain import Distribution, Endpoint, Mismatch, Tolerance
 from syncrelay.explain.clocks import Drift
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
+from tests.explain.support.groups import IMAGE, MS, NOW, S, a_group, an_input
 
 LIDAR = an_input("/lidar")
 

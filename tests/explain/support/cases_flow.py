@@ -1,10 +1,9 @@
 """What the flow tells: facts that come to a finding, and the nearest that do not."""
 
-from cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
-from groups import MS, NOW, S, a_group, a_silent_group, an_input
-
 from syncrelay.explain import Code, Distribution, Pause, Severity, Standstill
 from syncrelay.sync.messages import DropReason
+from tests.explain.support.cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
+from tests.explain.support.groups import MS, NOW, S, a_group, a_silent_group, an_input
 
 HELD_UP = {"bursts": 1, "held": 2 * S, "held_up": [(NOW - 4 * S, NOW - 2 * S)]}
 

@@ -1,10 +1,9 @@
 """What the graph tells: facts that come to a finding, and the nearest that do not."""
 
-from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
-from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
-
 from syncrelay.explain import ClockState, Code, Endpoint, GraphSnapshot, Mismatch, Refusal, Severity
 from syncrelay.sync.counts import InputCounts
+from tests.explain.support.cases import AGES, HALF_A_SECOND, LIDAR, ONCE, QUIET, STRANGER, UNFIT, camera
+from tests.explain.support.groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
 PICKY = Endpoint("/fusion", IMAGE, Mismatch("durability", "volatile", "transient_local"))
 

@@ -1,11 +1,22 @@
 """What stamps tell: facts that come to a finding, and the nearest that do not."""
 
-from cases import AGES, HALF_A_SECOND, LIDAR, ONCE, STEADY, camera, drifting, dropped, fed, stamped, wide
-from groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
-
 from syncrelay.explain import Code, Distribution, Endpoint, Severity, Step, Tolerance
 from syncrelay.explain.clocks import Drift
 from syncrelay.sync.messages import DropReason
+from tests.explain.support.cases import (
+    AGES,
+    HALF_A_SECOND,
+    LIDAR,
+    ONCE,
+    STEADY,
+    camera,
+    drifting,
+    dropped,
+    fed,
+    stamped,
+    wide,
+)
+from tests.explain.support.groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
 
 TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
 

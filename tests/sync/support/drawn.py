@@ -1,7 +1,8 @@
 """A table of drawn cases as one parametrized test."""
 
 import pytest
-from timeline import play_group, play_policy
+
+from tests.sync.support.timeline import play_group, play_policy
 
 
 def policy_cases(cases):

@@ -1,7 +1,5 @@
 """Groups of every policy, as the tests of what all of them share make them."""
 
-from timeline import TICK_NS
-
 from syncrelay.sync import (
     ApproximateTime,
     ApproximateTimeEager,
@@ -10,6 +8,7 @@ from syncrelay.sync import (
     LatestTime,
     SyncGroup,
 )
+from tests.sync.support.timeline import TICK_NS
 
 
 def grouped(policy, required=None, max_wait=None, **options):
