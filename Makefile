@@ -7,6 +7,8 @@ BIN := $(VENV)/bin
 # A change of these takes a new installation: the compiled path is built by it.
 BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
+# Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot test-release faults soak lint schema reference docs bench wheel release clean
 

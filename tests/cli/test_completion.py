@@ -239,7 +239,7 @@ def test_fish_is_told_what_may_follow_and_why(folder, environ):
     ]
 
 
-def test_the_places_that_the_help_names_are_those_of_the_readme():
-    readme = (Path(ROOT) / "README.md").read_text()
+def test_the_places_that_the_help_names_are_those_of_the_page_on_installing():
+    page = (Path(ROOT) / "docs/howto/install.md").read_text()
     for line in (parsers.completion().epilog or "").splitlines()[1:]:
-        assert line.split()[1] in readme
+        assert line.split()[1] in page

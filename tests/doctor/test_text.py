@@ -1,4 +1,4 @@
-"""What is printed: aligned, and as the README shows it."""
+"""What is printed: aligned, and as its page shows it."""
 
 from pathlib import Path
 
@@ -98,7 +98,7 @@ def test_a_healthy_group_is_told_with_its_figures():
     assert lines[-1] == "  front: 10 of 10 possible sets a second, span 5 ms and latency 2 ms at the 95th percentile"
 
 
-def test_the_readme_shows_what_is_printed():
+def test_its_page_shows_what_is_printed():
     nothing = {"last_received": None, "rate_hz": 0.0, "usual_hz": 0.0, "delay": None}
     never = InputCounts(0, 0, {}, 0)
     camera = an_input(
@@ -123,4 +123,4 @@ def test_the_readme_shows_what_is_printed():
     for each in found:
         lines += ["", *diagnosis_lines(each, colour=False)]
     lines += ["", verdict(found)]
-    assert "\n".join(lines) in (ROOT / "README.md").read_text(), "\n".join(lines)
+    assert "\n".join(lines) in (ROOT / "docs/howto/before_a_message_flows.md").read_text(), "\n".join(lines)
