@@ -5,16 +5,20 @@ that variable unset and put the index into the Python environment's own prefix.
 """
 
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
 HEADER: Final = "std_msgs/msg/Header"
 TIME: Final = "builtin_interfaces/msg/Time"
 
+_FIELD = re.compile(
+    r"(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[[^\]]*\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)"
+)
 PRIMITIVES: Final = frozenset(
     [
         "bool",
@@ -97,10 +101,7 @@ class Interfaces:
             text = (prefix / "share" / f"{type_name}.msg").read_text(encoding="utf-8", errors="replace")
         except OSError:
             return None
-        try:
-            return parse_fields(text, package=package)
-        except Exception:  # noqa: BLE001  the parser asserts and recurses: of what is no definition it may raise anything
-            return None
+        return parse_fields(text, package=package)
 
     def _resources(self, kind: str) -> dict[str, Path]:
         found: dict[str, Path] = {}
@@ -116,19 +117,17 @@ def _names_in(folder: Path) -> Iterator[str]:
 
 
 def parse_fields(text: str, *, package: str) -> tuple[Field, ...]:
-    """Return the fields of a .msg file in order; constants are none. Raises what rosbags' parser does for others."""
-    from rosbags.typesys import get_types_from_msg  # noqa: PLC0415  a file without fields of its own to check needs none
+    """Return the fields in order; constants are none."""
+    fields = []
+    for line in text.splitlines():
+        found = _FIELD.match(line.partition("#")[0].strip())
+        if found is not None and not found["rest"].startswith("="):
+            fields.append(Field(found["name"], _full_name(found["type"], package), found["array"] is not None))
+    return tuple(fields)
 
-    name = f"{package}/msg/Of"
-    _, fields = get_types_from_msg(text, name)[name]
-    return tuple(_field(name, description) for name, description in fields)
 
-
-def _field(name: str, description: Any) -> Field:
-    from rosbags.interfaces import Nodetype  # noqa: PLC0415
-
-    kind, what = description
-    is_array = kind in (Nodetype.ARRAY, Nodetype.SEQUENCE)
-    if is_array:
-        kind, what = what[0]
-    return Field(name, what[0] if kind == Nodetype.BASE else what, is_array)
+def _full_name(written: str, package: str) -> str:
+    if written in PRIMITIVES:
+        return written
+    owner, slash, name = written.rpartition("/")
+    return f"{owner.removesuffix('/msg')}/msg/{name}" if slash else f"{package}/msg/{name}"

@@ -1,7 +1,5 @@
 import sys
 
-import pytest
-
 from syncrelay.config import Severity, load_text
 from syncrelay.config.interfaces import Field, Interfaces, parse_fields
 from tests.config.ament import make_index
@@ -53,19 +51,6 @@ def test_a_type_without_its_definition_is_a_note_if_its_stamp_matters(environ):
     (note,) = notes("dock_msgs/msg/Opaque", environ)
     assert (note.path, note.severity, note.code) == ("groups.front.topics[0].type", Severity.NOTE, "not_checked")
     assert notes("dock_msgs/msg/Opaque, stamp: receive", environ) == ()
-
-
-@pytest.mark.parametrize("text", ["=", "[]", "float64[ x", "\0\0\0", "Type"])
-def test_a_definition_that_is_none_is_as_one_that_is_missing(environ, text, tmp_path):
-    folder = tmp_path / "share/dock_msgs/msg"
-    folder.mkdir(parents=True)
-    (folder / "Opaque.msg").write_text(text)
-    index = tmp_path / "share/ament_index/resource_index/rosidl_interfaces"
-    index.mkdir(parents=True)
-    (index / "dock_msgs").write_text("msg/Opaque.msg")
-    overlaid = {"AMENT_PREFIX_PATH": f"{tmp_path}:{environ['AMENT_PREFIX_PATH']}"}
-    (note,) = notes("dock_msgs/msg/Opaque", overlaid)
-    assert note.code == "not_checked"
 
 
 def test_a_package_that_may_come_later_is_a_note(environ):
