@@ -7,12 +7,21 @@ import struct
 import subprocess
 import termios
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from fcntl import ioctl
 
 from tests.cli.command import ROOT
 
 _DEADLINE_S = 60
+
+
+def read_to_the_end(descriptor):
+    """All that was written to a terminal that nobody has open any more; a single read may cut it anywhere."""
+    parts = []
+    with suppress(OSError):  # once nobody writes, Linux says EIO
+        while part := os.read(descriptor, 65536):
+            parts.append(part)
+    return b"".join(parts)
 
 
 class Terminal:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import BAD, GOOD, ROOT, run
+from tests.cli.terminals import read_to_the_end
 from tests.doctor.environments import OURS, distribution, site_with, unshared
 
 # Nothing that whoever runs the tests has chosen; on a domain of its own the doctor is alone.
@@ -328,7 +329,7 @@ def test_colour_is_for_terminals_that_want_it(no_color, coloured, base):
     command = [sys.executable, "-m", "syncrelay", "doctor"]
     subprocess.run(command, env=environ, stdout=terminal, check=False, timeout=120)
     os.close(terminal)
-    shown = os.read(reader, 100_000).decode()
+    shown = read_to_the_end(reader).decode()
     os.close(reader)
     assert "ROS_DOMAIN_ID=x is not a domain" in shown
     assert ("\033[" in shown) == coloured

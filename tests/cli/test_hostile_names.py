@@ -26,6 +26,7 @@ from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
 from tests.bag.making import rig
 from tests.cli.command import BAD, GOOD, ROOT
+from tests.cli.terminals import read_to_the_end
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.ros.cdr_messages import STORE, VECTOR
 from tests.ros.configs import config, inputs
@@ -293,7 +294,7 @@ def test_on_a_terminal_only_our_own_colours_are_let_through(folder, chance):
         check=False,
     )
     os.close(theirs)
-    shown = os.read(ours, 65536).decode()
+    shown = read_to_the_end(ours).decode()
     os.close(ours)
     assert (done.returncode, "\x1b[31m" in shown) == (1, True)
     assert_shown_safely(re.sub("\x1b\\[[0-9]{1,2}m", "", shown.replace("\r\n", "\n")))

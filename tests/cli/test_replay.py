@@ -3,12 +3,12 @@ import os
 import pty
 import subprocess
 import sys
-from contextlib import suppress
 
 import pytest
 
 from tests.bag.making import rig, write_mcap, write_ros1
 from tests.cli.command import ROOT, run, run_here
+from tests.cli.terminals import read_to_the_end
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.summary import read_summary
@@ -152,13 +152,6 @@ def test_it_needs_no_ros(folder):
     assert (done.returncode, done.stdout) == (0, _SUMMARY)
 
 
-def _read_to_the_end(terminal):
-    """Yield what was written to it, which a single read may cut anywhere; once nobody writes, Linux says EIO."""
-    with suppress(OSError):
-        while part := os.read(terminal, 4096):
-            yield part
-
-
 def test_a_terminal_gets_a_bar_on_stderr_that_leaves_no_trace_on_stdout(folder):
     ours, theirs = pty.openpty()
     done = subprocess.run(
@@ -171,7 +164,7 @@ def test_a_terminal_gets_a_bar_on_stderr_that_leaves_no_trace_on_stdout(folder):
         check=False,
     )
     os.close(theirs)
-    shown = b"".join(_read_to_the_end(ours))
+    shown = read_to_the_end(ours)
     os.close(ours)
     assert b"reading" in shown
     assert done.stdout == _SUMMARY

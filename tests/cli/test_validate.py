@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from tests.cli.command import BAD, GOOD, ROOT, run, run_here
+from tests.cli.terminals import read_to_the_end
 from tests.config.ament import make_index
 
 ERROR = """\
@@ -224,7 +225,7 @@ def test_colour_is_for_terminals_that_want_it(variables, coloured, folder, envir
     command = [sys.executable, "-m", "syncrelay", "validate", "f.yaml"]
     subprocess.run(command, cwd=folder, env=started, stderr=terminal, check=False, timeout=120)
     os.close(terminal)
-    shown = os.read(reader, 100_000).decode()
+    shown = read_to_the_end(reader).decode()
     os.close(reader)
     assert "unknown value" in shown
     assert ("\033[" in shown) == coloured
