@@ -36,7 +36,7 @@ class Heading(Node):
             if not isinstance(outcome, Match):
                 self.get_logger().debug(f"input {outcome.message.input}: {outcome.reason.meaning}")
                 continue
-            imu, mag = (message.payload for message in outcome.messages)
+            imu, mag = (message.payload for message in outcome.messages if message)
             yaw = math.atan2(-mag.magnetic_field.y, mag.magnetic_field.x)
             told = Vector3Stamped(header=imu.header)
             told.vector.x, told.vector.y = yaw, imu.angular_velocity.z

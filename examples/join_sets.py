@@ -24,8 +24,9 @@ class SetJoiner:
 
     def __init__(self, outputs, take):
         self.take = take
-        self.held = {output: {} for output in outputs}  # of each output its messages by their sequence numbers
-        self.manifests = deque(maxlen=KEEP)
+        # Of each output its messages by their sequence numbers.
+        self.held: dict[str, dict] = {output: {} for output in outputs}
+        self.manifests: deque = deque(maxlen=KEEP)
         self.number = 0
 
     def add_message(self, output, message, info):

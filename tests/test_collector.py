@@ -16,7 +16,7 @@ def _thawed():
 def test_nothing_is_collected_and_what_exists_by_the_end_is_passed_over_from_then_on():
     with resting_collector():
         assert not gc.isenabled()
-        imported = [[]]
+        imported: list[list[object]] = [[]]
     assert gc.isenabled()
     assert not any(each is imported for each in gc.get_objects())
 

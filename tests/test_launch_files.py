@@ -20,7 +20,7 @@ def _first_arguments(name: str, *functions: str) -> set[str]:
     """The texts that a launch file passes first to these functions."""
     calls = [node for node in ast.walk(_TREES[name]) if isinstance(node, ast.Call) and node.args]
     named = [node.args[0] for node in calls if isinstance(node.func, ast.Name) and node.func.id in functions]
-    return {node.value for node in named if isinstance(node, ast.Constant)}
+    return {node.value for node in named if isinstance(node, ast.Constant) and isinstance(node.value, str)}
 
 
 def declared(name: str) -> set[str]:
@@ -66,7 +66,7 @@ def _groups():
 
 @pytest.mark.parametrize("path", sorted((_ROOT / "configs").glob("*.yaml")), ids=lambda path: path.name)
 def test_each_group_of_a_file_is_found(path: Path):
-    assert _groups()(str(path)) == [group.name for group in load(path).groups]
+    assert _groups()(str(path)) == [group.name for group in load(str(path)).groups]
 
 
 @pytest.mark.parametrize("key", ["on", "NO", "null_", "_1e3"])
@@ -74,7 +74,7 @@ def test_the_name_of_a_group_is_what_is_written(key: str, tmp_path: Path):
     topics = "[{topic: /a, type: sensor_msgs/msg/Image}, {topic: /b, type: sensor_msgs/msg/Image}]"
     path = tmp_path / "fusion.yaml"
     path.write_text(f"version: 1\ngroups: {{{key}: {{policy: exact_time, topics: {topics}}}}}\n")
-    assert _groups()(str(path)) == [group.name for group in load(path).groups] == [key]
+    assert _groups()(str(path)) == [group.name for group in load(str(path)).groups] == [key]
 
 
 @pytest.mark.parametrize("text", ["", "[]", "groups:", "groups: {}", "groups: [front]"])

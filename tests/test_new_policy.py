@@ -90,7 +90,7 @@ def test_a_recording_is_analyzed_by_it_and_drawn(tmp_path: Path):
     (found,) = group.findings
     assert found.finding.code is Code.OVER_SLOP
     assert "gap 1 ms" in found.finding.text
-    assert "`gap: " in found.finding.suggestion
+    assert "`gap: " in (found.finding.suggestion or "")
     page = as_html(str(bag), analysis)
     assert "within_gap" in page
     assert "gap: " in page

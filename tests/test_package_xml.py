@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 _ROOT = Path(__file__).parents[1]
 _PACKAGE = ET.parse(_ROOT / "package.xml").getroot()  # noqa: S314  a file of ours
 _PROJECT = tomllib.loads((_ROOT / "pyproject.toml").read_text())["project"]
-_NEEDED = {each.text for each in _PACKAGE.findall("exec_depend")}
+_NEEDED = {each.text or "" for each in _PACKAGE.findall("exec_depend")}
 # Where Debian and rosdep have another name for it than PyPI.
 _KEYS = {"pyyaml": "python3-yaml"}
 _OF_ROS = re.compile(r"rclpy|ament_index_python|launch(_ros)?|\w+_(msgs|srvs|interfaces)")

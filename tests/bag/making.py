@@ -1,6 +1,6 @@
 """Recordings of every kind, made by the libraries that others write them with."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,7 @@ def rig(count: int = 40) -> list[Frame]:
 
 
 def write_mcap(
-    path: Path, frames: Sequence[Frame], *, store: Any = STORE, profile: str = "ros2", **options: Any
+    path: Path, frames: Iterable[Frame], *, store: Any = STORE, profile: str = "ros2", **options: Any
 ) -> Path:
     """An MCAP file with the frames in their order; `options` are the writer's."""
     with path.open("wb") as file:

@@ -5,6 +5,7 @@ from collections import defaultdict
 from contextlib import closing
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 from syncrelay.bag.bindings import bind
 from syncrelay.bag.replay import replay
@@ -71,7 +72,7 @@ class Stretches:
 
     def left(self, stretches):
         """What left the groups when stretches were last replayed, one behind another."""
-        whole = defaultdict(list)
+        whole: dict[str, list[Any]] = defaultdict(list)
         for stretch in stretches:
             for name, left in self._logs[stretch].items():
                 whole[name] += left

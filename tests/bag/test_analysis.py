@@ -33,8 +33,10 @@ def test_the_rhythm_of_a_topic_is_measured():
     assert (figures.messages, figures.gaps) == (97, 1)
     assert figures.period == pytest.approx(100 * MS, abs=MS)
     assert figures.longest_gap == pytest.approx(400 * MS, abs=4 * MS)
+    assert figures.jitter is not None
     assert MS < figures.jitter < 4 * MS
     assert figures.rate_hz == pytest.approx(9.7, abs=0.1)
+    assert figures.delay is not None
     assert (figures.delay.median, figures.delay.greatest) == (5 * MS, 5 * MS)
 
 
@@ -65,9 +67,12 @@ def test_a_pair_is_measured_from_the_slower_to_the_faster():
     slow, fast = streams_of(every(100 * MS, 20, phase=3 * MS), every(20 * MS, 100))
     for first, second in ((slow, fast), (fast, slow)):
         found = pair(first, second, (0, 0))
+        assert found is not None
         assert (found.first, found.second) == ("/a", "/b")
         assert {found.signed.least, found.signed.greatest} == {-3 * MS}
-    assert pair(slow, fast, (-3 * MS, 0)).signed.median == 0
+    shifted = pair(slow, fast, (-3 * MS, 0))
+    assert shifted is not None
+    assert shifted.signed.median == 0
     assert pair(slow, Stream("/c", VECTOR), (0, 0)) is None
 
 
@@ -78,6 +83,7 @@ _STAMPS = st.lists(st.integers(1, 60), min_size=1, max_size=8, unique=True).map(
 def test_the_tightest_sets_are_those_of_all_combinations(topics):
     streams = streams_of(*topics, latency=0)
     found = tightest(streams, [0] * len(topics))
+    assert found is not None
     others = [stamps for index, stamps in enumerate(topics) if index != found.pivot]
     expected = [
         min(max(stamp, *a_set) - min(stamp, *a_set) for a_set in product(*others)) for stamp in topics[found.pivot]
@@ -90,7 +96,9 @@ def test_a_queue_must_hold_what_comes_until_the_set_can_leave():
     slow, fast = streams_of([BEGIN + 100 * MS], every(10 * MS, 40))
     slow.places = array("q", [16])
     fast.places = array("q", [place for place in range(41) if place != 16])
-    assert tightest([slow, fast], (0, 0)).queues.tolist() == [6]
+    found = tightest([slow, fast], (0, 0))
+    assert found is not None
+    assert found.queues.tolist() == [6]
 
 
 def _pair_of(policy="approximate_time", **keys):

@@ -68,7 +68,8 @@ def test_messages_come_in_their_order_to_every_input_that_has_their_channel(data
 @given(sizes=st.lists(st.integers(0, 5000), max_size=8), large=st.booleans())
 def test_batches_that_are_filled_hold_the_same_messages_and_none_is_empty(sizes, large):
     payload = b"a" * (1_000_000 if large else 1)
-    messages = [(None, number, payload) for number in range(sum(sizes))]
+    channel = Channel(0, "/a", "a/msg/A", Encoding.CDR)
+    messages = [(channel, number, payload) for number in range(sum(sizes))]
     ends = [sum(sizes[: place + 1]) for place in range(len(sizes))]
     batches = list(filled(messages[end - size : end] for size, end in zip(sizes, ends, strict=True)))
     assert [message for batch in batches for message in batch] == messages

@@ -19,7 +19,7 @@ from syncrelay.cli.analysis_html import as_html
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.config import load_text
-from syncrelay.sync import DropReason, Match, Message
+from syncrelay.sync import DropReason, Match, Message, Outcome
 from tests.ros.cdr_messages import STORE, VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.streams import MS
@@ -43,7 +43,8 @@ class Made:
         self.rows = rows
         self.begin = rows[0][2] if rows else 0
         self.end = rows[-1][2] if rows else 0
-        self.faults = ()
+        self.faults: list[str] = []
+        self.size = self.position = 0
 
     def batches(
         self, channels: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
@@ -126,7 +127,8 @@ def _replayed(recording, bindings):
 
 def _fed_one_by_one(recording, binding):
     """What an engine makes of the messages, each read by itself and fed at its time: sets, drops, counts."""
-    engine, left = binding.group.engine(), []
+    engine = binding.group.engine()
+    left: list[tuple[Outcome, int | None]] = []
 
     def expire(until):
         while (deadline := engine.next_deadline()) is not None and (until is None or deadline <= until):
@@ -186,7 +188,9 @@ def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(policy, da
     by_value = {point["queue_size"]: point["sets"] for point in group["by_queue_size"]}
     if by_value:
         options = analysis.groups[0].group.options
-        pivot = analysis.groups[0].possible.tightest.pivot
+        possible = analysis.groups[0].possible
+        assert possible is not None
+        pivot = possible.tightest.pivot
         assert by_value[options.queue_size] == completed(analysis.groups[0].evaluation.counts, pivot)
 
 

@@ -6,6 +6,7 @@ import struct
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zstandard
@@ -121,7 +122,12 @@ def test_an_mcap_message_of_a_time_that_no_clock_shows_is_left_out(time, options
         assert recording.end <= LATEST
 
 
-_LOOSE = {"use_chunking": False, "use_summary_offsets": False, "repeat_channels": False, "repeat_schemas": False}
+_LOOSE: dict[str, Any] = {
+    "use_chunking": False,
+    "use_summary_offsets": False,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+}
 
 
 @pytest.mark.parametrize("opcode", [Opcode.SCHEMA, Opcode.CHANNEL])
@@ -171,7 +177,7 @@ def test_a_ros1_bag_that_ends_between_two_records_is_said(tmp_path):
     path = write_ros1(tmp_path / "rig.bag", _RIG, chunk=300)
     content = path.read_bytes()
     with closing(open_recording([str(path)])) as recording:
-        (file,) = recording._files  # noqa: SLF001  where its chunks are
+        (file,) = recording._files  # type: ignore[attr-defined]  # noqa: SLF001  where its chunks are
         second = sorted(each.offset for each in file._segments)[1]  # noqa: SLF001
     path.write_bytes(content[:second])
     frames, faults = _read(path)
@@ -184,7 +190,9 @@ def test_an_mcap_file_whose_index_lies_is_gone_through(lie, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
     content = path.read_bytes()
     with path.open("rb") as file:
-        begin = make_reader(file).get_summary().chunk_indexes[1].chunk_start_offset
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        begin = summary.chunk_indexes[1].chunk_start_offset
     at = content.rindex(struct.pack("<Q", begin))
     path.write_bytes(content[:at] + struct.pack("<Q", lie) + content[at + 8 :])
     assert _read(path) == (_RIG, [])
@@ -194,7 +202,9 @@ def test_messages_that_come_behind_later_ones_are_read_and_said(tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
     content = path.read_bytes()
     with path.open("rb") as file:
-        first = make_reader(file).get_summary().chunk_indexes[0]
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        first = summary.chunk_indexes[0]
     # The index says that the first chunk begins, and ends, an hour later.
     times = struct.pack("<QQ", first.message_start_time, first.message_end_time)
     later = struct.pack("<QQ", first.message_start_time + 3600 * 10**9, first.message_end_time + 3600 * 10**9)
@@ -263,7 +273,7 @@ def test_no_change_of_one_byte_of_a_ros1_message_keeps_its_chunk_from_ending():
     for at in range(len(content)):
         for value in range(256):
             changed = content[:at] + bytes([value]) + content[at + 1 :]
-            found = []
+            found: list[Any] = []
             try:
                 found.extend(messages(changed, channels))
             except UNREADABLE:

@@ -231,6 +231,7 @@ def test_qos_and_definitions_are_those_that_were_recorded(tmp_path):
         folder = write_rosbag2(tmp_path / plugin.name, _RIG, plugin=plugin, qos=[BEST_EFFORT])
         recording = open_recording([str(folder)])
         for channel in recording.channels:
+            assert channel.definition is not None
             assert (channel.encoding, channel.definition.format) == (Encoding.CDR, "ros2msg")
             assert "geometry_msgs/Vector3 vector" in channel.definition.text
             (profile,) = channel.qos

@@ -120,7 +120,9 @@ def _with_summary(path: Path, old: bytes, new: bytes) -> None:
 def test_an_index_that_hides_a_channel_is_told_by_the_statistics(server, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", rig(30), chunk_size=600, compression=CompressionType.ZSTD)
     with path.open("rb") as file:
-        chunk = make_reader(file).get_summary().chunk_indexes[-1]
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        chunk = summary.chunk_indexes[-1]
     entries = b"".join(struct.pack("<HQ", *each) for each in chunk.message_index_offsets.items())
     numbers = list(chunk.message_index_offsets)
     assert len(numbers) == 2

@@ -2,6 +2,7 @@
 
 import random
 from itertools import product
+from typing import get_args
 
 import pytest
 from hypothesis import given, settings
@@ -34,7 +35,7 @@ _examples = settings(derandomize=True, deadline=None, database=None)
 
 
 def test_every_policy_of_a_file_is_among_those_tested():
-    assert {model.model_fields["policy"].annotation.__args__[0] for model in GROUP_MODELS} == set(_KEYS)
+    assert {get_args(model.model_fields["policy"].annotation)[0] for model in GROUP_MODELS} == set(_KEYS)
 
 
 @st.composite
@@ -67,7 +68,8 @@ def texts(draw, policy):
 
 def drive(seed, seconds, trouble, jitter):
     """Three topics of 10, 10 and 4 Hz; `trouble` of all messages are late, lost, doubled, in a burst or unreadable."""
-    chance, rows = random.Random(seed), []
+    chance = random.Random(seed)
+    rows: list[tuple] = []
     for index, period in enumerate((100, 100, 250)):
         for number in range(seconds * 1000 // period):
             stamp = BEGIN + number * period * MS + round(chance.uniform(-jitter, jitter) * MS)
@@ -198,7 +200,12 @@ def test_what_waits_when_a_stretch_goes_on_leaves_when_it_is_due():
 def test_a_stretch_that_goes_on_reads_nothing_before_it():
     recording, begins = drive(1, 10, 0, 0), []
     batches = recording.batches
-    recording.batches = lambda channels, *, begin, end: begins.append(begin) or batches(channels, begin=begin, end=end)
+
+    def noted(channels, *, begin, end):
+        begins.append(begin)
+        return batches(channels, begin=begin, end=end)
+
+    recording.batches = noted
     text = config(
         {"front": {"policy": "equal_key", **_KEYS["equal_key"], "topics": inputs(dict.fromkeys(_TOPICS[:2], VECTOR))}}
     )

@@ -18,8 +18,8 @@ _SECOND = 1000 * MS
 
 def _suggested(streams, **keys):
     topics = inputs({stream.topic: VECTOR for stream in streams})
-    group = {"policy": "approximate_time", "slop": "10ms", "topics": topics, **keys}
-    text = config({"front": {key: value for key, value in group.items() if value is not None}})
+    chosen = {"policy": "approximate_time", "slop": "10ms", "topics": topics, **keys}
+    text = config({"front": {key: value for key, value in chosen.items() if value is not None}})
     group = group_of(text, "front")
     return suggest(
         group, streams, evaluate(group, streams), lambda changes: group_of(with_changes(text, changes), "front")

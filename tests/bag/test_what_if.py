@@ -10,6 +10,7 @@ from syncrelay.cdr import read_stamp
 from syncrelay.errors import UsageError
 from syncrelay.rig.what_if import parse_fault
 from tests.bag.making import CUSTOM_STORE, HEADERLESS, rig, write_mcap, write_ros1, write_rosbag2
+from tests.ros.cdr_messages import stamp_of
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS
 
@@ -84,13 +85,13 @@ def test_a_clock_that_is_off_changes_stamps_and_nothing_else(write, tmp_path):
     path = write(tmp_path / "rig", FRAMES)
     found = [(topic, received, read_stamp(payload)) for topic, received, payload in _read(path, "offset: /lidar -7ms")]
     shift = {"/lidar": -7 * MS, "/camera": 0}
-    assert found == [(each.topic, each.time, read_stamp(each.payload) + shift[each.topic]) for each in FRAMES]
+    assert found == [(each.topic, each.time, stamp_of(each.payload) + shift[each.topic]) for each in FRAMES]
 
 
 def test_a_clock_drifts_from_when_it_begins_and_keeps_what_it_gained(bag):
     found = [payload for topic, _, payload in _read(bag, "drift: /lidar 1000ppm from 1s until 2s") if topic == "/lidar"]
     recorded = [each for each in FRAMES if each.topic == "/lidar"]
-    gained = [read_stamp(payload) - read_stamp(each.payload) for payload, each in zip(found, recorded, strict=True)]
+    gained = [stamp_of(payload) - stamp_of(each.payload) for payload, each in zip(found, recorded, strict=True)]
     assert gained[:11] == [0] * 11
     assert gained[15] == MS // 2
     assert set(gained[20:]) == {MS}

@@ -126,7 +126,9 @@ def test_a_part_of_a_file_whose_index_tells_other_times_is_refused(first, last, 
     """Whatever the index says, one of the parts that together are the whole finds out."""
     path = _mcap(tmp_path)
     with path.open("rb") as file:
-        chunk = make_reader(file).get_summary().chunk_indexes[3]
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        chunk = summary.chunk_indexes[3]
     content = bytearray(path.read_bytes())
     old = struct.pack("<QQ", chunk.message_start_time, chunk.message_end_time)
     new = struct.pack("<QQ", chunk.message_start_time + first * 10**9, chunk.message_end_time + last * 10**9)

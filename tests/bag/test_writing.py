@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 from mcap.reader import make_reader
-from rosbags.interfaces import QosDurability, QosReliability
+from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
 from syncrelay.bag import open_recording
@@ -68,6 +68,7 @@ def test_types_and_qos_are_recorded(output, tmp_path):
         for connection in reader.connections:
             assert connection.msgtype == VECTOR
             assert "Vector3 vector" in connection.msgdef.data
+            assert isinstance(connection.ext, ConnectionExtRosbag2)
             (qos,) = connection.ext.offered_qos_profiles
             assert (qos.reliability, qos.durability) == (QosReliability.BEST_EFFORT, QosDurability.VOLATILE)
 
@@ -112,7 +113,9 @@ def test_a_type_that_nothing_here_knows_keeps_its_recorded_definition(tmp_path):
     )
     assert _payloads(written, "/front/camera") == _payloads(frames, "/camera")
     with (tmp_path / "out.mcap").open("rb") as file:
-        schemas = make_reader(file).get_summary().schemas.values()
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        schemas = summary.schemas.values()
     (schema,) = (schema for schema in schemas if schema.name == CUSTOM)
     assert schema.data.decode().startswith(CUSTOM_TEXT)
 
@@ -136,7 +139,7 @@ def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
             ("/front/camera", number, told.stamp),
             ("/front/lidar", number, told.stamp),
         ]
-        newest = max(each.received for each in told.inputs)
+        newest = max(each.received for each in told.inputs if each.received is not None)
         assert told.latency == manifest.time - newest
     with Reader(tmp_path / "out") as reader:
         (connection,) = (each for each in reader.connections if each.topic == "/syncrelay/front/sets")
@@ -159,7 +162,7 @@ def test_nothing_is_overwritten(tmp_path):
         (AUTO, [PRESETS["action_status_default"]], Profile(depth=100, durability="transient_local")),
         (QosPreset("sensor_data"), [Profile()], PRESETS["sensor_data"]),
         (QosOverrides(depth=3), [PRESETS["sensor_data"]], Profile(depth=3, reliability="best_effort")),
-        (QosOverrides(deadline="1s"), [], Profile(depth=100, deadline=1_000_000_000)),
+        (QosOverrides.model_validate({"deadline": "1s"}), [], Profile(depth=100, deadline=1_000_000_000)),
     ],
 )
 def test_outputs_offer_what_the_relay_would(asked, offered, profile):

@@ -1,5 +1,6 @@
 """Test files made in a test: a file of one group with a camera and a lidar, and cases of it."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import yaml
@@ -32,14 +33,14 @@ def run(folder: Path, case: object, **group: object):
     return result
 
 
-def left(folder: Path, drawing: str, *, case: dict[str, object] | None = None, **group: object) -> tuple[str, ...]:
+def left(folder: Path, drawing: str, *, case: Mapping[str, object] | None = None, **group: object) -> tuple[str, ...]:
     """Return what leaves of a drawing that expects nothing."""
     result = run(folder, {"drawing": drawing, **(case or {})}, **group)
     assert result.error is None
     return result.mismatches[0].found if result.mismatches else ()
 
 
-def found(folder: Path, expect: dict[str, object], case: dict[str, object], **group: object) -> dict[str, str]:
+def found(folder: Path, expect: Mapping[str, object], case: Mapping[str, object], **group: object) -> dict[str, str]:
     """Return what was found, by the last keys of what was expected otherwise."""
     result = run(folder, {**case, "expect": expect}, **group)
     assert result.error is None

@@ -259,5 +259,5 @@ def test_a_drawing_gives_what_the_engine_gives_by_hand(tmp_path, drawn, policy):
 
 def in_words(outcome):
     if isinstance(outcome, Match):
-        return "".join(message.payload for message in outcome.messages)
+        return "".join(message.payload for message in outcome.messages if message is not None)
     return f"{outcome.message.payload} {outcome.reason.value}"

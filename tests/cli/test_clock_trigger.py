@@ -10,6 +10,7 @@ from syncrelay.config import load_text
 from syncrelay.rig.schedule import SENSORS
 from syncrelay.sync import Match, Message, Ticks
 from tests.cli.command import run
+from tests.ros.cdr_messages import stamp_of
 from tests.ros.configs import config
 
 _TOPICS = [sensor.topic for sensor in SENSORS.values()]
@@ -56,7 +57,7 @@ def test_there_is_a_set_at_every_tick_of_none_newer_than_it(lines):
 
 def test_they_are_those_of_the_engine_fed_with_the_arrivals_as_it_is_live(folder, lines):
     engine = load_text(_TEXT).groups[0].engine()
-    sets = []
+    sets: list[tuple[int | None, ...]] = []
 
     def note(outcomes):
         sets.extend(outcome.stamps for outcome in outcomes if isinstance(outcome, Match))
@@ -64,7 +65,7 @@ def test_they_are_those_of_the_engine_fed_with_the_arrivals_as_it_is_live(folder
     with AnyReader([folder / "rig.mcap"]) as reader:
         for connection, received, raw in reader.messages():
             # A loop that wakes when something comes, and seldom besides.
-            note(engine.add(Message(_TOPICS.index(connection.topic), read_stamp(raw), None), now=received))
+            note(engine.add(Message(_TOPICS.index(connection.topic), stamp_of(raw), None), now=received))
         end = received
     note(engine.expire(now=end + _WAIT))
     assert sets == [tuple(line["stamps"][topic] for topic in _TOPICS) for line in lines]

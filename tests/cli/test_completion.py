@@ -222,7 +222,7 @@ def test_fish_is_told_what_may_follow_and_why(folder, environ):
     lines = ("syncrelay val", "syncrelay --config fu", "syncrelay --config fusion.yaml --group ")
     script = "; ".join(["source complete.fish", *(f"complete -C '{line}'" for line in lines)])
     done = subprocess.run(
-        [shutil.which("fish"), "--no-config", "-c", script],
+        [shutil.which("fish") or "", "--no-config", "-c", script],
         cwd=folder,
         env=environ,
         capture_output=True,

@@ -192,7 +192,7 @@ def test_who_asks_while_the_files_are_read_is_told_of_what_they_are_then(files: 
         second = files.read_again()
         replace(path, OTHER)
         pipe.write(GOOD)
-    told = {}
+    told: dict[Future[str], list[str]] = {}
     while second not in told:
         read = reading(files)
         told |= {asked: names(read.config) for asked in read.asked}

@@ -69,7 +69,7 @@ def summed_up(text):
 
 
 def _of_group(text):
-    sets = int(re.search(r"(\d+) sets?, last", text)[1])
+    (sets,) = map(int, re.findall(r"(\d+) sets?, last", text)[:1])
     span = [
         float(number) / {"us": 1000, "ms": 1, "s": 0.001}[unit]
         for number, unit in re.findall(r"p\d\d ([\d.]+) (\w+)", text)

@@ -1,5 +1,7 @@
 """The demo's rig as a recording: the same each time, made without ROS, and with the shipped file it gives sets."""
 
+from typing import Any
+
 import pytest
 from rosbags.highlevel import AnyReader
 
@@ -24,7 +26,9 @@ def folder(tmp_path_factory):
 def test_it_holds_what_the_rig_sends(folder):
     with AnyReader([folder / "rig.mcap"]) as reader:
         counts = {each.topic: each.msgcount for each in reader.connections}
-        first = {each.topic: reader.deserialize(raw, each.msgtype) for each, _, raw in reader.messages()}
+        first: dict[str, Any] = {
+            each.topic: reader.deserialize(raw, each.msgtype) for each, _, raw in reader.messages()
+        }
         received = [(time, read_stamp(raw)) for _, time, raw in reader.messages()]
     assert counts == {sensor.topic: pytest.approx(10 * sensor.rate_hz, rel=0.05) for sensor in SENSORS.values()}
     camera, lidar, imu = (first[sensor.topic] for sensor in SENSORS.values())

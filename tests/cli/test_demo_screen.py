@@ -126,7 +126,7 @@ def test_the_summary_says_what_became_of_every_message_and_what_was_found():
     assert "camera_lidar: OK, 10.1 of 10.1 possible sets a second, 120 sets, last just now" in lines
     assert "lidar_imu: ERROR, 0 of 0 possible sets a second, no set yet" in lines
     assert "  ERROR: nobody publishes /demo/imu/data (sensor_msgs/msg/Imu)" in lines
-    received, matched, waiting, dropped = map(
-        int, re.search(r"(\d+) received, (\d+) in sets, (\d+) waiting, (\d+) dropped", "\n".join(lines)).groups()
-    )
+    counted = re.search(r"(\d+) received, (\d+) in sets, (\d+) waiting, (\d+) dropped", "\n".join(lines))
+    assert counted is not None
+    received, matched, waiting, dropped = map(int, counted.groups())
     assert received == matched + waiting + dropped == 360

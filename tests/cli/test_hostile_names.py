@@ -128,7 +128,9 @@ class _Page(html.parser.HTMLParser):
 
     def __init__(self) -> None:
         super().__init__()
-        self.texts, self.elements, self._inside = [], [], ""
+        self.texts: list[str] = []
+        self.elements: list[str] = []
+        self._inside = ""
 
     def handle_starttag(self, tag, attrs):
         self.elements.append(tag)

@@ -20,7 +20,8 @@ def replayed(tmp_path, monkeypatch, capsys):
 
     def run(*words):
         parser = recording_parsers.replay()
-        code = command(parser, parser.read(["rig.mcap", "--config", "fusion.yaml", *words]), None)
+        arguments = parser.read(["rig.mcap", "--config", "fusion.yaml", *words])
+        code = command(parser, arguments, None)  # type: ignore[arg-type]  # nobody ends it
         told = capsys.readouterr()
         return code, told.out.splitlines(), told.err
 

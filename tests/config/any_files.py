@@ -10,7 +10,7 @@ _TYPES = tuple(f"sensor_msgs/msg/{name}" for name in ("Imu", "Image", "Temperatu
 _NAMES = ("a", "/b", "~/c", "/d/e", "f")
 _POLICIES = ("exact_time", "approximate_time", "approximate_time_eager", "approximate_epsilon_time")
 _QOS = (None, "auto", "sensor_data", {"depth": 5}, {"reliability": "reliable"})
-_ONCE = {
+_ONCE: dict[str, tuple[dict[str, Any] | None, ...]] = {
     "node": ({}, {"namespace": "/r"}, {"name": "n", "coalesce": "1ms"}),
     "metrics": (None, {}, {"listen": "127.0.0.1:0"}),
     "diagnostics": (None, {}, {"scalars": True}),

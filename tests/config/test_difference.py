@@ -73,8 +73,8 @@ def test_what_says_the_same_changes_nothing(new, environ):
     ],
 )
 def test_a_key_is_told_with_its_values_as_they_are_written(old, new, expected, environ):
-    files = [file(group("front", "/a", "/b", **keys)) for keys in (old, new)]
-    assert keys(*files, environ) == expected
+    before, after = (file(group("front", "/a", "/b", **keys)) for keys in (old, new))
+    assert keys(before, after, environ) == expected
 
 
 def test_the_keys_of_another_policy_go_and_come_with_it(environ):

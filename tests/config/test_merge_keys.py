@@ -1,5 +1,7 @@
 """Merge keys and keys of the user's own: what a file with them says is what it says with all of it written out."""
 
+from typing import Any
+
 import pytest
 
 from syncrelay.config import ConfigError, load_text
@@ -23,7 +25,7 @@ groups:
 
 
 def test_own_keys_come_first_then_the_first_that_is_merged_then_defaults(environ):
-    groups = load_text(_FILE, environ=environ).groups
+    groups: Any = load_text(_FILE, environ=environ).groups
     assert [(each.options.slop // 1_000_000, each.options.queue_size, each.options.every) for each in groups] == [
         (10, 5, 2),
         (20, 20, 2),

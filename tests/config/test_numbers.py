@@ -47,7 +47,8 @@ def _places() -> Iterator[tuple[str, dict[str, Any]]]:
     """Every key of the file, with a file that has a number there."""
     for key in FileKeys.model_fields:
         yield key, _file(_group("exact_time")) | {key: "number"}
-    for name, model in {"node": NodeConfig, "metrics": MetricsConfig, "diagnostics": DiagnosticsConfig}.items():
+    sections: dict[str, Any] = {"node": NodeConfig, "metrics": MetricsConfig, "diagnostics": DiagnosticsConfig}
+    for name, model in sections.items():
         for key in model.model_fields:
             yield f"{name}.{key}", _file(_group("exact_time"), **{name: {key: "number"}})
     for key in file_format().defaults.model_fields:
@@ -88,7 +89,9 @@ def test_more_messages_than_dds_counts_are_refused(place: str, number: str, envi
 def test_no_limit_as_rosbag2_writes_it_is_the_longest_duration(environ):
     endless = {"deadline": {"sec": 9223372036, "nsec": 854775807}, "lifespan": {"sec": 10**399, "nsec": 10**399}}
     (group,) = load_text(json.dumps(_file(_group("exact_time"), {"qos": endless})), environ=environ).groups
-    assert group.topics[0].qos.deadline == group.topics[0].qos.lifespan == 2**63 - 1
+    qos = group.topics[0].qos
+    assert isinstance(qos, QosOverrides)
+    assert qos.deadline == qos.lifespan == 2**63 - 1
 
 
 @pytest.mark.parametrize(

@@ -171,7 +171,7 @@ OPTIONS = {
     "scalars": (file(), file(diagnostics={"scalars": True}), lambda config: config.diagnostics),
     "defaults": (file(), file(defaults={"output_prefix": "/z"}), outputs),
 }
-LEROBOT = {"fps": 10, "task": "pick", "features": {"action": "/a:height"}}
+LEROBOT: dict[str, Any] = {"fps": 10, "task": "pick", "features": {"action": "/a:height"}}
 
 
 def _of_two_groups(group: str) -> str:
@@ -180,19 +180,20 @@ def _of_two_groups(group: str) -> str:
     return json.dumps({"version": 1, "groups": groups, "export": {"lerobot": LEROBOT | {"group": group}}})
 
 
+_OF_LEROBOT: dict[str, dict[str, Any]] = {
+    "fps": {"fps": 20},
+    "task": {"task": "place"},
+    "max_gap": {"max_gap": "3s"},
+    "features": {"features": {"action": "/b:height"}},
+}
 OPTIONS |= {
     key: (file(export={"lerobot": LEROBOT}), file(export={"lerobot": LEROBOT | keys}), lambda config: config.lerobot)
-    for key, keys in {
-        "fps": {"fps": 20},
-        "task": {"task": "place"},
-        "max_gap": {"max_gap": "3s"},
-        "features": {"features": {"action": "/b:height"}},
-    }.items()
+    for key, keys in _OF_LEROBOT.items()
 }
 OPTIONS |= {
     key: (file(), file(export={"lerobot": LEROBOT}), lambda config: config.lerobot) for key in ("export", "lerobot")
 }
-OPTIONS["group"] = (*(_of_two_groups(group) for group in ("front", "back")), lambda config: config.lerobot)
+OPTIONS["group"] = (_of_two_groups("front"), _of_two_groups("back"), lambda config: config.lerobot)
 QOS_POLICIES = {
     "history": "keep_all",
     "depth": 5,
@@ -233,7 +234,7 @@ def test_every_key_of_the_file_is_an_option_under_test():
     assert keys - OPTIONS.keys() == {"version"}
 
 
-DEFAULTS = {
+DEFAULTS: dict[str, tuple[Any, ...]] = {
     "policy": ("approximate_time", "exact_time", NEAR_PAIRS),
     "queue_size": (10, 1, sets_of((0, 10), (0, 20), (1, 11), (1, 21), (0, 100), (1, 100))),
     "slop": ("20ms", "5ms", WIDER_PAIRS),

@@ -56,7 +56,9 @@ def test_a_plain_scalar_is_what_yaml_1_2_says(text, value):
 
 @pytest.mark.parametrize("text", [".nan", ".NaN", ".NAN"])
 def test_not_a_number_is_a_number(text):
-    assert math.isnan(read_plain(text))
+    read = read_plain(text)
+    assert isinstance(read, float)
+    assert math.isnan(read)
 
 
 @given(st.text(max_size=20))

@@ -3,7 +3,7 @@
 import re
 from contextlib import suppress
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
 import yaml
@@ -69,7 +69,7 @@ def parsed(file):
 
 
 class Yaml12Loader(yaml.SafeLoader):
-    yaml_implicit_resolvers: ClassVar = {
+    yaml_implicit_resolvers: ClassVar = {  # type: ignore[misc]  # yaml sets it on classes, too
         first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith((":bool", ":timestamp"))]
         for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
     }
@@ -173,7 +173,7 @@ def test_a_variable_may_stand_for_any_value():
 @pytest.mark.parametrize(("keys", "is_good"), [({"slop": "20ms"}, True), ({}, False)])
 def test_what_a_policy_needs_is_needed_unless_there_are_defaults(keys, is_good):
     topics = [{"topic": "/a", "type": "a/msg/B"}, {"topic": "/b", "type": "a/msg/B"}]
-    file = {"version": 1, "groups": {"front": {"policy": "approximate_time", "topics": topics, **keys}}}
+    file: dict[str, Any] = {"version": 1, "groups": {"front": {"policy": "approximate_time", "topics": topics, **keys}}}
     assert VALIDATOR.is_valid(file) == is_good
     assert VALIDATOR.is_valid({**file, "defaults": {"slop": "20ms"}})
     del file["groups"]["front"]["policy"]

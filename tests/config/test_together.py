@@ -164,4 +164,5 @@ def test_notes_name_their_file(environ):
     Path("one.yaml").write_text(FRONT)
     Path("two.yaml").write_text(opaque)
     (note,) = load("one.yaml", "two.yaml", environ=environ).notes
+    assert note.span is not None
     assert (note.file, note.span.line, note.source) == ("two.yaml", 6, opaque.splitlines()[5])

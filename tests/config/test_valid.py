@@ -15,6 +15,7 @@ from syncrelay.config import (
     load,
     load_text,
 )
+from syncrelay.config.models import StampField
 from syncrelay.sync import Restamp, Ticks
 
 FOLDER = Path(__file__).parent / "valid"
@@ -53,12 +54,13 @@ def test_every_key_arrives_where_it_is_used(environ):
         depth=7,
         reliability="best_effort",
         durability="volatile",
-        deadline="1.5s",
-        lifespan="2s",
+        deadline="1.5s",  # type: ignore[arg-type]  # as a file has it
+        lifespan="2s",  # type: ignore[arg-type]
         liveliness="automatic",
-        liveliness_lease_duration="500ms",
+        liveliness_lease_duration="500ms",  # type: ignore[arg-type]
         avoid_ros_namespace_conventions=False,
     )
+    assert isinstance(dock.stamp, StampField)
     assert dock.stamp.field == "trigger.time"
     assert chatter.stamp == "receive"
     assert back.topics[0].qos == QosOverrides() == back.topics[1].qos
@@ -117,6 +119,7 @@ def test_a_duration_of_the_middleware_has_a_largest_value(environ):
     no_limit = "qos: {lifespan: {sec: 9223372036, nsec: 854775807}, deadline: {sec: 9223372036854, nsec: 0}}"
     config = load_text(text.replace("qos: {}", no_limit), environ=environ)
     qos = config.groups[1].topics[1].qos
+    assert isinstance(qos, QosOverrides)
     assert (qos.lifespan, qos.deadline) == (2**63 - 1, 2**63 - 1)
 
 

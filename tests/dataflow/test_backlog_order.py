@@ -2,6 +2,7 @@
 
 import random
 from collections import deque
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ from tests.dataflow.payloads import Named
 class _Source:
     """Gives (time, payload) pairs, the first first."""
 
-    def __init__(self, delivered: list, *messages: tuple[int, str]):
+    def __init__(self, delivered: list, *messages: tuple[int, Any]):
         self.messages = deque(messages)
         self.waited = 0
         self.pending = ALL
@@ -119,7 +120,9 @@ def test_messages_up_to_a_time_leave_however_many_they_are():
 @pytest.mark.parametrize("seed", range(100))
 def test_each_source_tells_how_long_its_own_messages_waited_whenever_it_was_looked_at(seed):
     chance = random.Random(seed)
-    backlog, delivered, waits = Backlog(), [], {}
+    backlog = Backlog()
+    delivered: list[tuple[_Source, int]] = []
+    waits: dict[_Source, int] = {}
     sources = [_Source(delivered) for _ in range(chance.randint(1, 4))]
     now = 0
     for _ in range(chance.randint(1, 30)):

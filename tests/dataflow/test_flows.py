@@ -57,7 +57,8 @@ def _played(flow, keys, stream, connected) -> list:
     group = GroupRelay(
         load_text(config({"front": {"topics": inputs(_TOPICS), **keys}})).groups[0], now=lambda: seen[0], flow=flow
     )
-    seen, noted = [0], []
+    seen = [0]
+    noted: list[object] = []
     outlets = [_Outlet(noted, index) for index in range(3)]
     for index in connected:
         group.connect(index, outlets[index], restamped=index != 1)

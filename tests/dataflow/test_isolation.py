@@ -3,7 +3,9 @@
 import random
 import time
 from collections import deque
+from functools import partial
 from threading import Thread
+from typing import Any
 
 import pytest
 
@@ -74,10 +76,10 @@ def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then
 ):
     outlets = [_Outlet(), _Outlet()]
     for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)
+        group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
         group.flow.receive(index, Named(b"set"), BEGIN)
     assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
-    group.engine = _Failing(group.engine, failing)
+    group.engine = _Failing(group.engine, failing)  # type: ignore[assignment]  # it passes all on
     _drive(group, failing)
     assert group.failure == f"ZeroDivisionError: {failing}"
     for step in _STEPS:
@@ -99,7 +101,7 @@ def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_
 
     def connect() -> None:
         for index, outlet in enumerate(outlets):
-            group.connect(index, outlet, restamped=False)
+            group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
 
     connect()
     group.flow.receive(0, Named(b"before"), BEGIN)
@@ -118,11 +120,11 @@ def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_
 def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in_part(group: GroupRelay):
     outlets = [_Outlet(), _Outlet()]
     for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)
+        group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
     group.flow.receive(0, Named(b"before"), BEGIN)
     group.suspend()
     group.flow.receive(1, Named(b"meanwhile"), BEGIN)
-    group.connect(1, outlets[1], restamped=False)
+    group.connect(1, outlets[1], restamped=False)  # type: ignore[arg-type]
     group.resume()
     assert [outlet.sent for outlet in outlets] == [[], []]
     assert [(each.fed, each.dropped) for each in group.counts()] == [(1, {DropReason.SHUTDOWN: 1})] * 2
@@ -147,7 +149,7 @@ def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_go
     caplog.set_level("INFO")
     outlets = [_Outlet(), _FailingOutlet(b"2")]
     for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)
+        group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
     told = []
     for n in range(4):
         for index in range(2):
@@ -167,7 +169,7 @@ class _Source:
 
     def __init__(self, *messages: bytes | Exception) -> None:
         self.messages = deque(messages)
-        self.deliver = lambda *_: None
+        self.deliver: Any = lambda *_: None
         self.waited = 0
         self.pending = ALL
 
@@ -186,6 +188,7 @@ class _Watch:
     def __init__(self, chance: random.Random) -> None:
         self._chance = chance
         self.sources: list[_Source] = []
+        self.timeouts: list[int] = []
 
     def add(self, source: _Source) -> None:
         self.sources.append(source)
@@ -214,11 +217,16 @@ def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
     """Whatever fails around them, all messages of the other sources are delivered in order, and all calls are made."""
     chance = random.Random(seed)
     told: list[Exception] = []
+
+    def deadline() -> int | None:
+        _fail_at_times(chance)
+        return chance.choice([None, 0])
+
     loop = ReceiveLoop(
         PolledInbox(_Watch(chance)),
         now=lambda: 0,
         expire=lambda _: _fail_at_times(chance),
-        deadline=lambda: _fail_at_times(chance) or chance.choice([None, 0]),
+        deadline=deadline,
         on_turn=lambda: _fail_at_times(chance),
         contain=told.append,
     )
@@ -227,14 +235,15 @@ def test_the_receive_thread_ends_for_nothing_but_the_end(seed: int):
     for source in sound:
         source.deliver = lambda payload, source=source: delivered[source].append(payload.name)
         loop.add(source, told.append)
-    ailing, lost = _Source(b"a", OSError("gone"), b"b"), []
+    ailing = _Source(b"a", OSError("gone"), b"b")
+    lost: list[Exception] = []
     loop.add(ailing, lost.append)
     thread = Thread(target=loop.run)
     thread.start()
     for n in range(20):
-        assert loop.call(lambda n=n: n).result(timeout=60) == n
+        assert loop.call(partial(int, n)).result(timeout=60) == n
         with pytest.raises(KeyError):
-            loop.call(lambda: {}["no such"]).result(timeout=60)
+            loop.call(lambda: dict[str, object]()["no such"]).result(timeout=60)
     wait_until(lambda: not any(source.messages for source in sound), "all messages")
     loop.stop()
     thread.join(timeout=60)
@@ -262,7 +271,6 @@ class _Trickle(_Watch):
 @pytest.mark.parametrize(("coalesce_ns", "delivered"), [(0, [b"a"]), (1, [b"a", b"b"])])
 def test_what_comes_with_the_first_message_is_taken_with_it_where_the_file_says_so(coalesce_ns: int, delivered):
     watch, came = _Trickle(random.Random(0)), []
-    watch.timeouts = []
     inbox = PolledInbox(watch, coalesce_ns=coalesce_ns)
     for source in (_Source(b"a"), _Source(b"b")):
         source.deliver = lambda payload: came.append(payload.name)

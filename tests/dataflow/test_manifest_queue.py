@@ -148,8 +148,13 @@ def test_a_bug_costs_one_manifest_and_no_set(queue, caplog):
 
 def test_each_is_published_once_and_in_order_whoever_publishes(queue):
     told = [_Told(queue, name) for name in ("front", "rear")]
+
+    def feed() -> None:
+        for each in told * 100:
+            each.feed_sets(10)
+
     with _running(queue) as threads:
-        fed = threads.submit(lambda: [each.feed_sets(10) for _ in range(100) for each in told])
+        fed = threads.submit(feed)
         while not fed.done():
             queue.publish()
         fed.result()

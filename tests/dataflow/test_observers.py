@@ -4,7 +4,6 @@ import time
 
 import pytest
 
-from syncrelay.dataflow import observers
 from syncrelay.dataflow.observers import Losses, SimulatedClock, Standstills, SystemClock, Waits
 from syncrelay.explain import ClockState, Standstill
 
@@ -18,9 +17,9 @@ def test_the_longest_standstill_is_told_for_ten_evaluations():
     assert standstills.recent == ()
     standstills.observe()
     for _ in range(9):
-        assert standstills.recent == (Standstill(200, 7),)
+        assert list(standstills.recent) == [Standstill(200, 7)]
         standstills.observe()
-    assert standstills.recent == (Standstill(200, 7),)
+    assert list(standstills.recent) == [Standstill(200, 7)]
     standstills.observe()
     assert standstills.recent == ()
 
@@ -66,7 +65,7 @@ def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publisher
 
 def test_a_clock_that_was_set_has_stepped_once_and_is_told_for_half_a_minute(monkeypatch):
     ahead = [0]
-    monkeypatch.setattr(observers.time, "time_ns", lambda: time.monotonic_ns() + ahead[0])
+    monkeypatch.setattr(time, "time_ns", lambda: time.monotonic_ns() + ahead[0])
     clock = SystemClock()
     assert not clock.has_stepped(0)
     for at, step in ((10 * _SECOND, 5 * _SECOND), (20 * _SECOND, -5 * _SECOND)):

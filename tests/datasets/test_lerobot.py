@@ -429,6 +429,8 @@ def test_a_file_that_says_nothing_of_lerobot_is_told_what_is_missing(tmp_path):
 
 
 def test_features_are_the_ones_that_the_file_names():
-    assert [feature.name for feature in config().lerobot.features] == [
+    lerobot = config().lerobot
+    assert lerobot is not None
+    assert [feature.name for feature in lerobot.features] == [
         line.split(":")[0].strip() for line in FEATURES.strip().splitlines()
     ]

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -273,7 +274,7 @@ def images(encoding, pixels, *, big_endian=0, height=None):
     frames = []
     for frame in rig(10):
         if frame.topic == "/camera":
-            found = STORE.deserialize_cdr(frame.payload, frame.type_name)
+            found: Any = STORE.deserialize_cdr(frame.payload, frame.type_name)
             image = types["sensor_msgs/msg/Image"](
                 header=found.header,
                 height=height or pixels.shape[0],

@@ -30,7 +30,10 @@ def site_with(folder, packages):
     site = folder / "site"
     site.mkdir()
     for package in packages:
-        origin = Path(importlib.util.find_spec(package).origin)
+        found = importlib.util.find_spec(package)
+        assert found is not None
+        assert found.origin is not None
+        origin = Path(found.origin)
         origin = origin.parent if origin.name.startswith("__init__") else origin
         (site / origin.name).symlink_to(origin)
     return site

@@ -45,7 +45,7 @@ def test_nodes_that_are_found_but_do_not_get_through_are_not_taken_for_absent():
     (found,) = check_graph(replace(GRAPH, nodes=(), n_unreached=1))
     assert (found.code, found.severity) == ("unreachable", ERROR)
     assert found.what == "1 topic on domain 3 has a publisher whose node is not known"
-    assert "let UDP ports 8150 to 8399 through" in found.fix
+    assert "let UDP ports 8150 to 8399 through" in (found.fix or "")
     unreached = Endpoint("a publisher whose node is not known yet", IMAGE, is_named=False)
     facts = a_silent_group(silent(publishers=(unreached,)), an_input("/lidar"))
     assert [each.code for each in judge(facts)] == [Code.SILENT]
@@ -59,7 +59,7 @@ def test_a_managed_node_that_is_not_active_is_told_with_its_next_transition():
     assert found.fix == "activate it with `ros2 lifecycle set /robot/syncrelay activate`"
     (found,) = check_state("unconfigured", "/syncrelay")
     assert found.fix == "configure it with `ros2 lifecycle set /syncrelay configure`"
-    assert "restart" in next(check_state("finalized", "/syncrelay")).fix
+    assert "restart" in (next(check_state("finalized", "/syncrelay")).fix or "")
     assert [*check_state("active", "/syncrelay"), *check_state("activating", "/s"), *check_state(None, "/s")] == []
 
 
@@ -100,6 +100,7 @@ def test_what_several_groups_share_is_told_once():
 def test_a_silent_topic_leads_no_further_than_here():
     (found,) = check_groups([report(a_silent_group(silent(), an_input("/lidar")))], [])
     assert found.code == "silent"
+    assert found.fix is not None
     assert "doctor" not in found.fix
     assert "FASTDDS_BUILTIN_TRANSPORTS=UDPv4" in found.fix
 

@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import merge
-from typing import Any
+from typing import Any, TypedDict
 
 import yaml
 
@@ -81,6 +81,13 @@ class Source(_SourceFaults):
     @property
     def endpoint(self) -> Endpoint:
         return Endpoint(self.node or f"{self.topic}_driver", IMU)
+
+
+class Noise(TypedDict):
+    """What a real source has of both jitters, as keywords of `Source`."""
+
+    jitter_ms: float
+    delay_jitter_ms: float
 
 
 @dataclass(frozen=True)

@@ -213,7 +213,9 @@ def test_no_arrivals_whatever_break_a_watch_or_a_judge(config, messages, publish
     watch, a_judge, engine = GroupWatch(config, began=BEGAN), Judge(), config.engine()
     shown = (Endpoint("/a", "sensor_msgs/msg/Imu"),) * publishers
     graph = [InputGraph(topic.topic, topic.output, shown) for topic in config.topics]
-    arrived, sent, now = ([], [], []), [], BEGAN
+    arrived: tuple[list[tuple[int, int]], ...] = ([], [], [])
+    sent: list[tuple[tuple[int | None, ...], int]] = []
+    now = BEGAN
     for index, stamp, passes, polls in messages:
         now += passes
         arrived[index].append((stamp, now))

@@ -28,7 +28,7 @@ def watched(keys, streams, *, until_s):
         for index, (period, delay, end) in enumerate(streams.values())
         for ms in range(0, end, period)
     )
-    sets = []
+    sets: list[tuple[tuple[int | None, ...], int]] = []
 
     def take(outcomes, _now):
         sets.extend((each.stamps, 0) for each in outcomes if isinstance(each, Match))

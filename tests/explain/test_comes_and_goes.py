@@ -4,14 +4,23 @@ What the graph shows changes before messages come, and both at any moment betwee
 """
 
 import random
+from typing import TypedDict
 
 import pytest
 
 from syncrelay.explain import Endpoint
 from tests.explain.scenario import IMU, Source, Told, run
 
+
+class Calm(TypedDict):
+    """Keywords of `Source`."""
+
+    delay_ms: float
+    delay_jitter_ms: float
+
+
 TOPICS = ("/camera", "/lidar", "/imu")
-CALM = {"delay_ms": 1.0, "delay_jitter_ms": 0.3}
+CALM: Calm = {"delay_ms": 1.0, "delay_jitter_ms": 0.3}
 SLOP = {"slop": "20ms"}
 
 

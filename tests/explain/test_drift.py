@@ -23,18 +23,22 @@ def is_straight(found):
 @pytest.mark.parametrize("ppm", [20, 100, 2000, -100])
 def test_a_drift_is_measured_in_the_noise(ppm):
     found = drift(points(lambda second: second * ppm * 1000, noise=0.2 * MS))
+    assert found is not None
     assert found.slope * 1e6 == pytest.approx(ppm, abs=3)
     assert found.watched_ns == 119 * S
 
 
 def test_a_line_has_no_bend():
     found = drift(points(lambda second: second * 100_000))
+    assert found is not None
     assert found.drifted_ns == pytest.approx(11.9 * MS)
     assert found.bend_ns < 1
 
 
 def test_an_epoch_costs_no_nanoseconds():
-    assert drift(points(lambda second: second)).slope == pytest.approx(1e-9)
+    found = drift(points(lambda second: second))
+    assert found is not None
+    assert found.slope == pytest.approx(1e-9)
 
 
 @pytest.mark.parametrize("n", [0, 1, 3])

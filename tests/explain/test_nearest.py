@@ -77,7 +77,10 @@ def test_a_message_is_measured_once_something_on_every_input_is_not_older():
 def test_slow_inputs_that_never_come_in_one_chunk_are_measured():
     nearest = NearestSpans(2)
     spans = [
-        span for n in range(10) for one in (([n * 100], []), ([], [n * 100 + 30])) for span in nearest.add(one, pivot=0)
+        span
+        for n in range(10)
+        for first, second in (([n * 100], list[int]()), (list[int](), [n * 100 + 30]))
+        for span in nearest.add([first, second], pivot=0)
     ]
     assert spans == [30] * 9
 

@@ -1,6 +1,7 @@
 """What is seen of streams: rates, delays, faults, windows; and that memory stays bounded."""
 
 from operator import add
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -23,7 +24,7 @@ class Stage:
             offsets_ns=offsets or [0] * n_inputs, required=required or [True] * n_inputs, began=began, trigger=trigger
         )
         self.fed = [0] * n_inputs
-        self.dropped = [{} for _ in range(n_inputs)]
+        self.dropped: list[dict[DropReason, int]] = [{} for _ in range(n_inputs)]
         self.sets = 0
 
     def second(self, *streams, sets=(), dropped=None, length=S):
@@ -338,7 +339,7 @@ def test_memory_does_not_grow_with_time():
 
     def held():
         observation = stage.observation
-        kept = [observation._polls, observation._spans, observation._latencies, observation._nearest]  # noqa: SLF001  memory is the promise
+        kept: list[Any] = [observation._polls, observation._spans, observation._latencies, observation._nearest]  # noqa: SLF001  memory is the promise
         for each in observation._inputs:  # noqa: SLF001
             kept += [each._stamps, each._received, each._delays, each._faults, each._points]  # noqa: SLF001
         return sum(map(len, kept))

@@ -58,9 +58,10 @@ class _History:
     def came_too_late(self) -> bool:
         """Whether a message came that fits a set which had left without it."""
         return any(
-            received > left and max(*stamps[:2], stamp) - min(*stamps[:2], stamp) <= _SLOP
-            for stamps, left in self.sets
-            if stamps[2] is None
+            received > left and max(*required, stamp) - min(*required, stamp) <= _SLOP
+            for (*members, optional), left in self.sets
+            if optional is None
+            for required in [[each for each in members if each is not None]]
             for stamp, received in self.came
         )
 
@@ -71,7 +72,8 @@ def _findings(history: _History):
     engine, watch = config.engine(), GroupWatch(config, began=BEGAN)
     looks = list(range(BEGAN + S, BEGAN + (_LASTS_S + 2) * S, history.chance.choice([1, 1, 4]) * S))
     events = list(heapq.merge(((at, -1, 0) for at in looks), history.messages()))
-    arrivals, sent = tuple(deque() for _ in range(3)), deque()
+    arrivals: tuple[deque[tuple[int, int]], ...] = tuple(deque() for _ in range(3))
+    sent: deque[tuple[tuple[int | None, ...], int]] = deque()
 
     def settle(outcomes, now):
         for outcome in outcomes:

@@ -2,31 +2,34 @@
 
 import random
 import re
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import pytest
 
 from syncrelay.explain import ClockState, Endpoint, Standstill, Step
-from tests.explain.scenario import IMU, Source, Told, run
+from tests.explain.scenario import IMU, Noise, Source, Told, run
 from tests.explain.support.groups import S
 
-REAL = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
+REAL: Noise = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
 SLOP = {"slop": "20ms"}
 
 
 def a_pair(*, seconds=60, options=SLOP, more=None, **faults) -> Told:
     """Two inputs at 10 Hz; the second has the faults."""
-    sources = Source("/a", 10, **REAL), Source("/b", 10, **(REAL | faults))
+    sources = Source("/a", 10, **REAL), Source("/b", 10, **{**REAL, **faults})
     return run(*sources, seconds=seconds, options=options, **(more or {}))
 
 
 def a_trio(*, seconds=60, **faults) -> Told:
-    sources = Source("/a", 10, **REAL), Source("/b", 10, **(REAL | faults)), Source("/c", 10, **REAL)
+    sources = Source("/a", 10, **REAL), Source("/b", 10, **{**REAL, **faults}), Source("/c", 10, **REAL)
     return run(*sources, seconds=seconds, options=SLOP)
 
 
 def all_of(**faults) -> Told:
     """Two inputs with the same faults."""
-    return run(*(Source(topic, 10, **(REAL | faults)) for topic in ("/a", "/b")), seconds=60, options=SLOP)
+    return run(*(Source(topic, 10, **{**REAL, **faults}) for topic in ("/a", "/b")), seconds=60, options=SLOP)
 
 
 def says_only(told: Told, code: str, *texts: str) -> None:
@@ -60,16 +63,22 @@ def test_nothing_is_said_of_a_healthy_rig(sources, options, seed):
     assert told.ever_found == set()
 
 
+def held_up(kind: str, pauses: list[tuple[float, float]]) -> dict[str, Any]:
+    """The keyword of `run` that makes a relay rest."""
+    return {kind: pauses}
+
+
 @pytest.mark.parametrize(("sources", "options"), HEALTHY.values(), ids=HEALTHY)
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("kind", ["stops", "starved"])
 def test_of_a_relay_that_gets_too_little_cpu_only_that_is_said(sources, options, seed, kind):
     chance = random.Random(seed)
-    at, pauses = 5.0, []
+    at = 5.0
+    pauses: list[tuple[float, float]] = []
     while at < 55:
         pauses.append((at, at + chance.choice([0.05, 0.2, 0.6, 1.5])))
         at = pauses[-1][1] + chance.expovariate(0.5)
-    told = run(*sources, seconds=90, seed=seed, options=options, **{kind: pauses})
+    told = run(*sources, seconds=90, seed=seed, options=options, **held_up(kind, pauses))
     assert told.codes <= {"too_slow"}, told.warnings
 
 
@@ -78,7 +87,7 @@ def test_of_a_relay_that_gets_too_little_cpu_only_that_is_said(sources, options,
 @pytest.mark.parametrize("hz", [1, 30])
 def test_one_stop_of_the_relay_is_blamed_on_nothing_else(kind, length, hz):
     sources = Source("/a", hz, **REAL), Source("/b", hz / 3 if hz > 1 else 1, **REAL)
-    told = run(*sources, seconds=120, options={"slop": "30ms"}, **{kind: [(30.25, 30.25 + length)]})
+    told = run(*sources, seconds=120, options={"slop": "30ms"}, **held_up(kind, [(30.25, 30.25 + length)]))
     assert told.codes <= {"too_slow"}, told.warnings
     if length >= 3:
         assert told.codes
@@ -191,13 +200,17 @@ def test_without_any_clock_only_that_is_said():
 
 
 def test_a_simulation_that_is_paused_is_one_line():
-    paused = {"sends": lambda second: second < 20}
-    more = {
+    more: dict[str, Any] = {
         "facts": lambda second: {
             "clock": ClockState(received=True, stopped=round((second - 20) * S) if second > 23 else None)
         }
     }
-    told = run(*(Source(topic, 10, **(REAL | paused)) for topic in ("/a", "/b")), seconds=60, options=SLOP, **more)
+    told = run(
+        *(Source(topic, 10, sends=lambda second: second < 20, **REAL) for topic in ("/a", "/b")),
+        seconds=60,
+        options=SLOP,
+        **more,
+    )
     says_only(told, "clock_stopped", "/clock has stood still")
 
 
@@ -263,9 +276,8 @@ def test_a_sensor_that_dies_and_returns_is_silent_and_then_nothing():
 
 
 def test_a_recorder_that_pauses_is_one_line():
-    more = {"facts": lambda _: {"is_recorded": True}}
     sources = (Source(topic, 10, sends=lambda second: not 20 < second < 35, **REAL) for topic in ("/a", "/b"))
-    told = run(*sources, seconds=80, options=SLOP, **more)
+    told = run(*sources, seconds=80, options=SLOP, facts=lambda _: {"is_recorded": True})
     says_only(told, "silent", "all inputs have been silent for 5", "check whether recording was paused")
 
 
@@ -339,7 +351,7 @@ def pauses(seed: int, longest: float) -> list[tuple[float, float]]:
     return found
 
 
-BUSY = {
+BUSY: dict[str, Callable[[int], dict[str, Any]]] = {
     "calm": lambda _: {},
     "starved": lambda seed: {"starved": pauses(seed, 0.45)},
     "starved for a second": lambda seed: {"starved": pauses(seed, 1.0)},
@@ -351,11 +363,11 @@ BUSY = {
 @pytest.mark.parametrize("noise", [0.0, 2.0, 10.0])
 @pytest.mark.parametrize("busy", BUSY)
 def test_no_slop_and_no_offset_is_offered_for_a_drift(rate, slop, noise, busy):
-    real = {"delay_jitter_ms": noise}
+    source = partial(Source, delay_jitter_ms=noise)
     sources = (
-        Source("/camera", 10, **real),
-        Source("/lidar", 10, clock=lambda second: rate * second, **real),
-        Source("/imu", 20, **real),
+        source("/camera", 10),
+        source("/lidar", 10, clock=lambda second: rate * second),
+        source("/imu", 20),
     )
     told = run(*sources, seconds=80, options={"slop": slop}, **BUSY[busy](1))
     assert told.codes <= {"clock_drift", "too_slow"}, told.warnings
@@ -433,9 +445,11 @@ def test_what_comes_in_batches_has_the_pace_of_its_stamps(slower):
 @pytest.mark.parametrize("rest_s", [0.0, 0.8])
 @pytest.mark.parametrize("again_s", [20.4, 21.5, 23.2])
 def test_what_is_sent_again_after_a_standstill_is_missed_because_of_it(again_s, rest_s):
-    sent_again = {"received": lambda at: again_s if 17 < at < again_s else at}
+    def received(at: float) -> float:
+        return again_s if 17 < at < again_s else at
+
     told = run(
-        *(Source(topic, 10, **REAL, **sent_again) for topic in ("/a", "/b")),
+        *(Source(topic, 10, received=received, **REAL) for topic in ("/a", "/b")),
         seconds=60,
         options=SLOP,
         stops=[(17.1, 20.1)],

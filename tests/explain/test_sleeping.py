@@ -3,9 +3,9 @@
 import pytest
 
 from syncrelay.explain import Code, Endpoint
-from tests.explain.scenario import IMU, Source, Told, run
+from tests.explain.scenario import IMU, Noise, Source, Told, run
 
-REAL = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
+REAL: Noise = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
 HEALTHY = {
     "camera and lidar": (
         [Source("/camera", 30, delay_ms=20, **REAL), Source("/lidar", 10, delay_ms=30, **REAL)],

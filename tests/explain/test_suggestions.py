@@ -12,6 +12,7 @@ from syncrelay.config.units import parse_duration
 from syncrelay.explain import Code, Finding, FindingLog, Severity
 from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, constant_offsets
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
+from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run
 from tests.explain.support.groups import NOW, S, a_group
 
@@ -267,7 +268,8 @@ def slops(trials: Trials) -> Iterator[Tried]:
 def test_a_poll_interrupts_what_takes_long_and_the_next_goes_on_from_there():
     budget = TryBudget(clock := Processor())
     asked = evaluator(budget)
-    polls, found = 0, ()
+    polls = 0
+    found: tuple[Tried, ...] = ()
     while not found and polls < 100:
         began = clock.now
         found = asked.best("a", slops, now=BEGAN).tried
@@ -280,12 +282,12 @@ def test_a_poll_interrupts_what_takes_long_and_the_next_goes_on_from_there():
 
 def test_the_first_run_of_a_poll_ends_however_slow_the_processor_is():
     budget = TryBudget(clock := Processor())
-    first = budget.spent_on(range(1000))
+    first = budget.spent_on(Message(0, n, None) for n in range(1000))
     next(first)
     clock.now += 1000 * MS
     assert len(list(first)) == 999
     with pytest.raises(OutOfTimeError):
-        list(budget.spent_on(range(1000)))
+        list(budget.spent_on(Message(0, n, None) for n in range(1000)))
 
 
 def test_what_was_never_tried_comes_before_what_was():

@@ -32,7 +32,9 @@ def right_groups(chance: random.Random, published: tuple[str, ...]) -> dict[str,
     groups: dict[str, Any] = {}
     for name in chance.sample(("one", "two", "three"), k=chance.randrange(1, 4)):
         chosen = chance.sample(sorted(types), k=2)
-        topics = [{"topic": each, "type": types[each], "qos": qos[each], "output": outputs.pop()} for each in chosen]
+        topics: list[dict[str, Any]] = [
+            {"topic": each, "type": types[each], "qos": qos[each], "output": outputs.pop()} for each in chosen
+        ]
         if chance.random() < 0.5:
             # Fed in earnest, and shared with the group that stays.
             topics += [{"topic": chance.choice(published), "type": VECTOR, "qos": LOSSLESS}]

@@ -3,6 +3,7 @@
 import random
 from collections.abc import Iterator
 from struct import pack
+from typing import Literal
 
 from tests.faults.certified import certified
 from tests.ros.cdr_messages import NS_PER_SECOND, padded
@@ -27,7 +28,7 @@ def fate(payload: bytes) -> str:
     carried = padded(payload)
     if len(carried) < 12 or carried[0] or carried[1] not in (0, 1, 6, 7):
         return "malformed"
-    order = "little" if carried[1] % 2 else "big"
+    order: Literal["little", "big"] = "little" if carried[1] % 2 else "big"
     seconds, nanoseconds = carried[4:8], int.from_bytes(carried[8:12], order)
     if nanoseconds >= NS_PER_SECOND:
         return "malformed"

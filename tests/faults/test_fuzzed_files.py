@@ -27,7 +27,8 @@ _PAIRS = chosen(short=80, long=2000)
 @pytest.mark.timeout(chosen(short=600, long=1200))
 @pytest.mark.parametrize("batch", range(_BATCHES))
 def test_a_file_of_any_content_is_in_order_or_an_error_that_says_why(batch: int, tmp_path: Path, figures):
-    path, became = tmp_path / "fusion.yaml", Counter()
+    path = tmp_path / "fusion.yaml"
+    became: Counter[str] = Counter()
     for number in range(batch, _FILES, _BATCHES):
         content = mutated(_EXAMPLES[number % len(_EXAMPLES)].read_bytes(), random.Random(number))
         path.write_bytes(content)
@@ -38,7 +39,8 @@ def test_a_file_of_any_content_is_in_order_or_an_error_that_says_why(batch: int,
 
 @pytest.mark.timeout(chosen(short=600, long=1200))
 def test_a_document_made_up_of_our_words_is_in_order_or_an_error_that_says_why(tmp_path: Path, figures):
-    path, became = tmp_path / "fusion.yaml", Counter()
+    path = tmp_path / "fusion.yaml"
+    became: Counter[str] = Counter()
     for number in range(_MADE_UP):
         path.write_bytes(made_up(random.Random(number)))
         became[_loaded(path)] += 1
@@ -48,7 +50,8 @@ def test_a_document_made_up_of_our_words_is_in_order_or_an_error_that_says_why(t
 
 @pytest.mark.timeout(chosen(short=600, long=1200))
 def test_files_of_any_content_together_are_in_order_or_an_error_that_says_where(tmp_path: Path, figures):
-    paths, became = [tmp_path / "one.yaml", tmp_path / "two.yaml"], Counter()
+    paths = [tmp_path / "one.yaml", tmp_path / "two.yaml"]
+    became: Counter[str] = Counter()
     for number in range(_PAIRS):
         chance = random.Random(number)
         for path in paths:

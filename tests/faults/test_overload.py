@@ -37,7 +37,8 @@ def test_what_is_too_much_is_lost_in_order_and_told_and_then_all_is_as_before(st
     witness.wait_for_sets(_HZ)
     before = _received(relay)
     sent_before = [source.pace(_MORE_THAN_ANYONE_CAN)[0] for source in sources]
-    told, most_mb, quarter_mb = set(), 0.0, 0.0
+    told: set[str] = set()
+    most_mb, quarter_mb = 0.0, 0.0
     began = time.monotonic()
     while (passed_s := time.monotonic() - began) < _OVERLOAD_S:
         told |= findings(relay).keys()

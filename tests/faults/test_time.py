@@ -84,9 +84,11 @@ class _Simulated:
         self._player = stage.player({**_PAIR, "/imu": VECTOR, "/clock": CLOCK})
         self._player.match()
 
-    def tick(self, seconds: float) -> None:
+    def tick(self, seconds: float) -> bool:
+        """Whether it is over, as conditions ask: a tick is sent, and does not say."""
         now = BEGIN + round(seconds * NS_PER_SECOND)
         self._player.play([Frame("/clock", CLOCK, 0, serialize(CLOCK, time(now)))])
+        return False
 
     def send(self, *seconds: float) -> None:
         """A pair of each of these stamps."""

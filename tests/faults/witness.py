@@ -13,6 +13,7 @@ import json
 import select
 import sys
 import time
+from typing import Any
 
 import rclpy
 from geometry_msgs.msg import Vector3Stamped
@@ -67,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _drain(law: SetLaw, index: int, handle: object) -> None:
+def _drain(law: SetLaw, index: int, handle: Any) -> None:
     for _ in range(_BATCH):
         taken = handle.take_message(Vector3Stamped, True)  # noqa: FBT003  rclpy's signature
         if taken is None:

@@ -130,6 +130,7 @@ os._exit(0)
 def test_a_worker_that_outlives_the_command_does_not_hold_the_lock(out):
     environ = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
     with subprocess.Popen([sys.executable, "-c", _FORKS, str(out)], stdout=subprocess.PIPE, env=environ) as command:
+        assert command.stdout is not None
         worker = int(command.stdout.readline())
         try:
             assert command.wait(60) == 0

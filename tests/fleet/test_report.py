@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.errors import SyncRelayError, UsageError
 from syncrelay.fleet import report as fleet_module
+from syncrelay.fleet.cells import Cells
 from syncrelay.fleet.documents import documents_in
 from syncrelay.fleet.report import Failure, Fleet, fleet_report
 from syncrelay.fleet.robots import RobotPattern
@@ -110,6 +111,8 @@ def test_spans_and_latencies_of_recordings_become_those_of_the_fleet():
         ]
     )
     span, latency = report.whole.span, report.whole.latency
+    assert span is not None
+    assert latency is not None
     assert span.median == pytest.approx(30 * MS, rel=1 / 16)
     assert span.high == pytest.approx(500 * MS, rel=1 / 16)
     assert span.greatest == 500 * MS
@@ -128,6 +131,7 @@ def test_clocks_and_drops_are_told_of_robots_groups_and_topics():
     for figures in (whole, _figures(report.by_group, "front")):
         assert figures.dropped == (("too_far", 5), ("late", 1))
         assert figures.faults == (("stamp 0", 4), ("out of order", 1))
+        assert figures.drift is not None
         assert (figures.drift.ppm, figures.drift.topic, figures.drift.recording) == (-40.0, "/camera", "/r1/a")
         assert (figures.other_clock, figures.gaps, figures.longest_gap) == (1, 2, SECOND)
         assert (figures.received, figures.matched, figures.unneeded) == (22, 16, 2)
@@ -198,7 +202,10 @@ def _of_group(**told):
             "topics.0.drift_ppm: Input should be a fin",
         ),
         (_of_group(findings=[finding("x", about=2)]), "names an input that the group does not have"),
-        (_of_group(span=quantity(list(range(10))) | {"counts": dict.fromkeys(range(9000), 1)}), "at most 1100 items"),
+        (
+            _of_group(span={**(quantity(list(range(10))) or {}), "counts": dict.fromkeys(range(9000), 1)}),
+            "at most 1100 items",
+        ),
         ({**document(group(9, 10)), "begin": 10**40}, "begin: Input should be less than or equal to"),
     ],
 )
@@ -231,6 +238,7 @@ def test_a_real_analysis_is_a_document(tmp_path):
     sets = analysis.groups[0].evaluation.sets
     assert report.failed == 0
     assert report.whole.sets == len(sets)
+    assert report.whole.span is not None
     assert report.whole.span.greatest == max(each.span for each in sets)
     assert report.whole.match_rate == pytest.approx(analysis.groups[0].suggestion.now / 100, rel=0.02)
     assert {each.code for each in report.findings} == {
@@ -251,7 +259,7 @@ def test_the_documents_in_a_folder_are_those_of_its_results(tmp_path):
 
 
 def test_too_many_robots_are_not_told_apart_but_counted(monkeypatch):
-    monkeypatch.setattr(fleet_module.Cells.__init__, "__defaults__", (3,))
+    monkeypatch.setattr(Cells.__init__, "__defaults__", (3,))
     many = [(f"/data/r{number}/a.mcap", document(group(9, 10))) for number in range(4)]
     report = fleet_report(many)
     assert (report.by_robot.is_told, report.by_robot.rows, report.whole.recordings) == (False, (), 4)

@@ -137,7 +137,7 @@ def test_no_name_moves_a_cursor_begins_a_line_or_runs():
     def name():
         return hostile_name(chance)
 
-    hostile = []
+    hostile: list[tuple[str, dict | None]] = []
     for _ in range(5):
         topics = (name(), name())
         told = finding(name(), 9, about=0)

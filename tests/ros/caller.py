@@ -32,7 +32,7 @@ def main() -> None:
     keep_stdout()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     caller = _Caller(rclpy.create_node("caller"))
-    commands = {
+    commands: dict[str, Any] = {
         "call": caller.call,
         "begin": caller.begin,
         "end": caller.end,

@@ -1,7 +1,7 @@
 """Messages of the tests as CDR bytes, made and read without the relay's own code."""
 
 import struct
-from typing import Any
+from typing import Any, Literal
 
 from rosbags.typesys import Stores, get_typestore
 
@@ -46,14 +46,14 @@ def vector(stamp: int, *, frame_id: str = "base", little_endian: bool = True) ->
 
 def stamp_of(payload: bytes) -> int:
     """Nanoseconds of the leading Header's stamp."""
-    order = "little" if payload[1] else "big"
+    order: Literal["little", "big"] = "little" if payload[1] else "big"
     seconds = int.from_bytes(payload[4:8], order, signed=True)
     return seconds * NS_PER_SECOND + int.from_bytes(payload[8:12], order)
 
 
 def with_stamp(payload: bytes, stamp: int) -> bytes:
     """The payload with other bytes in the place of its leading Header's stamp."""
-    order = "little" if payload[1] else "big"
+    order: Literal["little", "big"] = "little" if payload[1] else "big"
     seconds, nanoseconds = divmod(stamp, NS_PER_SECOND)
     return payload[:4] + seconds.to_bytes(4, order, signed=True) + nanoseconds.to_bytes(4, order) + payload[12:]
 

@@ -1,7 +1,7 @@
 """Manifests as their readers see them: by the keys that docs/reference/manifest.md names, deserialized by rosbags."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from syncrelay.dataflow.manifest import Note
 from tests.ros.cdr_messages import NS_PER_SECOND, STORE
@@ -65,7 +65,7 @@ class Told(NamedTuple):
 
 
 def read(payload: bytes) -> Told:
-    message = STORE.deserialize_cdr(payload, MANIFEST_TYPE)
+    message: Any = STORE.deserialize_cdr(payload, MANIFEST_TYPE)
     stamp, (of_set, *inputs) = message.header.stamp, message.status
     values = {each.key: each.value for each in of_set.values}
     assert values.pop("version") == "1"

@@ -21,9 +21,12 @@ _ROS_IDENTITY = {"ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION"}
 
 
 def wait_until(
-    condition: Callable[[], bool], what: str, *, deadline_s: float = DEADLINE_S, poll_s: float = _POLL_S
+    condition: Callable[..., object], what: str, *, deadline_s: float = DEADLINE_S, poll_s: float = _POLL_S
 ) -> None:
-    """Return as soon as the condition holds; `what` says in an AssertionError what did not come."""
+    """Return as soon as the condition holds; `what` says in an AssertionError what did not come.
+
+    The condition is called with nothing. It may be a lambda that keeps what a loop has come to as a default.
+    """
     end = time.monotonic() + deadline_s
     while not condition():
         if time.monotonic() > end:
@@ -108,14 +111,14 @@ class Process:
     def running(self) -> bool:
         return self._child.poll() is None
 
-    def wait_until(self, condition: Callable[[], bool], what: str, *, deadline_s: float = DEADLINE_S) -> None:
+    def wait_until(self, condition: Callable[..., object], what: str, *, deadline_s: float = DEADLINE_S) -> None:
         """As the function of that name, but over at once when the process ends."""
         held = False
 
         def over() -> bool:
             nonlocal held
             ended = not self.running()
-            held = condition()
+            held = bool(condition())
             return held or ended
 
         try:

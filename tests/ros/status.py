@@ -41,7 +41,12 @@ def status(relay: Process) -> dict[str, Any]:
 def first_group(relay: Process) -> dict[str, Any]:
     """What is told of the file's first group, as soon as it was looked at once."""
     groups: list[dict[str, Any]] = []
-    wait_until(lambda: groups.extend(status(relay)["groups"]) or groups, "the first look")
+
+    def looked_at() -> bool:
+        groups.extend(status(relay)["groups"])
+        return bool(groups)
+
+    wait_until(looked_at, "the first look")
     return groups[0]
 
 

@@ -32,7 +32,7 @@ _NAMES = ("/a", "/b", "/c", "/d", "/e", "/f")
 _AT_ONCE = {"reliability": "reliable", "durability": "volatile"}
 
 
-class _Refusing(entities.Entities):
+class _Refusing(entities.Entities):  # type: ignore[name-defined]  # of a module that may be missing
     """Refuses, too, what a test says."""
 
     def __init__(self, node: Any) -> None:
@@ -180,13 +180,18 @@ def test_what_others_in_the_process_made_is_refused_in_the_words_of_dds(here):
 
 def test_a_topic_that_gives_no_messages_any_more_is_subscribed_anew_and_told(here):
     sources, source = [], here.backend.source
-    here.backend.source = lambda *of: sources.append(source(*of)) or sources[-1]
+
+    def noted(*of):
+        sources.append(source(*of))
+        return sources[-1]
+
+    here.backend.source = noted
     here.bindings.run(_groups(**_ONE))
     _poll(here)
     binding = here.bindings.all[0]
     failing = binding.inputs[0].topic
     publisher = here.node.create_publisher(import_type(_IMU), "/x", 10)
-    sources[0].deliver = lambda _: {}["no such"]
+    sources[0].deliver = lambda _: dict[str, object]()["no such"]
     wait_until(lambda: publisher.publish(import_type(_IMU)()) or failing.is_due, "the source to fail")
     # No refusal of rcl's: it is a bug, which whoever looks tells with its traceback.
     with pytest.raises(KeyError):
@@ -233,7 +238,8 @@ _STAYS = [("/s", _IMU, "/so"), ("/t", _FIELD, "/to")]
 def _entities(here: SimpleNamespace) -> tuple[dict[str, Any], dict[str, Any]]:
     """The publishers and subscriptions, by topic."""
     node = here.node
-    return tuple({each.topic_name: each for each in of} for of in (node.publishers, node.subscriptions))
+    publishers, subscriptions = ({each.topic_name: each for each in of} for of in (node.publishers, node.subscriptions))
+    return publishers, subscriptions
 
 
 def _names(told: tuple[tuple[str, ...], ...]) -> set[str]:

@@ -33,6 +33,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 
 from syncrelay.ros.backend_choice import choose_backend
 from syncrelay.ros.compiled import backend as compiled_backend
+from syncrelay.ros.compiled import path
 from syncrelay.ros.handlers import handler
 from syncrelay.ros.librcl.rcl import MessageInfo, Rcl
 from tests.ros.in_process import own_node
@@ -182,7 +183,7 @@ class _Thread(threading.Thread):
 
 def test_no_message_and_no_wake_is_missed_without_the_poll_of_every_second(here):
     came, chance = [], random.Random(3)
-    inbox = compiled_backend.path.Inbox(force_ns=_NEVER)
+    inbox = path.Inbox(force_ns=_NEVER)
     for topic in here.topics:
         inbox.add(here.backend.source(topic.subscription, lambda payload: came.append(payload.received)))
     # It never ends by itself: a wake that is missed is one that this test waits for in vain.
@@ -216,7 +217,8 @@ def test_messages_of_several_topics_are_delivered_by_their_time_of_receipt(here)
 
 
 def test_the_first_message_waits_for_those_that_come_with_it_where_the_file_says_so(here):
-    came, inbox = [], here.backend.inbox(coalesce_ns=50 * MS)
+    came: list[object] = []
+    inbox = here.backend.inbox(coalesce_ns=50 * MS)
     source = here.backend.source(here.topics[0].subscription, came.append)
     inbox.add(source)
     inbox.receive_once(0)
@@ -229,8 +231,9 @@ def test_the_first_message_waits_for_those_that_come_with_it_where_the_file_says
 
 
 def test_a_source_whose_messages_cannot_be_taken_in_is_named_and_the_others_go_on(here):
-    came, inbox = [], here.backend.inbox()
-    failing = here.backend.source(here.topics[0].subscription, lambda _: {}["no such"])
+    came: list[object] = []
+    inbox = here.backend.inbox()
+    failing = here.backend.source(here.topics[0].subscription, lambda _: dict[str, object]()["no such"])
     sound = here.backend.source(here.topics[1].subscription, came.append)
     for source in (failing, sound):
         inbox.add(source)
@@ -287,8 +290,9 @@ def test_a_clock_that_is_set_back_holds_up_no_topic(here):
         return code
 
     rcl = copy(real)
-    rcl.take = take_before
-    backend, came = compiled_backend.CompiledBackend(rcl), []
+    rcl.take = take_before  # type: ignore[assignment]  # a function of ours, not one of the library
+    backend = compiled_backend.CompiledBackend(rcl)
+    came: list[object] = []
     inbox = backend.inbox()
     source = backend.source(here.topics[0].subscription, came.append)
     inbox.add(source)
@@ -304,7 +308,8 @@ def test_a_clock_that_is_set_back_holds_up_no_topic(here):
 @pytest.mark.parametrize("name", ["compiled", "direct"])
 def test_a_source_may_be_removed_by_who_gets_its_messages(here, name):
     backend = choose_backend(name, node=here.node, context=here.context)
-    came, inbox = [], backend.inbox()
+    came: list[object] = []
+    inbox = backend.inbox()
 
     def deliver(payload) -> None:
         came.append(payload)
@@ -323,7 +328,8 @@ def test_a_source_may_be_removed_by_who_gets_its_messages(here, name):
 @pytest.mark.parametrize("name", ["compiled", "direct"])
 def test_an_inbox_that_is_closed_delivers_nothing_more(here, name):
     backend = choose_backend(name, node=here.node, context=here.context)
-    came, inbox = [], backend.inbox()
+    came: list[object] = []
+    inbox = backend.inbox()
     inbox.add(backend.source(here.topics[0].subscription, came.append))
     for _ in range(300):
         here.topics[0].publisher.publish(vector(BEGIN))
@@ -344,7 +350,8 @@ def test_a_source_is_drained_by_one_inbox_only(here):
 
 
 def test_a_source_that_is_fed_elsewhere_in_the_midst_of_a_delivery_that_fails_tells_what_failed(here):
-    topic, flow, told = here.topics[0], _group().flow, []
+    topic, flow = here.topics[0], _group().flow
+    told: list[Exception] = []
 
     class Failing:
         def add(self, _message, *, now):
@@ -383,7 +390,7 @@ def test_where_it_is_not_as_expected_librcl_is_used_from_python_and_the_log_says
 def test_where_it_was_built_of_a_source_that_lacked_something_librcl_is_used(here, monkeypatch, caplog):
     for module in ("backend", "check"):
         monkeypatch.delitem(sys.modules, f"syncrelay.ros.compiled.{module}")
-    monkeypatch.delattr(compiled_backend.path, "Outlet")
+    monkeypatch.delattr(path, "Outlet")
     assert choose_backend(None, node=here.node, context=here.context).name is BackendName.LIBRCL
     assert "the compiled path is not as expected here (module" in caplog.text
 

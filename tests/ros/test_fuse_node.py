@@ -4,6 +4,7 @@ import itertools
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,6 +44,6 @@ def test_a_node_of_ones_own_matches_what_it_receives(stage: Stage):
         stage.player({"/imu": _IMU, "/mag": _MAG}), collector, (_pair(n) for n in itertools.count()), ["/heading"]
     )
     payload = collector.payloads("/heading")[0]
-    told = STORE.deserialize_cdr(payload, VECTOR)
+    told: Any = STORE.deserialize_cdr(payload, VECTOR)
     assert (stamp_of(payload) - BEGIN) % (100 * MS) == 0
     assert (told.vector.x, told.vector.y) == (math.pi / 2, 0.25)

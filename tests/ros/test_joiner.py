@@ -75,7 +75,8 @@ def _joiner(taken: list[tuple]):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_all_sets_are_joined_in_order_whatever_order_the_topics_come_in(seed: int):
-    chance, taken = random.Random(seed), []
+    chance = random.Random(seed)
+    taken: list[tuple] = []
     run = _Run(chance, BEGIN)
     _feed(_joiner(taken), run, chance, losing=0)
     assert taken == list(enumerate(run.sets, 1))
@@ -83,7 +84,8 @@ def test_all_sets_are_joined_in_order_whatever_order_the_topics_come_in(seed: in
 
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_lost_costs_sets_and_makes_none_wrong(seed: int):
-    chance, taken = random.Random(seed), []
+    chance = random.Random(seed)
+    taken: list[tuple] = []
     joiner = _joiner(taken)
     # Each run begins where the relay was started again; what was on its way then is lost.
     runs = [_Run(chance, BEGIN + n * 1000 * MS) for n in range(3)]

@@ -295,7 +295,12 @@ def test_what_is_pending_is_taken_without_asking_once_more(here, topic, monkeypa
     # Once a second it asks in any case: in a moment that does not pass, never.
     moment = time.time_ns()
     monkeypatch.setattr(time, "time_ns", lambda: moment)
-    monkeypatch.setattr(here.rcl, "take", lambda *words: asked.append(words) or take(*words))
+
+    def noted(*words):
+        asked.append(words)
+        return take(*words)
+
+    monkeypatch.setattr(here.rcl, "take", noted)
     source, watch = _source(here, topic, print), here.backend.watch()
     watch.add(source)
     while watch.wait(0)[0]:

@@ -5,6 +5,7 @@ import sys
 from itertools import count, islice
 from pathlib import Path
 from time import time_ns
+from typing import Any
 
 import pytest
 
@@ -62,7 +63,7 @@ def _joiner(stage: Stage) -> Process:
     return stage.start("joiner", [sys.executable, str(_JOINER), _MANIFEST, *words])
 
 
-def _joined(joiner: Process) -> list[dict[str, int | None]]:
+def _joined(joiner: Process) -> list[dict[str, Any]]:
     return [json.loads(line) for line in joiner.stdout.splitlines()]
 
 
@@ -156,8 +157,8 @@ def test_what_is_told_of_each_set_is_what_left_and_goes_on_after_reloads(stage: 
     assert [each.number for each in told] == list(range(told[0].number, told[0].number + len(told)))
     for each, number in zip(told[-len(chosen) :], chosen, strict=True):
         assert _without_measures(each) == _expected(number, each.number)
-        there = [its for its in each.inputs if its.received is not None]
-        assert all(before <= its.received <= time_ns() and its.sequence > 0 for its in there)
+        there = [(its.received, its.sequence or 0) for its in each.inputs if its.received is not None]
+        assert all(before <= received <= time_ns() and sequence > 0 for received, sequence in there)
         assert 0 <= each.latency <= time_ns() - before
     (publisher,) = collector.endpoints(_MANIFEST, kind="publisher")
     assert (publisher["reliability"], publisher["durability"]) == ("reliable", "volatile")

@@ -3,6 +3,7 @@
 import signal
 import socket
 import struct
+from typing import Any
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
@@ -29,7 +30,7 @@ _RIG = merged(stream("/camera", hz=10), stream("/lidar", hz=10, shift_ms=7))
 def statuses(collector: Collector) -> dict[str, tuple[int, str, dict[str, str]]]:
     """The newest status of each name: its level, message and values."""
     newest = collector.payloads("/diagnostics")[-1:]
-    arrays = [_STORE.deserialize_cdr(payload, DIAGNOSTICS) for payload in newest]
+    arrays: list[Any] = [_STORE.deserialize_cdr(payload, DIAGNOSTICS) for payload in newest]
     return {
         each.name: (each.level, each.message, {pair.key: pair.value for pair in each.values})
         for array in arrays
@@ -90,7 +91,7 @@ def test_what_the_foxglove_layout_and_the_grafana_dashboard_draw_is_there_on_a_r
     wait_until(lambda: last_span() == pytest.approx(7.0), "the span of all sets")
     assert all(collector.wait_for(topic, 2) for topic in topics)
     (told,) = collector.wait_for("/diagnostics", 1)[-1:]
-    array = _STORE.deserialize_cdr(told, DIAGNOSTICS)
+    array: Any = _STORE.deserialize_cdr(told, DIAGNOSTICS)
     assert {detailed()} == {(each.hardware_id, each.name) for each in array.status}
     families = [family.name for family in text_string_to_metric_families(get(relay, "/metrics"))]
     there = {name + ending for name in families for ending in ("", "_total", "_bucket")}

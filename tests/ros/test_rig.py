@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from syncrelay.cdr import read_stamp
 from syncrelay.environment.quick_discovery import quick_discovery
 from syncrelay.environment.transport import PROFILES
 from syncrelay.rig.schedule import SENSORS, schedule
+from tests.ros.cdr_messages import stamp_of
 from tests.ros.processes import children_of, wait_until
 from tests.ros.shared_memory import left_of, segments_of
 
@@ -89,7 +89,7 @@ def received(stage, name, type_name, count):
     start = time.time_ns()
     sensor(stage, name, start)
     payloads = collector.wait_for(topic, count)
-    stamps = [read_stamp(payload) for payload in payloads]
+    stamps = [stamp_of(payload) for payload in payloads]
     assert set(stamps) <= {shot.stamp for shot in shots(name, 20_000, seed=3, start=start)}
     assert stamps == sorted(stamps)
     return [_TYPES.deserialize_cdr(payload, type_name) for payload in payloads[:count]]

@@ -21,7 +21,8 @@ _MOST = 10
 def test_what_fails_and_what_never_ends_is_answered_and_more_calls_than_can_wait_are_refused(stage: Stage, monkeypatch):
     for name, value in stage.environment.items():
         monkeypatch.setenv(name, value)
-    asked, all_wait = [], Event()
+    asked: list[Future[str]] = []
+    all_wait = Event()
 
     def never() -> Future[str]:
         asked.append(Future())

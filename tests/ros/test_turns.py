@@ -100,9 +100,12 @@ def test_a_report_stands_until_the_next_one_is_there(relay_of, monkeypatch):
     relay = relay_of(3)
     _evaluated_next(relay)
     evaluate, there = relay.monitor._evaluate_group, []  # noqa: SLF001  no other moment is within an evaluation
-    monkeypatch.setattr(
-        relay.monitor, "_evaluate_group", lambda *of: there.append(len(_evaluated_at(relay))) or evaluate(*of)
-    )
+
+    def noted(*of):
+        there.append(len(_evaluated_at(relay)))
+        return evaluate(*of)
+
+    monkeypatch.setattr(relay.monitor, "_evaluate_group", noted)
     _evaluated_next(relay)
     assert there == [3] * 3
 
@@ -111,6 +114,6 @@ def test_a_group_that_cannot_be_evaluated_is_named_and_its_last_report_is_gone(r
     relay = relay_of(2)
     _evaluated_next(relay)
     assert relay.state().unjudged == ()
-    monkeypatch.setattr(relay.monitor, "_evaluate_group", lambda *_: {}["no such"])
+    monkeypatch.setattr(relay.monitor, "_evaluate_group", lambda *_: dict[str, object]()["no such"])
     relay.evaluate()
     assert (relay.state().unjudged, _evaluated_at(relay)) == (("g0", "g1"), {})

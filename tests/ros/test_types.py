@@ -21,6 +21,7 @@ import_type = types.import_type
 def test_every_field_of_every_installed_type_reads_as_rclpy_deserializes_it():
     chance = random.Random(7)
     interfaces = Interfaces.find({})
+    assert interfaces is not None
     names = [name for package in interfaces.packages for name in interfaces.types(package) if "/msg/" in name]
     compared = 0
     for name in names:

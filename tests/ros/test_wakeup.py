@@ -34,9 +34,14 @@ def test_signals_that_come_in_the_midst_of_a_rest_never_hang_it():
         try:
             assert resting.stdout is not None
             assert resting.stdout.readline() == b"ready\n"
+
             # From another process, which no lock of the interpreter lets send at certain moments only.
+            def ended() -> bool:
+                os.kill(resting.pid, signal.SIGHUP)
+                return resting.poll() is not None
+
             wait_until(
-                lambda: os.kill(resting.pid, signal.SIGHUP) or resting.poll() is not None,
+                ended,
                 f"{_SIGNALS} handled signals",
                 poll_s=1e-4,
                 # Each needs a turn of both processes.

@@ -1,11 +1,11 @@
 """Rigs whose messages come too slowly, too late, at once, or not at all; and rigs in which all is well."""
 
 from tests.scenarios.play import Scenario
-from tests.scenarios.streams import Stream
+from tests.scenarios.streams import OnItsGrid, Stream
 
 # A driver's samples are a little off their place, and a lidar's are not those of the camera.
-CAMERA = {"wobble_ms": 1}
-LIDAR = {"phase_ms": 7, "wobble_ms": 1}
+CAMERA: OnItsGrid = {"wobble_ms": 1}
+LIDAR: OnItsGrid = {"phase_ms": 7, "wobble_ms": 1}
 
 RECOVERED = r"recovered after [\d.]+ s"
 

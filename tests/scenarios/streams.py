@@ -3,11 +3,19 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from typing import TypedDict
 
 from tests.ros.cdr_messages import VECTOR
 
 POINT = "geometry_msgs/msg/PointStamped"
 """Another type with the same fields as VECTOR: its messages are the same bytes."""
+
+
+class OnItsGrid(TypedDict, total=False):
+    """Where the samples of a `Stream` are, as its keywords."""
+
+    phase_ms: float
+    wobble_ms: float
 
 
 @dataclass(frozen=True, slots=True)

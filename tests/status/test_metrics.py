@@ -95,7 +95,7 @@ def test_a_finding_that_is_made_twice_is_one_series():
 
 
 def test_the_state_is_asked_for_at_each_scrape_and_not_before():
-    asked = []
+    asked: list[None] = []
 
     def state():
         asked.append(None)

@@ -25,7 +25,8 @@ REFUSED = replace(
         working().facts,
         inputs=tuple(
             replace(
-                each, graph=replace(each.graph, refusal=Refusal("publish", each.output, each.type, why="no memory"))
+                each,
+                graph=replace(each.graph, refusal=Refusal("publish", each.output, str(each.type), why="no memory")),
             )
             for each in working().facts.inputs
         ),

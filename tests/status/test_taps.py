@@ -247,4 +247,5 @@ def test_what_is_noted_while_it_is_read_is_neither_lost_nor_told_twice(taps):
     lines += reader.read()
     stamps = [line["stamps"]["/robot/camera"] for line in lines]
     assert all(one < other for one, other in pairwise(stamps))
+    assert reader.lost is not None
     assert len(stamps) + reader.lost == count

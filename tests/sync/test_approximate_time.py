@@ -223,7 +223,7 @@ def test_a_queue_of_the_needed_length_matches():
     for column in range(1, 21):
         policy.add(Message(0, column * TICK_NS, None))
     outcomes = policy.add(Message(1, 8 * TICK_NS, None))
-    assert [message.stamp for match in outcomes if isinstance(match, Match) for message in match.messages] == [
+    assert [stamp for match in outcomes if isinstance(match, Match) for stamp in match.stamps] == [
         8 * TICK_NS,
         8 * TICK_NS,
     ]

@@ -16,7 +16,7 @@ POLICIES = [ApproximateTime, ApproximateTimeEager]
 
 def calls_of_each(policy, events):
     """How many functions, Python's or C's, each event calls."""
-    counts = []
+    counts: list[int] = []
 
     def count(_, kind, __):
         counts[-1] += kind in ("call", "c_call")
@@ -58,7 +58,7 @@ class Payload:
 def test_no_more_messages_are_kept_than_the_queues_hold(policy):
     queue_size, n_inputs = 5, 3
     group = SyncGroup(policy(n_inputs=n_inputs, queue_size=queue_size, slop_ns=50 * MS), required=(True,) * n_inputs)
-    alive = weakref.WeakSet()
+    alive: weakref.WeakSet[Payload] = weakref.WeakSet()
     most = 0
     gc.disable()
     try:

@@ -1,6 +1,7 @@
 """The timelines that the policies' docstrings show are true."""
 
 import textwrap
+from typing import TypedDict
 
 import pytest
 
@@ -17,7 +18,13 @@ from syncrelay.sync import (
 from tests.sync.support.grouped import grouped
 from tests.sync.support.timeline import TICK_NS, play_group, play_policy
 
-SIZES = {"n_inputs": 2, "queue_size": 10}
+
+class Sizes(TypedDict):
+    n_inputs: int
+    queue_size: int
+
+
+SIZES: Sizes = {"n_inputs": 2, "queue_size": 10}
 POLICIES = [
     ExactTime(**SIZES),
     ApproximateTime(**SIZES, slop_ns=5 * TICK_NS),

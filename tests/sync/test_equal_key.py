@@ -2,7 +2,7 @@ from functools import partial
 
 import pytest
 
-from syncrelay.sync import Drop, DropReason, EqualKey, Message
+from syncrelay.sync import Drop, DropReason, EqualKey, Match, Message
 from tests.sync.support.drawn import policy_cases
 
 equal_key = partial(EqualKey, n_inputs=2, queue_size=3)
@@ -93,6 +93,7 @@ def test_stamps_may_be_unset():
     assert policy.add(second) == []
     *drops, match = policy.add(other)
     assert drops == [Drop(first, DropReason.SUPERSEDED)]
+    assert isinstance(match, Match)
     assert match.messages == (second, other)
 
 

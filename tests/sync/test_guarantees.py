@@ -50,9 +50,9 @@ class Tally:
     """Counts from outside, by each message's own fate."""
 
     def __init__(self, n_inputs):
-        self.fed = Counter()
-        self.matched = [set() for _ in range(n_inputs)]
-        self.dropped = [Counter() for _ in range(n_inputs)]
+        self.fed: Counter[int] = Counter()
+        self.matched: list[set] = [set() for _ in range(n_inputs)]
+        self.dropped: list[Counter[DropReason]] = [Counter() for _ in range(n_inputs)]
 
     def note(self, step, outcomes):
         if step.message is not None:

@@ -423,7 +423,9 @@ def test_sets_are_those_of_the_rule(drawn):
 def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(drawn):
     rig, taken = drawn
     group = rig.group()
-    fed, matched, dropped = Counter(), set(), Counter()
+    fed: Counter[int] = Counter()
+    matched: set[Message] = set()
+    dropped: Counter[tuple[int, DropReason]] = Counter()
     for step in taken:
         if step.message is not None:
             fed[step.message.input] += 1

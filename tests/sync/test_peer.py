@@ -26,7 +26,7 @@ def driver(tmp_path):
         pytest.skip("no g++ to build the driver of message_filters with")
     binary = tmp_path / "driver"
     libraries = ("-lmessage_filters", "-lrosconsole", "-lrostime", "-lboost_thread")
-    subprocess.run([compiler, "-std=c++17", "-w", DRIVER, "-o", binary, *libraries], check=True)
+    subprocess.run([compiler or "g++", "-std=c++17", "-w", DRIVER, "-o", binary, *libraries], check=True)
     return binary
 
 
@@ -87,7 +87,9 @@ def our_lines(add, events):
     for event, (index, stamp) in enumerate(events):
         for outcome in add(Message(index, stamp, event)):
             if isinstance(outcome, Match):
-                yield f"set {event} " + " ".join(str(message.payload) for message in outcome.messages)
+                yield f"set {event} " + " ".join(
+                    str(message.payload) for message in outcome.messages if message is not None
+                )
             else:
                 yield f"drop {event} {outcome.message.payload}"
 

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rosbags.highlevel import AnyReader
@@ -22,7 +23,8 @@ def bag(name, *topics):
     with AnyReader([next(Path(FOLDER, name).glob("*.bag"))]) as reader:
         connections = [connection for connection in reader.connections if connection.topic in topics]
         for connection, _, data in reader.messages(connections):
-            time = reader.deserialize(data, connection.msgtype).header.stamp
+            message: Any = reader.deserialize(data, connection.msgtype)
+            time = message.header.stamp
             yield topics.index(connection.topic), time.sec * 10**9 + time.nanosec
 
 

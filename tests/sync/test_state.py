@@ -3,6 +3,7 @@
 import pickle
 from collections import deque
 from types import MethodType
+from typing import get_args
 
 import pytest
 from hypothesis import given, settings
@@ -66,6 +67,7 @@ def follow(whole, late, taken):
             equal_from, before = place, (counted(whole), counted(late))
         left = list(take(whole, step)), list(take(late, step))
         if equal_from is not None:
+            assert before is not None
             assert left[0] == left[1]
             assert whole.next_deadline() == late.next_deadline()
             assert state(whole) == state(late)
@@ -76,7 +78,7 @@ def follow(whole, late, taken):
 
 
 def test_every_policy_of_a_file_is_among_those_tested():
-    names = {model.model_fields["policy"].annotation.__args__[0] for model in GROUP_MODELS}
+    names = {get_args(model.model_fields["policy"].annotation)[0] for model in GROUP_MODELS}
     assert names == set(POLICIES)
 
 

@@ -61,7 +61,7 @@ def play(case):
     for event, (index, stamp, *_) in enumerate(case["events"]):
         for outcome in group.add(Message(index, stamp + SHIFT_NS, event), now=0):
             if isinstance(outcome, Match):
-                members = outcome.messages
+                members = [message for message in outcome.messages if message is not None]
                 sets.append([event, [message.stamp - SHIFT_NS for message in members]])
                 assert [case["events"][message.payload][1] for message in members] == sets[-1][1]
             elif outcome.reason in (DropReason.SUPERSEDED, DropReason.OVERFLOW):

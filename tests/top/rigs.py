@@ -83,7 +83,7 @@ def _report(config: GroupConfig, sensors: Mapping[str, Sensor], seconds: int, rn
                 *engine.add(Message(index, stamp, received, stamp), now=received),
             ]:
                 if isinstance(outcome, Match):
-                    stamps = tuple(m and m.stamp for m in outcome.messages)
+                    stamps = outcome.stamps
                     newest = max(m.payload for m in outcome.messages if m)
                     sets.append((stamps, received - newest + rng.randrange(100_000, 400_000)))
                     recent.append(stamps)

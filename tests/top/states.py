@@ -1,6 +1,7 @@
 """The states that the screens are tested with."""
 
 import json
+from collections.abc import Mapping
 from functools import cache
 
 from syncrelay.explain import Mismatch
@@ -10,7 +11,7 @@ from tests.top.rigs import Sensor, simulated
 IMAGE, CLOUD, IMU = "sensor_msgs/msg/Image", "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/Imu"
 
 
-def group(topics: dict[str, str | None], **keys) -> dict:
+def group(topics: Mapping[str, str | None], **keys) -> dict:
     """A group of topics by name with their types; None for one that the graph has to tell."""
     listed = [{"topic": topic, **({"type": type_name} if type_name else {})} for topic, type_name in topics.items()]
     return {"policy": "approximate_time", "slop": "20ms", "queue_size": 10, **keys, "topics": listed}

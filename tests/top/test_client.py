@@ -59,8 +59,8 @@ def test_an_input_tells_its_offset_and_a_strange_key_is_left_aside():
     group["topics"][0]["offset"] = "-12ms"
     with serving(states.simulated(states.file(front=group), {})) as server:
         server.body = server.body.replace(b'"relay": {', b'"key_of_tomorrow": 1, "relay": {', 1)
-        (group,) = ask(server.url).state.groups
-    assert [each.offset_ms for each in group.inputs] == [-12, 0]
+        (shown,) = ask(server.url).state.groups
+    assert [each.offset_ms for each in shown.inputs] == [-12, 0]
 
 
 def test_nobody_there_is_said(closed_port):

@@ -3,7 +3,7 @@
 from bisect import insort
 from fractions import Fraction
 
-from syncrelay.sync import Drop, DropReason, Match
+from syncrelay.sync import Drop, DropReason, Match, Message, Outcome
 
 
 class ReferenceApproximateTime:
@@ -13,7 +13,7 @@ class ReferenceApproximateTime:
         self.slop = slop_ns
         self.factor = Fraction(1.0 + age_penalty)
         self.bounds = min_periods_ns or [0] * n_inputs
-        self.queues = [[] for _ in self.inputs]
+        self.queues: list[list[Message]] = [[] for _ in self.inputs]
         self.overflowed = [False] * n_inputs
         self.rewind()
 
@@ -29,7 +29,7 @@ class ReferenceApproximateTime:
         return queue[self.cursors[index]].stamp if self.cursors[index] < len(queue) else None
 
     def add(self, message):
-        self.left = []
+        self.left: list[Outcome] = []
         queue = self.queues[message.input]
         for position, queued in enumerate(queue):
             if queued.stamp == message.stamp:

@@ -2,7 +2,7 @@
 
 from itertools import product
 
-from syncrelay.sync import Drop, DropReason, Match
+from syncrelay.sync import Drop, DropReason, Match, Message, Outcome
 
 
 def by_stamp(message):
@@ -15,8 +15,8 @@ class Queued:
     def __init__(self, n_inputs, queue_size):
         self.n_inputs = n_inputs
         self.queue_size = queue_size
-        self.queued = []
-        self.left = []
+        self.queued: list[Message] = []
+        self.left: list[Outcome] = []
 
     def of(self, index):
         return [message for message in self.queued if message.input == index]
@@ -50,6 +50,9 @@ class Queued:
 
     def heads(self):
         return [self.of(index)[0] for index in range(self.n_inputs) if self.of(index)]
+
+    def take(self, message):
+        raise NotImplementedError
 
     def add(self, message):
         self.left = []
@@ -191,10 +194,10 @@ class ReferenceEqualKey:
     def __init__(self, n_inputs, queue_size):
         self.n_inputs = n_inputs
         self.queue_size = queue_size
-        self.queues = [[] for _ in range(n_inputs)]
+        self.queues: list[list[Message]] = [[] for _ in range(n_inputs)]
 
     def add(self, message):
-        left = []
+        left: list[Outcome] = []
         queue = self.queues[message.input]
         for queued in [queued for queued in queue if queued.key == message.key]:
             queue.remove(queued)

@@ -13,7 +13,7 @@ def rising_stamps(rng, count):
     grid = rng.choice((1, 1, MS, 10 * MS))
     loss = rng.choice((0.0, 0.0, 0.1, 0.5))
     at = START_NS + rng.randrange(period)
-    stamps = []
+    stamps: list[int] = []
     while len(stamps) < count:
         shape = rng.random()
         at += period // 10 if shape < 0.03 else period * rng.randint(5, 40) if shape > 0.98 else period
