@@ -9,6 +9,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 LARGE = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(HERE.parent / "configs/large_messages.xml")}
@@ -111,7 +112,7 @@ class Workshop:
         return Candidate(word, load, command, environ, checkout, hear, tap)
 
     def _entry(self, load, switches, coalesce, port):
-        keys = {"metrics": {"listen": f"127.0.0.1:{port}"}}
+        keys: dict[str, Any] = {"metrics": {"listen": f"127.0.0.1:{port}"}}
         if "scalars" in switches:
             keys["diagnostics"] = {"scalars": True}
         if "untold" in switches:

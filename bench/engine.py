@@ -68,7 +68,8 @@ def gappy(n_inputs, count, seed=1):
 
 def in_order(arrivals):
     """Messages by arrival, without those that came out of order on their input."""
-    messages, newest = [], {}
+    messages = []
+    newest: dict[int, int] = {}
     for _, index, stamp in sorted(arrivals):
         if stamp > newest.get(index, 0):
             newest[index] = stamp
@@ -240,7 +241,7 @@ def memory(events):
     pattern = jittered(n_inputs, 10_000)
     span = pattern[-1].stamp - pattern[0].stamp + 100 * MS
     alive, fed = 0, 0
-    at_first = None
+    at_first = 0
     while fed < events:
         shift = fed // len(pattern) * span
         for message in pattern:

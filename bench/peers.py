@@ -47,20 +47,21 @@ def main():
     export += ["--group", asked.group, *(f"--fields={word}" for word in asked.topics if ":" in word)]
     pythons = {tool: asked.venvs / tool / "bin" / "python" for tool in JOBS if tool not in asked.without}
     tools = ["syncrelay", *(tool for tool, python in pythons.items() if python.exists())]
-    spent, found = {tool: [] for tool in tools}, {}
+    spent: dict[str, list[tuple[float, float]]] = {tool: [] for tool in tools}
+    found = {}
     for _ in range(asked.rounds):
         for tool in tools:
             with tempfile.TemporaryDirectory() as out:
                 job = [Path(__file__).with_name("peer_jobs.py"), tool, json.dumps({**given, "out": out})]
                 spent[tool].append(run([*export, "-o", out] if tool == "syncrelay" else [pythons[tool], *job]))
                 found[tool] = pairs(Path(out), [topic for topic, _ in topics])
-    stamps = [stamps_of(asked.recording, topic) for topic, _ in topics]
+    first, second = (stamps_of(asked.recording, topic) for topic, _ in topics)
     for tool, runs in spent.items():
         ratio = statistics.median(cpu / base for (cpu, _), (base, _) in zip(runs, spent["syncrelay"], strict=True))
         cpu, memory = (statistics.median(column) for column in zip(*runs, strict=True))
         print(
             f"{tool}: {cpu:.2f} s of CPU, ratio {ratio:.2f}, {memory:.0f} MB,",
-            judge(found[tool], *stamps, asked.offset),
+            judge(found[tool], first, second, asked.offset),
         )
 
 
@@ -93,10 +94,14 @@ def ns(sec, nanosec, **_):
     return int(sec) * 10**9 + int(nanosec)
 
 
+def stamp_in(message):
+    return message.header.stamp
+
+
 def stamps_of(recording, topic):
     with AnyReader([Path(recording)]) as reader:
         read = reader.messages(reader.topics[topic].connections)
-        stamps = (reader.deserialize(content, of.msgtype).header.stamp for of, _, content in read)
+        stamps = (stamp_in(reader.deserialize(content, of.msgtype)) for of, _, content in read)
         return sorted(ns(stamp.sec, stamp.nanosec) for stamp in stamps)
 
 

@@ -83,7 +83,7 @@ def receive(node, asked):
             wait_set.wait(int(POLL_S * 1e9))
             for index, subscription in enumerate(subscriptions):
                 while wait_set.is_ready("subscription", index) and (taken := take(subscription.handle, kind)):
-                    stamp, last = read_stamp(taken[0]), time.monotonic()
+                    stamp, last = read_stamp(taken[0]) or 0, time.monotonic()
                     came += stamp >= since
                     # The last topic of a set completes it: the others wait for it, whatever the relay.
                     if stamp >= since and (index + 1) % asked.together == 0:

@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from candidates import HERE, clean_environment
 from intervals import median_interval, stolen_share, undisturbed
@@ -55,21 +55,23 @@ class Child:
         self.process = subprocess.Popen(
             argv, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, env=environ, cwd=cwd, text=True
         )
+        self._told: Any = self.process.stdin
+        self._said: Any = self.process.stdout
 
     def read(self, patience_s):
-        ready, _, _ = select.select([self.process.stdout], [], [], patience_s)
-        line = self.process.stdout.readline() if ready else ""
+        ready, _, _ = select.select([self._said], [], [], patience_s)
+        line = self._said.readline() if ready else ""
         if not line:
-            raise RuntimeError(f"{self.process.args} said nothing")
+            raise RuntimeError(f"{self.process.args!r} said nothing")
         return line.rstrip("\n")
 
     def tell(self, line):
-        self.process.stdin.write(f"{line}\n")
-        self.process.stdin.flush()
+        self._told.write(f"{line}\n")
+        self._told.flush()
 
     def end(self):
         """End it by the end of its stdin; if that does not help, by signals."""
-        self.process.stdin.close()
+        self._told.close()
         for insist in (self.process.terminate, self.process.kill):
             try:
                 self.process.wait(2)
@@ -95,9 +97,12 @@ class Station:
         self._receiver = start(told, rig_environ)
         # Once the relay is there.
         self._start_tap = lambda: start(candidate.tap, relay_environ, candidate.folder) if candidate.tap else None
-        self._instructions = None
-        self._before = None
-        self._idle_share, self._loaded_ns, self._loaded_ran, self._slices = Counter(), 0, Counter(), []
+        # From when it is ready.
+        self._instructions: Any = None
+        self._before: Any = None
+        self._idle_share: Any = Counter()
+        self._loaded_ran: Counter = Counter()
+        self._loaded_ns, self._slices = 0, []
 
     def wait_ready(self):
         for child in (self._publisher, self._receiver):
@@ -194,7 +199,7 @@ def in_turns(candidates, *, most=200, width=0.05):
 
     Returns the rounds that nothing disturbed, and how many there were; Ctrl-C ends it early.
     """
-    rounds = []
+    rounds: list = []
     with contextlib.suppress(KeyboardInterrupt), processes() as start:
         domains = free_domains()
         started = [Station(candidate, next(domains), start) for candidate in candidates]

@@ -38,7 +38,7 @@ class Stamp:
 
 class SlopSynchronizer:
     def __init__(self, n_inputs, queue_size, slop, stamp_type):
-        self.queues = [{} for _ in range(n_inputs)]
+        self.queues: list[dict] = [{} for _ in range(n_inputs)]
         self.queue_size = queue_size
         self.slop = stamp_type(slop)
         self.stamp_type = stamp_type

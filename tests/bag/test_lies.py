@@ -177,7 +177,7 @@ def test_a_ros1_bag_that_ends_between_two_records_is_said(tmp_path):
     path = write_ros1(tmp_path / "rig.bag", _RIG, chunk=300)
     content = path.read_bytes()
     with closing(open_recording([str(path)])) as recording:
-        (file,) = recording._files  # type: ignore[attr-defined]  # noqa: SLF001  where its chunks are
+        (file,) = recording._files  # type: ignore[attr-defined]  # noqa: SLF001  of this kind alone: where its chunks are
         second = sorted(each.offset for each in file._segments)[1]  # noqa: SLF001
     path.write_bytes(content[:second])
     frames, faults = _read(path)

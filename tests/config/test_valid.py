@@ -55,9 +55,9 @@ def test_every_key_arrives_where_it_is_used(environ):
         reliability="best_effort",
         durability="volatile",
         deadline="1.5s",  # type: ignore[arg-type]  # as a file has it
-        lifespan="2s",  # type: ignore[arg-type]
+        lifespan="2s",  # type: ignore[arg-type]  # and this
         liveliness="automatic",
-        liveliness_lease_duration="500ms",  # type: ignore[arg-type]
+        liveliness_lease_duration="500ms",  # type: ignore[arg-type]  # and this
         avoid_ros_namespace_conventions=False,
     )
     assert isinstance(dock.stamp, StampField)

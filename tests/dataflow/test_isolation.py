@@ -124,7 +124,7 @@ def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in
     group.flow.receive(0, Named(b"before"), BEGIN)
     group.suspend()
     group.flow.receive(1, Named(b"meanwhile"), BEGIN)
-    group.connect(1, outlets[1], restamped=False)  # type: ignore[arg-type]
+    group.connect(1, outlets[1], restamped=False)  # type: ignore[arg-type]  # as above
     group.resume()
     assert [outlet.sent for outlet in outlets] == [[], []]
     assert [(each.fed, each.dropped) for each in group.counts()] == [(1, {DropReason.SHUTDOWN: 1})] * 2

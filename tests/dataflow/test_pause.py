@@ -94,7 +94,7 @@ def test_a_group_that_is_suspended_while_paused_stays_paused():
     group.suspend()
     for index in range(2):
         _give(group, index, 0)
-        group.connect(index, outlets[index], restamped=False)  # type: ignore[arg-type]
+        group.connect(index, outlets[index], restamped=False)  # type: ignore[arg-type]  # as above
     group.resume()
     assert _sent(outlets) == [[], []]
     assert [dict(each.dropped) for each in group.counts()] == [{DropReason.PAUSED: 1}] * 2
