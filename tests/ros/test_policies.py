@@ -19,11 +19,10 @@ _PAIR_OUT = dict.fromkeys(outputs("front", _PAIR), VECTOR)
 
 
 def _one_set_out(stage: Stage, group: dict, sets) -> list[bytes]:
-    """Play sets until one has come out; the first of it, output by output."""
+    """Play sets until they come out; the last one, output by output."""
     collector = stage.collector(_PAIR_OUT)
     stage.relay(config({"front": group}))
-    relaying.play_until_out(stage.player(_PAIR), collector, sets, _PAIR_OUT)
-    return [collector.payloads(output)[0] for output in _PAIR_OUT]
+    return relaying.one_set(stage.player(_PAIR), collector, sets, list(_PAIR_OUT))[1]
 
 
 def test_a_set_leaves_without_an_optional_input_when_it_has_waited_enough(stage: Stage):
