@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 
 from syncrelay.cdr import patch_stamp
+from syncrelay.fastdds_files import held_by, remove_unused
 from syncrelay.rig.processes import LEAVE_WITHIN_S, UP
 from syncrelay.rig.schedule import SENSORS, Shot, schedule
 from syncrelay.ros.environment import log_arguments
@@ -72,8 +73,11 @@ def _publish(name: str, shots: Iterator[Shot], stop: Wakeup) -> None:
         if stop.wait(max(0, shot.sent - time.time_ns()) / 1e9):
             break
         publisher.publish(patch_stamp(frames[shot.number % len(frames)], shot.stamp))
+    held = held_by(os.getpid())
     node.destroy_node()
     rclpy.shutdown()
+    # Of processes that leave a port at the same moment, Fast DDS may let the last one leave the file.
+    remove_unused(held)
 
 
 if __name__ == "__main__":

@@ -192,6 +192,44 @@ def test_an_orderly_end_takes_the_sensors_along(stage, holder):
     assert left_of(stage.domain, held) == set()
 
 
+# What seldom happens by itself: two that leave a port at once, and each thinks that the other removes it.
+_PORTS_ARE_LEFT = """
+import os
+from pathlib import Path
+from rclpy.node import Node
+from syncrelay.fastdds_files import held_by
+from tests.ros.domain import ports_of
+destroy_node = Node.destroy_node
+def destroy_and_leave_the_ports(node):
+    names = {f"fastrtps_port{port}" for port in ports_of(int(os.environ["ROS_DOMAIN_ID"]))}
+    kept = {}
+    for name in names & held_by(os.getpid()):
+        kept[name] = Path(f"/dev/shm/kept_{os.getpid()}_{name}")
+        kept[name].hardlink_to(f"/dev/shm/{name}")
+    assert kept
+    destroy_node(node)
+    for name, link in kept.items():
+        link.replace(f"/dev/shm/{name}")
+        link.unlink(missing_ok=True)
+Node.destroy_node = destroy_and_leave_the_ports
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("number", [None, signal.SIGKILL])
+def test_the_last_sensor_to_end_removes_the_ports_that_dds_left(stage, number):
+    stage.before_each_sensor(_PORTS_ARE_LEFT)
+    holder = hold(stage)
+    sensors = children_of(holder.pid)
+    if number is None:
+        holder.ask_to_end()
+    else:
+        holder.send(number)
+    holder.wait()
+    wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes")
+    assert left_of(stage.domain, ()) == set()
+
+
 _AT_THE_END = """
 import atexit, os, sys, time
 def linger():
