@@ -288,6 +288,9 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     if finding.severity is Severity.ERROR:
         # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
         since = max(since, facts.figures.now - facts.silent_after)
+    elif rules_matching.has_few_sets(facts):
+        # Nor is it one for sets that are missing of late, however far back the stamps are compared.
+        since = max(since, facts.figures.now - WINDOW_NS)
     return cause.at >= since
 
 

@@ -304,14 +304,9 @@ def _behind(facts: GroupFacts, an_input: InputFacts) -> int:
 
 def few_sets(facts: GroupFacts) -> Found:
     """Find that far fewer sets leave than the input that sets the pace would allow."""
-    figures = facts.figures
-    # The window's rate counts a silence that is over.
-    since = max(figures.began, figures.resumed or 0)
-    if facts.is_silent or figures.last_set is None or figures.now - since < _WATCHED:
+    if not has_few_sets(facts):
         return
-    if facts.possible_hz * _WATCHED < _POSSIBLE * SECOND or figures.rate_hz >= _FEW * facts.possible_hz:
-        return
-    pacemaker = facts.pacemaker
+    figures, pacemaker = facts.figures, facts.pacemaker
     yield Finding(
         Code.FEW_SETS,
         Severity.WARN,
@@ -319,6 +314,16 @@ def few_sets(facts: GroupFacts) -> Found:
         f" {fates(pacemaker)}",
         more_sets(facts, Code.FEW_SETS),
     )
+
+
+def has_few_sets(facts: GroupFacts) -> bool:
+    """Return whether far fewer sets left, of late, than the input that sets the pace would allow."""
+    figures = facts.figures
+    # The window's rate counts a silence that is over.
+    since = max(figures.began, figures.resumed or 0)
+    if facts.is_silent or figures.last_set is None or figures.now - since < _WATCHED:
+        return False
+    return facts.possible_hz * _WATCHED >= _POSSIBLE * SECOND and figures.rate_hz < _FEW * facts.possible_hz
 
 
 def more_sets(facts: GroupFacts, code: Code) -> str | None:

@@ -71,6 +71,14 @@ def test_a_cause_is_remembered_while_the_messages_of_its_time_are_judged_by():
     assert codes(a_judge.judge(a_group(figures=later))) == [Code.OVER_SLOP]
 
 
+def test_a_cause_that_is_over_does_not_explain_that_few_sets_leave_now():
+    a_judge = Judge()
+    assert codes(a_judge.judge(a_group(figures=WIDE, waited=3 * S))) == [Code.TOO_SLOW]
+    later = {**WIDE, "nearest_from": NOW - S, "now": NOW + 11 * S, "last_set": NOW + 11 * S}
+    assert codes(a_judge.judge(a_group(figures=later))) == []
+    assert codes(a_judge.judge(a_group(figures={**later, "rate_hz": 0.5}))) == [Code.OVER_SLOP]
+
+
 def test_a_cause_explains_a_step_for_as_long_as_the_step_is_told():
     stepped = [an_input(name, figures={"stepped": Step(NOW - S, S)}) for name in ("/camera", "/lidar")]
     later = {"now": NOW + 25 * S, "last_set": NOW + 25 * S}
