@@ -23,7 +23,7 @@ test: $(VENV)/test
 # all of these tests.
 test-kilted:
 	$(MAKE) test VENV=.venv-kilted ROS=kilted \
-		ARGS="$(or $(ARGS),tests/ros/test_librcl.py tests/ros/test_policies.py tests/ros/test_node.py)"
+		ARGS="$(or $(ARGS),tests/ros/test_librcl_backend.py tests/ros/test_policies.py tests/ros/test_node.py)"
 
 # Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
 test-container: $(VENV)/test

@@ -1,4 +1,4 @@
-"""Real recordings replayed: the sets are those that come out over DDS (tests/ros/test_recordings.py), byte for byte."""
+"""Real recordings replayed: byte for byte the sets that come out over DDS (tests/ros/test_real_recordings.py)."""
 
 from itertools import chain
 from pathlib import Path
@@ -13,19 +13,19 @@ from syncrelay.bag.replay import replay
 from syncrelay.bag.writing import SetWriter
 from syncrelay.config import load_text
 from tests.bag.making import write_mcap
-from tests.ros import recordings, relaying, test_recordings
+from tests.ros import recordings, relaying, test_real_recordings
 from tests.ros.cdr_messages import stamp_of
 from tests.ros.configs import config, inputs, outputs
 
 pytestmark = pytest.mark.real_data
 
 _CASES = [
-    test_recordings.IMU_MAGNETIC_EXACT,
-    test_recordings.IMU_MAGNETIC,
-    test_recordings.IMU_SCAN,
-    test_recordings.FIX_ODOM_IMU,
-    test_recordings.RGB_DEPTH,
-    test_recordings.PICTURES,
+    test_real_recordings.IMU_MAGNETIC_EXACT,
+    test_real_recordings.IMU_MAGNETIC,
+    test_real_recordings.IMU_SCAN,
+    test_real_recordings.FIX_ODOM_IMU,
+    test_real_recordings.RGB_DEPTH,
+    test_real_recordings.PICTURES,
 ]
 _BAGS = {
     "imu_magnetic_exact": recordings.VEHICLE,
