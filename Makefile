@@ -10,14 +10,21 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-kilted test-container test-workspace test-fleet test-lerobot test-release faults soak lint schema reference docs bench wheel release clean
+.PHONY: demo test test-fast test-kilted test-container test-workspace test-fleet test-lerobot test-release faults soak lint schema reference docs bench wheel release clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
 
-# Many tests wait on real processes, so one more runs at once than there are cores; who is done first takes from others.
+# Many tests wait on real processes, so twice as many run at once as there are cores; who is done first takes from others.
 test: $(VENV)/test
-	$(BIN)/python -m pytest -n $(shell expr 1 + $$(nproc)) --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest -n $(shell expr 2 \* $$(nproc)) --dist worksteal --durations=30 --durations-min=2 $(ARGS)
+
+# Most of the tests in under a minute, for after each change: what needs no DDS, no process and no browser, and of each
+# property fewer examples. One that starts a process all the same fails.
+test-fast: $(VENV)/test
+	$(BIN)/python -m pytest -n $(shell nproc) --dist worksteal -p tests.no_processes --hypothesis-profile=quick \
+		-m "not (ros or browser or process or peer or real_data or faults)" \
+		$(addprefix tests/,bag cases config dataflow datasets explain status sync) $(ARGS)
 
 # The relay on ROS 2 Kilted: the path through librcl proves itself, and messages are relayed over DDS. ARGS=tests/ros runs
 # all of these tests.
@@ -49,11 +56,11 @@ test-lerobot:
 	$(MAKE) .venv-lerobot/lerobot VENV=.venv-lerobot
 	.venv-lerobot/bin/python -m pytest tests/datasets/test_lerobot_loader.py tests/datasets/test_lerobot.py $(ARGS)
 
-# Breaks what a robot breaks, at length, and prints what was survived, and compares the engine with C++ on many more
-# streams; `make test` has the short form of each.
+# Breaks what a robot breaks, at length, and prints what was survived; compares the engine with C++ on many more streams,
+# and tries what must hold of all inputs on many more of them. `make test` has the short form of each.
 faults: $(VENV)/test
 	.ci/network-tools
-	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m "(faults or peer) and not soak" $(ARGS)
+	SYNCRELAY_FAULTS=long $(BIN)/python -m pytest -m "(faults or peer or hypothesis) and not soak" $(ARGS)
 
 # A quarter of an hour and two million messages.
 soak: $(VENV)/test

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.faults.extent import chosen
 from tests.ros.domain import claimed_domain
 from tests.ros.stage import BACKEND, Stage, running_stage
 
@@ -16,14 +17,16 @@ _REAL_DATA = "SYNCRELAY_REAL_DATA"
 _FIGURES = "figures"
 
 
-# The same examples in every run, and no verdict that a slow machine could change.
-settings.register_profile(
-    "repeatable", derandomize=True, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow]
-)
+# No verdict that a slow machine could change, and the same examples in every run, but for the long form, which hunts.
+_any = settings(deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("long", _any, max_examples=400, print_blob=True)
+settings.register_profile("short", _any, max_examples=25, derandomize=True)
+# Of `make test-fast`.
+settings.register_profile("quick", _any, max_examples=10, derandomize=True)
 
 
-def pytest_configure() -> None:
-    settings.load_profile("repeatable")
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile(config.getoption("--hypothesis-profile") or chosen(short="short", long="long"))
     # A shell that starts the tests in the background has them, and all that they start, ignore Ctrl-C.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -5,7 +5,7 @@ from array import array
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.bag.analysis.analysis import analyze_group, group_of
@@ -115,7 +115,6 @@ _POLICIES = ("approximate_time", "approximate_time_eager", "approximate_epsilon_
 
 
 @pytest.mark.parametrize("policy", _POLICIES)
-@settings(max_examples=15)
 @given(
     keys=st.fixed_dictionaries(
         {"slop": st.integers(0, 20), "queue_size": st.integers(1, 12), "every": st.integers(1, 3)}
@@ -222,7 +221,6 @@ def _costs_nothing(drop, found):
     return False
 
 
-@settings(max_examples=60)
 @given(
     topics=st.lists(st.lists(st.integers(1, 80), min_size=1, max_size=20, unique=True), min_size=3, max_size=3),
     slop=st.integers(0, 15),

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.bag import Channel, Encoding
@@ -152,7 +152,6 @@ def _fed_one_by_one(recording, binding):
 
 
 @pytest.mark.parametrize("policy", _POLICIES)
-@settings(max_examples=40)
 @given(data=st.data())
 def test_a_replay_and_an_evaluation_give_what_messages_fed_one_by_one_give(policy, data):
     recording, text = data.draw(_recordings()), data.draw(_groups(policy))
@@ -173,7 +172,6 @@ def test_a_replay_and_an_evaluation_give_what_messages_fed_one_by_one_give(polic
 
 
 @pytest.mark.parametrize("policy", _POLICIES)
-@settings(max_examples=15)
 @given(data=st.data())
 def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(policy, data):
     recording, text = data.draw(_recordings()), data.draw(_groups(policy))

@@ -303,6 +303,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
 
 
 @pytest.mark.parametrize("write", [write_mcap, write_rosbag2, write_ros1], ids=["mcap", "sqlite3", "ros1"])
+@pytest.mark.process
 def test_memory_does_not_grow_with_the_recording(write, tmp_path):
     # Large enough to see, and of many chunks: 4 MB and 120 MB.
     picture = np.zeros(1_000_000, dtype=np.uint8)

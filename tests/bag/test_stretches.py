@@ -5,7 +5,7 @@ from itertools import product
 from typing import get_args
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.bag.bindings import bind
@@ -31,7 +31,6 @@ _KEYS = {
     "equal_key": {"key": "header.frame_id"},
 }
 every_policy = pytest.mark.parametrize("policy", _KEYS)
-_examples = settings(derandomize=True, deadline=None, database=None)
 
 
 def test_every_policy_of_a_file_is_among_those_tested():
@@ -116,7 +115,6 @@ def borders_of(recording):
 
 
 @every_policy
-@settings(_examples, max_examples=40)
 @given(data=st.data())
 def test_stretches_are_one_pass_wherever_a_recording_is_cut(policy, data):
     seed, seconds = data.draw(st.integers(0, 10**6)), data.draw(st.integers(1, 7))

@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import IndexType
@@ -88,7 +88,6 @@ _TIMES = st.integers(-3 * MS, _LENGTH + 3 * MS).map(lambda time: BEGIN + time) |
 )
 
 
-@settings(max_examples=25, derandomize=True, deadline=None, database=None)
 @given(begin=_TIMES | st.just(0), end=_TIMES | st.just(AFTER_ALL), wanted=st.integers(1, 2))
 def test_a_part_is_what_leaving_out_the_rest_gives(made, begin, end, wanted):
     with closing(open_recording([str(made)])) as recording:
@@ -109,7 +108,6 @@ def test_only_what_may_be_of_the_time_is_read(tmp_path):
     assert 0 < sizes[-1] < recording.size / 4
 
 
-@settings(max_examples=10, derandomize=True, deadline=None, database=None)
 @given(begin=_TIMES, end=_TIMES)
 def test_a_part_of_what_would_have_been_recorded_has_the_faults_of_the_whole(tmp_path_factory, begin, end):
     path = _mcap(tmp_path_factory.mktemp("made"))

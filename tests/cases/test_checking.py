@@ -239,7 +239,7 @@ def lanes(draw):
 
 
 @given(drawn=lanes(), policy=st.sampled_from(("approximate_time", "approximate_time_eager", "exact_time")))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_drawing_gives_what_the_engine_gives_by_hand(tmp_path, drawn, policy):
     camera, lidar = drawn
     group = {"policy": policy, "slop": None if policy == "exact_time" else "20ms", "queue_size": 3}

@@ -11,6 +11,7 @@ from typing import IO
 from unittest.mock import patch
 
 from syncrelay.cli import main
+from tests import preloaded
 
 ROOT = Path(__file__).parents[2]
 
@@ -53,13 +54,5 @@ def run_python(
     *words: str, folder: Path, stdin: str = "", environ: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run Python with this syncrelay in a folder to its end."""
-    return subprocess.run(
-        [sys.executable, *words],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1", **(environ or {})},
-        input=stdin,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    environ = {**os.environ, **preloaded.PYTHON, **(environ or {})}
+    return preloaded.run([sys.executable, *words], environ=environ, folder=folder, stdin=stdin)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests import preloaded
 from tests.cli.command import BAD, GOOD, ROOT, run
 from tests.cli.terminals import read_to_the_end
 from tests.doctor.environments import OURS, distribution, site_with, unshared
@@ -20,13 +21,13 @@ UNSET = ("RMW_IMPLEMENTATION", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "FASTDD
 @pytest.fixture
 def base(tmp_path):
     kept = {name: value for name, value in os.environ.items() if name not in UNSET}
-    return {**kept, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(tmp_path / "log"), "NO_COLOR": "1"}
+    return {**kept, **preloaded.PYTHON, "ROS_LOG_DIR": str(tmp_path / "log"), "NO_COLOR": "1"}
 
 
 def examine(environ, *words, command=None):
     """The exit code and what the doctor found: severity and text by code."""
     argv = command or [sys.executable, "-m", "syncrelay", "doctor", "--json", *words]
-    done = subprocess.run(argv, env=environ, capture_output=True, text=True, timeout=120, check=False)
+    done = preloaded.run(argv, environ=environ, folder=ROOT)
     assert done.stdout, done.stderr
     report = json.loads(done.stdout)
     assert done.returncode == (0 if report["ok"] else 1)
@@ -37,14 +38,8 @@ def examine(environ, *words, command=None):
 
 @pytest.mark.ros
 def test_where_all_is_well_it_says_so_and_exits_with_0(base):
-    done = subprocess.run(
-        [sys.executable, "-m", "syncrelay", "doctor"],
-        env={**base, "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    environ = {**base, "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
+    done = preloaded.run([sys.executable, "-m", "syncrelay", "doctor"], environ=environ, folder=ROOT)
     assert (done.returncode, done.stderr) == (0, "")
     first, *_, last = done.stdout.splitlines()
     assert first.startswith("Python 3.")

@@ -16,7 +16,7 @@ from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import inputs
 from tests.ros.streams import jittery, merged
 
-pytestmark = needs_chromium
+pytestmark = [pytest.mark.browser, needs_chromium]
 
 _DRAWN = """() => [...document.querySelectorAll(".chart")].map((chart) => {
   const canvas = chart.querySelector("canvas");

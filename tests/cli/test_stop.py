@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.command import ROOT
 from tests.ros.processes import Process, ros_environment
 
 # What hangs is begun only when the signals are in hand.
@@ -50,7 +49,7 @@ globals()[sys.argv[1]]()
 
 
 def _hanging(tmp_path: Path, where: str, since: str = "deferred") -> Process:
-    environment = ros_environment(domain=0, folder=tmp_path, python_path=[ROOT])
+    environment = ros_environment(domain=0, folder=tmp_path)
     argv = [sys.executable, "-c", _HANGING, where, since]
     process = Process("hanging", argv, environment=environment, folder=tmp_path)
     process.wait_until(lambda: process.stdout == "ready\n", "it to hang")
@@ -139,7 +138,7 @@ python.pthread_mutex_lock(mutex)
 
 
 def test_what_hangs_as_it_ends_is_ended_by_the_third_signal_at_the_latest(tmp_path: Path):
-    environment = ros_environment(domain=0, folder=tmp_path, python_path=[ROOT])
+    environment = ros_environment(domain=0, folder=tmp_path)
     argv = [sys.executable, "-c", _HANGING_AT_ITS_END]
     process = Process("hanging", argv, environment=environment, folder=tmp_path)
     process.wait_until(lambda: process.stdout == "ready\n", "it to hang")
@@ -168,7 +167,7 @@ def _run_as_pid_1(script: str, *words: str, folder: Path) -> subprocess.Complete
 
 
 def _run(argv: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    environment = ros_environment(domain=0, folder=folder, python_path=[ROOT])
+    environment = ros_environment(domain=0, folder=folder)
     return subprocess.run(argv, env=environment, capture_output=True, text=True, check=False, timeout=120)
 
 

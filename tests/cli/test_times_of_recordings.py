@@ -11,7 +11,7 @@ from rosbags.rosbag2 import StoragePlugin
 from syncrelay.config import load_text
 from tests.bag.making import write_mcap, write_rosbag2
 from tests.cli.in_process import read_by_all
-from tests.faults.extent import IS_LONG, chosen
+from tests.faults.extent import chosen
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
@@ -63,12 +63,7 @@ def _files(draw: st.DrawFn) -> str:
 
 
 @pytest.mark.timeout(chosen(short=600, long=3600))
-@settings(
-    max_examples=chosen(short=30, long=600),
-    derandomize=not IS_LONG,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(recording=_recordings(), text=_files())
 def test_no_time_that_a_recording_can_hold_stops_a_command(recording, text, capsys):
     load_text(text)

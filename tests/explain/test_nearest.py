@@ -4,7 +4,7 @@ from bisect import bisect_right
 from itertools import product
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.explain.nearest import NearestSpans, greatest_age, tightest_span
@@ -56,7 +56,6 @@ def chunked(draw, streams):
     [(tightest_span, tightest_of_all), (greatest_age, oldest_of_the_latest)],
     ids=["tightest span", "greatest age"],
 )
-@settings(max_examples=60)
 @given(cases=st.data())
 def test_it_is_what_a_search_through_all_sets_finds_in_whatever_chunks_the_stamps_come(measure, reference, cases):
     streams = cases.draw(STREAMS)

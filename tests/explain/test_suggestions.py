@@ -336,7 +336,7 @@ def _sources(draw):
     ]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@settings(suppress_health_check=list(HealthCheck))
 @given(_sources(), st.sampled_from([1, 5, 20, 60]), st.sampled_from([2, 10, 40]))
 def test_whatever_is_suggested_gives_what_it_promises_and_cures(sources, slop_ms, queue_size):
     options = {"slop": f"{slop_ms}ms", "queue_size": queue_size}

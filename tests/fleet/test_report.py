@@ -5,7 +5,7 @@ import random
 from copy import deepcopy
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.cli.analysis_json import as_json
@@ -306,7 +306,6 @@ def _documents(draw):
 
 
 @pytest.mark.parametrize("pattern", [None, "{robot}/*"])
-@settings(max_examples=30, deadline=None)
 @given(parts=st.lists(st.lists(_documents(), max_size=5), max_size=4), data=st.data())
 def test_parts_in_any_order_give_the_report_of_the_whole(pattern, parts, data):
     def fleet(documents):

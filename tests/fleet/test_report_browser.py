@@ -8,7 +8,7 @@ from tests.browser import launched, needs_chromium, opened
 from tests.cli.html_reports import HOSTILE
 from tests.fleet.documents import change, document, finding, fleet, group
 
-pytestmark = needs_chromium
+pytestmark = [pytest.mark.browser, needs_chromium]
 
 
 @pytest.fixture(scope="module")

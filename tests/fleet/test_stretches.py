@@ -20,6 +20,8 @@ from tests.ros import recordings
 from tests.ros.configs import config, inputs
 
 CUT = ("--stretch", "3s", "--jobs", "2")
+# It is of rows: without their megabytes of pixels and points.
+LEAN = ("--fields", "/demo/camera/image_raw:header", "--fields", "/demo/lidar/points:header,width")
 
 
 def export(folder, into, *words, bag="rig.mcap", file="demo.yaml"):
@@ -42,8 +44,8 @@ def rigged(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stretches")
     (folder / "demo.yaml").write_text(shipped_config())
     run("demo", "--record", "rig.mcap", "--seconds", "8", folder=folder)
-    assert export(folder, "whole").returncode == 0
-    done = export(folder, "cut", *CUT)
+    assert export(folder, "whole", *LEAN).returncode == 0
+    done = export(folder, "cut", *LEAN, *CUT)
     assert (done.returncode, done.stdout) == (0, "cut: 1 recording: 1 done\n")
     return folder
 
@@ -60,17 +62,18 @@ def test_the_ledger_tells_of_the_recording_what_it_tells_of_one_pass(rigged):
     whole, cut = entries(rigged / "whole")["rig"], entries(rigged / "cut")["rig"]
     assert (cut["facts"], cut["content"]) == (whole["facts"], whole["content"])
     assert sorted(cut["files"]) == files(rigged / "cut")
-    assert export(rigged, "cut", *CUT).stdout == "cut: 1 recording: 1 done before\n"
+    assert export(rigged, "cut", *LEAN, *CUT).stdout == "cut: 1 recording: 1 done before\n"
 
 
 def test_the_length_is_an_option_that_decides_what_is_there(rigged):
-    refused = export(rigged, "cut", "--stretch", "4s")
+    refused = export(rigged, "cut", *LEAN, "--stretch", "4s")
     assert refused.returncode != 0
     assert "holds results of other options" in refused.stderr
 
 
 def test_a_recording_shorter_than_a_stretch_is_one(rigged, tmp_path):
-    assert export(rigged, str(tmp_path / "out"), "--stretch", "10min", "--group", "lidar_imu").returncode == 0
+    words = (*LEAN[2:], "--stretch", "10min", "--group", "lidar_imu")
+    assert export(rigged, str(tmp_path / "out"), *words).returncode == 0
     assert files(tmp_path / "out") == ["lidar_imu-0001.parquet"]
     assert rows(tmp_path / "out", "lidar_imu").equals(rows(rigged / "whole", "lidar_imu", ""))
 
@@ -92,7 +95,7 @@ def test_a_damaged_recording_is_done_as_a_whole(rigged, tmp_path):
     content = (rigged / "rig.mcap").read_bytes()
     (tmp_path / "rig.mcap").write_bytes(content[: len(content) * 3 // 4])
     shutil.copy(rigged / "demo.yaml", tmp_path)
-    whole, cut = export(tmp_path, "whole"), export(tmp_path, "cut", *CUT)
+    whole, cut = export(tmp_path, "whole", *LEAN), export(tmp_path, "cut", *LEAN, *CUT)
     assert cut.returncode == whole.returncode
     assert files(tmp_path / "cut") == ["camera_lidar-0001.parquet", "lidar_imu-0001.parquet"]
     assert rows(tmp_path / "cut", "camera_lidar").equals(rows(tmp_path / "whole", "camera_lidar", ""))
@@ -117,7 +120,8 @@ def test_workers_and_commands_that_are_killed_leave_nothing_half_written(rigged,
                 os.kill(worker, signal.SIGKILL)
         command.communicate(timeout=60)
     assert command.returncode == 0
-    assert tree(tmp_path / "out") == tree(rigged / "cut")
+    assert export(rigged, str(tmp_path / "undisturbed"), *CUT).returncode == 0
+    assert tree(tmp_path / "out") == tree(tmp_path / "undisturbed")
 
 
 def test_what_is_no_length_of_a_stretch_is_refused(rigged):

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from tests import preloaded
 from tests.ros.shared_memory import segments_of
 
 # What is still missing after this long will not come. A bound for broken runs, not a measure: on an idle
@@ -42,7 +43,7 @@ def comes_true(condition: Callable[[], object], *, within_s: float) -> bool:
     return held
 
 
-def ros_environment(*, domain: int, folder: Path, python_path: Sequence[Path]) -> dict[str, str]:
+def ros_environment(*, domain: int, folder: Path) -> dict[str, str]:
     """The caller's environment without any choice of ROS that it made, on a domain of its own."""
     kept = {
         name: value for name, value in os.environ.items() if name in _ROS_IDENTITY or not name.startswith(_ROS_PREFIXES)
@@ -51,7 +52,7 @@ def ros_environment(*, domain: int, folder: Path, python_path: Sequence[Path]) -
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(folder / "ros-log"),
-        "PYTHONPATH": os.pathsep.join(map(str, python_path)),
+        **preloaded.PYTHON,
         "NO_COLOR": "1",
     }
 
@@ -88,7 +89,7 @@ class Process:
         self.name = name
         self._stdout, self._stderr = folder / f"{name}.stdout", folder / f"{name}.stderr"
         with self._stdout.open("wb") as stdout, self._stderr.open("wb") as stderr:
-            self._child = subprocess.Popen(argv, stdin=stdin, stdout=stdout, stderr=stderr, env=environment, cwd=folder)
+            self._child = preloaded.start(argv, stdin=stdin, stdout=stdout, stderr=stderr, env=environment, cwd=folder)
         self._answered = 0
         self._left: set[Path] = set()
 
@@ -148,9 +149,8 @@ class Process:
         return self.stdout.splitlines()[self._answered - 1]
 
     def send(self, number: signal.Signals) -> None:
-        if number == signal.SIGKILL:
-            # It removes nothing then, and of the dead nothing tells what was theirs.
-            self._left = self.shared_memory()
+        # At SIGKILL, and at a second SIGTERM, it removes nothing; and of the dead nothing tells what was theirs.
+        self._left = self.shared_memory()
         self._child.send_signal(number)
 
     def wait(self, timeout_s: float = DEADLINE_S) -> int:

@@ -11,14 +11,10 @@ from pathlib import Path
 
 import pytest
 
-import syncrelay
 from tests.ros import frames
 from tests.ros.frames import Frame
 from tests.ros.processes import DEADLINE_S, Process, ros_environment
 from tests.ros.shared_memory import left_of
-
-_CHECKOUT = Path(__file__).parents[2]
-_PACKAGE = Path(syncrelay.__file__).parents[1]
 
 
 def _usual_backend() -> str:
@@ -155,7 +151,7 @@ class Stage:
 
     def __init__(self, folder: Path, domain: int, backend: str = BACKEND) -> None:
         self.folder, self.domain = folder, domain
-        self.environment = ros_environment(domain=domain, folder=folder, python_path=[_PACKAGE, _CHECKOUT])
+        self.environment = ros_environment(domain=domain, folder=folder)
         self.environment["SYNCRELAY_RECEIVE"] = backend
         self._processes: list[Process] = []
         self._segments: set[Path] = set()

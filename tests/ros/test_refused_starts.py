@@ -46,7 +46,7 @@ _WORDS = (
 
 @pytest.fixture(autouse=True)
 def _alone(ros_domain: int, tmp_path, monkeypatch):
-    for name, value in ros_environment(domain=ros_domain, folder=tmp_path, python_path=[]).items():
+    for name, value in ros_environment(domain=ros_domain, folder=tmp_path).items():
         monkeypatch.setenv(name, value)
 
 

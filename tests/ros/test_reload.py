@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from syncrelay.sync import ApproximateTime
+from tests.preloaded import FROM_SCRATCH
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
@@ -217,11 +218,13 @@ def _command(stage: Stage, relay: Process, says: str) -> subprocess.CompletedPro
 
 
 def test_a_command_has_it_read_and_tells_what_came_of_it(stage: Stage):
-    file = ReloadedFile(stage, front=_FRONT)
-    done = _command(stage, file.relay, "has read")
+    # The command knows a relay by the words that it was started with.
+    relay = stage.relay(config({"front": _FRONT}, metrics=ANY_PORT), before=FROM_SCRATCH)
+    relay.wait_for_log("status and metrics: ")
+    done = _command(stage, relay, "has read")
     assert (done.returncode, done.stdout.startswith("/syncrelay has read ")) == (0, True)
-    file.write("groups: 5")
-    failed = _command(stage, file.relay, "reload failed")
+    (stage.folder / "config-0.yaml").write_text("groups: 5")
+    failed = _command(stage, relay, "reload failed")
     assert failed.returncode == 1
     assert "/syncrelay: reload failed; it keeps its running configuration:" in failed.stderr
     assert "groups: expected a mapping" in failed.stderr

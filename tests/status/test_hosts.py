@@ -171,7 +171,7 @@ hosts = st.one_of(
 in_target = hosts.filter(lambda host: re.fullmatch(r"[!-~]+", host) and not set(host) & set("/\\?#"))
 
 
-@settings(max_examples=250, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(suppress_health_check=list(HealthCheck))
 @given(
     named=st.lists(hosts, max_size=3),
     target=st.none() | in_target,

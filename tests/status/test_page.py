@@ -16,7 +16,7 @@ from tests.hostile_names import FORGED, hostile_name
 from tests.status.support.serving import ANY
 from tests.top import states
 
-pytestmark = needs_chromium
+pytestmark = [pytest.mark.browser, needs_chromium]
 
 _STATES = {"light": "rgb(255, 255, 255)", "dark": "rgb(18, 22, 27)"}
 _SHOWN = "html[data-shown]"

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.sync import Drop, DropReason, Message
-from tests.sync.support.rigs import POLICIES, REPEATABLE, TICK, Options, make_policy, options, steps
+from tests.sync.support.rigs import POLICIES, TICK, Options, make_policy, options, steps
 
 every_policy = pytest.mark.parametrize("name", POLICIES)
 
@@ -42,7 +42,6 @@ def test_what_overflowed_before_it_is_not_missed_after_it(name):
 
 
 @every_policy
-@REPEATABLE
 @given(data=st.data(), chosen=options(optional=False, limited=False, thinned=False))
 def test_the_policy_is_as_new_but_for_the_queues_that_were_needed(name, data, chosen):
     before, after = (

@@ -12,7 +12,6 @@ from tests.sync.support.rigs import (
     BY_STAMP,
     ONCE,
     POLICIES,
-    REPEATABLE,
     START,
     TICK,
     few,
@@ -66,7 +65,6 @@ class Tally:
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs())
 def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(policy, rig):
     chosen, taken = rig
@@ -85,7 +83,6 @@ def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(policy, rig):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs())
 def test_each_message_leaves_once_in_a_set_or_as_a_drop_with_one_reason(policy, rig):
     chosen, taken = rig
@@ -99,7 +96,6 @@ def test_each_message_leaves_once_in_a_set_or_as_a_drop_with_one_reason(policy, 
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs(disorder=False))
 def test_sets_leave_in_the_order_of_their_stamps(policy, rig):
     chosen, taken = rig
@@ -124,7 +120,6 @@ def shifted(match, chosen, inputs=(True,) * 9):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs(jumps=False))
 def test_without_a_jump_no_input_ever_goes_back(policy, rig):
     chosen, taken = rig
@@ -136,7 +131,6 @@ def test_without_a_jump_no_input_ever_goes_back(policy, rig):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs())
 def test_a_set_has_all_required_inputs_and_fits(policy, rig):
     chosen, taken = rig
@@ -155,7 +149,6 @@ def test_a_set_has_all_required_inputs_and_fits(policy, rig):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs(optional=False, limited=False), shift=st.integers(-START, START))
 def test_without_max_wait_the_clock_changes_nothing(policy, rig, shift):
     chosen, taken = rig
@@ -165,7 +158,6 @@ def test_without_max_wait_the_clock_changes_nothing(policy, rig, shift):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs())
 def test_expiring_more_often_changes_nothing_that_is_due(policy, rig):
     chosen, taken = rig
@@ -182,7 +174,6 @@ def test_expiring_more_often_changes_nothing_that_is_due(policy, rig):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs())
 def test_nothing_waits_longer_than_max_wait_even_when_the_clock_falls(policy, rig):
     chosen, taken = rig
@@ -197,7 +188,6 @@ def test_nothing_waits_longer_than_max_wait_even_when_the_clock_falls(policy, ri
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs())
 def test_what_is_buffered_is_bounded(policy, rig):
     chosen, taken = rig
@@ -211,7 +201,6 @@ def test_what_is_buffered_is_bounded(policy, rig):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs(thinned=False, disorder=False))
 def test_optional_inputs_never_change_which_required_messages_go_together(policy, rig):
     chosen, taken = rig
@@ -244,7 +233,6 @@ def only_required(values, chosen):
 
 
 @pytest.mark.parametrize("policy", BY_STAMP)
-@REPEATABLE
 @given(rig=rigs(thinned=False, offset=True))
 def test_an_offset_is_as_if_the_stamps_were_other_ones(policy, rig):
     chosen, taken = rig
@@ -269,7 +257,6 @@ def names(outcome):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs(disorder=False, thinned=False), every=few(1, 4), period=few(1, 8))
 def test_thinning_lets_some_sets_pass_whole_and_evenly(policy, rig, every, period):
     chosen, taken = rig
@@ -286,7 +273,6 @@ def test_thinning_lets_some_sets_pass_whole_and_evenly(policy, rig, every, perio
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs())
 def test_restamp_is_a_stamp_of_the_set(policy, rig):
     chosen, taken = rig
@@ -303,7 +289,6 @@ def test_restamp_is_a_stamp_of_the_set(policy, rig):
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs(disorder=False), gap=few(101, 500))
 def test_the_second_pass_of_a_looped_recording_gives_the_sets_of_the_first(policy, rig, gap):
     chosen, taken = rig
@@ -325,7 +310,6 @@ def test_the_second_pass_of_a_looped_recording_gives_the_sets_of_the_first(polic
 
 
 @every_policy
-@REPEATABLE
 @given(rig=rigs(disorder=False, optional=False, limited=False), data=st.data())
 def test_left_overs_of_the_first_pass_do_not_disturb_the_second(policy, rig, data):
     chosen, taken = rig
@@ -359,7 +343,6 @@ def test_left_overs_of_the_first_pass_do_not_disturb_the_second(policy, rig, dat
     assert sets_of(flat(two)) == sets_of(flat(one))
 
 
-@REPEATABLE
 @given(data=st.data(), chosen=options(optional=False, limited=False, thinned=False))
 def test_sets_of_approximate_time_depend_on_stamps_alone_while_no_queue_is_full(data, chosen):
     chosen = replace(chosen, queue_size=100, min_periods=())  # a period that is not kept leads astray
@@ -380,7 +363,6 @@ def test_sets_of_approximate_time_depend_on_stamps_alone_while_no_queue_is_full(
 
 
 @pytest.mark.parametrize("policy", ONCE)
-@REPEATABLE
 @given(rig=rigs(optional=False, limited=False, thinned=False))
 def test_a_policy_alone_loses_nothing_either(policy, rig):
     chosen, taken = rig

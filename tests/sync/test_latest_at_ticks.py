@@ -10,7 +10,7 @@ from syncrelay.sync import Drop, DropReason, LatestAtTicks, LatestTime, Match, M
 from syncrelay.sync.latest_at_ticks import REST_NS
 from tests.sync.support.drawn import group_cases
 from tests.sync.support.grouped import grouped
-from tests.sync.support.rigs import REPEATABLE, START, TICK, Step, few, finish, run, steps, take
+from tests.sync.support.rigs import START, TICK, Step, few, finish, run, steps, take
 from tests.sync.support.timeline import START_NS, TICK_NS
 
 
@@ -221,7 +221,6 @@ def test_ticks_are_whole_nanoseconds_that_do_not_drift(ticks, index, expected):
     assert ticks.at(index) == expected
 
 
-@REPEATABLE
 @given(
     numerator=st.integers(1, 10**10),
     denominator=st.integers(1, 10**9),
@@ -409,7 +408,6 @@ def slow_sets(rig, taken):
             yield tick, tuple(members)
 
 
-@REPEATABLE
 @given(drawn=rigs(disorder=False))
 def test_sets_are_those_of_the_rule(drawn):
     rig, taken = drawn
@@ -418,7 +416,6 @@ def test_sets_are_those_of_the_rule(drawn):
         assert [(match.tick, match.stamps) for match in left] == list(slow_sets(rig, taken))
 
 
-@REPEATABLE
 @given(drawn=rigs(queue=few(1, 4), every=few(1, 3)))
 def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(drawn):
     rig, taken = drawn
@@ -444,7 +441,6 @@ def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(drawn):
     assert [counts.buffered for counts in group.counts()] == [0] * len(rig.required)
 
 
-@REPEATABLE
 @given(drawn=rigs(queue=few(1, 4), every=few(1, 3)))
 def test_each_message_leaves_in_sets_or_once_as_a_drop(drawn):
     rig, taken = drawn
@@ -454,7 +450,6 @@ def test_each_message_leaves_in_sets_or_once_as_a_drop(drawn):
     assert dropped + Counter(matched) == Counter(step.message for step in taken if step.message is not None)
 
 
-@REPEATABLE
 @given(drawn=rigs(queue=few(1, 4)))
 def test_no_message_is_newer_than_its_tick_or_too_old_and_all_required_are_there(drawn):
     rig, taken = drawn
@@ -468,7 +463,6 @@ def test_no_message_is_newer_than_its_tick_or_too_old_and_all_required_are_there
                 assert rig.max_age is None or age <= rig.max_age * TICK
 
 
-@REPEATABLE
 @given(drawn=rigs(jumps=False, queue=few(1, 4)))
 def test_no_input_ever_goes_back(drawn):
     rig, taken = drawn
@@ -478,7 +472,6 @@ def test_no_input_ever_goes_back(drawn):
         assert stamps == sorted(stamps)
 
 
-@REPEATABLE
 @given(drawn=rigs(queue=few(1, 4), every=few(1, 3)), data=st.data())
 def test_calling_expire_more_often_changes_nothing(drawn, data):
     rig, taken = drawn
@@ -496,7 +489,6 @@ def test_calling_expire_more_often_changes_nothing(drawn, data):
         assert list(often.expire(now=clock)) == []
 
 
-@REPEATABLE
 @given(drawn=rigs(queue=few(1, 4)))
 def test_the_next_deadline_is_when_the_next_set_leaves(drawn):
     rig, taken = drawn

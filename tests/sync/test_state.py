@@ -6,7 +6,7 @@ from types import MethodType
 from typing import get_args
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.config.policies import GROUP_MODELS
@@ -16,7 +16,6 @@ from syncrelay.sync.state import state_of
 from tests.sync.support.rigs import (
     BY_CLOCK,
     POLICIES,
-    REPEATABLE,
     START,
     TICK,
     Options,
@@ -83,7 +82,6 @@ def test_every_policy_of_a_file_is_among_those_tested():
 
 
 @every_policy
-@settings(REPEATABLE, max_examples=150)
 @given(data=st.data())
 def test_engines_of_equal_state_give_and_count_the_same_from_then_on(policy, data):
     chosen = data.draw(options())
@@ -147,7 +145,6 @@ def test_the_phase_of_thinning_is_state(policy):
 
 
 @every_policy
-@settings(REPEATABLE, max_examples=50)
 @given(data=st.data())
 def test_a_pickled_engine_goes_on_where_it_was(policy, data):
     chosen = data.draw(options())

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-from hypothesis import settings
 from hypothesis import strategies as st
 
 from syncrelay.sync import (
@@ -22,7 +21,6 @@ from syncrelay.sync import (
 
 TICK = 10_000_000
 START = 10**12
-REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100, database=None)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,31 @@
+"""`pytest -p tests.no_processes`: a test that starts a process or imports rclpy fails: `make test-fast` stays fast."""
+
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+# What CPython tells before it starts a process, by whichever way: https://docs.python.org/3/library/audit_events.html.
+_STARTS = ("os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen")
+
+
+class _NoProcesses:
+    def __init__(self) -> None:
+        self._runs = False
+        sys.addaudithook(self._hear)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self) -> Iterator[None]:
+        self._runs = True
+        try:
+            return (yield)
+        finally:
+            self._runs = False
+
+    def _hear(self, event: str, arguments: tuple) -> None:
+        if self._runs and (event in _STARTS or (event == "import" and arguments[0] == "rclpy")):
+            pytest.fail(f"{event} {arguments[0]}: no test of `make test-fast`; give it a marker that leaves it out")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(_NoProcesses())

@@ -1,0 +1,293 @@
+"""Processes that begin with all that they import: a server has imported it once, and forks for each.
+
+Importing rclpy, numpy and types of messages is more than half of the CPU that a process of a short test needs. What
+is forked runs the same code, with an environment, a folder and standard streams of its own. What it lacks is the start
+from the command line, which is the subject of the tests that use FROM_SCRATCH.
+
+Run as `python -m tests.preloaded FD`, with the file descriptor of a socket that listens, it is the server; it ends
+when its stdin does.
+"""
+
+import atexit
+import contextlib
+import ctypes
+import functools
+import gc
+import importlib
+import json
+import os
+import pkgutil
+import re
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any, Final
+
+import syncrelay
+
+FROM_SCRATCH: Final = ("env",)
+"""Words before a command that make it a program of its own, started as a user starts it."""
+
+# Where this syncrelay and these tests are imported from.
+_PYTHON_PATH: Final = (Path(syncrelay.__file__).parents[1], Path(__file__).parents[1])
+PYTHON: Final = {"PYTHONPATH": os.pathsep.join(map(str, _PYTHON_PATH)), "PYTHONSAFEPATH": "1"}
+"""What the environment says of Python where nothing else is tested; with another, a process is no fork."""
+
+# The modules that are forked where they are to be run by `python -m`, and where each has its `main`.
+_MAINS: Final = {
+    "syncrelay": "syncrelay.cli",
+    **{
+        name: name
+        for name in (
+            "tests.faults.source",
+            "tests.faults.witness",
+            "tests.ros.caller",
+            "tests.ros.collector",
+            "tests.ros.manager",
+            "tests.ros.player",
+            "tests.scenarios.source",
+        )
+    },
+}
+# What they import as they run, beside what syncrelay has. What is not installed here is missed by nobody until then.
+_IMPORTED_LATER: Final = (
+    "diagnostic_msgs.msg",
+    "geometry_msgs.msg",
+    "pyarrow.parquet",
+    "rclpy.executors",
+    "rosgraph_msgs.msg",
+    "sensor_msgs.msg",
+    "std_msgs.msg",
+    "std_srvs.srv",
+)
+# Ray has threads of its own, and the other one runs a command.
+_NEVER_IMPORTED: Final = ("on_ray", "__main__")
+# What Python and the loader of libraries go by: it is too late to change it in a fork.
+_GONE_BY_AT_THE_START: Final = ("AMENT_", "LANG", "LC_", "LD_", "PYTHON", "RMW_")
+_LONGEST_REQUEST: Final = 1 << 20
+# Threads of a test may all be the first to start a process.
+_STARTS: Final = threading.Lock()
+
+
+class Forked:
+    """A forked process, with what tests use of subprocess.Popen."""
+
+    def __init__(self, connection: socket.socket, *, stdin: int | None) -> None:
+        self.pid = int(connection.recv(64))
+        self.stdin = None if stdin is None else os.fdopen(stdin, "wb")
+        self._connection = connection
+        self._code: int | None = None
+
+    def poll(self) -> int | None:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0)
+        return self._code
+
+    def wait(self, timeout: float | None = None) -> int:
+        """The exit code, negative for a signal; raises subprocess.TimeoutExpired."""
+        if self._code is None:
+            self._connection.settimeout(timeout)
+            try:
+                self._code = int(self._connection.recv(64))
+            except (BlockingIOError, TimeoutError):
+                raise subprocess.TimeoutExpired(str(self.pid), timeout or 0) from None
+            self._connection.close()
+        return self._code
+
+    def send_signal(self, number: signal.Signals) -> None:
+        if self.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+
+def start(
+    argv: Sequence[str], *, stdin: int, stdout: IO[Any], stderr: IO[Any], env: Mapping[str, str], cwd: Path
+) -> "subprocess.Popen[bytes] | Forked":
+    """Start a process: forked, where it could be with this environment."""
+    if not _is_forked(argv, env):
+        return subprocess.Popen(argv, stdin=stdin, stdout=stdout, stderr=stderr, env=env, cwd=cwd)
+    read, written = os.pipe() if stdin == subprocess.PIPE else (os.open(os.devnull, os.O_RDONLY), None)
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with _STARTS:
+        address = _server()
+    connection.connect(address)
+    request = json.dumps({"words": argv[2:], "environment": dict(env), "folder": str(cwd)}).encode()
+    socket.send_fds(connection, [request], [read, stdout.fileno(), stderr.fileno()])
+    os.close(read)
+    return Forked(connection, stdin=written)
+
+
+def _is_forked(argv: Sequence[str], environ: Mapping[str, str]) -> bool:
+    """Whether a process with this command and environment imports what the server has imported."""
+    if list(argv[:2]) != [sys.executable, "-m"] or argv[2] not in _MAINS:
+        return False
+    usual = {**os.environ, **PYTHON}
+    return all(
+        environ.get(name) == usual.get(name)
+        for name in environ.keys() | usual.keys()
+        if name.startswith(_GONE_BY_AT_THE_START)
+    )
+
+
+def run(
+    argv: Sequence[str], *, environ: Mapping[str, str], folder: Path, stdin: str = "", timeout_s: float = 120
+) -> "subprocess.CompletedProcess[str]":
+    """As subprocess.run with its output captured, but forked where it could be."""
+    if not _is_forked(argv, environ):
+        return subprocess.run(
+            argv, cwd=folder, env=environ, input=stdin, capture_output=True, text=True, timeout=timeout_s, check=False
+        )
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as talk:
+        process = start(argv, stdin=subprocess.PIPE, stdout=out, stderr=talk, env=environ, cwd=folder)
+        assert process.stdin is not None
+        try:
+            with contextlib.suppress(BrokenPipeError), process.stdin as pipe:
+                pipe.write(stdin.encode())
+            code = process.wait(timeout_s)
+        finally:
+            process.kill()
+        out.seek(0)
+        talk.seek(0)
+        return subprocess.CompletedProcess(argv, code, out.read(), talk.read())
+
+
+@functools.cache
+def _server() -> str:
+    """The address of this process's server, which is started at the first call."""
+    address = f"\0syncrelay-preloaded-{os.getpid()}"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
+        listening.bind(address)
+        listening.listen(64)
+        server = subprocess.Popen(
+            [sys.executable, "-m", __spec__.name, str(listening.fileno())],
+            stdin=subprocess.PIPE,
+            pass_fds=[listening.fileno()],
+            # numpy's library would start a thread for each core, and with threads no fork is safe.
+            env={**os.environ, **PYTHON, "OPENBLAS_NUM_THREADS": "1"},
+        )
+    # Its end is that of its stdin.
+    atexit.register(server.communicate)
+    return address
+
+
+def main() -> None:
+    """Serve; in a fork, run what was asked for."""
+    # A Ctrl-C is for whoever started the server, who ends the forks.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ours = (module.name for module in pkgutil.walk_packages(syncrelay.__path__, "syncrelay."))
+    for name in (*_MAINS.values(), *_IMPORTED_LATER, *ours):
+        with contextlib.suppress(ImportError):
+            if name.rpartition(".")[2] not in _NEVER_IMPORTED:
+                importlib.import_module(name)
+    # What is there stays: the collector would go through it in each fork, which copies the memory.
+    gc.collect()
+    gc.freeze()
+    # LTTng's two threads are the only ones.
+    warnings.filterwarnings("ignore", category=DeprecationWarning, message=".*multi-threaded, use of fork")
+    with socket.socket(fileno=int(sys.argv[1])) as listening:
+        request, streams = _served(listening)
+    if request is not None:
+        sys.exit(_run(request, streams))
+
+
+def _served(listening: socket.socket) -> tuple[dict[str, Any] | None, Sequence[int]]:
+    """Fork for each request, and tell how each fork ended; return in a fork with the request, at the end without."""
+    forks: dict[int, tuple[int, socket.socket]] = {}
+    tracing = _Tracing()
+    with selectors.DefaultSelector() as selector:
+        selector.register(sys.stdin.fileno(), selectors.EVENT_READ)
+        selector.register(listening, selectors.EVENT_READ)
+        while True:
+            for key, _ in selector.select():
+                if key.fd in forks:
+                    selector.unregister(key.fd)
+                    os.close(key.fd)
+                    _tell_end(*forks.pop(key.fd))
+                    continue
+                if key.fileobj is not listening:
+                    return None, ()
+                connection, _ = listening.accept()
+                text, streams, _, _ = socket.recv_fds(connection, _LONGEST_REQUEST, 3)
+                if not (pid := tracing.fork()):
+                    for fd, (_, other) in forks.items():
+                        os.close(fd)
+                        other.close()
+                    connection.close()
+                    return json.loads(text), streams
+                for fd in streams:
+                    os.close(fd)
+                connection.send(str(pid).encode())
+                fork = os.pidfd_open(pid)
+                forks[fork] = pid, connection
+                selector.register(fork, selectors.EVENT_READ)
+
+
+def _tell_end(pid: int, connection: socket.socket) -> None:
+    code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    # Nobody may have waited for it.
+    with connection, contextlib.suppress(BrokenPipeError):
+        connection.send(str(code).encode())
+
+
+def _run(request: Mapping[str, Any], streams: Sequence[int]) -> int | None:
+    """Take on what a process is started with, and run the module that it is to run."""
+    for number, fd in enumerate(streams):
+        os.dup2(fd, number)
+        os.close(fd)
+    # As Python opens them.
+    opened: dict[str, IO[str]] = {
+        "stdin": os.fdopen(0, closefd=False),
+        "stdout": os.fdopen(1, "w", closefd=False),
+        "stderr": os.fdopen(2, "w", buffering=1, errors="backslashreplace", closefd=False),
+    }
+    for name, stream in opened.items():
+        setattr(sys, name, stream)
+        setattr(sys, f"__{name}__", stream)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    os.environ.clear()
+    os.environ.update(request["environment"])
+    os.chdir(request["folder"])
+    sys.argv = request["words"]
+    code: int | None = importlib.import_module(_MAINS[sys.argv[0]]).main()
+    return code
+
+
+class _Tracing:
+    """LTTng's library, which comes with rclpy: as it ends it waits for two threads, which a fork has to make anew.
+
+    These are the functions that LTTng's own wrapper of fork() calls, with a place for a mask of signals.
+    """
+
+    def __init__(self) -> None:
+        maps = (line.split(maxsplit=5) for line in Path("/proc/self/maps").read_text().splitlines())
+        found = {path for *_, path in maps if re.search(r"/liblttng-ust(-[0-9a-f]+)?\.so", path)}
+        self._libraries = [ctypes.CDLL(path) for path in found]
+        self._masks = [ctypes.create_string_buffer(128) for _ in found]
+
+    def fork(self) -> int:
+        """As os.fork."""
+        self._call("before_fork")
+        pid = os.fork()
+        self._call("after_fork_parent" if pid else "after_fork_child")
+        return pid
+
+    def _call(self, moment: str) -> None:
+        for library, mask in zip(self._libraries, self._masks, strict=True):
+            getattr(library, f"ust_{moment}")(mask)
+
+
+if __name__ == "__main__":
+    main()
