@@ -19,11 +19,11 @@ demo: $(VENV)/demo
 test: $(VENV)/test
 	$(BIN)/python -m pytest -n $(shell expr 2 \* $$(nproc)) --dist worksteal --durations=30 --durations-min=2 $(ARGS)
 
-# Most of the tests in under a minute, for after each change: what needs no DDS, no process and no browser, and of each
-# property fewer examples. One that starts a process all the same fails.
+# Most of the tests in under a minute, for after each change: what needs no DDS, no process, no browser and no seconds,
+# and of each property fewer examples. One that starts a process all the same fails.
 test-fast: $(VENV)/test
 	$(BIN)/python -m pytest -n $(shell nproc) --dist worksteal -p tests.no_processes --hypothesis-profile=quick \
-		-m "not (ros or browser or process or peer or real_data or faults)" \
+		-m "not (ros or browser or process or peer or real_data or faults or long)" \
 		$(addprefix tests/,bag cases config dataflow datasets explain status sync) $(ARGS)
 
 # The relay on ROS 2 Kilted: the path through librcl proves itself, and messages are relayed over DDS. ARGS=tests/ros runs

@@ -4,8 +4,8 @@ Importing rclpy, numpy and types of messages is more than half of the CPU that a
 is forked runs the same code, with an environment, a folder and standard streams of its own. What it lacks is the start
 from the command line, which is the subject of the tests that use FROM_SCRATCH.
 
-Run as `python -m tests.preloaded FD`, with the file descriptor of a socket that listens, it is the server; it ends
-when its stdin does.
+Run as `python -m tests.preloaded nodes FD`, with the file descriptor of a socket that listens, it is the server; it
+ends when its stdin does.
 """
 
 import atexit
@@ -26,7 +26,8 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any, Final
 
@@ -56,16 +57,24 @@ _MAINS: Final = {
         )
     },
 }
-# What they import as they run, beside what syncrelay has. What is not installed here is missed by nobody until then.
-_IMPORTED_LATER: Final = (
+# What nodes import as they run. What is not installed here is missed by nobody until then.
+_OF_NODES: Final = (
     "diagnostic_msgs.msg",
     "geometry_msgs.msg",
-    "pyarrow.parquet",
     "rclpy.executors",
     "rosgraph_msgs.msg",
     "sensor_msgs.msg",
     "std_msgs.msg",
     "std_srvs.srv",
+    "syncrelay.cli.run",
+    "syncrelay.cli.services",
+    "syncrelay.cli.summary",
+    "syncrelay.config",
+    "syncrelay.logs",
+    "syncrelay.ros.compiled.path",
+    "syncrelay.ros.relay",
+    "syncrelay.ros.rclpy_backend",
+    "syncrelay.status.server",
 )
 # Ray has threads of its own, and the other one runs a command.
 _NEVER_IMPORTED: Final = ("on_ray", "__main__")
@@ -113,8 +122,23 @@ class Forked:
         self.send_signal(signal.SIGKILL)
 
 
+class Imported(StrEnum):
+    """What a server has imported. A fork copies of that memory what it changes, and as it ends, that is most of it."""
+
+    NODES = "nodes"
+    COMMANDS = "commands"
+    """All of syncrelay, too."""
+
+
 def start(
-    argv: Sequence[str], *, stdin: int, stdout: IO[Any], stderr: IO[Any], env: Mapping[str, str], cwd: Path
+    argv: Sequence[str],
+    *,
+    stdin: int,
+    stdout: IO[Any],
+    stderr: IO[Any],
+    env: Mapping[str, str],
+    cwd: Path,
+    imported: Imported = Imported.NODES,
 ) -> "subprocess.Popen[bytes] | Forked":
     """Start a process: forked, where it could be with this environment."""
     if not _is_forked(argv, env):
@@ -122,7 +146,7 @@ def start(
     read, written = os.pipe() if stdin == subprocess.PIPE else (os.open(os.devnull, os.O_RDONLY), None)
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     with _STARTS:
-        address = _server()
+        address = _server(imported)
     connection.connect(address)
     request = json.dumps({"words": argv[2:], "environment": dict(env), "folder": str(cwd)}).encode()
     socket.send_fds(connection, [request], [read, stdout.fileno(), stderr.fileno()])
@@ -151,7 +175,15 @@ def run(
             argv, cwd=folder, env=environ, input=stdin, capture_output=True, text=True, timeout=timeout_s, check=False
         )
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as talk:
-        process = start(argv, stdin=subprocess.PIPE, stdout=out, stderr=talk, env=environ, cwd=folder)
+        process = start(
+            argv,
+            stdin=subprocess.PIPE,
+            stdout=out,
+            stderr=talk,
+            env=environ,
+            cwd=folder,
+            imported=Imported.COMMANDS,
+        )
         assert process.stdin is not None
         try:
             with contextlib.suppress(BrokenPipeError), process.stdin as pipe:
@@ -165,14 +197,14 @@ def run(
 
 
 @functools.cache
-def _server() -> str:
+def _server(imported: Imported) -> str:
     """The address of this process's server, which is started at the first call."""
-    address = f"\0syncrelay-preloaded-{os.getpid()}"
+    address = f"\0syncrelay-preloaded-{imported}-{os.getpid()}"
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
         listening.bind(address)
         listening.listen(64)
         server = subprocess.Popen(
-            [sys.executable, "-m", __spec__.name, str(listening.fileno())],
+            [sys.executable, "-m", __spec__.name, imported, str(listening.fileno())],
             stdin=subprocess.PIPE,
             pass_fds=[listening.fileno()],
             # numpy's library would start a thread for each core, and with threads no fork is safe.
@@ -187,20 +219,33 @@ def main() -> None:
     """Serve; in a fork, run what was asked for."""
     # A Ctrl-C is for whoever started the server, who ends the forks.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    ours = (module.name for module in pkgutil.walk_packages(syncrelay.__path__, "syncrelay."))
-    for name in (*_MAINS.values(), *_IMPORTED_LATER, *ours):
+    imported, listening_at = sys.argv[1:]
+    for name in (*_MAINS.values(), *_OF_NODES, *(_of_commands() if imported == Imported.COMMANDS else ())):
         with contextlib.suppress(ImportError):
-            if name.rpartition(".")[2] not in _NEVER_IMPORTED:
-                importlib.import_module(name)
+            importlib.import_module(name)
     # What is there stays: the collector would go through it in each fork, which copies the memory.
     gc.collect()
     gc.freeze()
     # LTTng's two threads are the only ones.
     warnings.filterwarnings("ignore", category=DeprecationWarning, message=".*multi-threaded, use of fork")
-    with socket.socket(fileno=int(sys.argv[1])) as listening:
+    with socket.socket(fileno=int(listening_at)) as listening:
         request, streams = _served(listening)
     if request is not None:
-        sys.exit(_run(request, streams))
+        code = _run(request, streams)
+        if request["words"][0] == "syncrelay":
+            sys.exit(code)
+        # What is of the tests has left DDS by now. What Python does at its end would touch, so copy, most memory.
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(code or 0)
+
+
+def _of_commands() -> Iterator[str]:
+    """What commands import as they run."""
+    yield "pyarrow.parquet"
+    for module in pkgutil.walk_packages(syncrelay.__path__, "syncrelay."):
+        if module.name.rpartition(".")[2] not in _NEVER_IMPORTED:
+            yield module.name
 
 
 def _served(listening: socket.socket) -> tuple[dict[str, Any] | None, Sequence[int]]:

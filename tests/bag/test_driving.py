@@ -173,6 +173,7 @@ def test_a_replay_and_an_evaluation_give_what_messages_fed_one_by_one_give(polic
 
 @pytest.mark.parametrize("policy", _POLICIES)
 @given(data=st.data())
+@pytest.mark.long
 def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(policy, data):
     recording, text = data.draw(_recordings()), data.draw(_groups(policy))
     analysis = analyze(recording, text, bind(load_text(text), recording))

@@ -190,6 +190,7 @@ def test_a_damaged_chunk_is_left_out_and_named(tmp_path):
     assert "is damaged and left out" in fault
 
 
+@pytest.mark.long
 def test_a_compressed_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
     path = _packed(_ros1(), ".bz2", lambda content: bz2.compress(content)[:-200])(tmp_path)
     with pytest.raises(BagError, match=r"rig\.bag\.bz2: cut off or damaged"):

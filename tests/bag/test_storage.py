@@ -145,6 +145,7 @@ def test_without_a_checksum_or_statistics_no_chunk_is_left_out(lack, server, tmp
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if "index" not in kind])
+@pytest.mark.long
 def test_whatever_became_of_it_is_read_as_a_file_of_this_machine_is(kind, server, tmp_path):
     path = KINDS[kind](tmp_path)
     url = server.url("/rig")
@@ -193,6 +194,7 @@ def test_what_cannot_be_read_by_ranges_is_copied_here_and_that_is_said(kind, ser
 
 @pytest.mark.parametrize("fault", ["drop", "cut", "500", "503", "429", "shifted", "short", "whole"])
 @pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.long
 def test_what_goes_wrong_once_is_tried_again(fault, number, server, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", rig_with_images(10))
     server.fault = lambda request: fault if request == number else ""

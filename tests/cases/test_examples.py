@@ -19,6 +19,7 @@ def test_every_example_has_tests():
     assert [file.name for file in FILES] == sorted(file.name for file in CONFIGS.glob("*.yaml"))
 
 
+@pytest.mark.long
 def test_every_changed_value_is_noticed_that_changes_anything(tmp_path):
     left, tried = survivors(tmp_path)
     assert {(mutant.name, mutant.place) for mutant in left} == ALIKE

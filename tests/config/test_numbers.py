@@ -65,6 +65,7 @@ def _places() -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 @pytest.mark.parametrize("number", _WITHOUT_END.values(), ids=_WITHOUT_END)
+@pytest.mark.long
 def test_at_every_key_a_number_without_end_is_refused_where_it_stands(number: str, environ):
     for place, file in _places():
         text = json.dumps(file).replace(_NUMBER, number)

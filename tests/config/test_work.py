@@ -81,6 +81,7 @@ def _work(text: str, environ: dict[str, str]) -> int:
 
 
 @pytest.mark.parametrize("shape", _SHAPES.values(), ids=_SHAPES)
+@pytest.mark.long
 def test_twice_as_much_of_anything_takes_about_twice_the_work(shape: Callable[[int], str], environ):
     once, twice = (_work(shape(n), environ) for n in (300, 600))
     # What is quadratic comes to nearly 4.
@@ -90,6 +91,7 @@ def test_twice_as_much_of_anything_takes_about_twice_the_work(shape: Callable[[i
 @pytest.mark.parametrize(
     "shape", ["keys of the file misspelt", "policies misspelt", "keys of another level", "packages misspelt"]
 )
+@pytest.mark.long
 def test_a_valid_word_is_looked_for_only_as_often_as_somebody_may_read_of_it(shape: str, environ):
     looked = 0
 

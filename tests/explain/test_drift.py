@@ -81,6 +81,7 @@ def is_told(found):
 
 
 @pytest.mark.parametrize("seed", range(40))
+@pytest.mark.long
 def test_a_few_delays_of_a_slow_sensor_that_lie_on_a_line_by_chance_are_no_drift(seed):
     chance = random.Random(seed)
     delays = [round(chance.uniform(-30 * MS, 30 * MS)) for _ in range(400)]

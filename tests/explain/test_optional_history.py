@@ -5,6 +5,8 @@ import random
 from collections import deque
 from dataclasses import dataclass, field
 
+import pytest
+
 from syncrelay.config import load_text
 from syncrelay.explain import Code, Endpoint, GroupWatch, InputGraph, judge
 from syncrelay.sync import Match, Message
@@ -97,6 +99,7 @@ def _findings(history: _History):
         yield at, next((each for each in judge(facts) if each.code is Code.WAITING_FOR_OPTIONAL), None)
 
 
+@pytest.mark.long
 def test_no_cause_is_named_that_did_not_hold():
     said = set()
     for seed in _SEEDS:
@@ -124,6 +127,7 @@ def test_no_cause_is_named_that_did_not_hold():
     assert {cause[:6] for cause in said} >= {"", "it arr", "it has", "its st", "the ne"}
 
 
+@pytest.mark.long
 def test_an_input_that_has_been_in_every_set_for_long_is_not_told():
     for seed in _SEEDS:
         history = _History(random.Random(seed))

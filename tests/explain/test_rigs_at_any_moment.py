@@ -29,6 +29,7 @@ _NOT_YET = "not known yet"
 
 
 @pytest.mark.parametrize(("name", "seed"), _CASES)
+@pytest.mark.long
 def test_at_any_moment_the_cause_is_named_and_no_other(name: str, seed: int):
     rig = RIGS[name]
     play = played(name, rig, seed)

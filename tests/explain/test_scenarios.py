@@ -71,6 +71,7 @@ def held_up(kind: str, pauses: list[tuple[float, float]]) -> dict[str, Any]:
 @pytest.mark.parametrize(("sources", "options"), HEALTHY.values(), ids=HEALTHY)
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("kind", ["stops", "starved"])
+@pytest.mark.long
 def test_of_a_relay_that_gets_too_little_cpu_only_that_is_said(sources, options, seed, kind):
     chance = random.Random(seed)
     at = 5.0
@@ -362,6 +363,7 @@ BUSY: dict[str, Callable[[int], dict[str, Any]]] = {
 @pytest.mark.parametrize(("rate", "slop"), [(0.01, "20ms"), (-0.01, "20ms"), (0.001, "20ms"), (-0.0002, "5ms")])
 @pytest.mark.parametrize("noise", [0.0, 2.0, 10.0])
 @pytest.mark.parametrize("busy", BUSY)
+@pytest.mark.long
 def test_no_slop_and_no_offset_is_offered_for_a_drift(rate, slop, noise, busy):
     source = partial(Source, delay_jitter_ms=noise)
     sources = (

@@ -338,6 +338,7 @@ def _sources(draw):
 
 @settings(suppress_health_check=list(HealthCheck))
 @given(_sources(), st.sampled_from([1, 5, 20, 60]), st.sampled_from([2, 10, 40]))
+@pytest.mark.long
 def test_whatever_is_suggested_gives_what_it_promises_and_cures(sources, slop_ms, queue_size):
     options = {"slop": f"{slop_ms}ms", "queue_size": queue_size}
     told = run(*sources, seconds=20, options=options)
