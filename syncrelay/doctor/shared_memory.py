@@ -3,6 +3,7 @@
 import os
 import pwd
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from syncrelay.fastdds_files import FOLDER, NAME, is_locked, locks_of
 # One participant with the default segment size of 512 kB, and its ports.
 _NEEDED: Final = 600_000
 _TIGHT: Final = 8_000_000
+_MADE_WITHIN_S: Final = 0.05
 # Removes only what no process holds a lock on, which is how `fastdds shm clean` decides too.
 _CLEAN: Final = """for f in /dev/shm/fast*s_*_[es]l; do flock -n "$f" rm -f "$f" "${f%_?l}"; done"""
 
@@ -55,6 +57,7 @@ def check_shared_memory(found: SharedMemory, *, domain: int | None) -> Iterator[
         return
     yield from _room(found)
     yield from _foreign(found, ports_of(domain) if domain is not None else range(0))
+    yield from _empty(found)
     yield from _stale(found)
 
 
@@ -95,6 +98,18 @@ def _foreign(found: SharedMemory, ports: range) -> Iterator[Diagnosis]:
             f"processes of another user ({', '.join(elsewhere)}) use DDS over shared memory, perhaps on other domains",
             impact="if you need their topics: they are listed, but no data passes from user to user",
             fix="nothing if you don't; otherwise on both sides: export FASTDDS_BUILTIN_TRANSPORTS=UDPv4",
+        )
+
+
+def _empty(found: SharedMemory) -> Iterator[Diagnosis]:
+    """Ports that were made and never written: Fast DDS waits for who made them, and no signal is heard."""
+    empty = [f"{found.folder}/{each.name}" for each in found.files if each.is_live and each.port and not each.size]
+    if empty:
+        yield error(
+            "shm_empty",
+            f"{', '.join(empty)}: empty, and Fast DDS waits for its content",
+            impact="a node that comes to such a port hangs as it starts, for ever, and only SIGKILL ends it",
+            fix=f"rm -f {' '.join(empty)}\nand kill -9 what hangs",
         )
 
 
@@ -146,6 +161,10 @@ def _files(folder: Path) -> Iterator[ShmFile]:
             continue
         try:
             status = path.stat()
+            if not status.st_size:
+                # Perhaps it is being made.
+                time.sleep(_MADE_WITHIN_S)
+                status = path.stat()
         except FileNotFoundError:
             # Its process ended just now.
             continue

@@ -290,6 +290,7 @@ FAULTS = {
     "shm_tight": (["mount"], "mount -t tmpfs -o size=2m shm /dev/shm"),
     "shm_unusable": (["mount"], "mount -t tmpfs -o ro shm /dev/shm"),
     "shm_stale": (["mount"], f"{SHM}; {STALE}"),
+    "shm_empty": (["mount"], f"{SHM}; touch fastrtps_port7499"),
     "shm_foreign": (["mount"], f"{SHM}; {LIVE}; chown 65534 fastrtps*"),
     "private_shm": (
         ["mount", "net"],

@@ -177,8 +177,8 @@ def shm(*files, free=64 * MB, fault=None):
     return list(check_shared_memory(memory, domain=2))
 
 
-def file(*, uid, is_live, port=None):
-    return ShmFile("fastrtps_x", 549_408, uid, f"user{uid}", is_live, port)
+def file(*, uid, is_live, port=None, size=549_408):
+    return ShmFile("fastrtps_x", size, uid, f"user{uid}", is_live, port)
 
 
 @pytest.mark.parametrize(
@@ -191,6 +191,9 @@ def file(*, uid, is_live, port=None):
         (shm(free=2 * MB), [("shm_tight", INFO)]),
         (shm(file(uid=1000, is_live=False)), [("shm_stale", INFO)]),
         (shm(file(uid=0, is_live=False, port=7911)), [("shm_stale", INFO)]),
+        (shm(file(uid=1000, is_live=True, port=7000, size=0)), [("shm_empty", ERROR)]),
+        (shm(file(uid=1000, is_live=False, port=7000, size=0)), [("shm_stale", INFO)]),
+        (shm(file(uid=1000, is_live=True, size=0)), []),
         # Domain 2 has the ports 7900 to 8149.
         (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7911)), [("shm_foreign", ERROR)]),
         (shm(file(uid=0, is_live=True), file(uid=0, is_live=True, port=7411)), [("shm_foreign", INFO)]),

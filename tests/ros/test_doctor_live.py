@@ -1,14 +1,15 @@
 """The doctor's look at a graph with everything wrong that can be seen there, over real DDS."""
 
 import json
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
 
+from tests import preloaded
 from tests.doctor.environments import unshared
 from tests.ros.cdr_messages import CLOCK, IMAGE, VECTOR, serialize, vector
 from tests.ros.cdr_messages import time as ros_time
@@ -69,7 +70,7 @@ def longer(seconds: int) -> list[int]:
 
 
 def run(argv: Sequence[str], environment: Mapping[str, str]) -> Examined:
-    done = subprocess.run(argv, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    done = preloaded.run(argv, environ=environment, folder=Path.cwd())
     assert done.stdout, done.stderr
     report = json.loads(done.stdout)
     problems = [each for each in report["diagnoses"] if each["severity"] != "info"]

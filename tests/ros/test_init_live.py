@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import load
+from tests import preloaded
 from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
 from tests.ros.frames import Frame
 from tests.ros.processes import ours_of
@@ -34,7 +35,7 @@ def _now(topic: str, *, period_ms: int, after_ms: int = 0, is_stamped: bool = Tr
 
 def _init(stage: Stage, *words: str) -> subprocess.CompletedProcess[str]:
     argv = [sys.executable, "-m", "syncrelay", "init", "--from-graph", *words]
-    return subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
+    return preloaded.run(argv, environ=stage.environment, folder=stage.folder)
 
 
 def _init_of_all(stage: Stage, written: Path, *topics: str) -> subprocess.CompletedProcess[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests import preloaded
 from tests.ros.cdr_messages import STRING, VECTOR, stamps_of
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
@@ -248,7 +249,7 @@ def test_who_only_looks_is_not_managed_and_the_doctor_names_the_state(stage: Sta
     for seconds in (3, 10, 40):
         argv = [sys.executable, "-m", "syncrelay", "doctor", "--json", "--live", "--config", str(path)]
         argv += ["--seconds", f"{seconds}"]
-        done = subprocess.run(argv, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
+        done = preloaded.run(argv, environ=stage.environment, folder=stage.folder)
         told = {each["code"]: each for each in json.loads(done.stdout)["diagnoses"]}
         if "inactive" in told:
             break

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from tests import preloaded
 from tests.hostile_names import FORGED, assert_shown_safely
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import inputs
@@ -42,7 +43,7 @@ def test_a_type_of_an_odd_name_is_shown_as_text_and_no_package_is_imported_for_i
     shown = re.escape(rf"antigravity/msg/Ev\x1b[31mil\n{FORGED}")
     assert_logged(relay, rf"/odd_publisher publishes /lidar as {shown}, the file says {VECTOR}")
     look = [sys.executable, "-X", "importtime", "-m", "syncrelay", "init", "--from-graph", "--seconds", "3"]
-    done = subprocess.run(look, env=stage.environment, capture_output=True, text=True, timeout=120, check=False)
+    done = preloaded.run(look, environ=stage.environment, folder=stage.folder)
     assert (done.returncode, done.stdout) == (1, "")
     assert "antigravity\n" not in done.stderr
     assert_shown_safely(relay.stderr + done.stderr)

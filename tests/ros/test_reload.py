@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from syncrelay.sync import ApproximateTime
+from tests import preloaded
 from tests.preloaded import FROM_SCRATCH
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR
@@ -211,7 +212,7 @@ def _command(stage: Stage, relay: Process, says: str) -> subprocess.CompletedPro
     address = relay.stderr.split("http://")[1].split("/")[0]
     words = [sys.executable, "-m", "syncrelay", "reload", "--url", address]
     for _ in range(4):
-        done = subprocess.run(words, env=stage.environment, capture_output=True, text=True, check=False)
+        done = preloaded.run(words, environ=stage.environment, folder=stage.folder)
         if says in done.stdout + done.stderr:
             break
     return done
