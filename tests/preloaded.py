@@ -32,6 +32,8 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import syncrelay
+from syncrelay.config import ConfigError, load_text
+from syncrelay.fastdds_files import held_by
 
 FROM_SCRATCH: Final = ("env",)
 """Words before a command that make it a program of its own, started as a user starts it."""
@@ -59,13 +61,7 @@ _MAINS: Final = {
 }
 # What nodes import as they run. What is not installed here is missed by nobody until then.
 _OF_NODES: Final = (
-    "diagnostic_msgs.msg",
-    "geometry_msgs.msg",
     "rclpy.executors",
-    "rosgraph_msgs.msg",
-    "sensor_msgs.msg",
-    "std_msgs.msg",
-    "std_srvs.srv",
     "syncrelay.cli.run",
     "syncrelay.cli.services",
     "syncrelay.cli.summary",
@@ -76,6 +72,20 @@ _OF_NODES: Final = (
     "syncrelay.ros.rclpy_backend",
     "syncrelay.status.server",
 )
+# Loading the first of them takes half of what a node needs to start.
+_TYPE_SUPPORTS: Final = (
+    "builtin_interfaces.msg",
+    "diagnostic_msgs.msg",
+    "geometry_msgs.msg",
+    "rcl_interfaces.msg",
+    "rcl_interfaces.srv",
+    "rosgraph_msgs.msg",
+    "sensor_msgs.msg",
+    "std_msgs.msg",
+    "std_srvs.srv",
+    "type_description_interfaces.srv",
+)
+_ALMOST_A_FILE: Final = "{version: 1, groups: {g: {policy: exact_time, topics: [{topic: /a, type: a/msg/A}]}}}"
 # Ray has threads of its own, and the other one runs a command.
 _NEVER_IMPORTED: Final = ("on_ray", "__main__")
 # What Python and the loader of libraries go by: it is too late to change it in a fork.
@@ -223,6 +233,12 @@ def main() -> None:
     for name in (*_MAINS.values(), *_OF_NODES, *(_of_commands() if imported == Imported.COMMANDS else ())):
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
+    for name in _TYPE_SUPPORTS:
+        with contextlib.suppress(ImportError):
+            _load_type_supports(name)
+    # The first file has pydantic build its models.
+    with contextlib.suppress(ConfigError):
+        load_text(_ALMOST_A_FILE, environ={})
     # What is there stays: the collector would go through it in each fork, which copies the memory.
     gc.collect()
     gc.freeze()
@@ -232,9 +248,9 @@ def main() -> None:
         request, streams = _served(listening)
     if request is not None:
         code = _run(request, streams)
-        if request["words"][0] == "syncrelay":
+        # Where DDS is left, all that Python does at its end is to touch, so copy, most memory.
+        if held_by(os.getpid()):
             sys.exit(code)
-        # What is of the tests has left DDS by now. What Python does at its end would touch, so copy, most memory.
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code or 0)
@@ -246,6 +262,14 @@ def _of_commands() -> Iterator[str]:
     for module in pkgutil.walk_packages(syncrelay.__path__, "syncrelay."):
         if module.name.rpartition(".")[2] not in _NEVER_IMPORTED:
             yield module.name
+
+
+def _load_type_supports(name: str) -> None:
+    from rclpy.type_support import check_for_type_support  # noqa: PLC0415  rclpy may not be there
+
+    for each in vars(importlib.import_module(name)).values():
+        if hasattr(type(each), "__import_type_support__"):
+            check_for_type_support(each)
 
 
 def _served(listening: socket.socket) -> tuple[dict[str, Any] | None, Sequence[int]]:

@@ -21,7 +21,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from syncrelay.cli.boundary import guarded
     from syncrelay.cli.dispatch import dispatch
 
-    return guarded(lambda: dispatch(words, stop=stop))
+    code = guarded(lambda: dispatch(words, stop=stop))
+    if "rclpy" in sys.modules:
+        from syncrelay.ros.leaving import is_leaving
+
+        if is_leaving():
+            # Python's own end would wait for what DDS holds.
+            os._exit(code)
+    return code
 
 
 def _open_closed_streams() -> None:

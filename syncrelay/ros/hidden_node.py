@@ -17,6 +17,7 @@ from syncrelay.errors import RosUnavailableError
 from syncrelay.explain import GraphSnapshot
 from syncrelay.ros.environment import keep_stdout, log_arguments
 from syncrelay.ros.graph import snapshot
+from syncrelay.ros.leaving import leave
 from syncrelay.ros.start import make_node, resolver, start
 
 _NAME: Final = "_syncrelay_observer"
@@ -72,18 +73,15 @@ def join_hidden(config: Config, ros_args: Sequence[str]) -> tuple[Context, Any, 
 
 def watch_graph(*, seconds: float) -> GraphSnapshot:
     """Join the graph for a time and return what it holds; raises RosUnavailableError where rclpy does not start."""
-    context = Context()
+    context, node = Context(), None
     try:
         node = join(context, _NAME)
-        try:
-            time.sleep(seconds)
-            return snapshot(node)
-        finally:
-            node.destroy_node()
+        time.sleep(seconds)
+        return snapshot(node)
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"cannot look at the graph: {error}") from error
     finally:
-        context.try_shutdown()
+        leave(node, context)
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.entities import never_called
 from syncrelay.ros.graph import is_nameless, is_relayed, published_topics
 from syncrelay.ros.hidden_node import join
+from syncrelay.ros.leaving import leave
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.types import begins_with_header, import_type
 
@@ -76,9 +77,7 @@ def listen(*, seconds: float) -> Heard:
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"cannot listen to the graph: {error}") from error
     finally:
-        if node is not None:
-            node.destroy_node()
-        context.try_shutdown()
+        leave(node, context)
 
 
 class _Listener:

@@ -12,6 +12,7 @@ from typing import Any, Self, TypeVar
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.task import Future as RosFuture
 
 from syncrelay import own_version
 from syncrelay.collector import resting_collector
@@ -30,6 +31,7 @@ from syncrelay.ros.diagnostics import Reporters
 from syncrelay.ros.entities import Entities, Purpose
 from syncrelay.ros.groups import Groups, require_distinct_names
 from syncrelay.ros.hidden_node import join_hidden
+from syncrelay.ros.leaving import leave
 from syncrelay.ros.manifests import Manifests
 from syncrelay.ros.monitor import EVALUATE_S, Monitor
 from syncrelay.ros.parameters import Parameters
@@ -106,10 +108,10 @@ class Relay:
         try:
             require_distinct_names(config, groups, resolve)
         except SyncRelayError:
-            self._leave()
+            leave(self.node, self._context)
             raise
         name_after(relay_name.removeprefix("/").replace("/", "."))
-        self._rosout = RosoutHandler(self.node.get_logger())
+        self._rosout = RosoutHandler(self.node.get_logger().name)
         _LOG.addHandler(self._rosout)
         self._clock = WaitingClock(self.node)
         backend = choose_backend(os.environ.get(VARIABLE), node=self.node, context=self._context)
@@ -165,6 +167,7 @@ class Relay:
         self._threads = ThreadPoolExecutor(max_workers=3, thread_name_prefix="syncrelay")
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+        self._served = RosFuture()
         self._services = Services(self.node, {}, bugs=self._bugs)
         self._receiving: Future[None] | None = None
 
@@ -391,17 +394,15 @@ class Relay:
             self.drain()
         finally:
             self._clock.close()
-            self._executor.shutdown()
             self._manifest_queue.stop()
+            # Shut down at once, the executor would wait forever where it was just about to: what wakes it is destroyed.
+            self._served.set_result(None)
             self._threads.shutdown()
+            self._executor.shutdown()
             self._manifest_queue.keep(())
             self._loop.close()
             _LOG.removeHandler(self._rosout)
-            self._leave()
-
-    def _leave(self) -> None:
-        self.node.destroy_node()
-        self._context.try_shutdown()
+            leave(self.node, self._context)
 
     def _serve(self) -> None:
         while self._context.ok():
@@ -409,6 +410,6 @@ class Relay:
                 self._bugs.contained("serving services and the clock"),
                 suppress(ExternalShutdownException),
             ):
-                self._executor.spin()
+                self._executor.spin_until_future_complete(self._served)
                 return
             time.sleep(_AFTER_FAILURE_S)

@@ -55,6 +55,7 @@ def _publish(name: str, shots: Iterator[Shot], stop: Wakeup) -> None:
     from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
 
     from syncrelay.rig.scene import SCENES  # noqa: PLC0415
+    from syncrelay.ros.leaving import is_leaving, leave  # noqa: PLC0415
     from syncrelay.ros.types import import_type  # noqa: PLC0415
 
     sensor, (type_name, make_frames) = SENSORS[name], SCENES[name]
@@ -74,8 +75,9 @@ def _publish(name: str, shots: Iterator[Shot], stop: Wakeup) -> None:
             break
         publisher.publish(patch_stamp(frames[shot.number % len(frames)], shot.stamp))
     held = held_by(os.getpid())
-    node.destroy_node()
-    rclpy.shutdown()
+    leave(node, rclpy.utilities.get_default_context())
+    if is_leaving():
+        os._exit(0)
     # Of processes that leave a port at the same moment, Fast DDS may let the last one leave the file.
     remove_unused(held)
 

@@ -86,22 +86,20 @@ def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:
 
 
 class RosoutHandler(logging.Handler):
-    """Passes records on to a node's logger, which publishes them on /rosout and writes ROS's log file."""
+    """Passes records of ROS's five severities to a node's logger: for /rosout and ROS's log file."""
 
-    def __init__(self, node_logger: Any) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__()
-        # rclpy refuses two severities from one line of code, hence a line for each.
-        self._emit_at = {
-            logging.DEBUG: lambda text: node_logger.debug(text),  # noqa: PLW0108
-            logging.INFO: lambda text: node_logger.info(text),  # noqa: PLW0108
-            logging.WARNING: lambda text: node_logger.warning(text),  # noqa: PLW0108
-            logging.ERROR: lambda text: node_logger.error(text),  # noqa: PLW0108
-            logging.CRITICAL: lambda text: node_logger.fatal(text),  # noqa: PLW0108
-        }
+        self._name = name
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
-            self._emit_at.get(record.levelno, self._emit_at[logging.INFO])(one_entry(record.getMessage()))
+            text = one_entry(record.getMessage())
+            # rclpy's own logger would tell this line as the one that logs, and searches all modules for it.
+            if _rclpy.rclpy_logging_logger_is_enabled_for(self._name, record.levelno):
+                _rclpy.rclpy_logging_rcutils_log(
+                    record.levelno, self._name, text, record.funcName or "", record.pathname, record.lineno
+                )
         except Exception:  # noqa: BLE001  logging never raises, as with every handler
             self.handleError(record)
 

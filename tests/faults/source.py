@@ -26,7 +26,9 @@ from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_default_context
 
+from syncrelay.ros.leaving import leave
 from tests.faults.certified import certified
 
 _POLL_S = 0.01
@@ -42,8 +44,7 @@ def main() -> None:
     profile = QoSProfile(depth=arguments.depth, reliability=ReliabilityPolicy[arguments.reliability.upper()])
     publishers = [node.create_publisher(Vector3Stamped, topic, profile) for topic in arguments.topic]
     _serve(_Flow(arguments.topic, publishers, jitter=arguments.jitter))
-    node.destroy_node()
-    rclpy.shutdown()
+    leave(node, get_default_context())
 
 
 def _parser() -> argparse.ArgumentParser:

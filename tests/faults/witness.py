@@ -20,7 +20,9 @@ from geometry_msgs.msg import Vector3Stamped
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_default_context
 
+from syncrelay.ros.leaving import leave
 from tests.faults.laws import Pairing, SetLaw
 
 _POLL_S = 0.01
@@ -54,8 +56,7 @@ def main() -> None:
         for index, subscription in enumerate(subscriptions):
             if wait_set.is_ready("subscription", index):
                 _drain(law, index, subscription.handle)
-    node.destroy_node()
-    rclpy.shutdown()
+    leave(node, get_default_context())
 
 
 def _parser() -> argparse.ArgumentParser:

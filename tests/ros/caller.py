@@ -21,9 +21,11 @@ import rclpy
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_default_context
 from std_srvs.srv import Trigger
 
 from syncrelay.ros.environment import keep_stdout
+from syncrelay.ros.leaving import leave
 from tests.ros.processes import DEADLINE_S
 
 
@@ -31,7 +33,8 @@ def main() -> None:
     # Fast DDS's own lines would be taken for answers.
     keep_stdout()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    caller = _Caller(rclpy.create_node("caller"))
+    node = rclpy.create_node("caller")
+    caller = _Caller(node)
     commands: dict[str, Any] = {
         "call": caller.call,
         "begin": caller.begin,
@@ -43,7 +46,7 @@ def main() -> None:
     for line in sys.stdin:
         command, *words = line.split()
         print(json.dumps(commands[command](*words)), flush=True)  # noqa: T201  the answer
-    rclpy.shutdown()
+    leave(node, get_default_context())
 
 
 class _Caller:

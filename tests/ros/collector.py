@@ -24,8 +24,10 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.utilities import get_default_context
 
 from syncrelay.ros.environment import keep_stdout
+from syncrelay.ros.leaving import leave
 from tests.ros import frames
 from tests.ros.message_types import import_type
 
@@ -51,9 +53,10 @@ def main() -> None:
         spinning.start()
         for line in sys.stdin:
             print(json.dumps(_answer(node, line.split())), flush=True)  # noqa: T201  the answer
-        executor.shutdown()
+        # Shut down first, the executor would wait forever where it was just about to.
         rclpy.shutdown()
         spinning.join()
+        leave(node, get_default_context())
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -22,8 +22,10 @@ import rclpy
 from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_default_context
 
 from syncrelay.ros.environment import keep_stdout
+from syncrelay.ros.leaving import leave
 from tests.ros.processes import DEADLINE_S, wait_until
 
 
@@ -31,11 +33,12 @@ def main() -> None:
     # Fast DDS's own lines would be taken for answers.
     keep_stdout()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    manager = _Manager(rclpy.create_node("manager"))
+    node = rclpy.create_node("manager")
+    manager = _Manager(node)
     for line in sys.stdin:
         command, *words = line.split()
         print(json.dumps(getattr(manager, command)(*words)), flush=True)  # noqa: T201  the answer
-    rclpy.shutdown()
+    leave(node, get_default_context())
 
 
 class _Manager:

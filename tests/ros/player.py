@@ -23,8 +23,10 @@ from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_default_context
 
 from syncrelay.ros.environment import keep_stdout
+from syncrelay.ros.leaving import leave
 from tests.ros import frames
 from tests.ros.message_types import import_type
 
@@ -58,8 +60,7 @@ def main() -> None:
         elif command == "acknowledge":
             _acknowledge(publishers)
         print(command, flush=True)  # noqa: T201  the answer
-    node.destroy_node()
-    rclpy.shutdown()
+    leave(node, get_default_context())
 
 
 def _parser() -> argparse.ArgumentParser:

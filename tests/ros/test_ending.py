@@ -70,6 +70,47 @@ def test_a_second_signal_ends_it_at_once(stage: Stage, step: str, first: signal.
     assert relay.wait() == -second
 
 
+# rclpy's executor, on which services are served, between the look whether it is shut down and the wait.
+_LATE_TO_WAIT = """\
+import time
+from rclpy import executors
+counted = executors.NumberOfEntities
+def late(*numbers):
+    time.sleep(0.5)
+    return counted(*numbers)
+executors.NumberOfEntities = late
+"""
+
+
+def test_it_ends_where_its_executor_was_about_to_wait(stage: Stage):
+    stage.before_each_relay(_LATE_TO_WAIT)
+    relay = stage.relay(config({"front": _FRONT}))
+    relay.wait_for_log("front: waiting for")
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+
+
+# rcl's last call, as Fast DDS hangs in it.
+_HANGS_IN_DDS = """\
+import time
+from syncrelay.ros import leaving
+leaving._PATIENCE_S = 0.1
+leaving._take_from_rcl = lambda address: time.sleep(10_000)
+"""
+
+
+def test_it_ends_in_order_where_dds_hangs_as_the_node_leaves(stage: Stage):
+    stage.before_each_relay(_HANGS_IN_DDS)
+    relay = stage.relay(config({"front": _FRONT}))
+    relay.wait_for_log("front: waiting for")
+    stage.note_shared_memory()
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+    assert set(read_summary(relay.stderr)) == {"front"}
+    assert "DDS hangs as this node leaves the graph" in relay.stderr
+    assert stage.left_in_shared_memory() == set()
+
+
 # `systemctl stop` sends SIGTERM to launch and to its nodes, and launch then SIGINT to them; where launch has no
 # terminal, Ctrl-C comes twice.
 @pytest.mark.parametrize(

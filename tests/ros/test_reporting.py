@@ -3,6 +3,7 @@
 import signal
 import socket
 import struct
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,6 +23,7 @@ from tests.test_foxglove import detailed, plotted
 pytestmark = pytest.mark.ros
 
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+LOG = "rcl_interfaces/msg/Log"
 FLOAT = "std_msgs/msg/Float64"
 _STORE = get_typestore(Stores.ROS2_JAZZY)
 _RIG = merged(stream("/camera", hz=10), stream("/lidar", hz=10, shift_ms=7))
@@ -36,6 +38,21 @@ def statuses(collector: Collector) -> dict[str, tuple[int, str, dict[str, str]]]
         for array in arrays
         for each in array.status
     }
+
+
+def test_rosout_says_where_a_line_was_logged(stage: Stage):
+    collector = stage.collector({"/rosout": LOG})
+    stage.relay(config({"front": {"policy": "exact_time", "topics": inputs(PAIR)}}))
+
+    def lines() -> list[Any]:
+        heard: list[Any] = [_STORE.deserialize_cdr(payload, LOG) for payload in collector.payloads("/rosout")]
+        return [each for each in heard if each.msg.startswith("front: waiting for")]
+
+    wait_until(lines, "the line that it waits for publishers, on /rosout")
+    line = lines()[0]
+    assert (line.name, line.level) == ("syncrelay", 20)
+    text = Path(line.file).read_text().splitlines()[line.line - 1]
+    assert "_LOG." in text, (line.file, line.line)
 
 
 def test_diagnostics_have_a_status_for_each_group(stage: Stage):

@@ -39,6 +39,7 @@ def _import_types(types: list[str]) -> None:
 def _start(plan: dict[str, Any]) -> None:
     from rclpy.utilities import get_rmw_implementation_identifier  # noqa: PLC0415  after require_rclpy
 
+    from syncrelay.ros.leaving import is_leaving, leave  # noqa: PLC0415  for those who start
     from syncrelay.ros.start import make_node, resolver, start  # noqa: PLC0415  after require_rclpy
 
     ros_args = plan["ros_args"]
@@ -64,8 +65,9 @@ def _start(plan: dict[str, Any]) -> None:
         use_sim_time=bool(node.get_parameter("use_sim_time").value),
         **_path(node, context),
     )
-    node.destroy_node()
-    context.try_shutdown()
+    leave(node, context)
+    if is_leaving():
+        os._exit(0)
 
 
 def _path(node: Any, context: Any) -> dict[str, str]:
