@@ -17,6 +17,7 @@ from syncrelay.datasets.lerobot import write_lerobot
 from syncrelay.datasets.lerobot.grid import Grid
 from syncrelay.datasets.lerobot.sets import INCOMPLETE, NO_IMAGE, NOT_FINITE
 from syncrelay.datasets.lerobot.stats import PictureStats, stats_of, together
+from syncrelay.datasets.lerobot.videos import VideoWriter
 from syncrelay.errors import BagError, UsageError
 from tests.datasets.drives import (
     FEATURES,
@@ -31,6 +32,7 @@ from tests.datasets.drives import (
     picture,
     task,
 )
+from tests.faults.extent import chosen
 
 FRONT, WRIST = "observation.images.front", "observation.images.wrist"
 NS = 10**9
@@ -211,6 +213,19 @@ def test_the_same_recordings_give_the_same_bytes(tmp_path):
         root = tmp_path / name / "dataset"
         contents.append({path.relative_to(root): path.read_bytes() for path in root.rglob("*") if path.is_file()})
     assert contents[0] == contents[1]
+
+
+@pytest.mark.faults
+def test_a_video_has_the_same_bytes_each_time(tmp_path):
+    pictures = [np.full((48, 64, 3), (9 * each, 200 - 5 * each, 3 * each), np.uint8) for each in range(20)]
+    contents = set()
+    # Where x264 builds macroblock trees, one of a hundred or so differs.
+    for number in range(chosen(short=200, long=2000)):
+        with VideoWriter(tmp_path / f"{number}.mp4", fps=30) as video:
+            for each in pictures:
+                video.add(each, 1)
+        contents.add((tmp_path / f"{number}.mp4").read_bytes())
+    assert len(contents) == 1
 
 
 def test_a_frame_is_the_set_that_is_nearest_to_its_time(tmp_path):

@@ -1,5 +1,6 @@
 """SIGTERM and Control-C: an orderly end at any moment, with an account of every message."""
 
+import itertools
 import random
 import signal
 import subprocess
@@ -7,6 +8,7 @@ import sys
 
 import pytest
 
+from tests.preloaded import FROM_SCRATCH
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR, stamp_of
 from tests.ros.configs import LOSSLESS, config, inputs
@@ -24,12 +26,19 @@ _FRONT = {"policy": "exact_time", "topics": inputs(_PAIR, qos=LOSSLESS)}
 # From the first moment to well after the start: imports, joining the graph, waiting.
 _CHANCE = random.Random(5)
 _MOMENTS_S = [0.0, *(_CHANCE.uniform(0, 2.5) for _ in range(7))]
+_SIGNALS = itertools.cycle([signal.SIGTERM, signal.SIGINT])
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
-@pytest.mark.parametrize("moment_s", _MOMENTS_S, ids=lambda moment_s: f"{moment_s:.2f}s")
+@pytest.mark.parametrize(
+    ("number", "moment_s"),
+    [
+        pytest.param(number, each, id=f"{number.name} {each:.2f}s")
+        for number, each in zip(_SIGNALS, _MOMENTS_S, strict=False)
+    ],
+)
 def test_a_signal_at_any_moment_ends_it_in_order(stage: Stage, number: signal.Signals, moment_s: float):
-    relay = stage.relay(config({"front": _FRONT, "rear": {**_FRONT, "output_prefix": "/back"}}))
+    text = config({"front": _FRONT, "rear": {**_FRONT, "output_prefix": "/back"}})
+    relay = stage.relay(text, before=FROM_SCRATCH)
     relay.wait_until(lambda: relay.handles(signal.SIGTERM), "its handler of signals")
     with pytest.raises(subprocess.TimeoutExpired):
         relay.wait(moment_s)

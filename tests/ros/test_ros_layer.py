@@ -16,6 +16,7 @@ _WITHOUT_IMPORT: Final = {
     "syncrelay.ros": "the package",
     "syncrelay.ros.environment": "asks whether rclpy can be imported at all",
     "syncrelay.ros.types": "imports message classes by name",
+    "syncrelay.ros.leaving": "takes a node from librcl through ctypes",
     "syncrelay.ros.librcl": "the package",
     "syncrelay.ros.librcl.rcl": "calls librcl through ctypes",
 }

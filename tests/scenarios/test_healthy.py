@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from tests.faults.extent import chosen
 from tests.ros.stage import Stage
 from tests.scenarios.play import Played, Scenario, Theatre
 from tests.scenarios.streams import Stream
@@ -28,7 +29,7 @@ RIGS = {
         options={"queue_size": 100, "slop": "50ms"},
     ),
 }
-_QUIET_S, _BUSY_S = 25, 10
+_QUIET_S, _BUSY_S = chosen(short=(15, 6), long=(25, 10))
 _HOG = "while True: pass"
 
 
