@@ -18,7 +18,7 @@ _QUALITY: Final = 23
 _PRESET: Final = "veryfast"
 _OPTIONS: Final = MappingProxyType(
     # No frame refers to a later one: frame n of the file is frame n of the data. And macroblock trees, of little use
-    # where each second frame is whole, give other bytes in one of a hundred runs.
+    # where each second frame is whole, give other bytes in one of fifty runs.
     {"g": str(_KEYFRAMES), "crf": str(_QUALITY), "preset": _PRESET, "bf": "0", "mbtree": "0"}
 )
 _PIXELS: Final = "yuv420p"
