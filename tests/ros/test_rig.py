@@ -194,24 +194,26 @@ def test_an_orderly_end_takes_the_sensors_along(stage, holder):
 
 # What seldom happens by itself: two that leave a port at once, and each thinks that the other removes it.
 _PORTS_ARE_LEFT = """
-import os
+import contextlib, os
 from pathlib import Path
-from rclpy.node import Node
 from syncrelay.fastdds_files import held_by
+from syncrelay.ros import leaving
 from tests.ros.domain import ports_of
-destroy_node = Node.destroy_node
-def destroy_and_leave_the_ports(node):
+take_from_rcl = leaving._take_from_rcl
+def take_and_leave_the_ports(address):
     names = {f"fastrtps_port{port}" for port in ports_of(int(os.environ["ROS_DOMAIN_ID"]))}
     kept = {}
     for name in names & held_by(os.getpid()):
-        kept[name] = Path(f"/dev/shm/kept_{os.getpid()}_{name}")
-        kept[name].hardlink_to(f"/dev/shm/{name}")
-    assert kept
-    destroy_node(node)
+        link = Path(f"/dev/shm/kept_{os.getpid()}_{name}")
+        # Another sensor that ends now may have removed it.
+        with contextlib.suppress(FileNotFoundError):
+            link.hardlink_to(f"/dev/shm/{name}")
+            kept[name] = link
+    take_from_rcl(address)
     for name, link in kept.items():
         link.replace(f"/dev/shm/{name}")
         link.unlink(missing_ok=True)
-Node.destroy_node = destroy_and_leave_the_ports
+leaving._take_from_rcl = take_and_leave_the_ports
 """
 
 
