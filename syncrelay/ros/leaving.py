@@ -21,7 +21,7 @@ _LOG: Final = logging.getLogger("syncrelay")
 def leave(node: Any, context: Any) -> None:
     """Destroy a node, if there is one, and shut its context down.
 
-    Where DDS hangs in that, say so and remove what it would leave in shared memory; it hangs on beside the caller then.
+    Where DDS takes too long for that, say so and remove what it would leave in shared memory; a thread goes on with it.
     """
     if node is None:
         context.try_shutdown()
@@ -37,14 +37,14 @@ def leave(node: Any, context: Any) -> None:
     leaving.start()
     leaving.join(_PATIENCE_S)
     if leaving.is_alive():
-        _LOG.warning("DDS hangs as this node leaves the graph: ended without waiting for it any longer")
+        _LOG.warning("DDS did not let this node go within %g s: ended without waiting any longer", _PATIENCE_S)
         remove_unused(held)
     else:
         context.try_shutdown()
 
 
 def is_leaving() -> bool:
-    """Whether DDS hangs, so that this process can only be ended by `os._exit`."""
+    """Whether DDS still holds a node, so that this process can only be ended by `os._exit`."""
     return any(thread.name == _NAME for thread in threading.enumerate())
 
 
