@@ -3,9 +3,11 @@ PYTHON ?= $(shell .ci/python)
 VENV ?= .venv
 # The extra that brings ROS.
 ROS ?= ros
+# Which versions of everything else: those that are known to pass. `CONSTRAINTS=` takes the newest.
+CONSTRAINTS ?= -c .ci/constraints.txt
 BIN := $(VENV)/bin
 # A change of these takes a new installation: the compiled path is built by it.
-BUILT_OF := pyproject.toml setup.py syncrelay/ros/compiled/path.pyx
+BUILT_OF := pyproject.toml .ci/constraints.txt setup.py syncrelay/ros/compiled/path.pyx
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
 unexport PYTHONDONTWRITEBYTECODE
@@ -106,11 +108,11 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { apt-get update && apt-get install -y python3-venv && $(PYTHON) -m venv $(VENV); }
 
 $(VENV)/demo: $(BIN)/python $(BUILT_OF)
-	$(BIN)/python -m pip install -q -e '.[$(ROS)]'
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS)]'
 	touch $@
 
 $(VENV)/test: $(BIN)/python $(BUILT_OF)
-	$(BIN)/python -m pip install -q -e '.[$(ROS),test]'
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),test]'
 	touch $@
 
 $(VENV)/fleet: $(VENV)/test
@@ -129,10 +131,10 @@ $(VENV)/colcon/done: $(BIN)/python
 		ros-jazzy-ament-cmake ros-jazzy-ament-cmake-include-directories ros-jazzy-ament-cmake-python
 	touch $@
 
-$(VENV)/lint: $(BIN)/python pyproject.toml
-	$(BIN)/python -m pip install -q -e '.[lint]'
+$(VENV)/lint: $(BIN)/python pyproject.toml .ci/constraints.txt
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[lint]'
 	touch $@
 
-$(VENV)/docs: $(BIN)/python pyproject.toml
-	$(BIN)/python -m pip install -q -e '.[docs]'
+$(VENV)/docs: $(BIN)/python pyproject.toml .ci/constraints.txt
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[docs]'
 	touch $@

@@ -60,14 +60,14 @@ class FrameSets:
 
     def read(self, table: pa.Table) -> Iterator[FrameSet]:
         """Yield the sets of a table that can be frames, in their order. Raises BagError for what no frame can be."""
-        whole = np.logical_and.reduce([table[topic].is_valid().to_numpy() for topic in self._needed])
+        whole = np.all([table[topic].is_valid().to_numpy() for topic in self._needed], axis=0)
         places = np.flatnonzero(whole)
         self.unusable[INCOMPLETE] += len(table) - len(places)
         if not len(places):
             return
         chosen = pa.array(places)
         vectors = [self._rows(each, table, chosen) for each in self._vectors]
-        finite = np.logical_and.reduce([np.isfinite(rows).all(axis=1) for rows in vectors])
+        finite = np.all([np.isfinite(rows).all(axis=1) for rows in vectors], axis=0)
         self.unusable[NOT_FINITE] += len(places) - int(finite.sum())
         tasks = self._tasks(table, chosen)
         stamps = table["stamp_ns"].to_numpy()
