@@ -112,7 +112,7 @@ $(VENV)/demo: $(BIN)/python $(BUILT_OF)
 	touch $@
 
 $(VENV)/test: $(BIN)/python $(BUILT_OF)
-	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),test]'
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),test]' ros-$(ROS:ros=jazzy)-test-msgs
 	touch $@
 
 $(VENV)/fleet: $(VENV)/test

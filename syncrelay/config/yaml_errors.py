@@ -19,6 +19,10 @@ _NO_SPACE_AFTER_COLON = re.compile(r"(?:- )?\s*[A-Za-z_]\w*:(?![\s/:]|$)\S")
 _NO_SPACE_AFTER_DASH = re.compile(r"-[A-Za-z_]")
 _WORD = re.compile(r"[^\s,:\[\]{}]+|\S")
 
+# A file that uses every key is 7 levels deep.
+DEEPEST: Final = 50
+TOO_DEEP: Final = f"more than {DEEPEST} levels of nesting"
+
 Fault: TypeAlias = tuple[str, Span]
 
 
@@ -198,6 +202,8 @@ _SAYINGS: Final[tuple[tuple[str, Callable[[_Scene], Fault | None]], ...]] = (
     ("unexpected end of stream", _open_quote),
     ("document separator", _open_quote),
     ("node content", _no_content),
+    # libyaml's own limit: it reads up to 1,024 characters ahead, so it may be there before we are at ours.
+    ("maximum nesting depth", lambda scene: (TOO_DEEP, scene.here())),
 )
 
 

@@ -25,11 +25,9 @@ from syncrelay.config.document import (
 from syncrelay.config.problems import ConfigError, Path, Problem, Span, dotted
 from syncrelay.config.source import Source
 from syncrelay.config.wording import describe, quoted
-from syncrelay.config.yaml_errors import in_words
+from syncrelay.config.yaml_errors import DEEPEST, TOO_DEEP, in_words
 
 LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-# A file that uses every key is 7 levels deep.
-_DEEPEST: Final = 50
 MOST_PROBLEMS: Final = 1_000
 """Of a file with single keys and values, which may be at the end of a long path."""
 # No name of ROS is as long, and every problem below a key tells the key.
@@ -122,8 +120,8 @@ class _Composer:
         if self._awaits_key():
             what = "mapping" if isinstance(node, MappingNode) else "list"
             raise self._refusal(f"a {what} cannot be a key: put text that begins with a bracket in quotes", node.span)
-        if len(self._open) == _DEEPEST:
-            raise self._refusal(f"more than {_DEEPEST} levels of nesting", node.span)
+        if len(self._open) == DEEPEST:
+            raise self._refusal(TOO_DEEP, node.span)
         self._open.append(_Open(node, event.anchor))
 
     def _end(self, event: Any) -> None:

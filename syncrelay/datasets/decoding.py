@@ -268,8 +268,9 @@ def _plain(node: Node, value: Any) -> Any:
     """Return what rosbags decoded as Arrow takes it."""
     match node:
         case Struct():
-            # rosbags renames fields that are Python's words; their order is the definition's. It adds the type's name.
-            own = [each.name for each in fields(value) if each.name != "__msgtype__"]
+            # rosbags renames fields that are Python's words, and keeps the definition's order. Its annotations are
+            # texts, so dataclasses takes constants and the type's name for fields, too.
+            own = [each.name for each in fields(value) if not str(each.type).startswith("ClassVar")]
             return {
                 field.name: _plain(field.node, getattr(value, name))
                 for field, name in zip(node.fields, own, strict=True)

@@ -24,6 +24,7 @@ _NUMBERS = {
 _TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=6)
 _COUNTED = st.integers(0, 3)
 _LITTLE = st.sampled_from([True])
+_CONSTANTS = st.sampled_from(["", "uint8 A=1\n", 'int32 B=-1\nstring C="text"\nfloat64 D=0.5\n'])
 
 
 @dataclass
@@ -44,7 +45,7 @@ def made(draw, *, most_messages: int = 12, little_endian=_LITTLE):
     store = get_typestore(Stores.EMPTY)
     types: dict[str, Any] = {}
     for each, fields in definitions.items():
-        text = "".join(f"{kind}{shape} {field}\n" for kind, shape, field in fields)
+        text = draw(_CONSTANTS) + "".join(f"{kind}{shape} {field}\n" for kind, shape, field in fields)
         types |= get_types_from_msg(text, each)
     store.register(types)
     values = [_message(draw, definitions, name) for _ in range(draw(st.integers(1, 3)))]
