@@ -55,8 +55,9 @@ def _as_text(answer: Answer) -> str:
 
 def show(relays: Sequence[Answer], source: Callable[[str], Answer] = ask) -> None:
     """Show relays on the terminal until the user has seen enough, or `source`, as TopApp takes it, ends."""
-    from syncrelay.top.app import TopApp
+    from syncrelay.top.app import TopApp, end_with_terminal
 
+    end_with_terminal()
     app = TopApp(relays, source=source)
     app.run()
     if app.failure is not None:

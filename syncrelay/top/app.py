@@ -2,13 +2,13 @@
 
 import asyncio
 import os
+import select
 import signal
 import sys
-import termios
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 from typing import ClassVar, Final
 
 from textual import on, work
@@ -40,12 +40,21 @@ class Heard(Message):
         self.url, self.heard = url, heard
 
 
-def _end_without_terminal() -> None:
-    """End the process at once where its terminal is gone: there is nothing to restore, and no one to tell."""
-    try:
-        termios.tcgetattr(sys.__stderr__.fileno() if sys.__stderr__ else 2)
-    except (termios.error, OSError, ValueError):
-        os._exit(128 + signal.SIGHUP)
+def end_with_terminal() -> None:
+    """From now on, end the process as soon as its terminal is gone: there is nothing to restore, and no one to tell.
+
+    SIGHUP cannot be relied on for this: a process that nohup or a CI runner started ignores it, and it may come before
+    there is a handler.
+    """
+    terminal = sys.stderr.fileno()
+    Thread(target=_await_hang_up, args=(terminal,), name="terminal", daemon=True).start()
+
+
+def _await_hang_up(terminal: int) -> None:
+    polled = select.poll()
+    polled.register(terminal, 0)
+    polled.poll()
+    os._exit(128 + signal.SIGHUP)
 
 
 class TopApp(App[None]):
@@ -82,17 +91,12 @@ class TopApp(App[None]):
         """Show the only relay, or ask which one."""
         # Without it, the terminal would be left as it was drawn upon.
         loop = asyncio.get_running_loop()
-        loop.add_signal_handler(signal.SIGTERM, self.exit)
-        # Not as the loop's handler: one whose terminal goes while it is set up may wait for it for ever.
-        signal.signal(signal.SIGHUP, lambda *_: self._hang_up(loop))
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            loop.add_signal_handler(number, self.exit)
         if len(self._relays) > 1:
             self.push_screen(RelaysScreen(self._relays))
         else:
             self._watch(self._relays[0])
-
-    def _hang_up(self, loop: asyncio.AbstractEventLoop) -> None:
-        _end_without_terminal()
-        loop.call_soon_threadsafe(self.exit)
 
     def on_unmount(self) -> None:
         """Let the thread end."""

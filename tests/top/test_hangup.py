@@ -3,6 +3,7 @@
 import os
 import pty
 import select
+import signal
 import subprocess
 import sys
 import time
@@ -15,13 +16,14 @@ from tests.top.relay_server import serving
 _DEADLINE_S = 60
 
 
+@pytest.mark.parametrize("inherited", [signal.SIG_DFL, signal.SIG_IGN])
 @pytest.mark.parametrize("delay_s", [0.0, 0.03, 0.08, 0.2, 0.6])
-def test_it_ends_with_its_terminal_however_soon_that_goes(delay_s: float):
+def test_it_ends_with_its_terminal_however_soon_that_goes(delay_s: float, inherited: signal.Handlers):
     with serving(states.healthy()) as server:
         ours, its = pty.openpty()
         process = subprocess.Popen(
             # The terminal has to be the process's own, to have it told that it is gone.
-            [sys.executable, "-c", _ON_A_TERMINAL_OF_ITS_OWN, server.url],
+            [sys.executable, "-c", _ON_A_TERMINAL_OF_ITS_OWN, server.url, inherited.name],
             stdin=its,
             stdout=its,
             stderr=its,
@@ -44,7 +46,9 @@ def test_it_ends_with_its_terminal_however_soon_that_goes(delay_s: float):
 
 
 _ON_A_TERMINAL_OF_ITS_OWN = """
-import fcntl, sys, termios
+import fcntl, signal, sys, termios
+# nohup and many CI runners start what they run with SIGHUP ignored.
+signal.signal(signal.SIGHUP, signal.Handlers[sys.argv[2]])
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 from syncrelay.cli import main
 sys.argv = ["syncrelay", "top", "--url", sys.argv[1]]
