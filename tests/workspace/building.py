@@ -14,10 +14,12 @@ COLCON = "SYNCRELAY_COLCON"
 
 
 class Workspace:
-    """A folder with src/, and after `colcon build` with install/."""
+    """A folder with src/, and after `colcon build` with install/; the venv that is active has a space in its path."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self.venv = folder.parent / "a venv"
+        self.venv.symlink_to(sys.prefix)
         self.sources = folder / "src" / "syncrelay"
         self.prefix = folder / "install" / "syncrelay"
         self.executable = self.prefix / "lib" / "syncrelay" / "syncrelay"
@@ -28,8 +30,8 @@ class Workspace:
         """Run colcon as a user does where ROS is sourced and the tests' venv is active; what it says."""
         ros = Path(os.environ[COLCON]).resolve()
         environment = _without_ours(os.environ) | {
-            "PATH": os.pathsep.join([str(Path(sys.prefix) / "bin"), str(ros / "bin"), os.environ["PATH"]]),
-            "VIRTUAL_ENV": sys.prefix,
+            "PATH": os.pathsep.join([str(self.venv / "bin"), str(ros / "bin"), os.environ["PATH"]]),
+            "VIRTUAL_ENV": str(self.venv),
             "CMAKE_PREFIX_PATH": str(ros),
             "AMENT_PREFIX_PATH": str(ros),
             "PYTHONPATH": sysconfig.get_path("purelib", vars={"base": str(ros)}),

@@ -11,5 +11,5 @@ collect_ignore_glob = [] if os.environ.get(COLCON) else ["test_*.py"]
 
 @pytest.fixture(scope="session")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A fresh workspace with this repository in its src/, built by colcon."""
-    return build(tmp_path_factory.mktemp("workspace"))
+    """A fresh workspace with this repository in its src/, built by colcon in a path with a space."""
+    return build(tmp_path_factory.mktemp("a workspace"))
