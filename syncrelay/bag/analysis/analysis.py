@@ -47,8 +47,10 @@ class GroupAnalysis:
     @cached_property
     def unneeded(self) -> Unneeded:
         """Which dropped messages cost no set."""
-        reach = self.possible.widest if self.possible is not None and self.possible.spans else None
-        return find_unneeded(self.group, self.evaluation, reach)
+        if self.possible is None or not self.possible.spans:
+            return find_unneeded(self.group, self.evaluation, None)
+        slop = self.group.options.tolerance.ns if self.group.options.tolerance else 0
+        return find_unneeded(self.group, self.evaluation, slop if self.possible.is_alone else self.possible.widest)
 
     @property
     def fates(self) -> tuple[InputFates, ...]:

@@ -74,7 +74,7 @@ def curves_of(
         return tuple(_point(group, option, value, used, pivot) for value in sorted(values))
 
     return Curves(
-        by_slop=() if slop is None else points(slop, _slops(possible)),
+        by_slop=() if slop is None or possible.is_alone else points(slop, _slops(possible)),
         by_queue_size=points("queue_size", _sizes(group, suggested, possible)),
         messages=len(used),
         recorded=sum(len(stream.places) for stream in streams),

@@ -53,14 +53,16 @@ class Tightest:
 
 @dataclass(frozen=True, slots=True)
 class PossibleSets:
-    """The sets that a recording holds, by the tightest set of each message of the slowest input.
+    """The sets that a recording holds, by the tightest set of each message of the slowest required input.
 
-    `spans`, sorted, are of those whose messages belong together and share none with a tighter one; `is_exact` tells
-    that their stamps are meant to be equal.
+    `spans`, sorted, are of those whose messages belong together and share none with a tighter one; `is_exact` means
+    that their stamps are meant to be equal. Where `is_alone`, one input is required: each of its messages is a
+    possible set, whatever slop is, with a span of 0.
     """
 
     tightest: Tightest
     is_exact: bool
+    is_alone: bool
     spans: tuple[int, ...]
 
     @property
@@ -113,7 +115,7 @@ def tightest(streams: Sequence[Stream], offsets: Sequence[int], *, successors: i
     pivots = inputs[pivot]
     others = [each for index, each in enumerate(inputs) if index != pivot]
     sides = [_sides(pivots.stamps, other.stamps) for other in others]
-    spans, lefts = _tightest_spans(sides)
+    spans, lefts = _tightest_spans(len(pivots.stamps), sides)
     chosen = [(pivots, np.arange(len(pivots.stamps)))]
     for other, (before, _, behind) in zip(others, sides, strict=True):
         # `behind` is the first not older: the partner is it, or the one before it, if that lies within.
@@ -134,6 +136,8 @@ def tightest(streams: Sequence[Stream], offsets: Sequence[int], *, successors: i
 
 def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArray[np.bool_]:
     """Tell which sets share no partner with one that is tighter: each message is in one set."""
+    if not partners:
+        return np.ones(len(spans), dtype=np.bool_)
     order = np.argsort(spans, kind="stable")
     rows = np.stack(partners, axis=1)[order].tolist()
     taken: list[set[int]] = [set() for _ in partners]
@@ -171,10 +175,10 @@ def _sides(pivots: Nanoseconds, stamps: Nanoseconds) -> tuple[Nanoseconds, Nanos
 
 
 def _tightest_spans(
-    sides: Sequence[tuple[Nanoseconds, Nanoseconds, Nanoseconds]],
+    pivots: int, sides: Sequence[tuple[Nanoseconds, Nanoseconds, Nanoseconds]]
 ) -> tuple[Nanoseconds, Nanoseconds]:
     """Return the least span of each pivot, and how far before the pivot that set begins."""
-    best = np.full(len(sides[0][0]), 2 * _FAR, dtype=np.int64)
+    best = np.full(pivots, 2 * _FAR, dtype=np.int64)
     best_left = np.zeros_like(best)
     for left in [np.zeros_like(best), *(before for before, _, _ in sides)]:
         reach = np.zeros_like(best)

@@ -120,14 +120,16 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> PossibleSets
     if found is None:
         return None
     found = replace(found, pivot=required[found.pivot])
+    is_alone = len(required) == 1
     if found.share_within(0) >= _EQUAL:
-        return PossibleSets(found, is_exact=True, spans=(0,) * int(np.count_nonzero(found.spans == 0)))
+        spans = (0,) * int(np.count_nonzero(found.spans == 0))
+        return PossibleSets(found, is_exact=not is_alone, is_alone=is_alone, spans=spans)
     periods = [figures_of(streams[index]).period or 0 for index in required if index != found.pivot]
     # Where most lie close together, what lies far off has lost its partner.
     usual = int(np.quantile(found.spans, 0.75, method="inverted_cdf"))
     limit = min(_PERIODS * max(periods), _FAR_OFF * usual)
     within = found.spans[found.disjoint & (found.spans <= limit)]
-    return PossibleSets(found, is_exact=False, spans=tuple(np.sort(within).tolist()))
+    return PossibleSets(found, is_exact=False, is_alone=False, spans=tuple(np.sort(within).tolist()))
 
 
 def _stamping(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]:
@@ -161,16 +163,16 @@ def _does(group: GroupConfig, evaluation: Evaluation, possible: PossibleSets) ->
     if completed(evaluation.counts, possible.tightest.pivot) < ENOUGH * len(possible.spans):
         return False
     slop = group.options.tolerance.ns if group.options.tolerance else 0
-    return bool(possible.is_exact and not slop) or (
+    return bool(possible.is_alone or (possible.is_exact and not slop)) or (
         not possible.is_exact and bool(possible.spans) and slop <= _TOO_WIDE * possible.spans[-1]
     )
 
 
 def _ladder(group: GroupConfig, possible: PossibleSets) -> Iterator[list[Change]]:
     """Yield values, the tightest first."""
-    if possible.is_exact:
-        for queue in _queues(group, possible, 0):
-            yield [*_policy(group, "exact_time", "the stamps of a set are equal"), *queue]
+    if possible.is_exact or possible.is_alone:
+        exact = _policy(group, "exact_time", "the stamps of a set are equal") if possible.is_exact else []
+        yield from ([*exact, *queue] for queue in _queues(group, possible, 0))
         return
     spans, tolerance = possible.spans, group.options.tolerance
     if not spans or tolerance is None:
