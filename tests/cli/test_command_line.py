@@ -1,5 +1,6 @@
 """The skeleton: commands, their help, usage errors and exit codes."""
 
+import shlex
 import sys
 
 import pytest
@@ -175,7 +176,7 @@ def test_a_reader_that_goes_away_is_no_bug(words, tmp_path):
 def test_a_stream_that_is_closed_is_as_good_as_none(streams, tmp_path):
     (tmp_path / "good.yaml").write_text(GOOD)
     script = "import os, sys; sys.exit(os.waitstatus_to_exitcode(os.system(sys.argv[1])))"
-    words = f"{sys.executable} -m syncrelay validate good.yaml {streams}"
+    words = f"{shlex.quote(sys.executable)} -m syncrelay validate good.yaml {streams}"
     done = run_python("-c", script, words, folder=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
 

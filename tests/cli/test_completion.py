@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -175,7 +176,7 @@ def environ(folder):
     """An environment in which `syncrelay` is the one that is tested, and a script for each shell is in the folder."""
     program = folder / "bin" / "syncrelay"
     program.parent.mkdir()
-    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m syncrelay "$@"\n')
+    program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m syncrelay "$@"\n')
     program.chmod(0o755)
     for shell in ("bash", "zsh", "fish"):
         (folder / f"complete.{shell}").write_text(run("completion", shell, folder=folder).stdout)

@@ -1,6 +1,7 @@
 import json
 import os
 import pty
+import shlex
 import subprocess
 import sys
 
@@ -86,7 +87,7 @@ def test_a_dash_is_standard_input(folder, environ):
     "command", ["{validate} <(cat good.yaml)", "cat good.yaml | {validate} -", "cat good.yaml | {validate} /dev/stdin"]
 )
 def test_what_another_program_writes_is_read_to_its_end(command, folder, environ):
-    validate = f"{sys.executable} -m syncrelay validate"
+    validate = f"{shlex.quote(sys.executable)} -m syncrelay validate"
     done = subprocess.run(
         ["/bin/bash", "-c", command.format(validate=validate)],
         cwd=folder,

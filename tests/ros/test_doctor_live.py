@@ -1,6 +1,7 @@
 """The doctor's look at a graph with everything wrong that can be seen there, over real DDS."""
 
 import json
+import shlex
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -170,7 +171,7 @@ MAY_READ = " ".join(f"--{kind}=-all,+dac_read_search" for kind in ("inh-caps", "
 
 def test_nodes_of_another_user_are_told_from_nodes_that_are_not_there(stage: Stage):
     (stage.folder / "doctor.yaml").write_text(config({"front": group("/camera", "/lidar")}))
-    player = f"{sys.executable} -m tests.ros.player --topic /camera {VECTOR} --topic /lidar {VECTOR}"
+    player = f"{shlex.quote(sys.executable)} -m tests.ros.player --topic /camera {VECTOR} --topic /lidar {VECTOR}"
     environment = {**stage.environment, "HOME": str(stage.folder)}
     said: dict[str, dict[str, Any]] = {}
     for look_s in longer(8):
