@@ -109,7 +109,7 @@ def _observe(config: Config, frames: list[Frame]) -> None:
         live.take(group.name, came)
     for analysis in analyze_live(config, config.groups, live):
         assert suggestion_as_json(analysis.suggestion)
-        assert list(suggestion_lines(analysis))
+        assert all(suggestion_lines(analysis))
 
 
 def _agree(replayed: str, analyzed: str, where: str) -> None:
