@@ -7,12 +7,14 @@ from docs.generate.markdown import linked
 from syncrelay.explain import Code, Severity
 from syncrelay.explain.judge import EXPLAINS, MATCHING
 
+# As programs get them: in /status, in the metrics, in `analyze --json`.
+_OK, _WARN, _ERROR = (f"`{severity.name.lower()}`" for severity in Severity)
 _SAID_AS = {
-    (Severity.OK,): "ok",
-    (Severity.WARN,): "warning",
-    (Severity.ERROR,): "error",
-    (Severity.WARN, Severity.ERROR): "error where it keeps sets from leaving, otherwise warning",
-    tuple(Severity): "ok, warning or error",
+    (Severity.OK,): _OK,
+    (Severity.WARN,): _WARN,
+    (Severity.ERROR,): _ERROR,
+    (Severity.WARN, Severity.ERROR): f"{_ERROR} where it keeps sets from leaving, otherwise {_WARN}",
+    tuple(Severity): f"{_OK}, {_WARN} or {_ERROR}",
 }
 
 

@@ -73,6 +73,8 @@ class Losses:
 
     def __init__(self) -> None:
         self._totals: deque[int] = deque(maxlen=_RECENT)
+        self.total = 0
+        """How many were lost in all."""
         self._publishers = 0
         self._settling = 0
 
@@ -83,6 +85,8 @@ class Losses:
         if self._settling:
             self._settling -= 1
             self._totals.clear()
+        elif self._totals:
+            self.total += total - self._totals[-1]
         self._publishers = publishers
         self._totals.append(total)
 

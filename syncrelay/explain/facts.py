@@ -81,10 +81,11 @@ class InputGraph:
 
     `name` is the topic's in the graph, `output` that under which its messages leave, `not_importable` says why its type
     cannot be used here, `not_readable` why the stamp or key that the file names cannot be read from it, `refusal` what
-    DDS does not make or publish for it, `alike` are topics of the graph that may have been meant, `lost` counts what
-    DDS lost on the way of late. `type_from` is the publisher, or one of several, whose type was taken because the file
-    has none, None while there is none. `rivals` are others that publish its output, seen so without a break since
-    `rivals_since`. `largest` is the size of the largest message in bytes, 0 where nobody measures it.
+    DDS does not make or publish for it, `alike` are topics of the graph that may have been meant. DDS recently lost
+    `lost` messages on the way, and `lost_in_all` since the relay follows the topic. `type_from` is the publisher, or
+    one of several, whose type was taken because the file has none, None while there is none. `rivals` are others that
+    publish its output, seen so without a break since `rivals_since`. `largest` is the size of the largest message in
+    bytes, 0 where nobody measures it.
     """
 
     name: str
@@ -96,6 +97,7 @@ class InputGraph:
     not_readable: str | None = None
     refusal: Refusal | None = None
     lost: int = 0
+    lost_in_all: int = 0
     rivals: tuple[Endpoint, ...] = ()
     rivals_since: int = 0
     largest: int = 0

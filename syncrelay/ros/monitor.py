@@ -161,7 +161,7 @@ class Monitor:
             now=now,
         )
         self.heard(binding.group.config.name, batch.arrivals)
-        shown = [self._surroundings.of(each, lost=self._losses[each.topic].recent) for each in binding.inputs]
+        shown = [self._surroundings.of(each, self._losses[each.topic]) for each in binding.inputs]
         facts = watch.facts(
             shown,
             now=now,

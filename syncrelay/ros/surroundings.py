@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from syncrelay.config.wording import counted
+from syncrelay.dataflow.observers import Losses
 from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal
 from syncrelay.ros import graph
 from syncrelay.ros.entities import Purpose
@@ -49,8 +50,8 @@ class Surroundings:
         is_missing = any(not binding.topic.publishers for binding in self._bindings)
         return graph.snapshot(self._node) if is_missing and not graph.other_nodes(self._node) else None
 
-    def of(self, binding: InputBinding, *, lost: int) -> InputGraph:
-        """Return what there is around an input, of whose messages so many were lost."""
+    def of(self, binding: InputBinding, losses: Losses) -> InputGraph:
+        """Return what there is around an input, of whose messages DDS lost some."""
         around = self._around.get(binding)
         if around is None:
             around = self._around[binding] = self._poll(binding)
@@ -66,7 +67,8 @@ class Surroundings:
             not_importable=topic.not_importable,
             not_readable=binding.not_readable,
             refusal=binding.refusal or _unpublished(binding, around.output),
-            lost=lost,
+            lost=losses.recent,
+            lost_in_all=losses.total,
             largest=topic.outputs.largest,
             type_from=topic.type_from,
         )

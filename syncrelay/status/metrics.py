@@ -59,20 +59,33 @@ def _of_inputs(state: RelayState) -> Iterator[Metric]:
         "Messages by what became of them: matched, or the reason why they were dropped.",
         labels=("group", "topic", "outcome"),
     )
+    lost = CounterMetricFamily(
+        "syncrelay_messages_lost",
+        "Messages that DDS lost on their way to the relay, which are none of those received. What a publisher sent"
+        " before it was found is not counted.",
+        labels=("group", "topic"),
+    )
     buffered = GaugeMetricFamily("syncrelay_queue_length", "Messages waiting in queues.", labels=("group", "topic"))
     for report in state.groups:
         for each in report.facts.inputs:
             labels = [report.facts.name, each.name]
             received.add_metric(labels, each.counts.fed)
+            lost.add_metric(labels, each.graph.lost_in_all)
             buffered.add_metric(labels, each.counts.buffered)
             outcomes.add_metric([*labels, "matched"], each.counts.matched)
             for reason, count in each.counts.dropped.items():
                 outcomes.add_metric([*labels, reason.value], count)
-    yield from (received, outcomes, buffered)
+    yield from (received, lost, outcomes, buffered)
 
 
 def _of_groups(state: RelayState) -> Iterator[Metric]:
     sets = CounterMetricFamily("syncrelay_sets", "Sets published.", labels=("group",))
+    last = GaugeMetricFamily(
+        "syncrelay_last_set_timestamp_seconds",
+        "When the last set was published, in seconds since 1970, to about a second. No sample before the first set, nor"
+        " before the next one after a lazy group slept.",
+        labels=("group",),
+    )
     spans = HistogramMetricFamily(
         "syncrelay_set_span_seconds",
         "Spans of the sets: the latest stamp of a set minus the earliest.",
@@ -86,9 +99,11 @@ def _of_groups(state: RelayState) -> Iterator[Metric]:
     for report in state.groups:
         figures = report.facts.figures
         sets.add_metric([report.facts.name], figures.sets)
+        if figures.last_set is not None:
+            last.add_metric([report.facts.name], figures.last_set / _NS_PER_SECOND)
         _add(spans, report.facts.name, figures.span_histogram)
         _add(latencies, report.facts.name, figures.latency_histogram)
-    yield from (sets, spans, latencies)
+    yield from (sets, last, spans, latencies)
 
 
 def _add(family: HistogramMetricFamily, group: str, histogram: Histogram) -> None:

@@ -47,20 +47,20 @@ def test_the_longest_wait_is_told_for_ten_evaluations():
 
 
 @pytest.mark.parametrize(
-    ("totals_and_publishers", "recent"),
+    ("totals_and_publishers", "recent", "in_all"),
     [
-        pytest.param([(0, 1), (0, 1), (4, 1), (5, 1)], 5, id="what is lost of a known publisher counts"),
-        pytest.param([(8, 1), (8, 1), (8, 1)], 0, id="what a first publisher sent before counts not"),
-        pytest.param([(0, 1), (0, 1), (0, 1), (6, 2), (7, 2)], 0, id="nor what a second one sent before"),
-        pytest.param([(0, 1), (0, 1), (3, 1), (1, 1), (1, 1), (2, 1)], 1, id="a new subscription counts from 0"),
-        pytest.param([(0, 1), (0, 1), (3, 1), *[(3, 1)] * 10], 0, id="after ten evaluations it is forgotten"),
+        pytest.param([(0, 1), (0, 1), (4, 1), (5, 1)], 5, 5, id="what is lost of a known publisher counts"),
+        pytest.param([(8, 1), (8, 1), (8, 1)], 0, 0, id="what a first publisher sent before counts not"),
+        pytest.param([(0, 1), (0, 1), (0, 1), (6, 2), (7, 2)], 0, 0, id="nor what a second one sent before"),
+        pytest.param([(0, 1), (0, 1), (3, 1), (1, 1), (1, 1), (2, 1)], 1, 4, id="a new subscription counts from 0"),
+        pytest.param([(0, 1), (0, 1), (3, 1), *[(3, 1)] * 10], 0, 3, id="after ten evaluations it counts in all only"),
     ],
 )
-def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publishers, recent):
+def test_only_what_a_known_publisher_lost_of_late_is_a_loss(totals_and_publishers, recent, in_all):
     losses = Losses()
     for total, publishers in totals_and_publishers:
         losses.observe(total, publishers=publishers)
-    assert losses.recent == recent
+    assert (losses.recent, losses.total) == (recent, in_all)
 
 
 def test_a_clock_that_was_set_has_stepped_once_and_is_told_for_half_a_minute(monkeypatch):

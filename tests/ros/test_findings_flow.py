@@ -1,5 +1,6 @@
 """A working rig, and one whose flow is broken: the relay's log and its state say what is wrong."""
 
+import re
 import signal
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +14,7 @@ from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
 from tests.ros.sensors import APPROXIMATE, LASTED, OF_A_BUSY_MACHINE, PAIR, front, play, stream, warnings_of
 from tests.ros.stage import Collector, Stage, running_stage
-from tests.ros.status import ANY_PORT, groups_of, status, wait_for_finding
+from tests.ros.status import ANY_PORT, get, groups_of, status, wait_for_finding
 from tests.ros.streams import merged
 
 pytestmark = pytest.mark.ros
@@ -131,6 +132,9 @@ def test_messages_that_dds_lost_while_the_relay_stood_still_are_counted_and_the_
 
     wait_until(is_blamed, "a relay that is too slow, and losses that are counted")
     assert "messages_lost" not in said
+    counted = re.search(r'syncrelay_messages_lost_total\{group="front",topic="/camera"\} (\S+)', get(relay, "/metrics"))
+    assert counted
+    assert float(counted[1]) > 0
 
 
 def test_a_relay_that_cannot_keep_up_is_told(stage: Stage):

@@ -18,7 +18,7 @@ _DATASOURCE = {"type": "prometheus", "uid": "${datasource}"}
 # What Prometheus itself gives each series, and what Grafana puts into a query.
 _OF_A_SCRAPE = {"job", "instance"}
 _BUILT_IN = {"__rate_interval", "__interval"}
-_FUNCTIONS = {"changes", "count", "histogram_quantile", "rate", "sum", "vector"}
+_FUNCTIONS = {"changes", "count", "histogram_quantile", "max", "rate", "sum", "time", "vector"}
 _GROUPING = re.compile(r"\b(?:by|without|on|ignoring) ?\(([^)]*)\)")
 
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from prometheus_client import generate_latest
@@ -10,7 +11,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from syncrelay.explain import Code, Finding, Severity
 from syncrelay.status import Phase
 from syncrelay.status.metrics import registry
-from tests.status.support.states import relay, started, working
+from tests.status.support.states import BEGAN, S, relay, started, working
 
 _SILENT = Finding(Code.SILENT, Severity.WARN, "/camera has been silent for 7 s", None, 0)
 
@@ -45,6 +46,22 @@ def test_received_is_matched_and_dropped_and_waiting():
     assert value(found, "syncrelay_messages_total", **of_camera, outcome="matched") == 30
 
 
+def test_what_dds_lost_is_counted_beside_what_was_received():
+    report = working()
+    camera, lidar = report.facts.inputs
+    camera = replace(camera, graph=replace(camera.graph, lost=2, lost_in_all=7))
+    found = samples(relay(replace(report, facts=replace(report.facts, inputs=(camera, lidar)))))
+    assert value(found, "syncrelay_messages_lost_total", group="front", topic="/camera") == 7
+    assert value(found, "syncrelay_messages_lost_total", group="front", topic="/lidar") == 0
+    assert value(found, "syncrelay_messages_received_total", group="front", topic="/camera") == 34
+
+
+def test_the_time_of_the_last_set_is_told_once_there_was_one():
+    name = "syncrelay_last_set_timestamp_seconds"
+    assert value(samples(relay(working())), name, group="front") == pytest.approx((BEGAN + 3 * S) / S)
+    assert not [each for each, _ in samples(relay(started())) if each == name]
+
+
 def test_histograms_are_in_seconds_and_count_every_set():
     found = samples(relay(working()))
     for quantity, seconds in (("span", 0.005), ("latency", 0.002)):
@@ -67,6 +84,14 @@ def test_readiness_reloads_and_build_are_told():
 def test_each_finding_is_a_series_while_it_holds():
     found = samples(relay(working()))
     assert value(found, "syncrelay_finding", group="front", code="healthy", severity="ok", topic="") == 1
+    found = samples(relay(replace(working(), problems=(_SILENT,))))
+    assert value(found, "syncrelay_finding", group="front", code="silent", severity="warn", topic="/camera") == 1
+
+
+def test_severities_are_named_in_the_reference_as_the_metrics_name_them():
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "findings.md").read_text()
+    told = set(re.findall(r"`(\w+)`", "\n".join(re.findall("^- Severity: .*$", page, re.MULTILINE))))
+    assert told == {severity.name.lower() for severity in Severity}
 
 
 def test_metrics_are_named_as_prometheus_has_it():
