@@ -15,7 +15,11 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument("config", description="the YAML file that describes the groups"),
             DeclareLaunchArgument("group", default_value="", description="run this group only; default: all"),
             DeclareLaunchArgument("node_name", default_value="", description="its name; default: as the file says"),
-            DeclareLaunchArgument("namespace", default_value="", description="of the node; default: as the file says"),
+            DeclareLaunchArgument(
+                "namespace",
+                default_value="",
+                description="of the node, its relative topics and their outputs; default: as the file says",
+            ),
             DeclareLaunchArgument(
                 "log_level",
                 default_value="info",

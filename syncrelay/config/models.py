@@ -336,7 +336,11 @@ class Group(Keys):
     )
     output_prefix: Annotated[OutputPrefix | None, NOT_NULL] = Field(
         default=None,
-        description="What default output names begin with. Default: / and the group's name.",
+        description=(
+            "What default output names begin with. Default: the group's name, absolute as the input's name is, or"
+            " relative: of the group front, /camera gives /front/camera, camera gives front/camera, in the node's"
+            " namespace, and ~/camera gives ~/front/camera."
+        ),
         examples=["/fused"],
     )
     topics: tuple[Topic, ...] = Topics

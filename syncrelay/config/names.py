@@ -86,9 +86,17 @@ def expand(name: str, *, node: str, namespace: str) -> str:
     return f"/{root}/{name}" if root else f"/{name}"
 
 
-def default_output(topic: str, *, prefix: str) -> str:
-    """Return the output name of an input: the prefix, then the input's name."""
-    return f"{prefix.rstrip('/')}/{topic.removeprefix('~').removeprefix('/')}" if prefix else topic
+def default_output(topic: str, *, group: str, prefix: str | None) -> str:
+    """Return the output name of an input: the prefix, then the input's name.
+
+    Without a prefix it is the group's name, below the root, the namespace or the node, as the input's is: so two robots
+    that run one file in namespaces of their own do not publish on the same topics.
+    """
+    root = next((each for each in ("~/", "/") if topic.startswith(each)), "")
+    name = topic.removeprefix(root)
+    if prefix is None:
+        return f"{root}{group}/{name}"
+    return f"{prefix.rstrip('/')}/{name}" if prefix else topic
 
 
 def _check_tokens(tokens: str, *, whole: str, kind: str) -> None:

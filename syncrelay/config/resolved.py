@@ -123,11 +123,10 @@ def resolve_listen(metrics: MetricsConfig | None) -> Listen | None:
 
 
 def _group(name: str, group: Group, node: NodeConfig) -> GroupConfig:
-    prefix = f"/{name}" if group.output_prefix is None else group.output_prefix
     inputs = Inputs.of(group.topics, node)
     return GroupConfig(
         name=name,
-        topics=tuple(_topic(topic, group, prefix=prefix) for topic in group.topics),
+        topics=tuple(_topic(topic, group, name=name) for topic in group.topics),
         restamp=_restamp(group, inputs),
         trigger=_index(group.trigger_topic, inputs),
         options=group,
@@ -135,11 +134,12 @@ def _group(name: str, group: Group, node: NodeConfig) -> GroupConfig:
     )
 
 
-def _topic(topic: Topic, group: Group, *, prefix: str) -> TopicConfig:
+def _topic(topic: Topic, group: Group, *, name: str) -> TopicConfig:
+    output = default_output(topic.topic, group=name, prefix=group.output_prefix)
     return TopicConfig(
         topic=topic.topic,
         type=topic.type,
-        output=default_output(topic.topic, prefix=prefix) if topic.output is None else topic.output,
+        output=output if topic.output is None else topic.output,
         qos=topic.qos,
         offset_ns=topic.offset,
         min_period_ns=topic.min_period if isinstance(topic, PacedTopic) else 0,

@@ -1,5 +1,8 @@
+import random
+
 import pytest
 
+from syncrelay.config.models import NodeConfig
 from syncrelay.config.names import (
     check_group_name,
     check_output_prefix,
@@ -40,7 +43,7 @@ def test_what_is_no_part_of_a_topic_name_is_no_group_name(name):
 @pytest.mark.parametrize("prefix", ["", "/", "~", "/a", "a", "~/a"])
 def test_a_prefix_may_be_empty_a_name_or_what_a_name_begins_with(prefix):
     assert accepts(check_output_prefix, prefix)
-    assert accepts(check_topic_name, default_output("/b", prefix=prefix))
+    assert accepts(check_topic_name, default_output("/b", group="front", prefix=prefix))
 
 
 @pytest.mark.parametrize(
@@ -54,7 +57,26 @@ def test_a_prefix_may_be_empty_a_name_or_what_a_name_begins_with(prefix):
         ("/b", "~/a", "~/a/b"),
         ("/b", "/", "/b"),
         ("b", "", "b"),
+        ("/b/c", None, "/front/b/c"),
+        ("b/c", None, "front/b/c"),
+        ("~/b/c", None, "~/front/b/c"),
     ],
 )
-def test_a_default_output_is_the_prefix_and_the_name_of_the_input(topic, prefix, output):
-    assert default_output(topic, prefix=prefix) == output
+def test_a_default_output_is_the_prefix_or_the_group_and_the_name_of_the_input(topic, prefix, output):
+    assert default_output(topic, group="front", prefix=prefix) == output
+
+
+def test_two_robots_with_one_file_publish_on_the_same_topics_only_where_they_receive_on_the_same():
+    drawn = shared = 0
+    for seed in range(500):
+        chance = random.Random(seed)
+        names = [chance.choice(("", "/", "~/")) + chance.choice("abc") for _ in range(3)]
+        nodes = [NodeConfig(name="relay", namespace=robot) for robot in ("/robot1", "/robot2")]
+        for topic in names:
+            group = chance.choice(("front", "rear"))
+            output = default_output(topic, group=group, prefix=None)
+            inputs, outputs = ({node.absolute(name) for node in nodes} for name in (topic, output))
+            assert len(inputs) == len(outputs), (seed, topic, output)
+            drawn, shared = drawn + 1, shared + (len(inputs) == 1)
+    assert drawn == 1500
+    assert 300 < shared < 700

@@ -119,9 +119,9 @@ def _names(file: dict, *, of: str) -> list[tuple[str, str]]:
     namespace = file["node"].get("namespace", "")
     named = []
     for group, keys in file["groups"].items():
-        prefix = keys.get("output_prefix", f"/{group}")
         for topic in keys["topics"]:
             below = topic["topic"].removeprefix("~").removeprefix("/")
+            prefix = keys.get("output_prefix", f"{topic['topic'].removesuffix(below)}{group}")
             default = topic["topic"] if prefix == "" else f"{prefix.rstrip('/')}/{below}"
             name = topic["topic"] if of == "topic" else topic.get("output", default)
             if name.startswith("~"):

@@ -75,6 +75,20 @@ def test_outputs_are_named_as_the_file_says(stage: Stage):
     assert relaying.sets_within(recording, collector, aligned) == expected
 
 
+def test_two_robots_that_run_one_file_in_namespaces_of_their_own_keep_their_sets_apart(stage: Stage):
+    offsets = {"/robot1": (0, 10, 20), "/robot2": (5, 15, 25, 35)}
+    recording = merged(*(at(f"{ns}/{name}", *offsets[ns]) for ns in offsets for name in ("camera", "lidar")))
+    outputs = {ns: [f"{ns}/front/camera", f"{ns}/front/lidar"] for ns in offsets}
+    relative = {"policy": "exact_time", "topics": inputs({"camera": VECTOR, "lidar": VECTOR}, qos=LOSSLESS)}
+    text = config({"front": relative})
+    aligned = dict.fromkeys([name for names in outputs.values() for name in names], VECTOR)
+    stage.relay(text, "--ros-args", "-r", "__ns:=/robot2")
+    _, collector = relaying.relay(stage, text, recording, aligned, arguments=["--ros-args", "-r", "__ns:=/robot1"])
+    for ns, names in outputs.items():
+        expected = [(frame.payload, frame.payload) for frame in at("", *offsets[ns])]
+        assert relaying.sets_within(recording, collector, names) == expected
+
+
 def _tick(seconds: int) -> Frame:
     return Frame("/clock", CLOCK, 0, serialize(CLOCK, time(seconds * NS_PER_SECOND)))
 
