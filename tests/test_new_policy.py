@@ -1,27 +1,31 @@
 """A policy that is an engine class and a model of its options, as docs/architecture.md has it, is known everywhere."""
 
+import random
+import re
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Final, Literal, get_args
 
 import pytest
 from jsonschema import Draft7Validator
-from pydantic import Field
+from pydantic import Field, create_model
 
 from syncrelay.bag import open_recording
-from syncrelay.bag.analysis import analyze
+from syncrelay.bag.analysis import GroupAnalysis, analyze
 from syncrelay.bag.bindings import bind
 from syncrelay.cli.analysis_html import as_html
 from syncrelay.config import ConfigError, Tolerance, load_text, policies
-from syncrelay.config.keys import Duration
+from syncrelay.config.keys import Duration, TopicName
 from syncrelay.config.models import Group, Inputs, Topic, Topics
 from syncrelay.config.schema import json_schema
 from syncrelay.explain import Code
 from syncrelay.sync import ApproximateEpsilonTime
 from tests.bag.making import write_mcap
+from tests.faults.extent import chosen
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
-from tests.ros.streams import MS, jittery, merged
+from tests.ros.frames import Frame
+from tests.ros.streams import MS, at, jittery, merged
 
 _TOPICS = ("/left", "/right")
 
@@ -48,9 +52,20 @@ class WithinGapGroup(Group):
         return WithinGap(n_inputs=len(self.topics), queue_size=self.queue_size, gap_ns=self.gap)
 
 
+class LedGroup(WithinGapGroup):
+    """The same at each message of one input, which need not be newer than the others as a trigger of latest_time is."""
+
+    policy: Literal["led"] = Field(description="At each message of the leader, the others less than a gap away.")  # type: ignore[assignment]
+    leader: TopicName = Field(description="Input whose every message makes a set.", examples=["/camera/image_raw"])
+
+    @property
+    def trigger_topic(self) -> str:
+        return self.leader
+
+
 @pytest.fixture(autouse=True)
-def _within_gap(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(policies, "GROUP_MODELS", (*policies.GROUP_MODELS, WithinGapGroup))
+def _new_policies(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(policies, "GROUP_MODELS", (*policies.GROUP_MODELS, WithinGapGroup, LedGroup))
 
 
 def _text(gap: str, **keys: str) -> str:
@@ -94,6 +109,92 @@ def test_a_recording_is_analyzed_by_it_and_drawn(tmp_path: Path):
     page = as_html(str(bag), analysis)
     assert "within_gap" in page
     assert "gap: " in page
+
+
+def _apart(by_ms: float, *, seed: int) -> list[Frame]:
+    """Two inputs of 10 Hz, of which the second is stamped so much later, 1 ms more or less."""
+    chance = random.Random(seed)
+    first = [100.0 * n for n in range(1, 61)]
+    return merged(at("/left", *first), at("/right", *(each + by_ms + chance.uniform(-1, 1) for each in first)))
+
+
+def _analyzed(frames: list[Frame], path: Path, **keys: str) -> GroupAnalysis:
+    text = _text(**keys)
+    with closing(open_recording([str(write_mcap(path, frames))])) as recording:
+        (group,) = analyze(recording, text, bind(load_text(text), recording)).groups
+    return group
+
+
+def test_of_a_trigger_it_is_judged_what_its_own_model_measures(tmp_path: Path):
+    seed, draws = 28, chosen(short=3, long=40)
+    chance = random.Random(seed)
+    for n in range(draws):
+        by, is_too_wide = chance.choice([-1, 1]) * chance.uniform(5, 45), n % 3 < 2
+        # The one that is stamped earlier, and the later one, in turns.
+        leader = _TOPICS[(by < 0) ^ (n % 2)]
+        gap = chance.uniform(1, abs(by) - 3) if is_too_wide else chance.uniform(abs(by) + 3, 60)
+        drawn = f"draw {n} of {draws}, seed {seed}: /right {by:.1f} ms after /left, led by {leader}, gap {gap:.1f} ms"
+        frames = _apart(by, seed=n)
+        group = _analyzed(frames, tmp_path / f"{n}.mcap", policy="led", leader=leader, gap=f"{gap:.3f}ms")
+        assert not group.group.held, drawn
+        assert group.suggestion.possible == 60, drawn
+        assert [each.finding.code for each in group.findings] == [Code.OVER_SLOP] * is_too_wide, drawn
+        for finding in (each.finding for each in group.findings):
+            span = re.match(r"the nearest sets span (\S+) ms to (\S+) ms, over gap ", finding.text)
+            assert span is not None, f"{drawn}: {finding.text}"
+            assert abs(by) - 1.1 <= float(span[1]) < float(span[2]) <= abs(by) + 1.1, f"{drawn}: {finding.text}"
+            wider = re.match(r"write `gap: (\S+)ms`", finding.suggestion or "")
+            assert wider is not None, f"{drawn}: {finding.suggestion}"
+            assert abs(by) + 1 <= float(wider[1]) <= 1.25 * abs(by) + 2, f"{drawn}: {finding.suggestion}"
+
+
+# Types of keys, each with a value as it is written and as it is read.
+_TYPES: Final[tuple[tuple[Any, Any, Any], ...]] = (
+    (Duration, "20ms", 20 * MS),
+    (Annotated[int, Field(ge=1)], 5, 5),
+    (Annotated[int, Field(ge=2)], 5, 5),
+    (int, 5, 5),
+    (str, "a", "a"),
+    (bool, False, False),
+)
+# What has a key of this name already, by its type above: every group, or within_gap.
+_THERE: Final = {"lazy": 5, "manifest": 5, "gap": 0}
+_NAMES: Final = ("one", "other")
+
+
+def test_policies_may_share_a_key_of_one_type_and_none_of_two(monkeypatch: pytest.MonkeyPatch):
+    seed, draws, there = 2228, chosen(short=12, long=300), policies.GROUP_MODELS
+    chance = random.Random(seed)
+    for n in range(draws):
+        key, first = chance.choice(["window", "window", *_THERE]), chance.randrange(len(_TYPES))
+        first = chance.choice([first, _THERE.get(key, first)])
+        second = chance.choice([first, chance.randrange(len(_TYPES))])
+        drawn = f"draw {n} of {draws}, seed {seed}: `{key}` is {_TYPES[first][0]} and {_TYPES[second][0]}"
+        keys: list[dict[str, Any]] = [
+            {"policy": (Literal[name], Field(description=name)), key: (_TYPES[of][0], Field(description=name))}
+            for name, of in zip(_NAMES, (first, second), strict=True)
+        ]
+        models = [create_model("AGroup", __base__=Group, **each) for each in keys]
+        monkeypatch.setattr(policies, "GROUP_MODELS", (*there, *models))
+        groups = {name: {"policy": name, "topics": inputs(dict.fromkeys(_TOPICS, VECTOR))} for name in _NAMES}
+        text = config(groups, defaults={key: _TYPES[first][1]})
+        is_shared = len({first, second, _THERE.get(key, first)}) == 1
+        found: Any
+        try:
+            found = [getattr(each.options, key) for each in load_text(text).groups]
+        except TypeError as error:
+            found = str(error).partition(":")[0].partition(" than ")[0]
+        refused = f"the key `{key}` of AGroup has another type"
+        assert found == ([_TYPES[first][2]] * 2 if is_shared else refused), drawn
+
+
+def test_no_two_policies_have_one_name(monkeypatch: pytest.MonkeyPatch):
+    class SecondGroup(WithinGapGroup):
+        pass
+
+    monkeypatch.setattr(policies, "GROUP_MODELS", (*policies.GROUP_MODELS, SecondGroup))
+    with pytest.raises(TypeError, match="WithinGapGroup and SecondGroup are both the policy within_gap"):
+        load_text(_text("50ms"))
 
 
 @pytest.mark.parametrize("model", policies.GROUP_MODELS, ids=lambda model: model.__name__)

@@ -3,7 +3,15 @@
 from syncrelay.config.export import ExportFeature, ExportSource, LerobotConfig
 from syncrelay.config.listen import Listen
 from syncrelay.config.load import Config, load, load_text
-from syncrelay.config.models import DiagnosticsConfig, NodeConfig, StampField, StampSource, Tolerance, Transport
+from syncrelay.config.models import (
+    DiagnosticsConfig,
+    Distance,
+    NodeConfig,
+    StampField,
+    StampSource,
+    Tolerance,
+    Transport,
+)
 from syncrelay.config.problems import ConfigError, Problem, Severity, Span, render, where
 from syncrelay.config.qos import AUTO, QosOverrides, QosPreset
 from syncrelay.config.resolved import GroupConfig, TopicConfig
@@ -13,6 +21,7 @@ __all__ = [
     "Config",
     "ConfigError",
     "DiagnosticsConfig",
+    "Distance",
     "ExportFeature",
     "ExportSource",
     "GroupConfig",

@@ -86,13 +86,17 @@ def partial_format() -> type[FileKeys]:
 
 @cache
 def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
-    groups = {get_args(model.model_fields["policy"].annotation)[0]: model for model in models}
+    groups: dict[str, type[Group]] = {}
+    for model in models:
+        (policy,) = get_args(model.model_fields["policy"].annotation)
+        if groups.setdefault(policy, model) is not model:
+            raise TypeError(f"{groups[policy].__name__} and {model.__name__} are both the policy {policy}")
     topics = {policy: _topic_model(model) for policy, model in groups.items()}
     names: Any = Literal[tuple(groups)]
-    every_key = _every_key(models)
+    every_key = _every_key((Group, *models))
     keys: dict[str, Any] = {name: _loose(every_key[name], None) for name in every_key if name not in _OWN}
     about = "How the messages of a group are matched."
-    any_topic = create_model("TopicOfAnyPolicy", __base__=Topic, **_fields(_every_key(topics.values())))
+    any_topic = create_model("TopicOfAnyPolicy", __base__=Topic, **_fields(_every_key((Topic, *topics.values()))))
     any_group = create_model(
         "GroupOfAnyPolicy",
         __base__=Group,
@@ -138,7 +142,21 @@ def _topic_model(group: type[Group]) -> type[Topic]:
 
 
 def _every_key(models: Iterable[type[BaseModel]]) -> dict[str, FieldInfo]:
-    return {name: info for model in models for name, info in model.model_fields.items()}
+    """Return all keys of some models. Raises TypeError where two have one of the same name and different types.
+
+    `defaults` holds one value for the groups of all policies.
+    """
+    keys: dict[str, FieldInfo] = {}
+    owners: dict[str, str] = {}
+    for model in models:
+        for name, info in model.model_fields.items():
+            key, owner = keys.setdefault(name, info), owners.setdefault(name, model.__name__)
+            if name not in _OWN and (key.annotation, key.metadata) != (info.annotation, info.metadata):
+                raise TypeError(
+                    f"the key `{name}` of {model.__name__} has another type than that of {owner}: rename one of them,"
+                    " as `defaults` holds one value for both"
+                )
+    return keys
 
 
 def _fields(keys: Mapping[str, FieldInfo]) -> dict[str, Any]:

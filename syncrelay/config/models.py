@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
@@ -240,6 +241,16 @@ class Inputs:
         return self.names.index(self.node.absolute(topic))
 
 
+class Distance(Enum):
+    """How it is measured how far apart the messages of a set are."""
+
+    SPAN = "span"
+    """From its oldest message to its newest."""
+
+    AGE = "age"
+    """How much older than the message, or the tick, that makes the set the oldest of the others is; none is newer."""
+
+
 @dataclass(frozen=True, slots=True)
 class Tolerance:
     """How far apart the stamps of a set may be, in nanoseconds, and the key that says so.
@@ -265,6 +276,9 @@ class Group(Keys):
 
     repeats: ClassVar[bool] = False
     """Whether a message may be in more than one set, as the engine's policy says."""
+
+    distance: ClassVar[Distance] = Distance.SPAN
+    """What `tolerance` bounds: how far apart the messages of a set are is measured like this."""
 
     waits_for_optional: ClassVar[bool] = True
     """Whether a set that lacks an optional message waits for it, up to `max_wait`."""

@@ -8,7 +8,7 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from syncrelay.config.keys import NOT_NULL, Duration, FieldPath, Trigger
-from syncrelay.config.models import Group, Inputs, KeyedTopic, PacedTopic, Tolerance, Topic, Topics
+from syncrelay.config.models import Distance, Group, Inputs, KeyedTopic, PacedTopic, Tolerance, Topic, Topics
 from syncrelay.sync import (
     ApproximateEpsilonTime,
     ApproximateTime,
@@ -117,6 +117,7 @@ class LatestTimeGroup(Group):
     """At each message of one input, or at each tick of a clock, the latest of every other."""
 
     repeats = LatestTime.repeats
+    distance = Distance.AGE
     waits_for_optional = False
     matched_by = ("trigger", "max_age")
 

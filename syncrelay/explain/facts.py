@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from syncrelay.config import Tolerance
+from syncrelay.config import Distance, Tolerance
 from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.suggestions import Evaluator
@@ -176,9 +176,10 @@ class ClockState(NamedTuple):
 class GroupFacts:
     """A group. Durations in nanoseconds.
 
-    `tolerance` is None where stamps may be any distance apart, as where keys are matched. `by_stamp` says whether
-    stamps are what is matched, `trigger` is the index of the input whose messages make the sets, each with the latest
-    of the others, which may serve again; `ticks_hz` is the rate of the clock that makes them, where one does. `clock`
+    `tolerance` is None where stamps may be any distance apart, as where keys are matched; `distance` is how it is
+    measured how far apart they are. `by_stamp` says whether stamps are what is matched, `repeats` whether a message may
+    be in more than one set. `trigger` is the index of the input whose every message makes a set; `ticks_hz` is the rate
+    of the clock that does, where one does. `clock`
     is the simulated one, None without use_sim_time; `clock_set` when and by how much this machine's clock was set of
     late; `is_recorded` says that a recording is judged and no live graph; `waited` how long its messages at most lay of
     late before the relay took them; `standstills` those of late; `failure` what stopped the group for good; `pause`
@@ -194,7 +195,9 @@ class GroupFacts:
     inputs: tuple[InputFacts, ...]
     figures: GroupFigures
     tolerance: Tolerance | None = None
+    distance: Distance = Distance.SPAN
     by_stamp: bool = True
+    repeats: bool = False
     trigger: int | None = None
     ticks_hz: float | None = None
     max_wait: int | None = None
@@ -240,7 +243,7 @@ class GroupFacts:
 
     def is_held(self, index: int) -> bool:
         """Whether the latest message of this input is held and serves until there is a newer one."""
-        return self.ticks_hz is not None or (self.trigger is not None and index != self.trigger)
+        return self.repeats and index != self.trigger
 
     @property
     def silent_after(self) -> int:

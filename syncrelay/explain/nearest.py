@@ -1,9 +1,10 @@
 """The tightest set that each message of one input could have had, whatever the slop and the queues."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, TypeAlias
 
+from syncrelay.config import Distance
 from syncrelay.explain.distribution import Distribution
 
 # More than comes between two looks, at 1 kHz; what an input piles up while another is silent is cut to this.
@@ -32,6 +33,12 @@ def greatest_age(sides: Sides) -> int | None:
     return max(ages) if len(ages) == len(sides) else None
 
 
+_MEASURES: Final[Mapping[Distance, Callable[[Sides], int | None]]] = {
+    Distance.SPAN: tightest_span,
+    Distance.AGE: greatest_age,
+}
+
+
 def signed_distances(stamps: Sequence[int], others: Sequence[int]) -> Distribution:
     """Return how far after each stamp the nearest of the others is, less than 0 where it is before; in order both.
 
@@ -50,9 +57,9 @@ def signed_distances(stamps: Sequence[int], others: Sequence[int]) -> Distributi
 class NearestSpans:
     """Measures, in nanoseconds, over the stamps that come in, as soon as it is certain, each message once."""
 
-    def __init__(self, n_inputs: int, *, measure: Callable[[Sides], int | None] = tightest_span) -> None:
+    def __init__(self, n_inputs: int, distance: Distance = Distance.SPAN) -> None:
         self._stamps: list[list[int]] = [[] for _ in range(n_inputs)]
-        self._measure = measure
+        self._measure = _MEASURES[distance]
         self._measured_until: int | None = None
 
     def clear(self) -> None:

@@ -7,10 +7,11 @@ from itertools import repeat
 from operator import add, sub
 from typing import Any, Final, NamedTuple, TypeAlias
 
+from syncrelay.config import Distance
 from syncrelay.explain.distribution import Distribution, Tallied, keep_last, no_values
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.input_observation import WINDOW_NS, Arrivals, InputObservation
-from syncrelay.explain.nearest import NearestSpans, greatest_age, tightest_span
+from syncrelay.explain.nearest import NearestSpans
 from syncrelay.sync.counts import InputCounts
 
 SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
@@ -29,9 +30,9 @@ _AS_SLOW: Final = 0.7
 class Observation:
     """Gathers what came and left of one group.
 
-    `offsets_ns` are added to stamps as for matching; `trigger` is the index of the input whose messages make the sets,
-    of the latest of the others; `ticks_hz` is the rate of the clock that does, where one does. All times are of one
-    clock, that of `began` and of the times of receipt.
+    `offsets_ns` are added to stamps as for matching; `distance` is how it is measured how far apart messages are;
+    `trigger` is the index of the input whose every message makes a set; `ticks_hz` is the rate of the clock that does,
+    where one does. All times are of one clock, that of `began` and of the times of receipt.
     """
 
     def __init__(
@@ -40,6 +41,7 @@ class Observation:
         offsets_ns: Sequence[int],
         required: Sequence[bool],
         began: int,
+        distance: Distance = Distance.SPAN,
         trigger: int | None = None,
         ticks_hz: float | None = None,
     ) -> None:
@@ -55,13 +57,11 @@ class Observation:
         self._last_set: int | None = None
         self._resumed: int | None = None
         self._spans, self._latencies = no_values(), no_values()
-        self._nearest_spans = NearestSpans(
-            len(self._required), measure=tightest_span if trigger is None else greatest_age
-        )
+        self._nearest_spans = NearestSpans(len(self._required), distance)
         self._with_optional = {
             index: NearestSpans(len(self._required) + 1)
             for index, needed in enumerate(required)
-            if not needed and trigger is None and ticks_hz is None
+            if not needed and distance is Distance.SPAN
         }
         self._nearest, self._nearest_at, self._nearest_since = no_values(), no_values(), no_values()
         self._paces: list[float | None] = [None] * len(offsets_ns)

@@ -3,6 +3,7 @@
 from statistics import median_low
 from typing import Final
 
+from syncrelay.config import Distance
 from syncrelay.explain import words
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
@@ -61,21 +62,23 @@ def _to_one_clock(facts: GroupFacts) -> str:
 
 def too_old(facts: GroupFacts) -> Found:
     """Find the required input whose latest message is too old for ticks, by how late and how seldom it comes."""
-    if facts.ticks_hz is None or facts.tolerance is None or (not facts.is_silent and not _lacks_sets(facts)):
+    if facts.ticks_hz is None or facts.tolerance is None or facts.distance is not Distance.AGE:
         return
-    max_age, found = facts.tolerance.ns, [(_ages(facts, each), each) for each in facts.inputs if each.required]
+    if not facts.is_silent and not _lacks_sets(facts):
+        return
+    max_age, found = facts.tolerance, [(_ages(facts, each), each) for each in facts.inputs if each.required]
     known = [(ages, each) for ages, each in found if ages is not None]
     if not known:
         return
     (least, most), an_input = max(known, key=lambda each: each[0][1])
-    if most <= max_age:
+    if most <= max_age.ns:
         return
     yield Finding(
         Code.OVER_SLOP,
         Severity.ERROR if facts.is_silent else Severity.WARN,
         f"at a tick, the latest message of {an_input.name} is {words.duration(least)} to {words.duration(most)} old,"
-        f" max_age is {words.duration(max_age)}",
-        f"write `max_age: {words.at_least(round(_HEADROOM * most))}`{_or_wait(facts, an_input, most - least)}",
+        f" {max_age.key} is {words.duration(max_age.ns)}",
+        f"write `{max_age.key}: {words.at_least(round(_HEADROOM * most))}`{_or_wait(facts, an_input, most - least)}",
     )
 
 

@@ -5,7 +5,7 @@ from itertools import islice
 from statistics import median_low
 from typing import Final
 
-from syncrelay.config import Tolerance
+from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.codes import Code, Severity
@@ -61,7 +61,7 @@ def over_slop(facts: GroupFacts) -> Found:
         return
     over = nearest.share_over(tolerance.ns)
     if facts.is_silent and over > 1 - _MISSED:
-        text, severity = _too_wide(tolerance, nearest), Severity.ERROR
+        text, severity = _too_wide(facts, tolerance, nearest), Severity.ERROR
     elif not facts.is_silent and over > max(_MOST if _come_at_once(facts) else _MISSED, 1.5 / len(nearest)):
         # One message alone is chance.
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
@@ -89,14 +89,15 @@ def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distributi
     return f"{missed} {name} were farther from their partners than {tolerance.key} {words.duration(tolerance.ns)}"
 
 
-def _too_wide(tolerance: Tolerance, nearest: Distribution) -> str:
+def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:
     least, most = words.duration(nearest.quantile(0)), words.duration(nearest.quantile(0.95))
     widths = least if least == most else f"{least} to {most}"
     if tolerance.wider_policy:
         return f"no stamps are equal: the nearest sets span {widths}"
-    if tolerance.key == "max_age":
-        return f"the latest messages are {widths} older than the trigger's, over max_age {words.duration(tolerance.ns)}"
-    return f"the nearest sets span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}"
+    limit = f"{tolerance.key} {words.duration(tolerance.ns)}"
+    if facts.distance is Distance.AGE:
+        return f"the latest messages are {widths} older than the trigger's, over {limit}"
+    return f"the nearest sets span {widths}, over {limit}"
 
 
 def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution, trials: Trials) -> Iterator[Tried]:
@@ -112,7 +113,7 @@ def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution,
         policies += [(Change("policy", each),) for each in others if each]
         values = ((*policy, Change(tolerance.key, wider)) for policy in policies)
         yield from islice(filter(None, map(trials.try_out, values)), 1)
-    if facts.trigger is None:
+    if facts.distance is Distance.SPAN:
         yield from filter(None, (trials.gives_enough((each,)) for each in dict.fromkeys(constant_offsets(trials))))
 
 

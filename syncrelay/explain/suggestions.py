@@ -7,14 +7,14 @@ from math import ceil
 from statistics import median
 from typing import Any, Final, NamedTuple, TypeAlias
 
-from syncrelay.config import GroupConfig
+from syncrelay.config import Distance, GroupConfig
 from syncrelay.config.file import file_format
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.dry_run import dry_run
 from syncrelay.explain.input_observation import Arrivals
-from syncrelay.explain.nearest import NearestSpans, greatest_age, signed_distances, tightest_span
+from syncrelay.explain.nearest import NearestSpans, signed_distances
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from syncrelay.sync import DropReason, Message
 from syncrelay.sync.queues import LONGEST_QUEUE
@@ -266,10 +266,11 @@ class Trials:
     def _possible(self, among: Sequence[int], within: int | None) -> Distribution:
         if len(among) == 1:
             return Distribution([0] * len(self.stamps[self.pivot]))
-        spans = NearestSpans(len(among), measure=tightest_span if self._trigger is None else greatest_age).add(
+        distance = self.config.options.distance
+        spans = NearestSpans(len(among), distance).add(
             [self.stamps[index] for index in among], pivot=among.index(self.pivot)
         )
-        if spans and self._trigger is None:
+        if spans and distance is Distance.SPAN:
             # Where most lie close together, what lies far off has lost its partner.
             limit = _FAR_OFF * Distribution(spans).quantile(0.75)
             limit = min(limit, round(_PERIODS * max(_period(self.stamps[i]) for i in among if i != self.pivot)))

@@ -41,6 +41,7 @@ class GroupWatch:
             offsets_ns=[topic.offset_ns for topic in config.topics],
             required=[topic.required for topic in config.topics],
             began=began,
+            distance=config.options.distance,
             trigger=config.trigger,
             ticks_hz=self._ticks_hz,
         )
@@ -124,6 +125,8 @@ class GroupWatch:
             figures=figures,
             tolerance=options.tolerance,
             by_stamp=options.by_stamp,
+            distance=options.distance,
+            repeats=options.repeats,
             trigger=self.config.trigger,
             ticks_hz=self._ticks_hz,
             max_wait=options.max_wait,

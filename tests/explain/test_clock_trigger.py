@@ -2,7 +2,7 @@
 
 import pytest
 
-from syncrelay.config import load_text
+from syncrelay.config import Distance, load_text
 from syncrelay.explain import Code, GroupWatch, InputGraph, Judge, Severity, Tolerance, judge, with_ok
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.facts import ClockState, Endpoint
@@ -11,7 +11,13 @@ from tests.explain.support.cases import LIDAR, camera
 from tests.explain.support.groups import BEGAN, MS, S, a_group, a_silent_group, an_input
 
 IMAGE = "sensor_msgs/msg/Image"
-CLOCKED = {"policy": "latest_time", "ticks_hz": 30.0, "tolerance": Tolerance("max_age", 200 * MS)}
+CLOCKED = {
+    "policy": "latest_time",
+    "ticks_hz": 30.0,
+    "tolerance": Tolerance("max_age", 200 * MS),
+    "distance": Distance.AGE,
+    "repeats": True,
+}
 
 
 def figures_of(delay, pace_hz=10.0):

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.explain.nearest import NearestSpans, greatest_age, tightest_span
+from syncrelay.config import Distance
+from syncrelay.explain.nearest import NearestSpans
 
 STAMPS = st.lists(st.integers(0, 60), min_size=1, max_size=7, unique=True).map(sorted)
 STREAMS = st.lists(STAMPS, min_size=2, max_size=4)
@@ -52,15 +53,15 @@ def chunked(draw, streams):
 
 
 @pytest.mark.parametrize(
-    ("measure", "reference"),
-    [(tightest_span, tightest_of_all), (greatest_age, oldest_of_the_latest)],
+    ("distance", "reference"),
+    [(Distance.SPAN, tightest_of_all), (Distance.AGE, oldest_of_the_latest)],
     ids=["tightest span", "greatest age"],
 )
 @given(cases=st.data())
-def test_it_is_what_a_search_through_all_sets_finds_in_whatever_chunks_the_stamps_come(measure, reference, cases):
+def test_it_is_what_a_search_through_all_sets_finds_in_whatever_chunks_the_stamps_come(distance, reference, cases):
     streams = cases.draw(STREAMS)
     pivot = cases.draw(st.integers(0, len(streams) - 1))
-    nearest = NearestSpans(len(streams), measure=measure)
+    nearest = NearestSpans(len(streams), distance)
     chunks = cases.draw(chunked(streams))
     assert [span for chunk in chunks for span in nearest.add(chunk, pivot=pivot)] == reference(streams, pivot)
 

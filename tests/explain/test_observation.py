@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from syncrelay.config import Distance
 from syncrelay.explain.input_observation import InputObservation
 from syncrelay.explain.observation import Observation
 from syncrelay.sync.counts import InputCounts
@@ -17,11 +18,11 @@ from tests.explain.support.groups import BEGAN, MS, S
 class Stage:
     """An observation of inputs, fed second by second as a relay is."""
 
-    def __init__(self, n_inputs=2, *, began=BEGAN, offsets=None, required=None, trigger=None):
+    def __init__(self, n_inputs=2, *, began=BEGAN, offsets=None, required=None, **options):
         self.n_inputs = n_inputs
         self.now = began
         self.observation = Observation(
-            offsets_ns=offsets or [0] * n_inputs, required=required or [True] * n_inputs, began=began, trigger=trigger
+            offsets_ns=offsets or [0] * n_inputs, required=required or [True] * n_inputs, began=began, **options
         )
         self.fed = [0] * n_inputs
         self.dropped: list[dict[DropReason, int]] = [{} for _ in range(n_inputs)]
@@ -260,11 +261,12 @@ def test_the_slowest_input_is_the_one_whose_messages_are_measured():
     assert stage.group.nearest.quantile(0.5) == 4 * MS
 
 
-def test_of_a_trigger_the_age_of_what_is_held_is_measured():
-    stage = Stage(trigger=0)
+@pytest.mark.parametrize(("distance", "measured"), [(Distance.SPAN, 40 * MS), (Distance.AGE, 60 * MS)])
+def test_of_a_trigger_it_is_measured_what_its_policy_bounds(distance, measured):
+    stage = Stage(trigger=0, distance=distance)
     for _ in range(3):
-        stage.second(stage.stream(10), stage.stream(10, shift=-40 * MS))
-    assert set(stage.group.nearest.values) == {40 * MS}
+        stage.second(stage.stream(10), stage.stream(10, shift=-60 * MS))
+    assert set(stage.group.nearest.values) == {measured}
 
 
 def test_nothing_is_known_before_the_first_look():

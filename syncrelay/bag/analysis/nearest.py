@@ -35,7 +35,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Tightest:
-    """For each message of the slowest input, the pivot, the tightest set that it could be in.
+    """For each message of the pivot, the trigger or else the slowest input, the tightest set that it could be in.
 
     `spans` are in nanoseconds; `queues` is how many messages the fullest queue must hold until the set is complete;
     `disjoint` tells which sets share no message with a tighter one. All in the order of the pivot's stamps.
@@ -53,7 +53,7 @@ class Tightest:
 
 @dataclass(frozen=True, slots=True)
 class PossibleSets:
-    """The sets that a recording holds, by the tightest set of each message of the slowest required input.
+    """The sets that a recording holds, by the tightest set of each message of the pivot.
 
     `spans`, sorted, are of those whose messages belong together and share none with a tighter one; `is_exact` means
     that their stamps are meant to be equal. Where `is_alone`, one input is required: each of its messages is a
@@ -103,15 +103,18 @@ def pair(first: Stream, second: Stream, offsets: tuple[int, int]) -> Pair | None
     return Pair(first.topic, second.topic, spread(signed), spread(np.abs(signed)), signed)
 
 
-def tightest(streams: Sequence[Stream], offsets: Sequence[int], *, successors: int = 0) -> Tightest | None:
-    """Return the tightest set of each message of the slowest stream; None where a stream has no stamps.
+def tightest(
+    streams: Sequence[Stream], offsets: Sequence[int], *, pivot: int | None = None, successors: int = 0
+) -> Tightest | None:
+    """Return the tightest set of each message of the pivot, by default the slowest; None where a stream has no stamps.
 
     A set can leave when all its messages are there, or, with `successors`, so many later ones of each input.
     """
     inputs = [_sorted(stream, offset) for stream, offset in zip(streams, offsets, strict=True)]
     if not all(len(each.stamps) for each in inputs):
         return None
-    pivot = min(range(len(inputs)), key=lambda index: len(inputs[index].stamps))
+    if pivot is None:
+        pivot = min(range(len(inputs)), key=lambda index: len(inputs[index].stamps))
     pivots = inputs[pivot]
     others = [each for index, each in enumerate(inputs) if index != pivot]
     sides = [_sides(pivots.stamps, other.stamps) for other in others]

@@ -116,7 +116,8 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> PossibleSets
     chosen, offsets = [streams[index] for index in required], [group.topics[index].offset_ns for index in required]
     # The best match is certain only when what comes next is there, unless it may not wait so long.
     waits = group.options.waits_for_next and group.options.max_wait is None
-    found = tightest(chosen, offsets, successors=int(waits))
+    pivot = None if group.trigger is None else required.index(group.trigger)
+    found = tightest(chosen, offsets, pivot=pivot, successors=int(waits))
     if found is None:
         return None
     found = replace(found, pivot=required[found.pivot])
@@ -128,7 +129,7 @@ def possible_sets(group: GroupConfig, streams: Sequence[Stream]) -> PossibleSets
     # Where most lie close together, what lies far off has lost its partner.
     usual = int(np.quantile(found.spans, 0.75, method="inverted_cdf"))
     limit = min(_PERIODS * max(periods), _FAR_OFF * usual)
-    within = found.spans[found.disjoint & (found.spans <= limit)]
+    within = found.spans[(found.disjoint | group.options.repeats) & (found.spans <= limit)]
     return PossibleSets(found, is_exact=False, is_alone=False, spans=tuple(np.sort(within).tolist()))
 
 
@@ -182,7 +183,7 @@ def _ladder(group: GroupConfig, possible: PossibleSets) -> Iterator[list[Change]
         text = words.at_least(slop)
         reason = f"the nearest messages lie {words.duration(median(spans))} apart, at most {words.duration(slop)}"
         if slop < tolerance.ns:
-            reason += "; a wider slop only lets in worse sets"
+            reason += f"; a wider {tolerance.key} only lets in worse sets"
         for queue in _queues(group, possible, slop):
             yield [
                 *_policy(group, policy, "the stamps of a set differ"),

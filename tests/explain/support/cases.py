@@ -1,5 +1,6 @@
 """Inputs and groups that findings are about."""
 
+from syncrelay.config import Distance
 from syncrelay.explain import Distribution, Endpoint, Mismatch, Tolerance
 from syncrelay.explain.clocks import Drift
 from syncrelay.sync.counts import InputCounts
@@ -16,7 +17,7 @@ QUIET = {"rate_hz": 0.0, "last_received": NOW - 7 * S, "fed": 0}
 
 ONCE = {**QUIET, "usual_hz": 0.0, "longest_pause": 0}
 
-AGES = {"policy": "latest_time", "trigger": 1, "tolerance": None}
+AGES = {"policy": "latest_time", "trigger": 1, "tolerance": None, "distance": Distance.AGE, "repeats": True}
 
 HALF_A_SECOND = {**AGES, "tolerance": Tolerance("max_age", 500 * MS)}
 
