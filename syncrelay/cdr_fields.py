@@ -182,7 +182,8 @@ def _sequence_skipper(fields_of: FieldsOf, element: str) -> _Skip:
 
 
 def _message_skipper(fields_of: FieldsOf, type_name: str) -> _Skip:
-    skips = [_skipper(fields_of, each) for each in fields_of(type_name).values()]
+    # A message without fields is written as a uint8 (rosidl: structure_needs_at_least_one_member).
+    skips = [_skipper(fields_of, each) for each in fields_of(type_name).values() or ("uint8",)]
 
     def skip(data: _Bytes, place: int) -> int:
         for each in skips:

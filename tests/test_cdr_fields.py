@@ -78,6 +78,11 @@ def test_big_endian_and_the_narrower_alignment_of_xcdr2_are_heeded():
         assert read == [1, 2.5, 3], hex(kind)
 
 
+def test_a_member_without_fields_takes_one_byte():
+    types: dict[str, dict[str, str]] = {"a/Signal": {"go": "std_msgs/Empty", "level": "uint8"}, "std_msgs/Empty": {}}
+    assert field_reader(types.__getitem__, "a/Signal", "level")(bytes.fromhex("00 01 00 00  00 07")) == 7
+
+
 @pytest.mark.parametrize("path", _ALL)
 def test_a_payload_cut_off_before_its_field_ends_gives_none(path):
     whole = [_read(path, _LITTLE_ENDIAN[:end]) for end in range(len(_LITTLE_ENDIAN) + 1)]

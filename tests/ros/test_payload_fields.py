@@ -22,9 +22,10 @@ def test_every_field_of_every_installed_type_reads_as_rclpy_deserializes_it():
     chance = random.Random(7)
     interfaces = Interfaces.find({})
     assert interfaces is not None
-    names = [name for package in interfaces.packages for name in interfaces.types(package) if "/msg/" in name]
+    names = {name for package in interfaces.packages for name in interfaces.types(package) if "/msg/" in name}
     compared = 0
-    for name in names:
+    # Nothing of a wstring is read: its layout differs between versions of Fast CDR.
+    for name in sorted(names - {"test_msgs/msg/WStrings"}):
         message_type = import_type(name)
         for _ in range(3):
             payload = serialization.serialize_message(_filled(message_type, chance))
@@ -34,6 +35,11 @@ def test_every_field_of_every_installed_type_reads_as_rclpy_deserializes_it():
                 assert value == _value_at(message, path), f"{name} {path}"
                 compared += 1
     assert compared > 1000
+
+
+def test_a_wstring_is_refused_by_name():
+    with pytest.raises(TypeImportError, match="WStrings has no usable field wstring_value: wstring_value is wstring"):
+        types.value_reader(import_type("test_msgs/msg/WStrings"), "wstring_value")
 
 
 _BITS = {
