@@ -18,6 +18,8 @@ _PATIENCE_S: Final = 6.0
 # Of it, what a pipe may take to come to its end: it says so itself.
 _PIPE_S: Final = 5.0
 _LOOK_S: Final = 0.5
+# A file that is written in place, or copied over a slow link, may rest half-written. NFS shows a change up to 3 s late.
+_SETTLED_S: Final = 3.0
 
 
 class Reading(NamedTuple):
@@ -33,7 +35,7 @@ class _Request(NamedTuple):
 
 
 class ConfigFiles:
-    """Reads files again when asked, and where they are watched when one has changed.
+    """Reads files again when asked, and where they are watched when one has changed or is gone.
 
     A context manager, which does not wait for a read that hangs: the thread ends with the process.
     """
@@ -43,6 +45,7 @@ class ConfigFiles:
         self._paths = tuple(paths)
         self._known = self._marks() if watched else None
         self._seen = self._known
+        self._seen_since = 0.0
         self._lock = threading.Lock()
         self._wanted = threading.Event()
         self._ended = False
@@ -92,7 +95,7 @@ class ConfigFiles:
     def _run(self) -> None:
         while not self._ended:
             self._wanted.wait(None if self._known is None else _LOOK_S)
-            if self.have_changed():
+            if self.have_changed(now=time.monotonic()):
                 self.read_again()
             if self._wanted.is_set() and not self._ended:
                 self._wanted.clear()
@@ -117,19 +120,14 @@ class ConfigFiles:
                 self._read = Reading(read, (*earlier, *told))
         self._done()
 
-    def have_changed(self) -> bool:
-        """Whether a watched file has changed since this was last called; not while one is missing.
-
-        A file that is gone from a directory is when the next look shows that too: to replace a file, some programs
-        remove it first.
-        """
+    def have_changed(self, *, now: float) -> bool:
+        """Whether watched files are others than when this last said so, and have been the same for some seconds."""
         if self._known is None:
             return False
-        marks, seen = self._marks(), self._seen
-        self._seen = marks
-        if None in marks.values() or marks == self._known:
-            return False
-        if self._known.keys() - marks.keys() and marks != seen:
+        marks = self._marks()
+        if marks != self._seen:
+            self._seen, self._seen_since = marks, now
+        if marks == self._known or now - self._seen_since < _SETTLED_S:
             return False
         self._known = marks
         return True
@@ -139,7 +137,7 @@ class ConfigFiles:
 
 
 def _files(path: str) -> tuple[str, ...]:
-    """Return the files to look at; a directory that cannot be read counts as a file that is missing."""
+    """Return the files to look at; of a directory that cannot be read, itself."""
     try:
         return yaml_files(path)
     except OSError:

@@ -1,9 +1,12 @@
 """Files that are read again beside the relay: what is read is told once, and what hangs holds nobody up."""
 
+import itertools
 import os
+import random
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -29,6 +32,12 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have no busy machine make anything seem to hang."""
     monkeypatch.setattr(config_files, "_PATIENCE_S", 600.0)
     monkeypatch.setattr(config_files, "_PIPE_S", 600.0)
+
+
+@pytest.fixture
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have what changed be read at the first look."""
+    monkeypatch.setattr(config_files, "_SETTLED_S", 0.0)
 
 
 @pytest.fixture
@@ -110,6 +119,7 @@ def test_what_reading_raises_is_raised_where_the_file_is_wanted(files: ConfigFil
     assert names(taken(files)) == ["rear"]
 
 
+@pytest.mark.usefixtures("soon")
 def test_each_of_several_files_is_watched(path: Path):
     other = path.with_name("other.yaml")
     other.write_text("version: 1\n")
@@ -119,11 +129,15 @@ def test_each_of_several_files_is_watched(path: Path):
         replace(path, GOOD.replace("front", "left"))
         assert names(taken(files)) == ["left", "rear"]
         other.unlink()
-        replace(path, GOOD)
+        with pytest.raises(ConfigError, match=r"other.yaml: no such file"):
+            taken(files).result()
         replace(other, OTHER)
+        assert names(taken(files)) == ["left", "rear"]
+        replace(path, GOOD)
         assert names(taken(files)) == ["front", "rear"]
 
 
+@pytest.mark.usefixtures("soon")
 def test_files_that_come_to_a_watched_directory_change_in_it_and_go_are_seen(path: Path):
     folder = path.parent / "conf"
     folder.mkdir()
@@ -142,18 +156,69 @@ def test_files_that_come_to_a_watched_directory_change_in_it_and_go_are_seen(pat
         assert names(taken(files)) == ["front"]
 
 
-def test_a_file_is_gone_from_a_directory_only_when_two_looks_show_it(path: Path):
-    # Nobody enters it: the looks are these.
-    files = ConfigFiles([str(path.parent)], watched=True)
-    text = path.read_text()
-    path.unlink()
-    assert not files.have_changed()
-    path.write_text(text)
-    assert files.have_changed()
-    path.unlink()
-    assert [files.have_changed() for _ in range(3)] == [False, True, False]
+class _Writer:
+    """Writes a file as people and programs do, and knows when it is as they want it: a version in full, or none."""
+
+    def __init__(self, path: Path, chance: random.Random) -> None:
+        self._path = path
+        self._chance = chance
+        self._left: list[Callable[[], None]] = []
+        self.is_whole = True
+        self.at = 0.0
+
+    def write(self) -> None:
+        """Go on with what was begun, or begin something; then name in `at` when to go on."""
+        if not self._left:
+            self._left = self._chance.choice((self._in_parts, self._in_one_go, self._removed, self._written_anew))()
+        self._left.pop(0)()
+        self.is_whole = not self._left
+        if self._path.exists():
+            # The times of files count in steps of the kernel's, and these are made up.
+            os.utime(self._path, ns=(0, round(self.at * 1e9)))
+        self.at += self._chance.uniform(8, 12) if self.is_whole else self._chance.uniform(0, 2.5)
+
+    def _in_parts(self) -> list[Callable[[], None]]:
+        cuts = sorted(self._chance.sample(range(len(OTHER)), self._chance.randint(0, 3)))
+        parts = [OTHER[begin:end] for begin, end in itertools.pairwise([0, *cuts, len(OTHER)])]
+        return [partial(self._put, part, "a" if n else "w") for n, part in enumerate(parts)]
+
+    def _in_one_go(self) -> list[Callable[[], None]]:
+        return [partial(replace, self._path, f"{GOOD}# {self.at}\n")]
+
+    def _removed(self) -> list[Callable[[], None]]:
+        return [partial(self._path.unlink, missing_ok=True)]
+
+    def _written_anew(self) -> list[Callable[[], None]]:
+        return [*self._removed(), *self._in_parts()]
+
+    def _put(self, text: str, mode: str) -> None:
+        with self._path.open(mode) as file:
+            file.write(text)
 
 
+@pytest.mark.parametrize("is_folder", [False, True], ids=["file", "directory"])
+def test_a_watched_file_is_read_when_it_is_whole_again_and_once_for_each_version(path: Path, is_folder):
+    read = 0
+    for seed in range(20):
+        path.write_text(GOOD)
+        # Nobody enters it: the looks are these.
+        files = ConfigFiles([str(path.parent if is_folder else path)], watched=True)
+        writer = _Writer(path, random.Random(seed))
+        versions: list[str | None] = [GOOD]
+        for look in range(400):
+            now = look / 2
+            while writer.at <= now:
+                writer.write()
+            if files.have_changed(now=now):
+                assert writer.is_whole, (seed, now)
+                versions.append(path.read_text() if path.exists() else None)
+                read += 1
+            elif writer.is_whole and writer.at < now + 1:
+                assert versions[-1] == (path.read_text() if path.exists() else None), (seed, now)
+    assert read > 250
+
+
+@pytest.mark.usefixtures("soon")
 def test_a_pipe_moved_over_a_watched_file_is_told_and_then_what_replaces_it_is_read(path: Path, monkeypatch):
     monkeypatch.setattr(config_files, "_PIPE_S", 0.05)
     with ConfigFiles([str(path)], watched=True) as files:

@@ -174,12 +174,15 @@ def test_a_file_that_comes_to_a_directory_or_goes_from_it_is_a_group_more_or_les
     assert file.count("reloads") == 2
 
 
-def test_a_watched_file_is_read_when_it_changes(stage: Stage):
+def test_a_watched_file_is_read_when_it_changes_and_missed_when_it_is_gone(stage: Stage):
     file = ReloadedFile(stage, "--watch", front=_FRONT)
     file.write(config({"front": _FRONT, "rear": _rear()}, metrics=ANY_PORT))
     wait_until(lambda: file.count("reloads") == 1, "the file to be read")
     file.write("version: 1\n")
     wait_until(lambda: file.count("refused_reloads") == 1, "the file to be refused")
+    file.path.unlink()
+    file.relay.wait_for_log(f"{file.path}: no such file")
+    assert file.count("reloads") == 1
 
 
 _CHANGED_AS_IT_STARTS = """
