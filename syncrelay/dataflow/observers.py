@@ -2,6 +2,7 @@
 
 import time
 from collections import deque
+from collections.abc import Hashable
 from typing import Final
 
 from syncrelay.explain import STEP_NS, ClockState, Standstill, Step
@@ -10,6 +11,10 @@ from syncrelay.explain import STEP_NS, ClockState, Standstill, Step
 _RECENT: Final = 10
 # So many evaluations after a publisher was found, its first messages have arrived.
 _SETTLING: Final = 2
+# Fast DDS announces a node every 3 s, and what it publishes is known some tenths of a second later.
+_UNCHANGED_S: Final = 4.0
+# A graph in which nodes come and go all the time never rests: three announcements are enough.
+_DISCOVERED_AT_LATEST_S: Final = 10.0
 # A clock that is set moves at once; one that is slewed only runs faster or slower.
 _STEP_NS: Final = 100_000_000
 _READINGS: Final = 3
@@ -94,6 +99,30 @@ class Losses:
     def recent(self) -> int:
         """How many were lost in the last evaluations."""
         return self._totals[-1] - self._totals[0] if self._totals else 0
+
+
+class Discovery:
+    """Whether nodes that run may still be missing from the graph, because this one has just joined it.
+
+    Fast DDS finds most at once. A node that missed the first announcements is found at the next, which come every 3 s.
+    So discovery is over once the graph has stayed as it is for longer than that.
+    """
+
+    def __init__(self, *, now: float) -> None:
+        """Take the monotonic time in seconds, here as below."""
+        self._latest = now + _DISCOVERED_AT_LATEST_S
+        self._ends = now + _UNCHANGED_S
+        self._graph: Hashable = None
+
+    def observe(self, graph: Hashable, *, now: float) -> None:
+        """Take what the graph holds, of which it matters only whether it has changed."""
+        if self._graph not in (None, graph) and self.goes_on(now):
+            self._ends = min(now + _UNCHANGED_S, self._latest)
+        self._graph = graph
+
+    def goes_on(self, now: float) -> bool:
+        """Whether nodes may still be found that were there before."""
+        return now < self._ends
 
 
 class SystemClock:

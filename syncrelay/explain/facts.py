@@ -12,8 +12,8 @@ from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
 _NO_SETS: Final = 5 * _SECOND
-DISCOVERY_NS: Final = 2 * _SECOND
-"""Finding all publishers takes up to about this long."""
+# What is found within this time of a group's beginning was there before.
+_FOUND_AT_ONCE: Final = 2 * _SECOND
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +185,7 @@ class GroupFacts:
     late before the relay took them; `standstills` those of late; `failure` what stopped the group for good; `pause`
     since when it is paused, and `unpaused` when the last pause ended; `asleep` that it is lazy and nobody subscribes to
     what it gives; `empty_graph` the graph, where it holds no node but our own.
+    `is_discovering` says that nodes that run may not be in the graph yet, because this one has just joined it.
     `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
     the name of a managed node that waits to be activated.
     """
@@ -214,6 +215,7 @@ class GroupFacts:
     asleep: bool = False
     evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
+    is_discovering: bool = False
     inactive: str | None = None
 
     @property
@@ -274,7 +276,7 @@ class GroupFacts:
     def _from_the_start_on(self, since: int) -> int:
         """Return when a flow began, or when the group did if discovery alone made it seem later."""
         began = self.figures.began
-        return began if began <= since <= began + DISCOVERY_NS else since
+        return began if began <= since <= began + _FOUND_AT_ONCE else since
 
     @property
     def silent_for(self) -> int:

@@ -6,7 +6,7 @@ from typing import Final
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
 from syncrelay.explain.codes import Code, Severity
-from syncrelay.explain.facts import DISCOVERY_NS, Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
+from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
 from syncrelay.explain.findings import SECOND, Finding, Found, blocks
 
 _NO_MESSAGE: Final = 5 * SECOND
@@ -127,7 +127,7 @@ def several_types(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
 def alone(facts: GroupFacts) -> Found:
     """Find that there is no other node in the graph, of a group to which nothing has come yet."""
     graph = facts.empty_graph
-    if graph is None or not _is_past_grace(facts) or any(each.figures.last_received for each in facts.inputs):
+    if graph is None or facts.is_discovering or any(each.figures.last_received for each in facts.inputs):
         return
     yield Finding(
         Code.ALONE,
@@ -145,18 +145,13 @@ def no_other_node(graph: GraphSnapshot) -> str:
 
 def no_publisher(facts: GroupFacts) -> Found:
     """Find the topics that nobody publishes, and those that nobody publishes any more."""
-    if not _is_past_grace(facts):
-        return
     missing = [index for index in facts.required_first if not facts.inputs[index].graph.publishers]
     gone = [index for index in missing if facts.inputs[index].figures.last_received is not None]
-    if never := [index for index in missing if index not in gone]:
+    never = [index for index in missing if index not in gone]
+    if never and not facts.is_discovering:
         yield _without_publisher(facts, never, _never_published(facts, [facts.inputs[index] for index in never]))
     if gone:
         yield _without_publisher(facts, gone, _no_longer_published(facts, [facts.inputs[index] for index in gone]))
-
-
-def _is_past_grace(facts: GroupFacts) -> bool:
-    return facts.figures.now - facts.figures.began >= DISCOVERY_NS
 
 
 def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: tuple[str, str]) -> Finding:

@@ -90,6 +90,7 @@ class GroupWatch:
         pause: Pause | None = None,
         asleep: bool = False,
         empty_graph: GraphSnapshot | None = None,
+        is_discovering: bool = False,
         inactive: str | None = None,
     ) -> GroupFacts:
         """Give all that is known now."""
@@ -143,6 +144,7 @@ class GroupWatch:
             asleep=asleep,
             evaluator=self._evaluator,
             empty_graph=empty_graph,
+            is_discovering=is_discovering,
             inactive=inactive,
         )
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from syncrelay.dataflow.bugs import Bugs
 from syncrelay.dataflow.group import Batch, GroupRelay
-from syncrelay.dataflow.observers import Losses, SimulatedClock, Standstills, SystemClock, Waits
+from syncrelay.dataflow.observers import Discovery, Losses, SimulatedClock, Standstills, SystemClock, Waits
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.explain import (
     Arrivals,
@@ -63,6 +63,7 @@ class Monitor:
         self._surroundings = surroundings
         self._waits: dict[TopicInput, Waits] = {}
         self.standstills = Standstills()
+        self._discovery = Discovery(now=time.monotonic())
         self._system_clock = SystemClock()
         self._try_budget = TryBudget()
         self._empty_graph: GraphSnapshot | None = None
@@ -138,6 +139,8 @@ class Monitor:
             # A new subscription hears them anew.
             losses.observe(topic.lost(), publishers=len(topic.publishers) if topic.entity is not None else 0)
         self._empty_graph = self._surroundings.empty_graph()
+        if self._discovery.goes_on(time.monotonic()):
+            self._discovery.observe(self._surroundings.nodes_and_topics(), now=time.monotonic())
         for binding, batch in zip(bindings, batches, strict=True):
             with self._bugs.contained(f"evaluating {binding.group.config.name}"):
                 try:
@@ -172,6 +175,7 @@ class Monitor:
             failure=binding.group.failure,
             pause=None if binding.group.paused_since is None else Pause(binding.group.paused_since, self._ends_pauses),
             asleep=binding.group.sleeps,
+            is_discovering=self._discovery.goes_on(time.monotonic()),
             empty_graph=None if all(each.publishers for each in shown) else self._empty_graph,
             inactive=self.inactive,
         )

@@ -311,13 +311,14 @@ class Relay:
     def look(self, seconds: float, *, is_over: Callable[[], bool] = lambda: False) -> tuple[GroupReport, ...]:
         """Run for a time, and return how the groups fare.
 
-        A group without a set to which messages have only just begun to come is given a little longer.
+        A group without a set to which messages have only just begun to come is given a little longer, and so is one
+        whose publishers may not have been found yet.
         """
         end = time.monotonic() + seconds
         latest = end + _LONGER_S
         while not is_over() and (left := end - time.monotonic()) > 0:
             self.step(left)
-            if time.monotonic() >= end and any(each.facts.is_new for each in self.evaluate()):
+            if time.monotonic() >= end and any(map(_is_early, self.evaluate())):
                 end = min(end + EVALUATE_S, latest)
         return self.evaluate()
 
@@ -413,3 +414,9 @@ class Relay:
                 self._executor.spin_until_future_complete(self._served)
                 return
             time.sleep(_AFTER_FAILURE_S)
+
+
+def _is_early(report: GroupReport) -> bool:
+    """Whether it will soon be known better why a group gives no set."""
+    facts = report.facts
+    return facts.is_new or (facts.is_discovering and not all(each.graph.publishers for each in facts.inputs))

@@ -1,7 +1,7 @@
 """What the graph shows around the inputs of groups: who publishes them, who takes their outputs, what was meant."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import Any, NamedTuple
 
 from syncrelay.config.wording import counted
@@ -49,6 +49,10 @@ class Surroundings:
         """Return the graph if no other node is in it. It is asked only while a topic has no publisher."""
         is_missing = any(not binding.topic.publishers for binding in self._bindings)
         return graph.snapshot(self._node) if is_missing and not graph.other_nodes(self._node) else None
+
+    def nodes_and_topics(self) -> Hashable:
+        """Return the nodes and topics that have been found."""
+        return graph.other_nodes(self._node), frozenset(graph.topics_in(self._node))
 
     def of(self, binding: InputBinding, losses: Losses) -> InputGraph:
         """Return what there is around an input, of whose messages DDS lost some."""

@@ -1,10 +1,11 @@
 """What the relay observes of itself, evaluation by evaluation, on made-up figures."""
 
+import random
 import time
 
 import pytest
 
-from syncrelay.dataflow.observers import Losses, SimulatedClock, Standstills, SystemClock, Waits
+from syncrelay.dataflow.observers import Discovery, Losses, SimulatedClock, Standstills, SystemClock, Waits
 from syncrelay.explain import ClockState, Standstill
 
 _SECOND = 1_000_000_000
@@ -109,3 +110,43 @@ def test_a_simulated_clock_that_began_or_was_set_back_tells_nothing_of_the_time_
     clock.observe(before * _SECOND, now=_SECOND)
     clock.observe(after * _SECOND, now=2 * _SECOND)
     assert not clock.is_steady
+
+
+# Fast DDS's: every node announces itself so often, and is known some tenths of a second after it was heard.
+_ANNOUNCED_S = 3.0
+_DISCOVERIES = 500
+
+
+@pytest.mark.parametrize("seed", [28])
+def test_discovery_goes_on_until_all_nodes_are_found_and_no_longer_than_it_must(seed):
+    """Nodes that run when this one joins at 0 s. Each is heard at once, or misses that and is heard at its next turn."""
+    chance, late = random.Random(seed), 0
+    for number in range(_DISCOVERIES):
+        heard = [chance.choice([0.0, chance.uniform(0, _ANNOUNCED_S)]) for _ in range(chance.randrange(12))]
+        found = [at + chance.uniform(0.01, 0.5) for at in heard]
+        late += any(at > 2 for at in found)
+        discovery, at, known = Discovery(now=0.0), 0.0, 0.0
+        while discovery.goes_on(at):
+            discovery.observe(frozenset(each for each in found if each <= at), now=at)
+            known, at = at, at + chance.uniform(0.9, 1.4)
+        case = f"{number} of seed {seed}: found at {found}"
+        assert all(each <= at for each in found), case
+        # A look that comes late is the first to see what came before it.
+        assert known <= max(found, default=0.0) + 1.4 + 4.0, case
+    assert late > _DISCOVERIES / 4
+
+
+def test_discovery_ends_in_a_graph_that_never_rests():
+    discovery, at = Discovery(now=0.0), 0.0
+    while discovery.goes_on(at):
+        discovery.observe(at, now=at)
+        at += 1
+    assert at == 10
+
+
+def test_discovery_that_is_over_does_not_begin_again():
+    discovery = Discovery(now=0.0)
+    discovery.observe("a graph", now=1.0)
+    assert not discovery.goes_on(5.0)
+    discovery.observe("another graph", now=5.0)
+    assert not discovery.goes_on(5.0)

@@ -179,3 +179,19 @@ def test_probes_tell_a_relay_that_waits_from_one_that_is_ready(stage: Stage):
     wait_until(lambda: status(relay)["relay"]["ready"], "the relay to be ready")
     wait_until(lambda: page(relay, "/readyz") == (200, "ready\n"), "a probe that says so")
     assert 'syncrelay_messages_received_total{group="front",topic="/camera"}' in get(relay, "/metrics")
+
+
+def test_nobody_is_missed_before_those_who_run_had_time_to_be_found(stage: Stage):
+    """One that missed the first announcements is found at the next: up to 3 s after the start, and a little."""
+    relay = stage.relay(front())
+    said: dict[str, float] = {}
+
+    def nobody_is_found() -> bool:
+        now = status(relay)
+        for each in (each for group in now["groups"] for each in group["findings"]):
+            said.setdefault(each["code"], now["relay"]["uptime_s"])
+        return "alone" in said or "no_publisher" in said
+
+    wait_until(nobody_is_found, "a finding that nobody is there")
+    assert said["starting"] < 3.5
+    assert min(said.get("alone", 99), said.get("no_publisher", 99)) > 3.5

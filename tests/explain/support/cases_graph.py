@@ -330,15 +330,15 @@ QUIETLY = {
         Code.OUTPUT_TAKEN,
         a_group(camera(rivals=(Endpoint("/syncrelay", IMAGE),), rivals_since=NOW - 2900 * MS), LIDAR),
     ),
-    "no publisher in the first two seconds": (
+    "no publisher while nodes are still being found": (
         Code.NO_PUBLISHER,
-        a_group(camera(publishers=()), LIDAR, figures={"began": NOW - 1900 * MS}),
+        a_group(*unpublished(camera={}), LIDAR, is_discovering=True),
     ),
-    "nobody is there in the first two seconds": (
+    "nobody is there while nodes are still being found": (
         Code.ALONE,
         a_group(
             *unpublished(camera={}, lidar={}),
-            figures={"began": NOW - 1900 * MS},
+            is_discovering=True,
             empty_graph=GraphSnapshot(0, "SUBNET"),
         ),
     ),
