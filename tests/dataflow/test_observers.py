@@ -119,7 +119,7 @@ _DISCOVERIES = 500
 
 @pytest.mark.parametrize("seed", [28])
 def test_discovery_goes_on_until_all_nodes_are_found_and_no_longer_than_it_must(seed):
-    """Nodes that run when this one joins at 0 s. Each is heard at once, or misses that and is heard at its next turn."""
+    """Nodes that run when this one joins at 0 s: each is heard at once, or misses that and is heard at its next."""
     chance, late = random.Random(seed), 0
     for number in range(_DISCOVERIES):
         heard = [chance.choice([0.0, chance.uniform(0, _ANNOUNCED_S)]) for _ in range(chance.randrange(12))]
