@@ -1,16 +1,8 @@
-"""Names as recorders write them, brought to the form of ROS 2, and the names of their files."""
+"""Names as recorders write them, brought to the form of ROS 2."""
 
 import re
-from pathlib import PurePosixPath
 from typing import Final
 
-SUFFIXES: Final = (".mcap", ".db3", ".bag", ".active")
-"""What the files of recordings end in, but for how they are compressed."""
-
-METADATA: Final = "metadata.yaml"
-"""What stands beside the files of rosbag2, in a folder that is one recording."""
-
-_COMPRESSED: Final = (".bz2", ".zstd", ".zst", ".gz")
 # Renamed in ROS 2; the layout is the same.
 _RENAMED: Final = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
 
@@ -25,12 +17,6 @@ def full_type_name(recorded: str) -> str:
     package, slash, name = recorded.partition("/")
     full = f"{package}/msg/{name}" if slash and "/" not in name else recorded
     return _RENAMED.get(full, full)
-
-
-def is_recording_name(name: str) -> bool:
-    """Tell whether a file has the name of a recording, compressed or not."""
-    path = PurePosixPath(name)
-    return (PurePosixPath(path.stem).suffix if path.suffix in _COMPRESSED else path.suffix) in SUFFIXES
 
 
 def natural(name: str) -> list[tuple[int, str]]:

@@ -18,12 +18,13 @@ import zstandard
 
 from syncrelay.bag import mcap_file, ros1_file, sqlite_file
 from syncrelay.bag.batching import batched, filled
-from syncrelay.bag.names import METADATA, SUFFIXES, is_recording_name, natural
+from syncrelay.bag.names import natural
 from syncrelay.bag.recording import AFTER_ALL, Channel, RawMessage, Recording
 from syncrelay.bag.sources import LocalFile, NoIndexError
 from syncrelay.bag.storage import files_of, is_url, open_url
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, StorageError
+from syncrelay.recording_files import METADATA, SUFFIXES, is_recording_name
 
 Tell: TypeAlias = Callable[[str], object]
 """Takes a sentence that is worth a remark and is no fault."""

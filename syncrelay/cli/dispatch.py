@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from syncrelay.cli import parsers, recording_parsers
 from syncrelay.cli.boundary import DONE, USAGE, put, say
-from syncrelay.cli.parser import HelpRequested, Parser
+from syncrelay.cli.parser import HelpRequested, Parser, for_recording
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
 from syncrelay.errors import UsageError
+from syncrelay.recording_files import holds_recording
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -95,6 +96,8 @@ def commands_help() -> str:
 def _unknown_command(word: str) -> str:
     from syncrelay.config.wording import did_you_mean
 
+    if holds_recording(word):
+        return f"{word} is a recording, not a command{for_recording(word)}"
     if word.endswith((".yaml", ".yml")) or Path(word).exists():
         return (
             f"{word} is not a command\n  syncrelay --config {word}     to run the relay with it\n"

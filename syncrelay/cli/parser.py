@@ -2,21 +2,38 @@
 
 import argparse
 import os
+import shlex
 from collections.abc import Sequence
 from itertools import chain
 from textwrap import fill
 from typing import Any, Final, NoReturn
 
 from syncrelay.errors import UsageError
+from syncrelay.recording_files import holds_recording
 from syncrelay.yaml_files import yaml_files
 
 ROS_ARGS: Final = "--ros-args"
 _WIDTH: Final = 78
+# The metavars of words that name YAML files which are read.
+_YAML_FILES: Final = ("FILE", "OLD", "NEW")
 
 
 def folded(text: str) -> str:
     """Return a paragraph of help in lines, the second and later ones indented."""
     return fill(text, _WIDTH, subsequent_indent="  ")
+
+
+def for_recording(path: str) -> str:
+    """Return lines that say which commands are meant for a recording."""
+    name = shlex.quote(path)
+    commands = {
+        f"analyze {name}": "what it holds",
+        f"init --from-bag {name} -o NEW": "a file for it",
+        f"replay {name} --config FILE": "the sets that a file makes of it",
+        f"export {name} --config FILE -o FOLDER": "a dataset of these",
+    }
+    width = max(map(len, commands)) + 3
+    return "".join(f"\n  syncrelay {command:<{width}}{gives}" for command, gives in commands.items())
 
 
 class HelpRequested(Exception):  # noqa: N818  not an error
@@ -26,10 +43,11 @@ class HelpRequested(Exception):  # noqa: N818  not an error
 class Parser(argparse.ArgumentParser):
     """A parser that raises UsageError, and HelpRequested where help is asked for, and never exits."""
 
-    def __init__(self, prog: str, *, description: str, **options: Any) -> None:
+    def __init__(self, prog: str, *, example: str, description: str, epilog: str = "", **options: Any) -> None:
         super().__init__(
             prog=prog,
             description=fill(description, _WIDTH),
+            epilog=f"{epilog}\nexample: {example}".lstrip(),
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
             add_help=False,
@@ -50,7 +68,15 @@ class Parser(argparse.ArgumentParser):
         # Whatever else is there, or missing.
         if "-h" in own or "--help" in own:
             raise HelpRequested(self.format_help())
-        arguments, unknown = self.parse_known_args(own)
+        try:
+            arguments, unknown = self.parse_known_args(own)
+        except UsageError as error:
+            # A recording alone: something that is required is missing beside it.
+            recordings = filter(holds_recording, own) if "required" in str(error) else ()
+            for recording in recordings:
+                raise UsageError(f"{error}{for_recording(recording)}") from error
+            raise
+        self._refuse_recordings(arguments)
         if unknown:
             from syncrelay.config.wording import did_you_mean
 
@@ -60,6 +86,15 @@ class Parser(argparse.ArgumentParser):
             self.error(f"unknown argument {word}{hint}")
         arguments.ros_args = ros_args
         return arguments
+
+    def _refuse_recordings(self, arguments: argparse.Namespace) -> None:
+        """Refuse a recording where a YAML file is expected."""
+        for action in self._actions:
+            if action.metavar in _YAML_FILES:
+                value = getattr(arguments, action.dest)
+                for word in [value] if isinstance(value, str) else value or []:
+                    if holds_recording(word):
+                        raise UsageError(f"{word} is a recording, expected a YAML file{for_recording(word)}")
 
     @property
     def actions(self) -> Sequence[argparse.Action]:

@@ -18,6 +18,7 @@ def relay() -> Parser:
     exit_codes = f"exit codes: {', '.join(f'{code} {means}' for code, means in EXIT_CODES.items())}"
     parser = Parser(
         "syncrelay",
+        example="syncrelay --config fusion.yaml",
         description="Matches ROS 2 messages by time, as a YAML file says, and republishes the sets.",
         usage=_RELAY_USAGE,
         epilog=f"commands:\n{commands_help()}\n\n{folded(exit_codes)}",
@@ -53,6 +54,7 @@ def validate() -> Parser:
     """Return the parser of `syncrelay validate`."""
     parser = Parser(
         "syncrelay validate",
+        example="syncrelay validate fusion.yaml",
         description="Checks files without ROS and shows every error at once, each at its line, with the nearest valid "
         "word. Message types are checked where ROS is installed; a package that is missing there is only a note. "
         "Exit code 1 if a file has an error.",
@@ -80,6 +82,7 @@ def diff() -> Parser:
     """Return the parser of `syncrelay diff`."""
     parser = Parser(
         "syncrelay diff",
+        example="syncrelay diff fusion.yaml wider.yaml",
         description="Says what a reload would do to a relay that runs OLD and reads NEW: which groups go on, are "
         "rebuilt, start and end, for which keys, and which subscriptions and publishers go and come. Needs no ROS. "
         "For files that run together, name a directory of them. "
@@ -95,6 +98,7 @@ def graph() -> Parser:
     """Return the parser of `syncrelay graph`."""
     parser = Parser(
         "syncrelay graph",
+        example="syncrelay graph fusion.yaml",
         description="Draws the groups of files that run together: which inputs each matches, how, and its outputs. "
         "With --url the drawing has what a running relay says: rates and findings. Needs no ROS.",
     )
@@ -114,6 +118,7 @@ def init() -> Parser:
     """Return the parser of `syncrelay init`."""
     parser = Parser(
         "syncrelay init",
+        example="syncrelay init --from-bag drive.mcap -o fusion.yaml",
         description="Proposes a file for a recording or for a live ROS graph: groups of its topics, their types, and "
         "values that fit, with what was measured as comments.",
     )
@@ -129,6 +134,7 @@ def test() -> Parser:
     """Return the parser of `syncrelay test`."""
     parser = Parser(
         "syncrelay test",
+        example="syncrelay test tests/fusion.yaml",
         description="Runs the tests of a configuration, without ROS: messages that are drawn, simulated or recorded go "
         "through the engine, and what comes of them is compared with what the test file expects. Exit code 1 if a case "
         "fails.",
@@ -155,6 +161,7 @@ def demo() -> Parser:
     """Return the parser of `syncrelay demo`."""
     parser = Parser(
         "syncrelay demo",
+        example="syncrelay demo --seconds 30",
         description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it. "
         "Exit code 1 if a group produced no set.",
     )
@@ -174,6 +181,7 @@ def doctor() -> Parser:
     """Return the parser of `syncrelay doctor`."""
     parser = Parser(
         "syncrelay doctor",
+        example="syncrelay doctor --config fusion.yaml --live",
         description="Finds out why messages may not arrive: what is wrong, what follows from it, how to fix it. "
         "Exit code 1 if something must be fixed.",
     )
@@ -199,6 +207,7 @@ def observe() -> Parser:
     """Return the parser of `syncrelay observe`."""
     parser = Parser(
         "syncrelay observe",
+        example="syncrelay observe --config fusion.yaml --seconds 30",
         description="Tries a file beside a running robot: subscribes, publishes nothing, and shows live, as top does, "
         "what its groups make of what comes. Ends with what would have left, why not more, and the values that would "
         "fit. Exit code 1 unless all groups are healthy.",
@@ -224,6 +233,7 @@ def top() -> Parser:
     """Return the parser of `syncrelay top`."""
     parser = Parser(
         "syncrelay top",
+        example="syncrelay top --url robot:9464",
         description="Shows a running relay live: its groups, their inputs, their last sets, and what is wrong. "
         "Without --url it shows the relay of this machine, and asks which if there are several. "
         "Exit code 1 if no relay answers.",
@@ -242,6 +252,7 @@ def tap() -> Parser:
 
     parser = Parser(
         "syncrelay tap",
+        example="syncrelay tap front --reason late",
         description="Prints each set and each dropped message of a running relay as it leaves, a line each, until "
         "Ctrl-C. It subscribes to nothing: the relay tells it over HTTP. For each set it shows how much later "
         "than the earliest stamp each input's stamp is, offsets included. The relay never waits: a reader that is too "
@@ -276,6 +287,7 @@ def reload() -> Parser:
     """Return the parser of `syncrelay reload`."""
     parser = Parser(
         "syncrelay reload",
+        example="syncrelay reload --url localhost:9464",
         description="Makes the relay on this machine read its file again. Groups that did not change keep running and "
         "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
     )
@@ -289,6 +301,7 @@ def healthcheck() -> Parser:
 
     return Parser(
         "syncrelay healthcheck",
+        example=f"{VARIABLE}=/run/syncrelay/heartbeat syncrelay healthcheck",
         description=f"Checks that the relay is receiving: the relay writes a heartbeat into the file that {VARIABLE} "
         "names. Exit code 1 if it is not receiving.",
     )
@@ -298,6 +311,7 @@ def schema() -> Parser:
     """Return the parser of `syncrelay schema`."""
     parser = Parser(
         "syncrelay schema",
+        example="syncrelay schema > syncrelay.json",
         description="Prints the JSON Schema (draft 7) of the file: with it, editors complete and check what you write.",
     )
     parser.add_argument("--test", action="store_true", help="print that of test files, see syncrelay test")
@@ -308,12 +322,13 @@ def completion() -> Parser:
     """Return the parser of `syncrelay completion`."""
     parser = Parser(
         "syncrelay completion",
+        example="syncrelay completion fish > ~/.config/fish/completions/syncrelay.fish",
         description="Prints a script that makes a shell complete syncrelay's commands, options and files, the groups "
         "of a file and the topics of a recording.",
         epilog="where to put it:\n"
         "  bash  ~/.local/share/bash-completion/completions/syncrelay\n"
         "  zsh   _syncrelay in a folder of $fpath, before compinit\n"
-        "  fish  ~/.config/fish/completions/syncrelay.fish",
+        "  fish  ~/.config/fish/completions/syncrelay.fish\n",
     )
     parser.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
     return parser

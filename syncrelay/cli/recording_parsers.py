@@ -8,6 +8,7 @@ def analyze() -> Parser:
     """Return the parser of `syncrelay analyze`."""
     parser = Parser(
         "syncrelay analyze",
+        example="syncrelay analyze drive.mcap --config fusion.yaml",
         description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
         "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
         "Each of several recordings is measured by itself, on all cores. "
@@ -37,6 +38,7 @@ def replay() -> Parser:
     """Return the parser of `syncrelay replay`."""
     parser = Parser(
         "syncrelay replay",
+        example="syncrelay replay drive.mcap --config fusion.yaml -o sets.mcap",
         description="Runs the groups of a file on a recording, without ROS, and says what became of every message. "
         "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic.",
     )
@@ -75,6 +77,7 @@ def export() -> Parser:
     """Return the parser of `syncrelay export`."""
     parser = Parser(
         "syncrelay export",
+        example="syncrelay export drive.mcap --config fusion.yaml -o dataset",
         description="Writes the sets that the groups of a file make of recordings as a dataset: in Parquet, a row a "
         "set, with the messages decoded. They are the sets of `syncrelay replay`. Exit code 1 if a recording cannot be "
         "read or lacks a required topic.",

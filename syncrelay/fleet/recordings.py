@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Final
 
 from syncrelay.bag.attempts import redacted
-from syncrelay.bag.names import METADATA, is_recording_name
 from syncrelay.bag.storage import find, is_url
 from syncrelay.errors import BagError
 from syncrelay.fleet.task import Source
+from syncrelay.recording_files import METADATA, is_recording_name
 
 _EXPECTED: Final = "expected files that end in .mcap, .db3 or .bag, compressed or not"
 _LIST: Final = "@"

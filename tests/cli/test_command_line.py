@@ -5,7 +5,10 @@ import sys
 
 import pytest
 
-from tests.cli.command import BAD, GOOD, ROOT, run, run_python
+from syncrelay.cli import parsers
+from syncrelay.cli.dispatch import COMMANDS
+from syncrelay.cli.parser import HelpRequested
+from tests.cli.command import BAD, GOOD, ROOT, run, run_here, run_python
 
 
 def test_help_names_every_command_and_option_on_stdout(tmp_path):
@@ -114,6 +117,51 @@ def test_the_relay_shows_the_faults_of_its_file_as_validate_does(tmp_path):
     relayed = run("--config", "f.yaml", folder=tmp_path)
     assert (relayed.returncode, relayed.stdout) == (1, "")
     assert relayed.stderr == run("validate", "f.yaml", folder=tmp_path).stderr
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_the_help_of_every_command_ends_with_an_example_of_it(command):
+    with pytest.raises(HelpRequested) as asked:
+        (COMMANDS[command].parser if command else parsers.relay)().read(["--help"])
+    *_, example = str(asked.value).splitlines()
+    assert example.startswith("example: ")
+    assert len(example) <= 80
+    words = shlex.split(example.removeprefix("example: ").partition(" > ")[0])
+    at = words.index("syncrelay")
+    assert all("=" in word for word in words[:at])
+    if not command:
+        assert parsers.relay().read(words[at + 1 :]).config
+        return
+    assert words[at + 1] == command
+    COMMANDS[command].parser().read(words[at + 2 :])
+
+
+@pytest.mark.parametrize("name", ["drive.mcap", "a drive.db3.zstd", "old.bag", "rosbag2_day"])
+def test_a_recording_where_it_does_not_belong_is_told_which_commands_are_meant(name, tmp_path):
+    (tmp_path / "rosbag2_day").mkdir()
+    (tmp_path / "rosbag2_day" / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
+    for each in ("drive.mcap", "a drive.db3.zstd", "old.bag", "rosbag2_day/drive_0.mcap"):
+        (tmp_path / each).write_bytes(b"")
+    (tmp_path / "f.yaml").write_text(GOOD)
+    tried = [[name], ["init", name], ["replay", name], ["export", name], ["--config", name], ["diff", "f.yaml", name]]
+    tried += [[command, name] for command in ("validate", "graph", "test")]
+    tried += [[command, "--config", name] for command in ("doctor", "observe")]
+    tried += [[command, name, "--config", name] for command in ("analyze", "replay", "export")]
+    for words in tried:
+        done = run_here(*words, folder=tmp_path)
+        assert (done.returncode, done.stdout) == (2, ""), words
+        meant = [line.split("   ")[0] for line in done.stderr.splitlines() if line.startswith("  syncrelay ")]
+        assert len(meant) == 4, done.stderr
+        for line in meant:
+            command, *rest = shlex.split(line)[1:]
+            assert name in rest
+            COMMANDS[command].parser().read(rest)
+
+
+def test_a_folder_of_files_beside_a_recording_is_one_of_files(tmp_path):
+    (tmp_path / "drive.mcap").write_bytes(b"")
+    (tmp_path / "f.yaml").write_text(GOOD)
+    assert run_here("validate", ".", folder=tmp_path).returncode == 0
 
 
 IN_THE_BOUNDARY = """
