@@ -24,7 +24,7 @@ from tests.drawn_files import drawn_files, frames_for
 from tests.ros.frames import Frame
 
 _LONG = os.environ.get("SYNCRELAY_FAULTS") == "long"
-_DRAWN = 6_000 if _LONG else 24
+_PARTS, _FILES_A_PART = (240, 25) if _LONG else (6, 4)
 _SEED = os.urandom(4).hex() if _LONG else "any file"
 _BLOCK = re.compile(r"^```yaml\n(version:.*?)^```", re.DOTALL | re.MULTILINE)
 _PAGES = [ROOT / "README.md", *(ROOT / "docs").glob("*/*.md")]
@@ -46,9 +46,9 @@ def test_every_command_takes_every_file_that_is_shipped(name, tmp_path):
 
 
 @pytest.mark.faults
-@pytest.mark.parametrize("part", range(6))
+@pytest.mark.parametrize("part", range(_PARTS))
 def test_every_command_takes_every_file_that_is_drawn(part, tmp_path):
-    for number, text in enumerate(itertools.islice(drawn_files(f"{_SEED} {part}"), _DRAWN // 6)):
+    for number, text in enumerate(itertools.islice(drawn_files(f"{_SEED} {part}"), _FILES_A_PART)):
         folder = tmp_path / str(number)
         folder.mkdir()
         _try(text, folder, f"{_SEED} {part} {number}")
