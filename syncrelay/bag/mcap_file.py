@@ -11,6 +11,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel as ChannelRecord
 from mcap.records import Chunk, ChunkIndex, Schema, Statistics
 
+from syncrelay.bag.effort import Effort
 from syncrelay.bag.losses import Losses
 from syncrelay.bag.mcap_parts import Parts, PlainChunk, is_mixed, is_needed, plain_chunk
 from syncrelay.bag.mcap_records import (
@@ -21,6 +22,7 @@ from syncrelay.bag.mcap_records import (
     parsed,
     parsed_from,
     records,
+    require_record,
     unpacked,
 )
 from syncrelay.bag.names import full_type_name, topic_name
@@ -53,6 +55,7 @@ class McapFile:
         self._losses = Losses(name)
         self.size = file.size
         self.position = 0
+        self._effort = Effort()
         self._segments: list[Segment] = []
         self._chunked: set[Segment] = set()
         self._schemas: dict[int, Schema] = {}
@@ -88,6 +91,7 @@ class McapFile:
             plain = {each: chunk for each, chunk in self._plain.items() if is_mixed(self._holds.get(each), chosen)}
             numbers = [number for number, channel in chosen.items() if channel is not None]
             parts = Parts(self._file, needed, plain, numbers)
+        self._effort = Effort()
         said, count = self.faults, 0
         read = partial(self._read, channels=chosen, parts=parts)
         for segment, found in read_in_order(needed, read, self._losses, begin=begin, end=end):
@@ -122,8 +126,10 @@ class McapFile:
         found: list[RawMessage] = []
         try:
             content = parts.of(segment) if parts is not None else None
-            add_messages(found, self._content(segment) if content is None else content, channels)
+            add_messages(found, self._content(segment) if content is None else content, channels, self._effort)
         except UNREADABLE as fault:
+            if found:
+                self._effort.found_message()
             self._losses.damaged(f"the chunk at byte {segment.offset}", fault, read=len(found))
         return found
 
@@ -133,7 +139,7 @@ class McapFile:
         opcode, length = RECORD.unpack(self._bytes(segment.offset, RECORD.size))
         if opcode != Opcode.CHUNK or length != segment.size - RECORD.size:
             raise ValueError("it does not match the index")
-        return unpacked(self._chunk(segment))
+        return unpacked(self._chunk(segment), self._effort)
 
     def _chunk(self, record: Segment) -> Chunk:
         self._file.seek(record.offset + RECORD.size)
@@ -148,7 +154,7 @@ class McapFile:
     def _walk(self, place: int, end: int) -> Iterator[tuple[int, int, int]]:
         """Yield opcode, begin and end of what each record of a part of the file holds.
 
-        Raises EOFError where the part ends within a record.
+        Raises EOFError where the part ends within a record, and ValueError where none begins or too many tell nothing.
         """
         while place < end:
             begin = place + RECORD.size
@@ -156,6 +162,8 @@ class McapFile:
             place = begin + length
             if place > end:
                 raise EOFError("a record ends past the end")
+            require_record(opcode)
+            self._effort.pass_record()
             yield opcode, begin, place
 
     def _read_index(self) -> bool:
@@ -208,6 +216,7 @@ class McapFile:
                 case Opcode.SCHEMA | Opcode.CHANNEL:
                     self._define(opcode, self._text(place, stop))
                 case Opcode.CHUNK_INDEX:
+                    self._effort.found_message()
                     yield parsed(ChunkIndex, self._text(place, stop))
                     count += 1
                 case Opcode.STATISTICS:
@@ -234,6 +243,7 @@ class McapFile:
         """Find channels and segments by going through the file to its end, or as far as it can be read."""
         self._schemas.clear()
         self._records.clear()
+        self._effort = Effort()
         loose = Pieces()
         place = len(MAGIC)
         try:
@@ -256,6 +266,7 @@ class McapFile:
                 case Opcode.SCHEMA | Opcode.CHANNEL:
                     self._define(opcode, self._text(begin, end))
                 case Opcode.MESSAGE:
+                    self._effort.found_message()
                     time = int.from_bytes(self._bytes(begin, min(MESSAGE_FIELDS, end - begin))[6:14], "little")
                     loose.add(Segment(place, end - place, time, time))
                 case Opcode.CHUNK:
@@ -265,7 +276,7 @@ class McapFile:
 
     def _note_chunk(self, record: Segment) -> None:
         chunk = self._chunk(record)
-        content = unpacked(chunk)
+        content = unpacked(chunk, self._effort)
         segment = Segment(record.offset, record.size, chunk.message_start_time, chunk.message_end_time)
         self._segments.append(segment)
         self._chunked.add(segment)
@@ -274,6 +285,10 @@ class McapFile:
             for opcode, begin, end in records(content):
                 if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                     self._define_in(record, opcode, content[begin:end])
+                if opcode == Opcode.MESSAGE:
+                    self._effort.found_message()
+                else:
+                    self._effort.pass_record()
 
     def _define_in(self, chunk: Segment, opcode: int, content: bytes) -> None:
         try:

@@ -12,9 +12,10 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 from zstandard import ZstdError
 
+from syncrelay.bag.effort import Effort
 from syncrelay.bag.losses import STRAY
 from syncrelay.bag.recording import Channel, RawMessage
-from syncrelay.bag.unpacking import unlz4, zstd_unpacker
+from syncrelay.bag.unpacking import plain, unlz4, unzstd
 
 RECORD: Final = Struct("<BQ")
 """What every record begins with: its opcode, and the length of what follows."""
@@ -28,7 +29,8 @@ UNREADABLE: Final = (McapError, ZstdError, RuntimeError, error, ValueError, EOFE
 """What bytes raise that are not what they should be."""
 
 _BEHIND: Final = "a record in it ends behind it"
-_UNPACKERS: Final[Mapping[str, Callable[[bytes], bytes]]] = {"": bytes, "lz4": unlz4, "zstd": zstd_unpacker()}
+_NO_RECORD: Final = "there is no record where one should begin"
+_UNPACKERS: Final[Mapping[str, Callable[[bytes, Effort], bytes]]] = {"": plain, "lz4": unlz4, "zstd": unzstd}
 _Parsed_co = TypeVar("_Parsed_co", covariant=True)
 
 
@@ -70,12 +72,18 @@ def parsed_from(kind: Kind[_Parsed_co], stream: Readable, size: int) -> _Parsed_
     return kind.read(ReadDataStream(bounded))
 
 
-def unpacked(chunk: Chunk) -> bytes:
+def require_record(opcode: int) -> None:
+    """Raise ValueError for an opcode of 0, which no record has: where power was lost, a file may end in zeros."""
+    if not opcode:
+        raise ValueError(_NO_RECORD)
+
+
+def unpacked(chunk: Chunk, effort: Effort) -> bytes:
     """Return the records of a chunk; raises one of UNREADABLE where it is damaged."""
     unpack = _UNPACKERS.get(chunk.compression)
     if unpack is None:
         raise ValueError(f"it is compressed with {chunk.compression!r}, expected lz4 or zstd")
-    content = unpack(chunk.data)
+    content = unpack(chunk.data, effort)
     # 0 is that of no sum.
     if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
         raise ValueError("its checksum is wrong")
@@ -87,6 +95,7 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
     place = 0
     while place < len(content):
         opcode, length = RECORD.unpack_from(content, place)
+        require_record(opcode)
         begin = place + RECORD.size
         place = begin + length
         if place > len(content):
@@ -94,7 +103,9 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
         yield opcode, begin, place
 
 
-def add_messages(found: list[RawMessage], content: bytes, channels: Mapping[int, Channel | None]) -> None:
+def add_messages(
+    found: list[RawMessage], content: bytes, channels: Mapping[int, Channel | None], effort: Effort
+) -> None:
     """Add the messages of a run of records that are of one of the channels by number, but of those that are None.
 
     Those of no channel are STRAY. Raises one of UNREADABLE where the records end, with all added that stand before.
@@ -102,10 +113,14 @@ def add_messages(found: list[RawMessage], content: bytes, channels: Mapping[int,
     """
     unpack, begin_payload, message, least = _MESSAGE.unpack_from, _MESSAGE.size, Opcode.MESSAGE.value, MESSAGE_FIELDS
     add = found.append
-    place, size = 0, len(content)
+    place, size, others = 0, len(content), 0
     while place < size:
         if content[place] != message:
-            place += RECORD.size + RECORD.unpack_from(content, place)[1]
+            require_record(content[place])
+            effort.pass_record()
+            record = RECORD.size + RECORD.unpack_from(content, place)[1]
+            place += record
+            others += record
             continue
         _, length, number, time = unpack(content, place)
         end = place + RECORD.size + length
@@ -118,3 +133,5 @@ def add_messages(found: list[RawMessage], content: bytes, channels: Mapping[int,
         place = end
     if place > size:
         raise ValueError(_BEHIND)
+    if others < size:
+        effort.found_message()

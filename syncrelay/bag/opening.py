@@ -3,7 +3,6 @@
 import bz2
 import gzip
 import heapq
-import shutil
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -18,6 +17,7 @@ import zstandard
 
 from syncrelay.bag import mcap_file, ros1_file, sqlite_file
 from syncrelay.bag.batching import batched, filled
+from syncrelay.bag.effort import TOO_MUCH, room_for
 from syncrelay.bag.names import natural
 from syncrelay.bag.recording import AFTER_ALL, Channel, RawMessage, Recording
 from syncrelay.bag.sources import LocalFile, NoIndexError
@@ -241,9 +241,13 @@ def _decompressed(
     """Return a temporary file of the content, and what is wrong with it."""
     folder = _temporary(name, "decompress it in", opened)
     content = folder / path.stem
+    room = room_for(path.stat().st_size)
     with decompressor(path) as packed, content.open("wb") as plain:
         try:
-            shutil.copyfileobj(packed, plain, _PIECE)
+            while piece := packed.read(_PIECE):
+                if len(piece) > room:
+                    return content, [f"{name}: {TOO_MUCH}; read up to there: decompress it yourself to have all of it"]
+                room -= plain.write(piece)
         except (EOFError, OSError, zlib.error, zstandard.ZstdError) as error:
             if isinstance(error, OSError) and error.errno == ENOSPC:
                 raise BagError(

@@ -12,6 +12,7 @@ from pathlib import Path
 from struct import Struct
 from typing import Final
 
+from syncrelay.bag.effort import Effort
 from syncrelay.bag.losses import Losses
 from syncrelay.bag.names import full_type_name, topic_name
 from syncrelay.bag.qos import Profile
@@ -27,6 +28,7 @@ from syncrelay.bag.ros1_records import (
     field_of,
     fields_of,
     messages,
+    record_of,
     records,
     time_of,
     unpacked,
@@ -50,6 +52,7 @@ class Ros1File:
         self._losses = Losses(name)
         self.size = os.fstat(self._file.fileno()).st_size
         self.position = 0
+        self._effort = Effort()
         self._by_id: dict[int, Channel] = {}
         self._segments: list[Segment] = []
         if self._is_encrypted():
@@ -145,7 +148,7 @@ class Ros1File:
             self._losses.damaged(f"the {'chunk' if op == CHUNK else 'connection'} at byte {place}", fault)
 
     def _note_chunk(self, place: int, record: Record) -> None:
-        content = unpacked(record.fields, self._content(record))
+        content = unpacked(record.fields, self._content(record), self._effort)
         times = []
         # Where its records end too soon is said when its messages are read.
         with suppress(*UNREADABLE):
@@ -155,13 +158,15 @@ class Ros1File:
                 elif each.fields.get(b"op") == MESSAGE:
                     times.append(time_of(field_of(each.fields, b"time")))
         if times:
+            self._effort.found_message()
             self._segments.append(Segment(place, record.end - place, min(times), max(times)))
 
     def _read(self, segment: Segment, channels: dict[int, Channel | None]) -> list[RawMessage]:
         found: list[RawMessage] = []
         try:
             record = self._record_at(segment.offset)
-            found.extend(messages(unpacked(record.fields, self._content(record)), channels))
+            found.extend(messages(unpacked(record.fields, self._content(record), self._effort), channels))
+            self._effort.found_message()
         except UNREADABLE as fault:
             self._losses.damaged(f"the chunk at byte {segment.offset}", fault, read=len(found))
         return found
@@ -173,7 +178,7 @@ class Ros1File:
         end = begin + self._length_at(begin - LENGTH.size)
         if end > self.size:
             raise EOFError("it ends past the end of the file")
-        return Record(fields_of(self._bytes(header, begin - LENGTH.size - header)), begin, end)
+        return record_of(self._bytes(header, begin - LENGTH.size - header), begin, end)
 
     def _length_at(self, place: int) -> int:
         (length,) = LENGTH.unpack(self._bytes(place, LENGTH.size))

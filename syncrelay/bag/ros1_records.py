@@ -5,9 +5,10 @@ from operator import itemgetter
 from struct import Struct, error
 from typing import Any, Final, NamedTuple
 
+from syncrelay.bag.effort import Effort
 from syncrelay.bag.losses import STRAY
 from syncrelay.bag.recording import Channel, RawMessage
-from syncrelay.bag.unpacking import unbz2, unlz4
+from syncrelay.bag.unpacking import plain, unbz2, unlz4
 
 MESSAGE, CHUNK, CHUNK_INFO, CONNECTION = (bytes([op]) for op in (2, 5, 6, 7))
 """What `op` is of the records that are read."""
@@ -19,7 +20,7 @@ UNREADABLE: Final = (error, ValueError, EOFError, OSError, RuntimeError, MemoryE
 _TIME: Final = Struct("<II")
 _NS_PER_SECOND: Final = 1_000_000_000
 _BEHIND: Final = "a record in it ends behind it"
-_UNPACKERS: Final[Mapping[bytes, Callable[[bytes], bytes]]] = {b"none": bytes, b"bz2": unbz2, b"lz4": unlz4}
+_UNPACKERS: Final[Mapping[bytes, Callable[[bytes, Effort], bytes]]] = {b"none": plain, b"bz2": unbz2, b"lz4": unlz4}
 
 
 class Record(NamedTuple):
@@ -30,13 +31,21 @@ class Record(NamedTuple):
     end: int
 
 
+def record_of(header: bytes, content: int, end: int) -> Record:
+    """Return the record of a header; raises one of UNREADABLE where that is none, as a tail of zeros is."""
+    fields = fields_of(header)
+    if b"op" not in fields:
+        raise ValueError("there is no record where one should begin")
+    return Record(fields, content, end)
+
+
 def time_of(value: bytes) -> int:
     """Return the nanoseconds of a time; raises struct.error where it is none."""
     seconds, nanoseconds = _TIME.unpack(value)
     return int(seconds * _NS_PER_SECOND + nanoseconds)
 
 
-def unpacked(fields: Mapping[bytes, bytes], content: bytes) -> bytes:
+def unpacked(fields: Mapping[bytes, bytes], content: bytes, effort: Effort) -> bytes:
     """Return the records of a chunk; raises one of UNREADABLE where it is none, or is damaged."""
     if fields.get(b"op") != CHUNK:
         raise ValueError("it does not match the index")
@@ -44,7 +53,7 @@ def unpacked(fields: Mapping[bytes, bytes], content: bytes) -> bytes:
     unpack = _UNPACKERS.get(compression)
     if unpack is None:
         raise ValueError(f"it is compressed with {compression.decode(errors='replace')!r}, expected bz2 or lz4")
-    return unpack(content)
+    return unpack(content, effort)
 
 
 def fields_of(header: bytes) -> dict[bytes, bytes]:
@@ -87,7 +96,7 @@ def _record_in(content: bytes, place: int) -> Record:
     begin = behind + LENGTH.size
     if begin + size > len(content):
         raise ValueError(_BEHIND)
-    return Record(fields_of(header), begin, begin + size)
+    return record_of(header, begin, begin + size)
 
 
 class _Head(NamedTuple):

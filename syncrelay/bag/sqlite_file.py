@@ -6,19 +6,20 @@ Whatever a column is declared as, sqlite3 keeps values of any kind in it: those 
 import os
 import reprlib
 import sqlite3
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from urllib.parse import quote
 
 from zstandard import ZstdError
 
 from syncrelay.bag.batching import batched
+from syncrelay.bag.effort import Effort
 from syncrelay.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.bag.qos import read_profiles
 from syncrelay.bag.recording import AFTER_ALL, LATEST, Channel, Definition, Encoding, RawMessage, is_part
-from syncrelay.bag.unpacking import zstd_unpacker
+from syncrelay.bag.unpacking import unzstd
 from syncrelay.errors import BagError
 
 MAGIC: Final = b"SQLite format 3\0"
@@ -33,6 +34,10 @@ _END_OF: Final = """
 SELECT timestamp FROM messages WHERE timestamp BETWEEN 0 AND ? AND typeof(timestamp) = 'integer'
 ORDER BY timestamp {} LIMIT 1"""
 _FIRST_PAYLOADS: Final = "SELECT data FROM messages WHERE typeof(data) = 'blob' LIMIT 3"
+_TABLES: Final = ("topics", "messages", "message_definitions")
+_KIND: Final = "SELECT DISTINCT type FROM pragma_table_list WHERE name = ? COLLATE NOCASE AND schema = 'main'"
+# The column of table_xinfo that is not 0 for those that are generated.
+_HIDDEN: Final = 6
 _ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
 # A sentence of sqlite3's own that quotes a damaged name is no text, which is a ValueError.
 _UNREADABLE: Final = (sqlite3.Error, ValueError, MemoryError)
@@ -50,12 +55,13 @@ class SqliteFile:
         self._losses = Losses(name)
         self.size = path.stat().st_size
         self.position = 0
-        self._database = _opened(path, name)
+        self._database, self._stored = _opened(path, name)
         try:
+            self._require_tables()
             self.channels = tuple(self._channels())
             # Of a damaged index, the first may be the later one.
             self.begin, self.end = sorted(self._end(order) for order in ("ASC", "DESC"))
-            self._unpack = self._unpacker()
+            self._is_packed = self._has_packed()
         except _UNREADABLE as fault:
             self._database.close()
             raise BagError(f"{name}: cannot be read as a rosbag2 recording: {fault}") from fault
@@ -79,7 +85,7 @@ class SqliteFile:
         among = frozenset(wanted)
         chosen = {channel.id: channel for channel in self.channels if channel in among}
         others = [channel.id for channel in self.channels if channel.id not in chosen]
-        unpack, leave_out = self._unpack, self._losses.leave_out
+        effort, stored, leave_out = Effort(), 0, self._losses.leave_out
         # What is of no time is left out where all is read.
         part = " AND timestamp >= ? AND timestamp < ?" if is_part(begin, end) else ""
         query = _BY_TIME.format(_marks(len(others)), part)
@@ -90,15 +96,26 @@ class SqliteFile:
                     leave_out(_why(channel, time, payload))
                     continue
                 self.position += len(payload)
+                stored += len(payload)
+                self._require_stored(stored)
                 try:
-                    content = payload if unpack is None else unpack(payload)
+                    content = unzstd(payload, effort) if self._is_packed else payload
                 except _NOT_UNPACKED:
                     leave_out("the payload cannot be decompressed")
                     continue
+                effort.found_message()
                 yield channel, time, content
         except _UNREADABLE as fault:
             self._losses.say(f"damaged; read as far as possible: {fault or 'there is not enough memory'}")
         self.position = self.size
+
+    def _require_tables(self) -> None:
+        """Raise ValueError where what is read is computed and not stored: there may be no end to that."""
+        for name in _TABLES:
+            kinds = self._database.execute(_KIND, (name,)).fetchall()
+            columns = self._database.execute(f"PRAGMA table_xinfo({name})")
+            if kinds not in ([], [("table",)]) or any(column[_HIDDEN] for column in columns):
+                raise ValueError(f"{name} is no plain table")
 
     def _channels(self) -> Iterator[Channel]:
         columns = {row[1] for row in self._database.execute("PRAGMA table_info(topics)")}
@@ -106,7 +123,7 @@ class SqliteFile:
         type_hash = "type_description_hash" if "type_description_hash" in columns else "''"
         definitions = dict(self._definitions())
         query = f"SELECT id, name, type, serialization_format, {qos}, {type_hash} FROM topics"  # noqa: S608  columns
-        for number, topic, type_name, encoding, profiles, hashed in self._database.execute(query):
+        for number, topic, type_name, encoding, profiles, hashed in self._described(query):
             if type(number) is not int or not all(isinstance(each, str) for each in (topic, type_name, encoding)):
                 described = ", ".join(map(reprlib.repr, (number, topic, type_name, encoding)))
                 self._losses.say(f"a topic is left out: expected a number, a name, a type and an encoding: {described}")
@@ -125,18 +142,30 @@ class SqliteFile:
         # Newer than the first versions of rosbag2.
         with suppress(sqlite3.OperationalError):
             query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-            for type_name, encoding, text in self._database.execute(query):
+            for type_name, encoding, text in self._described(query):
                 if all(isinstance(each, str) for each in (type_name, encoding, text)):
                     yield type_name, Definition(encoding, text)
+
+    def _described(self, query: str) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of a table that describes; raises ValueError where they hold more than the file."""
+        size = 0
+        for row in self._database.execute(query):
+            size += sum(len(each) for each in row if isinstance(each, str | bytes))
+            self._require_stored(size)
+            yield row
+
+    def _require_stored(self, size: int) -> None:
+        """Raise ValueError for more bytes than the file has, as where its pages are in a circle."""
+        if size > self._stored:
+            raise ValueError("its tables hold more than the file")
 
     def _end(self, order: str) -> int:
         """Return the first or the last time of receipt, 0 if there is none."""
         row = self._database.execute(_END_OF.format(order), (LATEST,)).fetchone()
         return int(row[0]) if row else 0
 
-    def _unpacker(self) -> Callable[[bytes], bytes] | None:
-        firsts = self._database.execute(_FIRST_PAYLOADS)
-        return zstd_unpacker() if any(payload.startswith(_ZSTD) for (payload,) in firsts) else None
+    def _has_packed(self) -> bool:
+        return any(payload.startswith(_ZSTD) for (payload,) in self._database.execute(_FIRST_PAYLOADS))
 
 
 def _marks(count: int) -> str:
@@ -152,8 +181,8 @@ def _why(channel: Channel | None, time: object, payload: object) -> str:
     return "the payload is not a BLOB" if type(payload) is not bytes else OF_NO_TIME
 
 
-def _opened(path: Path, name: str) -> sqlite3.Connection:
-    """Open a file without changing it or what is beside it."""
+def _opened(path: Path, name: str) -> tuple[sqlite3.Connection, int]:
+    """Open a file without changing it or what is beside it; return how many bytes there are to read, too."""
     log = path.with_name(f"{path.name}-wal")
     # A log is read only where its index can be made beside it; immutable files are read without it.
     is_logged = log.exists() and os.access(path.parent, os.W_OK)
@@ -163,7 +192,7 @@ def _opened(path: Path, name: str) -> sqlite3.Connection:
     except sqlite3.Error as fault:
         raise BagError(f"{name}: cannot be opened: {fault}") from fault
     database.text_factory = lambda text: text.decode(errors="replace")
-    steps = _STEPS_PER_BYTE * (path.stat().st_size + (log.stat().st_size if is_logged else 0))
-    left = iter(range(1 + steps // _STEPS_AT_ONCE))
+    size = path.stat().st_size + (log.stat().st_size if is_logged else 0)
+    left = iter(range(1 + _STEPS_PER_BYTE * size // _STEPS_AT_ONCE))
     database.set_progress_handler(lambda: next(left, None) is None, _STEPS_AT_ONCE)
-    return database
+    return database, size

@@ -15,10 +15,11 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType
 
 from syncrelay.bag import Channel, Encoding, open_recording
+from syncrelay.bag.effort import Effort
 from syncrelay.bag.losses import STRAY
 from syncrelay.bag.recording import LATEST
 from syncrelay.bag.ros1_records import UNREADABLE, messages
-from syncrelay.bag.unpacking import unlz4, zstd_unpacker
+from syncrelay.bag.unpacking import unlz4, unzstd
 from syncrelay.errors import BagError
 from tests.bag.making import ROS1_STORE, rig, write_mcap, write_ros1, write_rosbag2
 from tests.ros.cdr_messages import VECTOR
@@ -165,6 +166,21 @@ def test_an_mcap_record_that_is_no_message_and_ends_behind_its_chunk_is_said(len
     assert fault.endswith("is damaged and left out: a record in it ends behind it")
 
 
+@pytest.mark.parametrize("place", [0, 4, 11, 20, -1])
+@pytest.mark.parametrize("number", [0, 5, 11])
+def test_a_chunk_of_a_wrong_checksum_is_left_out(number, place, tmp_path):
+    """What only the checksum tells: the bit is in a payload, of which nothing says what it should be."""
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300)
+    content = bytearray(path.read_bytes())
+    payload = _RIG[number].payload
+    content[content.index(payload) + place % len(payload)] ^= 1
+    path.write_bytes(content)
+    frames, (fault,) = _read(path)
+    assert set(frames) < set(_RIG)
+    assert _RIG[number] not in frames
+    assert fault.endswith("is damaged and left out: its checksum is wrong")
+
+
 def test_an_mcap_file_that_ends_between_two_records_is_said(tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", _RIG, use_chunking=False)
     content = path.read_bytes()
@@ -235,13 +251,16 @@ def test_frames_that_tell_no_size_are_unpacked_and_what_is_cut_off_is_not():
     content = os.urandom(100_000) + bytes(5_000_000)
     stream = zstandard.ZstdCompressor().compressobj()
     packed = stream.compress(content) + stream.flush()
-    unpack = zstd_unpacker()
+
+    def unpack(packed: bytes) -> bytes:
+        return unzstd(packed, Effort())
+
     assert unpack(packed) == unpack(zstandard.compress(content)) == content
     for cut in (packed[:-10], packed[: len(packed) // 2], b"", packed[:4]):
         with pytest.raises((EOFError, zstandard.ZstdError)):
             unpack(cut)
     with pytest.raises((EOFError, RuntimeError)):
-        unlz4(b"\x04\x22\x4d\x18")
+        unlz4(b"\x04\x22\x4d\x18", Effort())
 
 
 def test_no_frame_unpacks_to_more_than_it_can_hold():
@@ -251,7 +270,7 @@ def test_no_frame_unpacks_to_more_than_it_can_hold():
     at = bytes(packed).index(struct.pack("<I", 70_000))
     packed[at : at + 4] = struct.pack("<I", 2**32 - 1)
     with pytest.raises((ValueError, zstandard.ZstdError)):
-        zstd_unpacker()(bytes(packed))
+        unzstd(bytes(packed), Effort())
 
 
 def _ros1_message() -> bytes:
