@@ -85,7 +85,7 @@ def lead_in(bindings: Iterable[GroupBinding]) -> int:
     leads = [_LEAST_LEAD_NS]
     for binding in bindings:
         options = binding.group.options
-        tolerance = options.tolerance.ns if options.tolerance is not None else 0
+        tolerance = max(topic.tolerance.ns if topic.tolerance else 0 for topic in binding.group.topics)
         held = 2 * ((options.max_wait or 0) + tolerance) + options.queue_size * _LEAD_PER_PLACE_NS
         leads.append(_LEAST_LEAD_NS + held)
     return max(leads)

@@ -15,7 +15,7 @@ from syncrelay.bag.stretch_replay import StretchReplay, run_stretch
 from syncrelay.bag.stretches import Stretch, StretchResult, cut, lead_in, total
 from syncrelay.cli.export_lerobot import export_lerobot
 from syncrelay.cli.fleet import do_on_many, engine_of
-from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of
+from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of, few_sets
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import eased_collector
 from syncrelay.cli.stop import StopRequest
@@ -27,7 +27,7 @@ from syncrelay.datasets.reading import SetsOf, resolved
 from syncrelay.datasets.tables import Content
 from syncrelay.errors import BagError, UsageError
 from syncrelay.fleet.stretched import InStretches, Place
-from syncrelay.fleet.task import JSON, PROBLEMS, Source, fingerprint_of, text_of
+from syncrelay.fleet.task import JSON, Source, fingerprint_of, text_of
 
 # Below, reading what leads in would take all the time.
 _SHORTEST_NS: Final = 1_000_000_000
@@ -96,12 +96,9 @@ class ParquetTask:
             sets = SetsOf(bindings, self.content, name=source.name)
             replay = Replay(recording, bindings, listeners=sets.listeners)
             write_parquet(sets, replay.steps(), folder, ending=SUFFIX if self.stretch_ns is None else _ending(1))
-            facts = about(recording, bindings)
-            undecodable = sets.faults()
-            if undecodable:
-                known = facts.get(PROBLEMS)
-                facts[PROBLEMS] = [*(known if isinstance(known, list) else []), *undecodable]
-            return {**facts, "groups": [counts_of(result) for result in replay.results()]}
+            results = replay.results()
+            facts = about(recording, bindings, more=[*sets.faults(), *few_sets(recording, bindings, results)])
+            return {**facts, "groups": [counts_of(result) for result in results]}
 
     def cut(self, source: Source) -> tuple[Sequence[Stretch], dict[str, JSON]]:
         """See LongTask."""

@@ -9,6 +9,7 @@ from typing import Final, Self
 
 from syncrelay.bag import Recording, open_recording
 from syncrelay.bag.analysis import inventory
+from syncrelay.bag.analysis.few_sets import why_few_sets
 from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.bag.mcap_output import McapOutput
 from syncrelay.bag.replay import GroupResult
@@ -57,8 +58,9 @@ class ReplayTask:
                 for binding in bindings:
                     writer.begin(binding)
                 results = replay_groups(recording, bindings, listeners=[writer.take])
+            few = [] if self.what_if else few_sets(recording, bindings, results)
             return {
-                **about(recording, bindings),
+                **about(recording, bindings, more=few),
                 "messages": writer.messages,
                 "groups": [counts_of(result) for result in results],
             }
@@ -104,11 +106,22 @@ class AnalyzeTask:
         return facts
 
 
-def about(recording: Recording, bindings: Sequence[GroupBinding]) -> dict[str, JSON]:
-    """Return when a recording was made, and what is wrong with it: what it lacks, and what could not be read."""
+def about(recording: Recording, bindings: Sequence[GroupBinding], *, more: Sequence[str] = ()) -> dict[str, JSON]:
+    """Return when a recording was made, and what is wrong with it: what it lacks, `more`, what could not be read."""
     lacking = [problem for binding in bindings if not binding.is_complete for problem in binding.problems]
+    lacking += more
     facts: dict[str, JSON] = {"begin": recording.begin, "end": recording.end}
     return {**facts, **_unless_empty(PROBLEMS, lacking), **_unless_empty("faults", recording.faults)}
+
+
+def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Sequence[GroupResult]) -> list[str]:
+    """Say of each group whose inputs are all there, and that gave few of the possible sets, what costs the others."""
+    found = [
+        why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
+        for binding, result in zip(bindings, results, strict=True)
+        if binding.is_complete
+    ]
+    return [sentence for sentence in found if sentence is not None]
 
 
 def _unless_empty(name: str, sentences: Iterable[str]) -> dict[str, JSON]:

@@ -88,6 +88,10 @@ def _trigger(group: GroupConfig, document: Document) -> Iterator[Problem]:
     named, path = group.options.trigger_topic, (*group.path, "trigger")
     if named is None:
         return
+    at = None if group.trigger is None else (*group.path, "topics", group.trigger, "max_age")
+    if at is not None and document.has(at):
+        text = f"{quoted(named)} triggers every set, so its messages have no age: `max_age` belongs to the others"
+        yield document.problem(at, text, code="conflict")
     if group.trigger is None:
         hint = document.did_you_mean(named, _inputs(group))
         yield document.problem(path, f"{quoted(named)} is not an input of this group{hint}", code="bad_value")

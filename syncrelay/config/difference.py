@@ -11,7 +11,7 @@ from syncrelay.config.problems import Path
 from syncrelay.config.reload import Exchange, Subscription, exchange, needs_restart
 from syncrelay.config.resolved import GroupConfig, TopicConfig
 
-_KEYS: Final = {"offset_ns": "offset", "min_period_ns": "min_period"}
+_KEYS: Final = {"offset_ns": "offset", "min_period_ns": "min_period", "tolerance": "max_age"}
 """What the file calls those of TopicConfig that it calls otherwise."""
 
 _FROM_ELSEWHERE: Final = ("output", "type")

@@ -211,6 +211,20 @@ class PacedTopic(Topic):
     )
 
 
+class AgedTopic(Topic):
+    """An input of a policy that takes the latest message, up to some age."""
+
+    max_age: Annotated[Duration | None, NOT_NULL] = Field(
+        default=None,
+        description=(
+            "How much older than the trigger's message or tick a message of this input may be: longer for one that is"
+            " sent rarely, such as a task or a map. A number is seconds, a string has a unit (ns, us, ms, s, min)."
+            " Default: the group's."
+        ),
+        examples=["60min"],
+    )
+
+
 def _restamp(value: Any) -> str:
     """Return a text; which texts are inputs only the group can tell."""
     if not isinstance(value, str):
@@ -373,6 +387,10 @@ class Group(Keys):
     def ticks(self) -> Ticks | None:
         """The ticks of the clock that makes the sets; None where messages do."""
         return None
+
+    def tolerance_of(self, _topic: Topic) -> Tolerance | None:
+        """Return how far a topic's stamps may be from those of its set; None where any distance will do."""
+        return self.tolerance
 
     def key_of(self, _topic: Topic) -> str | None:
         """Return the path of the field that a topic's messages are matched by; None where it is their stamps."""

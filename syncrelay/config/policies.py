@@ -8,7 +8,17 @@ from typing import Annotated, Final, Literal
 from pydantic import Field
 
 from syncrelay.config.keys import NOT_NULL, Duration, FieldPath, Trigger
-from syncrelay.config.models import Distance, Group, Inputs, KeyedTopic, PacedTopic, Tolerance, Topic, Topics
+from syncrelay.config.models import (
+    AgedTopic,
+    Distance,
+    Group,
+    Inputs,
+    KeyedTopic,
+    PacedTopic,
+    Tolerance,
+    Topic,
+    Topics,
+)
 from syncrelay.sync import (
     ApproximateEpsilonTime,
     ApproximateTime,
@@ -134,17 +144,22 @@ class LatestTimeGroup(Group):
     max_age: Annotated[Duration | None, NOT_NULL] = Field(
         default=None,
         description=(
-            "How much older than the trigger's message or tick another may be. A number is seconds, a string has a unit"
-            " (ns, us, ms, s, min). Default: no limit."
+            "How much older than the trigger's message or tick another may be, where its input has no `max_age` of its"
+            " own. A number is seconds, a string has a unit (ns, us, ms, s, min). Default: no limit."
         ),
         examples=["500ms"],
     )
-    topics: tuple[Topic, ...] = Topics
+    topics: tuple[AgedTopic, ...] = Topics
 
     @property
     def tolerance(self) -> Tolerance | None:
         """How much older than the trigger's message or tick another may be."""
         return None if self.max_age is None else Tolerance("max_age", self.max_age)
+
+    def tolerance_of(self, topic: Topic) -> Tolerance | None:
+        """Return the topic's own `max_age`, else the group's."""
+        own = topic.max_age if isinstance(topic, AgedTopic) else None
+        return self.tolerance if own is None else Tolerance("max_age", own)
 
     @property
     def trigger_topic(self) -> str | None:
@@ -159,15 +174,17 @@ class LatestTimeGroup(Group):
     def build_policy(self, inputs: Inputs) -> LatestTime | LatestAtTicks:
         """Return a new policy of the engine."""
         n_inputs = len(self.topics)
+        tolerances = [self.tolerance_of(topic) for topic in self.topics]
+        max_ages_ns = [None if tolerance is None else tolerance.ns for tolerance in tolerances]
         if isinstance(self.trigger, Ticks):
             return LatestAtTicks(
-                n_inputs=n_inputs, queue_size=self.queue_size, ticks=self.trigger, max_age_ns=self.max_age
+                n_inputs=n_inputs, queue_size=self.queue_size, ticks=self.trigger, max_ages_ns=max_ages_ns
             )
         return LatestTime(
             n_inputs=n_inputs,
             queue_size=self.queue_size,
             trigger=inputs.index_of(self.trigger),
-            max_age_ns=self.max_age,
+            max_ages_ns=max_ages_ns,
         )
 
 

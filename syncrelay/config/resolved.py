@@ -12,6 +12,7 @@ from syncrelay.config.models import (
     NodeConfig,
     PacedTopic,
     StampSource,
+    Tolerance,
     Topic,
 )
 from syncrelay.config.names import default_output
@@ -26,6 +27,7 @@ class TopicConfig:
 
     `type` is None where no group of the file says it: the graph or the recording does. `stamp` is "header", "receive"
     or a StampField with the path of the field; `key` the path of the field to match by, None where stamps are matched.
+    `tolerance` is how far its stamps may be from those of its set, None where any distance will do.
     """
 
     topic: str
@@ -37,6 +39,7 @@ class TopicConfig:
     stamp: StampSource
     required: bool
     key: str | None
+    tolerance: Tolerance | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,11 @@ class GroupConfig:
     def held(self) -> tuple[int, ...]:
         """The inputs whose latest message is held: it may be in many sets."""
         return tuple(index for index in range(len(self.topics)) if self.options.repeats and index != self.trigger)
+
+    @property
+    def own_tolerances(self) -> tuple[Tolerance | None, ...]:
+        """The tolerance of each input; None of one that goes by the group's."""
+        return tuple(None if each.tolerance == self.options.tolerance else each.tolerance for each in self.topics)
 
     def paths(self) -> Iterator[tuple[Path, TopicConfig]]:
         """Yield its topics, each with the place where it stands in the file."""
@@ -146,6 +154,7 @@ def _topic(topic: Topic, group: Group, *, name: str) -> TopicConfig:
         stamp=topic.stamp,
         required=topic.required,
         key=group.key_of(topic),
+        tolerance=group.tolerance_of(topic),
     )
 
 

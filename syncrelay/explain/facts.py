@@ -115,7 +115,7 @@ class InputFacts:
 
     `type` is the file's, or else the graph's; None until it is known. `key` is the newest message's. `offset` is added
     to stamps for matching, in nanoseconds. `served_since` is since when without a break the graph has shown a publisher
-    whose messages can be received, None while it shows none.
+    whose messages can be received, None while it shows none. `own_tolerance` is what the file gives this input alone.
     """
 
     graph: InputGraph
@@ -126,6 +126,7 @@ class InputFacts:
     key: Hashable = None
     offset: int = 0
     served_since: int | None = None
+    own_tolerance: Tolerance | None = None
 
     @property
     def name(self) -> str:
@@ -242,6 +243,10 @@ class GroupFacts:
     def lag(self, index: int) -> int | None:
         """Return how long after their stamps an input's messages come, in nanoseconds; None if no clock can tell."""
         return None if self.clock and not self.clock.received else self.inputs[index].figures.delay
+
+    def tolerance_of(self, index: int) -> Tolerance | None:
+        """Return how far an input's stamps may be from those of its set; None where any distance will do."""
+        return self.inputs[index].own_tolerance or self.tolerance
 
     def is_held(self, index: int) -> bool:
         """Whether the latest message of this input is held and serves until there is a newer one."""

@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import repeat
 from operator import add, sub
 from typing import Any, Final, NamedTuple, TypeAlias
@@ -32,7 +32,8 @@ class Observation:
 
     `offsets_ns` are added to stamps as for matching; `distance` is how it is measured how far apart messages are;
     `trigger` is the index of the input whose every message makes a set; `ticks_hz` is the rate of the clock that does,
-    where one does. All times are of one clock, that of `began` and of the times of receipt.
+    where one does. How near the messages of the inputs `apart` are is not measured: they have tolerances of their own.
+    All times are of one clock, that of `began` and of the times of receipt.
     """
 
     def __init__(
@@ -44,10 +45,12 @@ class Observation:
         distance: Distance = Distance.SPAN,
         trigger: int | None = None,
         ticks_hz: float | None = None,
+        apart: Collection[int] = (),
     ) -> None:
         self._began = began
         self._offsets = tuple(offsets_ns)
         self._required = [index for index, needed in enumerate(required) if needed]
+        self._measured = [index for index in self._required if index not in apart]
         self._trigger = trigger
         self._ticks_hz = ticks_hz
         self._inputs = [InputObservation() for _ in offsets_ns]
@@ -57,7 +60,7 @@ class Observation:
         self._last_set: int | None = None
         self._resumed: int | None = None
         self._spans, self._latencies = no_values(), no_values()
-        self._nearest_spans = NearestSpans(len(self._required), distance)
+        self._nearest_spans = NearestSpans(len(self._measured), distance)
         self._with_optional = {
             index: NearestSpans(len(self._required) + 1)
             for index, needed in enumerate(required)
@@ -172,10 +175,10 @@ class Observation:
         shifted = [
             [stamp + offset for stamp, _ in came if stamp] for came, offset in zip(arrivals, self._offsets, strict=True)
         ]
-        if len(self._required) > 1 and self._ticks_hz is None:
-            pivot = self._slowest(self._required) if self._trigger is None else self._trigger
+        if len(self._measured) > 1 and self._ticks_hz is None:
+            pivot = self._slowest(self._measured) if self._trigger is None else self._trigger
             measured = self._nearest_spans.add(
-                [shifted[index] for index in self._required], pivot=self._required.index(pivot)
+                [shifted[index] for index in self._measured], pivot=self._measured.index(pivot)
             )
             keep_last(self._nearest, measured, _LAST_SETS)
             keep_last(self._nearest_at, [now] * len(measured), _LAST_SETS)

@@ -1,5 +1,6 @@
 """Findings about sets that a clock triggers: stamps that are off the clock, messages too old at its ticks."""
 
+from math import inf
 from statistics import median_low
 from typing import Final
 
@@ -21,10 +22,9 @@ def off_the_clock(facts: GroupFacts) -> Found:
     if facts.ticks_hz is None or not facts.is_silent or facts.is_new:
         return
     limit = max(_OFF, 2 * max(waited_for_relay(facts)))
-    oldest = None if facts.tolerance is None else max(limit, facts.tolerance.ns + (facts.max_wait or 0))
     required = [(index, each) for index, each in enumerate(facts.inputs) if each.required]
     late = {index: lag - each.offset for index, each in required if (lag := facts.lag(index)) is not None}
-    off = {index: by for index, by in late.items() if by < -limit or (oldest is not None and by > oldest)}
+    off = {index: by for index, by in late.items() if by < -limit or by > _oldest(facts, index, limit)}
     if not off:
         return
     index = max(off, key=lambda each: abs(off[each]))
@@ -39,6 +39,11 @@ def off_the_clock(facts: GroupFacts) -> Found:
         _to_one_clock(facts),
         None if are_all else index,
     )
+
+
+def _oldest(facts: GroupFacts, index: int, limit: int) -> float:
+    tolerance = facts.tolerance_of(index)
+    return inf if tolerance is None else max(limit, tolerance.ns + (facts.max_wait or 0))
 
 
 def _clock(facts: GroupFacts) -> str:
@@ -61,24 +66,33 @@ def _to_one_clock(facts: GroupFacts) -> str:
 
 
 def too_old(facts: GroupFacts) -> Found:
-    """Find the required input whose latest message is too old for ticks, by how late and how seldom it comes."""
-    if facts.ticks_hz is None or facts.tolerance is None or facts.distance is not Distance.AGE:
+    """Find the required input whose latest message is too old, by how late and how seldom it comes.
+
+    At the messages of a trigger, only those that have a tolerance of their own: the others are measured.
+    """
+    if facts.distance is not Distance.AGE or (not facts.is_silent and not _lacks_sets(facts)):
         return
-    if not facts.is_silent and not _lacks_sets(facts):
-        return
-    max_age, found = facts.tolerance, [(_ages(facts, each), each) for each in facts.inputs if each.required]
-    known = [(ages, each) for ages, each in found if ages is not None]
+    known = [
+        (*ages, tolerance, index)
+        for index, each in enumerate(facts.inputs)
+        if each.required and (facts.trigger is None or each.own_tolerance is not None)
+        if (tolerance := facts.tolerance_of(index)) is not None and (ages := _ages(facts, each)) is not None
+    ]
     if not known:
         return
-    (least, most), an_input = max(known, key=lambda each: each[0][1])
+    least, most, max_age, index = max(known, key=lambda each: each[1] - each[2].ns)
     if most <= max_age.ns:
         return
+    an_input = facts.inputs[index]
+    where = "a tick" if facts.trigger is None else f"a message of {facts.inputs[facts.trigger].name}"
+    at = "" if an_input.own_tolerance is None else f" at {an_input.name}"
     yield Finding(
         Code.OVER_SLOP,
         Severity.ERROR if facts.is_silent else Severity.WARN,
-        f"at a tick, the latest message of {an_input.name} is {words.duration(least)} to {words.duration(most)} old,"
+        f"at {where}, the latest message of {an_input.name} is {words.duration(least)} to {words.duration(most)} old,"
         f" {max_age.key} is {words.duration(max_age.ns)}",
-        f"write `{max_age.key}: {words.at_least(round(_HEADROOM * most))}`{_or_wait(facts, an_input, most - least)}",
+        f"write `{max_age.key}: {words.at_least(round(_HEADROOM * most))}`{at}"
+        f"{_or_wait(facts, index, most - least, max_age.ns)}",
     )
 
 
@@ -89,17 +103,20 @@ def _lacks_sets(facts: GroupFacts) -> bool:
 
 
 def _ages(facts: GroupFacts, an_input: InputFacts) -> tuple[int, int] | None:
-    """Return how old its latest message is at ticks, at least and at most; None of too few to tell."""
+    """Return how old its latest message is at ticks or triggers, at least and at most; None of too few to tell."""
     figures = an_input.figures
     if not figures.delays or not figures.pace_hz:
         return None
-    late = max(0, median_low(figures.delays) - an_input.offset - (facts.max_wait or 0))
+    # A trigger waits for what comes late.
+    waited = facts.trigger is not None
+    late = 0 if waited else max(0, median_low(figures.delays) - an_input.offset - (facts.max_wait or 0))
     return late, late + round(SECOND / figures.pace_hz)
 
 
-def _or_wait(facts: GroupFacts, an_input: InputFacts, period: int) -> str:
+def _or_wait(facts: GroupFacts, index: int, period: int, limit: int) -> str:
     """Offer to wait for messages that come late, where that alone would do."""
+    an_input = facts.inputs[index]
     late = (an_input.figures.delay or 0) - an_input.offset
-    if late <= (facts.max_wait or 0) or facts.tolerance is None or period > facts.tolerance.ns:
+    if late <= (facts.max_wait or 0) or facts.ticks_hz is None or period > limit:
         return ""
     return f", or `max_wait: {words.at_least(round(_HEADROOM * late))}`, which delays every set by that"

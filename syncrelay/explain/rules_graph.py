@@ -355,10 +355,11 @@ def _is_enough(facts: GroupFacts, an_input: InputFacts) -> bool:
 
 
 def _or_hold_longer(facts: GroupFacts, index: int) -> str:
-    if facts.tolerance is None or not facts.is_held(index):
+    tolerance = facts.tolerance_of(index)
+    if tolerance is None or not facts.is_held(index):
         return ""
-    age = words.duration(facts.tolerance.ns)
-    return f"; if it is meant to be sent this rarely, write a `{facts.tolerance.key}` larger than {age}, or none"
+    age = words.duration(tolerance.ns)
+    return f"; if it is meant to be sent this rarely, write a `{tolerance.key}` larger than {age} for it"
 
 
 def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -198,6 +198,9 @@ class Trials:
             stamp = each.stamp + config.topics[each.input].offset_ns
             self.stamps[each.input].append(stamp)
             self.delays[each.input].append(each.payload - stamp)
+        # Those that have a tolerance of their own go by no value that is tried.
+        own = config.own_tolerances
+        required = [index for index in required if own[index] is None] or required
         among = self.among = required if optional is None else [*required, optional]
         slowest = min(among, key=lambda index: len(self.stamps[index]))
         self.pivot: int = slowest if self._trigger is None else self._trigger

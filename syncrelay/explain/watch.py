@@ -44,6 +44,7 @@ class GroupWatch:
             distance=config.options.distance,
             trigger=config.trigger,
             ticks_hz=self._ticks_hz,
+            apart=[index for index, own in enumerate(config.own_tolerances) if own is not None],
         )
         # Keys are not kept: what is matched by them cannot be run again. Nor can what a clock triggered: it may have
         # been a simulated one, and times of receipt are this machine's.
@@ -104,7 +105,15 @@ class GroupWatch:
         self._follow_publishers(graph, types, now)
         figures, input_figures = self._observation.figures(now=now)
         rows = zip(
-            self.config.topics, graph, types, self._counts, input_figures, self._keys, self._served_since, strict=True
+            self.config.topics,
+            graph,
+            types,
+            self._counts,
+            input_figures,
+            self._keys,
+            self._served_since,
+            self.config.own_tolerances,
+            strict=True,
         )
         return GroupFacts(
             name=self.config.name,
@@ -120,8 +129,9 @@ class GroupWatch:
                     key=key,
                     offset=topic.offset_ns,
                     served_since=since,
+                    own_tolerance=own,
                 )
-                for topic, shown, type_name, counts, seen, key, since in rows
+                for topic, shown, type_name, counts, seen, key, since, own in rows
             ),
             figures=figures,
             tolerance=options.tolerance,

@@ -3,6 +3,7 @@
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
+from syncrelay.sync.latest_time import check_max_ages
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Policy, check_sizes
@@ -19,8 +20,8 @@ _FALL_NS = 1_000_000_000
 class LatestAtTicks(Policy):
     """At each tick, a set of every input's latest message that is not newer than the tick.
 
-    None is older than `max_age_ns` at the tick (None: any age will do). A message may serve many sets. Nothing is
-    interpolated: a message is given as it came, or not at all.
+    None is older at the tick than its input's of `max_ages_ns` (None: any age will do). A message may serve many
+    sets. Nothing is interpolated: a message is given as it came, or not at all.
 
         lidar |.a.b......c..d..
         odom  |..A....B........
@@ -47,7 +48,7 @@ class LatestAtTicks(Policy):
 
     __slots__ = (
         "_fed_until",
-        "_max_age",
+        "_max_ages",
         "_needed",
         "_passed",
         "_queue_size",
@@ -70,19 +71,17 @@ class LatestAtTicks(Policy):
         n_inputs: int,
         queue_size: int,
         ticks: Ticks,
-        max_age_ns: int | None = None,
+        max_ages_ns: Sequence[int | None] | None = None,
         required: Sequence[bool] | None = None,
     ) -> None:
         check_sizes(n_inputs, queue_size)
         needed = (True,) * n_inputs if required is None else tuple(required)
         if len(needed) != n_inputs or not any(needed):
             raise ValueError(f"required {needed} must be {n_inputs}, one required")
-        if max_age_ns is not None and max_age_ns < 0:
-            raise ValueError(f"max_age_ns {max_age_ns} must be 0 or more")
         self.n_inputs = n_inputs
         self.ticks = ticks
         self._queue_size = queue_size
-        self._max_age = max_age_ns
+        self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
         self._queues = [StampQueue() for _ in needed]
         self._served = [False] * n_inputs
@@ -97,7 +96,7 @@ class LatestAtTicks(Policy):
             n_inputs=self.n_inputs,
             queue_size=self._queue_size,
             ticks=self.ticks,
-            max_age_ns=self._max_age,
+            max_ages_ns=self._max_ages,
             required=required,
         )
         return policy, OptionalInputs(required=(True,) * self.n_inputs, queue_size=1, slop_ns=0)
@@ -165,9 +164,9 @@ class LatestAtTicks(Policy):
         last = self.ticks.last_until(self._fed_until + REST_NS)
         while tick <= last:
             needed = tick
-            for queue, is_needed in zip(self._queues, self._required, strict=True):
+            for place, is_needed in enumerate(self._required):
                 if is_needed:
-                    served = self._first_served(queue.stamps, tick)
+                    served = self._first_served(place, tick)
                     if served is None:
                         return None
                     needed = max(needed, served)
@@ -176,21 +175,23 @@ class LatestAtTicks(Policy):
             tick = needed
         return None
 
-    def _first_served(self, stamps: Sequence[int], tick: int) -> int | None:
-        """Give this tick if one of these stamps serves it, else the first later one that is not before the next."""
+    def _first_served(self, place: int, tick: int) -> int | None:
+        """Give this tick if one of an input's messages serves it, else the first later one not before the next."""
+        stamps = self._queues[place].stamps
         position = bisect_right(stamps, self.ticks.at(tick))
-        if self._is_young(stamps, position - 1, self.ticks.at(tick)):
+        if self._is_young(place, position - 1, self.ticks.at(tick)):
             return tick
         return self.ticks.first_from(stamps[position]) if position < len(stamps) else None
 
-    def _is_young(self, stamps: Sequence[int], position: int, time: int) -> bool:
-        return position >= 0 and (self._max_age is None or time - stamps[position] <= self._max_age)
+    def _is_young(self, place: int, position: int, time: int) -> bool:
+        max_age = self._max_ages[place]
+        return position >= 0 and (max_age is None or time - self._queues[place].stamps[position] <= max_age)
 
     def _emit(self, time: int, outcomes: list[Outcome]) -> None:
         members: list[Message | None] = []
         for place, queue in enumerate(self._queues):
             position = bisect_right(queue.stamps, time) - 1
-            if self._is_young(queue.stamps, position, time):
+            if self._is_young(place, position, time):
                 outcomes += self._drop_oldest(place, position, DropReason.SUPERSEDED)
                 members.append(queue.messages[0])
                 self._served[place] = True
@@ -205,9 +206,10 @@ class LatestAtTicks(Policy):
         Of the messages between two ticks only the last is: a queue holds as many as there are ticks in its time.
         """
         queue, next_time = self._queues[place], self.ticks.at(self._passed + 1)
+        max_age = self._max_ages[place]
         drops = []
-        if self._max_age is not None:
-            expired = bisect_left(queue.stamps, next_time - self._max_age)
+        if max_age is not None:
+            expired = bisect_left(queue.stamps, next_time - max_age)
             drops = self._drop_oldest(place, expired, DropReason.EXPIRED)
         if stamp <= next_time:
             superseded = bisect_right(queue.stamps, next_time) - 1

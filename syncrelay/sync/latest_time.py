@@ -10,6 +10,14 @@ from syncrelay.sync.policy import Policy, check_sizes
 from syncrelay.sync.queues import Losses, StampQueue
 
 
+def check_max_ages(max_ages_ns: Sequence[int | None] | None, n_inputs: int) -> tuple[int | None, ...]:
+    """Return the largest age of each input's messages, None for any; raises ValueError for what is none."""
+    ages = (None,) * n_inputs if max_ages_ns is None else tuple(max_ages_ns)
+    if len(ages) != n_inputs or any(age is not None and age < 0 for age in ages):
+        raise ValueError(f"max_ages_ns {ages} must be {n_inputs} numbers, 0 or more, or None")
+    return ages
+
+
 class _Lookup(NamedTuple):
     """What an input has for a trigger: a place in its queue, or none, and whether one may still come."""
 
@@ -20,9 +28,9 @@ class _Lookup(NamedTuple):
 class LatestTime(Policy):
     """At each message of input `trigger`, a set of it and the latest not newer message of every other input.
 
-    None is older than `max_age_ns` at the trigger's stamp (None: any age will do). A message may serve many
-    sets. A trigger waits for required inputs that have nothing for it yet, and is too far once one of them has
-    shown newer messages only; it never waits for optional ones. `release_oldest` lets the oldest waiting trigger
+    None is older at the trigger's stamp than its input's of `max_ages_ns` (None: any age will do). A message may
+    serve many sets. A trigger waits for required inputs that have nothing for it yet, and is too far once one of them
+    has shown newer messages only; it never waits for optional ones. `release_oldest` lets the oldest waiting trigger
     expire.
 
         lidar |..a..b.c...d
@@ -40,7 +48,7 @@ class LatestTime(Policy):
 
     __slots__ = (
         "_losses",
-        "_max_age",
+        "_max_ages",
         "_queue_size",
         "_queues",
         "_required",
@@ -61,19 +69,17 @@ class LatestTime(Policy):
         n_inputs: int,
         queue_size: int,
         trigger: int,
-        max_age_ns: int | None = None,
+        max_ages_ns: Sequence[int | None] | None = None,
         required: Sequence[bool] | None = None,
     ) -> None:
         check_sizes(n_inputs, queue_size)
         needed = (True,) * n_inputs if required is None else tuple(required)
         if not 0 <= trigger < n_inputs or len(needed) != n_inputs or not needed[trigger]:
             raise ValueError(f"trigger {trigger} must be a required input of {n_inputs}: {needed}")
-        if max_age_ns is not None and max_age_ns < 0:
-            raise ValueError(f"max_age_ns {max_age_ns} must be 0 or more")
         self.n_inputs = n_inputs
         self._queue_size = queue_size
         self._trigger = trigger
-        self._max_age = max_age_ns
+        self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
         self._queues = [StampQueue() for _ in needed]
         self._served = [False] * n_inputs
@@ -86,7 +92,7 @@ class LatestTime(Policy):
             n_inputs=self.n_inputs,
             queue_size=self._queue_size,
             trigger=self._trigger,
-            max_age_ns=self._max_age,
+            max_ages_ns=self._max_ages,
             required=required,
         )
         return policy, OptionalInputs(required=(True,) * self.n_inputs, queue_size=1, slop_ns=0)
@@ -158,17 +164,17 @@ class LatestTime(Policy):
                 outcomes += self._drop_trigger(DropReason.TOO_FAR)
 
     def _look_up(self, place: int, stamp: int) -> _Lookup:
-        stamps = self._queues[place].stamps
+        stamps, max_age = self._queues[place].stamps, self._max_ages[place]
         position = bisect_right(stamps, stamp) - 1
-        if position >= 0 and (self._max_age is None or stamp - stamps[position] <= self._max_age):
+        if position >= 0 and (max_age is None or stamp - stamps[position] <= max_age):
             return _Lookup(position, may_come=True)
         return _Lookup(None, may_come=position == len(stamps) - 1)
 
     def _note_missed(self, stamp: int) -> None:
         for place, queue in enumerate(self._queues):
             if queue.stamps and queue.stamps[0] > stamp:
-                age = stamp if self._max_age is None else self._max_age
-                self._losses.miss(place, queue.stamps, stamp, before=age, after=0)
+                max_age = self._max_ages[place]
+                self._losses.miss(place, queue.stamps, stamp, before=stamp if max_age is None else max_age, after=0)
 
     def _emit(self, positions: Sequence[int | None], stamp: int, outcomes: list[Outcome]) -> None:
         members: list[Message | None] = []
@@ -195,9 +201,10 @@ class LatestTime(Policy):
 
     def _drop_expired(self, place: int, stamp: int) -> list[Drop]:
         """Drop what is too old for a trigger of this stamp, and so for all that follow."""
-        if self._max_age is None:
+        max_age = self._max_ages[place]
+        if max_age is None:
             return []
-        count = bisect_left(self._queues[place].stamps, stamp - self._max_age)
+        count = bisect_left(self._queues[place].stamps, stamp - max_age)
         return self._drop_oldest(place, count, DropReason.EXPIRED)
 
     def _drop_oldest(self, place: int, count: int, reason: DropReason) -> list[Drop]:

@@ -77,6 +77,28 @@ def test_a_recording_that_cannot_be_an_episode_is_told_and_left_out(folder):
     assert "no recording gave an episode, so there is no dataset" in alone.stderr
 
 
+def test_a_task_that_is_said_once_goes_with_every_frame_or_the_key_that_costs_them_is_named(folder):
+    # The first camera image was stamped before the task was received.
+    said = {("/task", stamp): None for stamp in range(100, 2000, 100)}
+    drive(folder / "task.mcap", instead=said, topics=("/camera", "/joints", "/cmd", "/task"))
+    text = FILE.replace("exact_time", "latest_time\n    trigger: /camera\n    max_age: 250ms")
+    text = text.replace("{topic: /cmd}", "{topic: /cmd}, {topic: /task, stamp: receive}")
+    text = text.replace("task: pick up the cube", "task: {topic: /task, field: data}")
+    (folder / "file.yaml").write_text(text)
+    done = run("export", "task.mcap", *COMMAND, folder=folder)
+    assert done.returncode == 1
+    why = "because of max_age 250 ms for /task: without it, 19 would be"
+    assert f"robot: only 2 of 20 possible sets are complete, {why}" in done.stderr
+    assert lengths(folder / "out") == [2]
+    for keys in ("max_age: 60min", "max_age: 60min, required: false"):
+        (folder / "file.yaml").write_text(text.replace("stamp: receive", f"stamp: receive, {keys}"))
+        done = run("export", "task.mcap", *COMMAND, "--overwrite", folder=folder)
+        assert (done.returncode, lengths(folder / "out")) == (0, [19]), done.stderr
+    (folder / "file.yaml").write_text(text.replace("stamp: receive", "stamp: receive, required: false"))
+    done = run("export", "task.mcap", *COMMAND, "--overwrite", folder=folder)
+    assert (done.returncode, why in done.stderr) == (1, True)
+
+
 def test_what_the_recording_does_not_have_is_an_error_of_the_recording(folder):
     (folder / "file.yaml").write_text(FILE.replace("twist.linear", "twist.lin"))
     done = run("export", "a.mcap", *COMMAND, folder=folder)

@@ -141,6 +141,12 @@ OPTIONS = {
         LATEST_OF_BOTH,
     ),
     "max_age": (file(LATEST), file({**LATEST, "max_age": "50ms"}), LATEST_OF_BOTH),
+    "max_age: own": (
+        file({**LATEST, "trigger": "/b", "max_age": "1s"}),
+        file({**LATEST, "trigger": "/b", "max_age": "1s"}, first={"max_age": "5ms"}),
+        LATEST_OF_BOTH,
+    ),
+    "max_age: own, by a clock": (file(CLOCK), file(CLOCK, first={"max_age": "20ms"}), BY_CLOCK),
     "key": (file(KEYED), file({**KEYED, "key": "header.frame_id"}), of_first_topic("key")),
     "key: own": (file(KEYED), file(KEYED, first={"key": "header.frame_id"}), of_first_topic("key")),
     "offset": (file(), file(first={"offset": "-50ms"}), sets_of((0, 150), (1, 100), (0, 250), (1, 200))),

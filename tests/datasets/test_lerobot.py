@@ -396,7 +396,7 @@ SIZED = np.zeros((32, 64, 3), np.uint8)
             {("/cmd", stamp): command(stamp, x=float("inf")) for stamp in range(0, 2000, 100)},
             "none of 20 sets can be a frame: 20 with a value that is no finite number",
         ),
-        ({("/camera", stamp): image(stamp + 5) for stamp in range(0, 2000, 100)}, "the recording gives no set"),
+        ({("/camera", stamp): image(stamp + 5) for stamp in range(0, 2000, 100)}, "because of policy exact_time"),
     ],
 )
 def test_what_no_episode_can_be_is_said(tmp_path, instead, told):

@@ -24,9 +24,13 @@ def figures_of(delay, pace_hz=10.0):
     return {"delay": None, "delays": (delay,) * 20, "pace_hz": pace_hz}
 
 
-def watched(keys, streams, *, until_s):
-    """The findings of each second, of messages that are `streams` of period, delay and end in milliseconds."""
-    topics = "".join(f"      - {{topic: /{name}, type: {IMAGE}}}\n" for name in streams)
+def watched(keys, streams, *, until_s, own=""):
+    """The findings of each second, of messages that are `streams` of period, delay and end in milliseconds.
+
+    `own` are keys of the last topic alone.
+    """
+    *first, last = [f"      - {{topic: /{name}, type: {IMAGE}" for name in streams]
+    topics = "".join(f"{topic}}}\n" for topic in [*first, f"{last}{own}"])
     text = f"version: 1\ngroups:\n  fixed:\n    policy: latest_time\n    {keys}\n    topics:\n{topics}"
     config = load_text(text).groups[0]
     messages = sorted(
@@ -79,6 +83,26 @@ def test_messages_that_are_too_old_at_ticks_are_found_and_the_value_that_is_told
     assert finding.text.startswith("at a tick, the latest message of /lidar is 30 ms to 130 ms old, max_age is")
     assert finding.suggestion == "write `max_age: 180ms`"
     assert watched("trigger: 30 Hz\n    max_age: 180ms", streams, until_s=30)[-1][0].code is Code.HEALTHY
+
+
+@pytest.mark.parametrize(("trigger", "when"), [("30 Hz", "a tick"), ("/camera", "a message of /camera")])
+def test_an_input_that_is_too_old_for_its_own_age_is_found_and_the_value_that_is_told_cures(trigger, when):
+    streams = {"camera": (33, 5, 40_000), "lidar": (33, 5, 40_000), "map": (1000, 5, 40_000)}
+    keys = f"trigger: {trigger}\n    max_age: 100ms"
+    (finding,) = watched(keys, streams, until_s=30, own=", max_age: 300ms")[-1]
+    assert (finding.code, finding.severity) == (Code.OVER_SLOP, Severity.WARN)
+    assert finding.text.startswith(f"at {when}, the latest message of /map is ")
+    assert finding.text.endswith("old, max_age is 300 ms")
+    assert finding.suggestion == "write `max_age: 1.3s` at /map"
+    assert watched(keys, streams, until_s=30, own=", max_age: 1.3s")[-1][0].code is Code.HEALTHY
+
+
+@pytest.mark.parametrize("trigger", ["30 Hz", "/camera"])
+def test_what_is_sent_once_and_may_be_old_leaves_a_group_healthy(trigger):
+    streams = {"camera": (33, 5, 40_000), "lidar": (33, 5, 40_000), "task": (1_000_000, 5, 40_000)}
+    keys = f"trigger: {trigger}\n    max_age: 100ms"
+    for found in watched(keys, streams, until_s=30, own=", max_age: 60min")[10:]:
+        assert [each.code for each in found] == [Code.HEALTHY]
 
 
 def test_a_longer_wait_is_offered_where_messages_are_only_late():

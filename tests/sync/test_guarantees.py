@@ -211,6 +211,7 @@ def test_optional_inputs_never_change_which_required_messages_go_together(policy
         required=(True,) * sum(chosen.required),
         offsets=only_required(chosen.offsets, chosen),
         min_periods=only_required(chosen.min_periods, chosen),
+        max_ages=only_required(chosen.max_ages, chosen),
         restamp=None,
     )
     places = {index: place for place, index in enumerate(only_required(range(chosen.n_inputs), chosen))}

@@ -16,8 +16,10 @@ from tests.sync.support.timeline import START_NS, TICK_NS
 
 def by_clock(inputs=2, queue=10, age=None, hz=20, **options):
     """Ticks at columns 0, 5, 10, ..."""
-    max_age_ns = None if age is None else age * TICK_NS
-    return grouped(LatestAtTicks(n_inputs=inputs, queue_size=queue, ticks=Ticks(hz), max_age_ns=max_age_ns), **options)
+    max_ages_ns = [None if age is None else age * TICK_NS] * inputs
+    return grouped(
+        LatestAtTicks(n_inputs=inputs, queue_size=queue, ticks=Ticks(hz), max_ages_ns=max_ages_ns), **options
+    )
 
 
 third_optional = {"inputs": 3, "required": (True, True, False)}
@@ -240,7 +242,7 @@ def test_a_rate_that_is_not_above_0_is_refused(numerator, denominator):
         Ticks(numerator, denominator)
 
 
-@pytest.mark.parametrize("wrong", [{"required": (False, False)}, {"required": (True,)}, {"max_age_ns": -1}])
+@pytest.mark.parametrize("wrong", [{"required": (False, False)}, {"required": (True,)}, {"max_ages_ns": (None, -1)}])
 def test_options_out_of_range_are_refused(wrong):
     with pytest.raises(ValueError, match="must be"):
         LatestAtTicks(**{"n_inputs": 2, "queue_size": 1, "ticks": Ticks(20), **wrong})
@@ -336,7 +338,7 @@ class Rig:
 
     required: tuple
     hz: Ticks
-    max_age: int | None
+    max_ages: tuple
     max_wait: int | None
     offsets: tuple
     every: int = 1
@@ -348,7 +350,7 @@ class Rig:
             n_inputs=inputs,
             queue_size=self.queue,
             ticks=self.hz,
-            max_age_ns=None if self.max_age is None else self.max_age * TICK,
+            max_ages_ns=[None if age is None else age * TICK for age in self.max_ages],
         )
         return SyncGroup(
             policy,
@@ -373,7 +375,7 @@ def rigs(draw, *, disorder=True, jumps=True, **chosen):
     rig = Rig(
         required=draw(st.tuples(*[st.booleans()] * inputs).filter(any)),
         hz=draw(st.sampled_from(RATES)),
-        max_age=draw(st.none() | few(0, 20)),
+        max_ages=draw(st.tuples(*[st.none() | few(0, 20)] * inputs)),
         max_wait=draw(st.none() | few(0, 20)),
         offsets=draw(st.tuples(*[few(-5, 5)] * inputs)),
         **{key: draw(each) for key, each in chosen.items()},
@@ -402,7 +404,9 @@ def slow_sets(rig, taken):
                 if each.input == place and (stamp := each.stamp + rig.offsets[place] * TICK) <= tick
             ]
             latest = max(stamps, default=None)
-            is_young = latest is not None and (rig.max_age is None or tick - latest <= rig.max_age * TICK)
+            is_young = latest is not None and (
+                rig.max_ages[place] is None or tick - latest <= rig.max_ages[place] * TICK
+            )
             members.append(latest - rig.offsets[place] * TICK if is_young else None)
         if all(stamp is not None for stamp, needed in zip(members, rig.required, strict=True) if needed):
             yield tick, tuple(members)
@@ -455,12 +459,12 @@ def test_no_message_is_newer_than_its_tick_or_too_old_and_all_required_are_there
     rig, taken = drawn
     for match in sets_of(flat(run(rig.group(), taken))):
         assert rig.hz.at(rig.hz.last_until(match.tick)) == match.tick == match.stamp
-        for stamp, needed, offset in zip(match.stamps, rig.required, rig.offsets, strict=True):
+        for stamp, needed, offset, max_age in zip(match.stamps, rig.required, rig.offsets, rig.max_ages, strict=True):
             assert stamp is not None or not needed
             if stamp is not None:
                 age = match.tick - stamp - offset * TICK
                 assert age >= 0
-                assert rig.max_age is None or age <= rig.max_age * TICK
+                assert max_age is None or age <= max_age * TICK
 
 
 @given(drawn=rigs(jumps=False, queue=few(1, 4)))

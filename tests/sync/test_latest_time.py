@@ -9,8 +9,8 @@ from tests.sync.support.timeline import TICK_NS, play_policy
 
 def latest(inputs=2, queue=10, age=3, **options):
     """Input 0 is the trigger."""
-    max_age_ns = None if age is None else age * TICK_NS
-    return LatestTime(n_inputs=inputs, queue_size=queue, trigger=0, max_age_ns=max_age_ns, **options)
+    max_ages_ns = [None if age is None else age * TICK_NS] * inputs
+    return LatestTime(n_inputs=inputs, queue_size=queue, trigger=0, max_ages_ns=max_ages_ns, **options)
 
 
 test_drawn = policy_cases(
@@ -259,7 +259,8 @@ def test_a_flush_drops_what_has_not_served():
         {"trigger": 2},
         {"required": (False, True)},
         {"required": (True,)},
-        {"max_age_ns": -1},
+        {"max_ages_ns": (None, -1)},
+        {"max_ages_ns": (None,)},
         {"n_inputs": 0},
         {"queue_size": 0},
     ],

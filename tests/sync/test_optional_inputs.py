@@ -246,7 +246,8 @@ test_optional = group_cases(
         ),
         "a set that does not wait for optional inputs needs no max_wait": (
             lambda: grouped(
-                LatestTime(n_inputs=3, queue_size=9, trigger=0, max_age_ns=2 * TICK_NS), required=(True, True, False)
+                LatestTime(n_inputs=3, queue_size=9, trigger=0, max_ages_ns=[2 * TICK_NS] * 3),
+                required=(True, True, False),
             ),
             """
             lidar |..a.b...c

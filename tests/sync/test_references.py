@@ -53,7 +53,7 @@ def latest_time(rng, sizes):
     required = [rng.random() < 0.7 for _ in range(sizes["n_inputs"])]
     options = {
         "trigger": rng.randrange(sizes["n_inputs"]),
-        "max_age_ns": rng.choice((None, 0, 20 * MS, 200 * MS)),
+        "max_ages_ns": [rng.choice((None, 0, 20 * MS, 200 * MS)) for _ in range(sizes["n_inputs"])],
         "required": required,
     }
     required[options["trigger"]] = True

@@ -185,7 +185,7 @@ def test_a_message_that_passed_before_a_flush_may_come_again_after_it():
 
 
 def test_what_passed_before_a_flush_is_not_known_after_it():
-    policy = LatestTime(n_inputs=2, queue_size=9, trigger=0, max_age_ns=2 * TICK_NS)
+    policy = LatestTime(n_inputs=2, queue_size=9, trigger=0, max_ages_ns=[2 * TICK_NS] * 2)
     group = SyncGroup(policy, required=(True, False), max_wait_ns=0, every=2)
     for index, column in ((1, 5), (0, 6)):
         group.add(Message(index, stamp(column), column), now=0)

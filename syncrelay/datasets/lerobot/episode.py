@@ -1,7 +1,7 @@
 """A recording as an episode: its frames as a table and videos, beside what they are."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any, Final
@@ -11,13 +11,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from syncrelay.bag import Recording, open_recording
+from syncrelay.bag.analysis.few_sets import why_few_sets
 from syncrelay.bag.attempts import redacted
 from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.bag.replay import Replay
 from syncrelay.config import Config, LerobotConfig
 from syncrelay.config.wording import counted
 from syncrelay.datasets.lerobot.grid import Grid
-from syncrelay.datasets.lerobot.sets import FrameSet, FrameSets
+from syncrelay.datasets.lerobot.sets import INCOMPLETE, FrameSet, FrameSets
 from syncrelay.datasets.lerobot.stats import PictureStats, Stats, stats_of
 from syncrelay.datasets.lerobot.videos import VideoWriter
 from syncrelay.datasets.reading import SetsOf, require_complete
@@ -49,7 +50,8 @@ def write_episode(name: str, words: Sequence[str], config: Config, folder: Path)
 
     `words` is what open_recording takes. The facts: how many frames there are, of which `held` show the set of the
     frame before; how many sets were `left_out`, as others were nearer, and `unusable`, by why; and the longest time
-    between a frame and its set; and `problems`, a sentence for each input of which messages could not be decoded.
+    between a frame and its set; and `problems`: a sentence for each
+    input of which messages could not be decoded, and for what leaves out most of the frames that there could be.
 
     Raises UsageError where the file says nothing of LeRobot, and BagError for a recording that cannot be an episode.
     """
@@ -77,10 +79,23 @@ def _write(
             for each in sets.read(part.table):
                 episode.add(each)
         episode.end()
+    (result,) = replay.results()
+    counts = [each.counts for each in result.inputs]
+    few = why_few_sets(recording, binding, counts, sets.complete, needed=sets.needed)
     if not episode.grid.frames:
-        raise BagError(_no_frames(source.groups[0].count, sets.unusable))
+        raise BagError(few or _no_frames(result.sets, sets.unusable))
     facts = episode.write_table()
-    return {**facts, "problems": source.faults()}
+    return {**facts, "problems": [*source.faults(), *_lost(few, sets)]}
+
+
+def _lost(few: str | None, sets: FrameSets) -> Iterator[str]:
+    """Say what leaves out most of the frames that there could be."""
+    if few is not None:
+        yield few
+    spoilt = {why: count for why, count in sets.unusable.items() if count and why != INCOMPLETE}
+    if 2 * sum(spoilt.values()) > sets.complete:
+        reasons = ", ".join(f"{count} {why}" for why, count in spoilt.items())
+        yield f"most of {counted(sets.complete, 'set')} cannot be frames: {reasons}"
 
 
 class _Episode:

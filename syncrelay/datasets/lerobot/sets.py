@@ -42,10 +42,14 @@ class FrameSets:
         types = {each.topic: each.config.type or "" for each in binding.inputs}
         self.unusable: Counter[str] = Counter()
         """How many sets can be no frame, by why."""
+        self.complete = 0
+        """How many sets have all messages that a frame needs."""
         self.content: Final = Content(_fields(config, types))
         """What is to be read of the messages."""
         self._task = config.task
         self._needed = [topic for topic in types if self.content.fields[topic]]
+        self.needed: Final = tuple(index for index, topic in enumerate(types) if topic in self._needed)
+        """The inputs of which a frame needs a message."""
         self._vectors = [
             _Vector(feature, tuple(VectorSource(source, types[source.topic]) for source in feature.sources))
             for feature in config.features
@@ -62,6 +66,7 @@ class FrameSets:
         """Yield the sets of a table that can be frames, in their order. Raises BagError for what no frame can be."""
         whole = np.all([table[topic].is_valid().to_numpy() for topic in self._needed], axis=0)
         places = np.flatnonzero(whole)
+        self.complete += len(places)
         self.unusable[INCOMPLETE] += len(table) - len(places)
         if not len(places):
             return

@@ -265,7 +265,7 @@ FOUND = {
         "/camera has been silent for 60 s",
         (
             "check /usb_cam, which still publishes it; if it is meant to be sent this rarely, write a `max_age` larger"
-            " than 500 ms, or none"
+            " than 500 ms for it"
         ),
     ),
     "a subscriber that gets nothing": (

@@ -44,7 +44,7 @@ def by_key(inputs=2, **options):
 
 
 def latest(max_wait=4):
-    policy = LatestTime(n_inputs=2, queue_size=9, trigger=0, max_age_ns=3 * TICK_NS)
+    policy = LatestTime(n_inputs=2, queue_size=9, trigger=0, max_ages_ns=[3 * TICK_NS] * 2)
     return grouped(policy, max_wait=max_wait)
 
 

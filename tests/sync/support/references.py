@@ -134,10 +134,10 @@ class ReferenceEpsilon(Queued):
 
 
 class ReferenceLatest(Queued):
-    def __init__(self, n_inputs, queue_size, trigger, max_age_ns, required):
+    def __init__(self, n_inputs, queue_size, trigger, max_ages_ns, required):
         super().__init__(n_inputs, queue_size)
         self.trigger = trigger
-        self.max_age = float("inf") if max_age_ns is None else max_age_ns
+        self.max_ages = [float("inf") if age is None else age for age in max_ages_ns]
         self.required = required
         self.served = []
 
@@ -168,12 +168,12 @@ class ReferenceLatest(Queued):
             self.queued.remove(trigger)
             self.served.remove(trigger)
         for queued in list(self.queued):
-            if queued.input != self.trigger and trigger.stamp - queued.stamp > self.max_age:
+            if queued.input != self.trigger and trigger.stamp - queued.stamp > self.max_ages[queued.input]:
                 self.forget(queued, DropReason.EXPIRED)
         return True
 
     def find(self, index, trigger):
-        fits = [queued for queued in self.of(index) if 0 <= trigger.stamp - queued.stamp <= self.max_age]
+        fits = [queued for queued in self.of(index) if 0 <= trigger.stamp - queued.stamp <= self.max_ages[index]]
         if fits:
             return fits[-1]
         if not self.required[index]:

@@ -32,6 +32,7 @@ class Options:
     slop: int = 2
     age_penalty: float = 0.1
     min_periods: tuple = ()
+    max_ages: tuple = ()
     max_wait: int | None = None
     offsets: tuple = ()
     restamp: object = None
@@ -41,6 +42,11 @@ class Options:
     @property
     def n_inputs(self):
         return len(self.required)
+
+    @property
+    def max_ages_ns(self):
+        """Those that are drawn, else slop for all inputs."""
+        return [None if age is None else age * TICK for age in self.max_ages or (self.slop,) * self.n_inputs]
 
 
 POLICIES = {
@@ -54,14 +60,14 @@ POLICIES = {
     "approximate_time_eager": lambda sizes, options: ApproximateTimeEager(**sizes, slop_ns=options.slop * TICK),
     "approximate_epsilon_time": lambda sizes, options: ApproximateEpsilonTime(**sizes, epsilon_ns=options.slop * TICK),
     "latest_time": lambda sizes, options: LatestTime(
-        **sizes, trigger=options.required.index(True), max_age_ns=options.slop * TICK
+        **sizes, trigger=options.required.index(True), max_ages_ns=options.max_ages_ns
     ),
     "equal_key": lambda sizes, _: EqualKey(**sizes),
 }
 # Sets leave as time passes: what is promised of the others as a message comes is not promised of it.
 BY_CLOCK = {
     "latest_at_ticks": lambda sizes, options: LatestAtTicks(
-        **sizes, ticks=Ticks(10**9, 3 * TICK), max_age_ns=None if options.slop > 4 else options.slop * TICK
+        **sizes, ticks=Ticks(10**9, 3 * TICK), max_ages_ns=options.max_ages_ns
     )
 }
 BY_STAMP = [name for name in POLICIES if name != "equal_key"]
@@ -111,6 +117,7 @@ def options(draw, *, optional=True, limited=True, thinned=True, offset=False):
         slop=draw(few(0, 5)),
         age_penalty=draw(st.sampled_from((0.0, 0.1, 0.7, 2.0))),
         min_periods=draw(st.just(()) | st.tuples(*[few(0, 4)] * n_inputs)),
+        max_ages=draw(st.just(()) | st.tuples(*[st.none() | few(0, 5)] * n_inputs)),
         max_wait=draw(waits),
         offsets=draw(shifts if offset else st.just(()) | shifts),
         restamp=draw(st.none() | st.sampled_from((Restamp.EARLIEST, Restamp.LATEST)) | few(0, n_inputs - 1)),
