@@ -28,7 +28,7 @@ class _TextFormatter(logging.Formatter):
 
 
 class _JsonFormatter(logging.Formatter):
-    """One object a line: time (ISO 8601, UTC), level, logger, message; group and finding where one is meant."""
+    """One object a line: time (ISO 8601, UTC), level, logger, message; group, groups and finding where meant."""
 
     def format(self, record: logging.LogRecord) -> str:
         line = {
@@ -37,7 +37,7 @@ class _JsonFormatter(logging.Formatter):
             "logger": getattr(record, "node", record.name),
             "message": record.getMessage(),
         }
-        for key in ("group", "finding"):
+        for key in ("group", "groups", "finding"):
             if value := getattr(record, key, None):
                 line[key] = value
         if record.exc_info:

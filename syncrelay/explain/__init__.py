@@ -4,6 +4,7 @@ Pure: values in, values out. The running relay and the analysis of recordings bo
 """
 
 from syncrelay.config import Tolerance
+from syncrelay.explain.cause_log import CauseLog
 from syncrelay.explain.clocks import STEP_NS, Step
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
@@ -38,6 +39,7 @@ __all__ = [
     "STEP_NS",
     "UNREADABLE",
     "Arrivals",
+    "CauseLog",
     "ClockState",
     "Code",
     "Distribution",

@@ -294,3 +294,32 @@ class Code(Enum):
         _OK,
         "All is well: so many of the possible sets a second, with the 95th percentiles of span and latency.",
     )
+
+
+OF_RELAY: Final = frozenset(
+    {Code.INACTIVE, Code.ALONE, Code.NO_CLOCK, Code.CLOCK_STOPPED, Code.TOO_SLOW, Code.CLOCK_STEP}
+)
+"""Findings that have one cause in all groups, where they are about no input."""
+OF_PUBLISHER: Final = frozenset(
+    {
+        Code.TYPE_NOT_IMPORTABLE,
+        Code.OTHER_TYPE,
+        Code.SEVERAL_TYPES,
+        Code.NO_PUBLISHER,
+        Code.INCOMPATIBLE_QOS,
+        Code.SILENT,
+        Code.MALFORMED,
+        Code.UNSTAMPED,
+        Code.SEVERAL_PUBLISHERS,
+        Code.CLOCK_STEP,
+        Code.CLOCK_DRIFT,
+        Code.OTHER_CLOCK,
+        Code.SLOWED,
+        Code.BURSTS,
+        Code.TIME_JUMP,
+        Code.MESSAGES_LOST,
+        Code.OUT_OF_ORDER,
+        Code.DUPLICATES,
+    }
+)
+"""Findings about an input whose cause is the node that publishes it, in all groups that use what it publishes."""

@@ -27,11 +27,19 @@ _OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OF
 
 
 class Remark(NamedTuple):
-    """A line for the log, and what it is about."""
+    """A line for the log, and the findings that it is about: none where it says that sets leave again.
+
+    Of a silence it says the first, and is about all that keep sets from leaving.
+    """
 
     severity: Severity
     text: str
-    code: Code | None
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def code(self) -> Code | None:
+        """The code of what it is about."""
+        return self.findings[0].code if self.findings else None
 
 
 class FindingLog:
@@ -65,7 +73,8 @@ class FindingLog:
         if facts.is_silent:
             worst = explanation(findings) if findings else None
             if worst is not None and worst.severity is Severity.ERROR:
-                yield from self._silent(facts, worst, now)
+                errors = (each for each in findings if each.severity is Severity.ERROR)
+                yield from self._silent(facts, (worst, *(each for each in errors if each is not worst)), now)
             # What only warns is not why no set leaves: its messages have just begun to come.
             if worst is None or worst.severity is not Severity.WARN:
                 return
@@ -73,7 +82,7 @@ class FindingLog:
         # After a pause, a group is not silent though no set has left yet.
         if self._quiet_since is not None and last is not None and last > self._quiet_since:
             if self._told:
-                yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}", None)
+                yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}")
             self._quiet_since, self._told, self._well_since = None, False, now
         yield from self._warnings(facts, findings, explained, now)
 
@@ -87,7 +96,8 @@ class FindingLog:
             warning.began -= by
             warning.seen -= by
 
-    def _silent(self, facts: GroupFacts, finding: Finding, now: int) -> Iterator[Remark]:
+    def _silent(self, facts: GroupFacts, errors: tuple[Finding, ...], now: int) -> Iterator[Remark]:
+        finding = errors[0]
         if self._quiet_since is None:
             last = facts.figures.last_set
             self._quiet_since = facts.figures.began if last is None else last
@@ -105,11 +115,11 @@ class FindingLog:
         self._tell_again = now + self._pause
         self._told = True
         # What explains a silence needs no line of its own when the silence is over.
-        warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
+        warning = self._warned.setdefault((finding.code, finding.input), _Warning(finding, now))
         warning.told, warning.holds, warning.seen = True, False, now
         quiet = words.seconds(now - self._quiet_since)
         ever = "no set" if facts.figures.last_set is None else "no more sets"
-        yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", finding.code)
+        yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", errors)
 
     def _warnings(
         self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code], now: int
@@ -117,21 +127,22 @@ class FindingLog:
         for finding in findings:
             if finding.severity is Severity.OK or finding.code in _TOLD_ELSEWHERE:
                 continue
-            warning = self._warned.setdefault((finding.code, finding.input), _Warning(now))
+            warning = self._warned.setdefault((finding.code, finding.input), _Warning(finding, now))
             if now - warning.seen > _FORGOTTEN:
                 warning.began, warning.told = now, False
-            warning.seen, warning.text = now, finding.text
+            warning.seen, warning.finding = now, finding
             lasting = _LASTING + (_UNTIL_TRIED if _awaits_a_try(facts, finding) else 0)
             if not warning.told and now - warning.began >= lasting:
                 warning.told = warning.holds = True
-                yield Remark(Severity.WARN, in_words(finding), finding.code)
+                yield Remark(Severity.WARN, in_words(finding), (finding,))
         for (code, _), warning in self._warned.items():
             if warning.holds and code in explained:
                 # It may be so still: it is not looked for.
                 warning.seen = now
             if warning.holds and now - warning.seen >= _OVER:
                 warning.holds = False
-                yield Remark(Severity.OK, f"resolved {words.seconds(now - warning.seen)} ago: {warning.text}", code)
+                text = f"resolved {words.seconds(now - warning.seen)} ago: {warning.finding.text}"
+                yield Remark(Severity.OK, text, (warning.finding,))
 
 
 def _awaits_a_try(facts: GroupFacts, finding: Finding) -> bool:
@@ -139,12 +150,12 @@ def _awaits_a_try(facts: GroupFacts, finding: Finding) -> bool:
 
 
 class _Warning:
-    """Since when something is so, when it was last, in which words, whether it has been said, and no end of it yet."""
+    """Since when something is so, when it was last found and how, whether it has been said, and no end of it yet."""
 
-    def __init__(self, now: int) -> None:
+    def __init__(self, finding: Finding, now: int) -> None:
         self.began = self.seen = now
+        self.finding = finding
         self.told = self.holds = False
-        self.text = ""
 
 
 def in_words(finding: Finding) -> str:

@@ -288,6 +288,7 @@ def silent(facts: GroupFacts) -> Found:
             "check whether recording was paused"
             if facts.is_recorded
             else "check whether their publishers are still running, and the network to them",
+            inputs=tuple(range(len(facts.inputs))),
         )
     else:
         yield from found

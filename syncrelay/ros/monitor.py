@@ -14,6 +14,7 @@ from syncrelay.dataflow.observers import Discovery, Losses, SimulatedClock, Stan
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.explain import (
     Arrivals,
+    CauseLog,
     FindingLog,
     GraphSnapshot,
     GroupReport,
@@ -66,6 +67,7 @@ class Monitor:
         self._discovery = Discovery(now=time.monotonic())
         self._system_clock = SystemClock()
         self._try_budget = TryBudget()
+        self._cause_log = CauseLog()
         self._empty_graph: GraphSnapshot | None = None
         self._ends_pauses = node.resolve_service_name("~/resume")
         self.inactive: str | None = None
@@ -94,6 +96,7 @@ class Monitor:
             or _Watched(GroupWatch(binding.group.config, began=now, budget=self._try_budget), Judge(), FindingLog())
             for binding in bindings
         }
+        self._cause_log.watch(binding.group.config.name for binding in bindings)
         topics = dict.fromkeys(each.topic for binding in bindings for each in binding.inputs)
         self._losses = {each: self._losses.get(each) or Losses() for each in topics}
         self._waits = {each: self._waits.get(each) or Waits() for each in topics}
@@ -120,10 +123,12 @@ class Monitor:
         # Not at the end, which takes its time on purpose.
         self.standstills.end()
         self._judge(bindings, waits, batches)
+        self._log()
 
     def conclude(self) -> None:
         """Evaluate all groups a last time, after the receive loop has ended."""
         self._judge(self._bindings, *self._gather(self._bindings))
+        self._log(is_last=True)
 
     def _judge(self, bindings: Sequence[GroupBinding], waits: Sequence[int], batches: Sequence[Batch]) -> None:
         now = time.time_ns()
@@ -181,9 +186,17 @@ class Monitor:
         )
         found = judge.judge(facts)
         self._reports[binding.group] = GroupReport(facts, found, batch.last)
-        for remark in log.remarks(facts, found, judge.explained(facts)):
-            about = {"group": facts.name, "finding": remark.code and remark.code.value}
-            _LOG.log(_LEVELS[remark.severity], "%s: %s", facts.name, remark.text, extra=about)
+        remarks = log.remarks(facts, found, judge.explained(facts))
+        self._cause_log.hear(facts, found, remarks, now=time.monotonic_ns())
+
+    def _log(self, *, is_last: bool = False) -> None:
+        for line in self._cause_log.lines(now=time.monotonic_ns(), is_last=is_last):
+            about = {
+                "group": line.groups[0] if len(line.groups) == 1 else None,
+                "groups": line.groups if len(line.groups) > 1 else None,
+                "finding": line.code and line.code.value,
+            }
+            _LOG.log(_LEVELS[line.severity], "%s", line.text, extra=about)
 
     def _gather(self, bindings: Sequence[GroupBinding]) -> tuple[list[int], list[Batch]]:
         """Take how long messages of each topic waited, and what came and left. On the loop's thread."""

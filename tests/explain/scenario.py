@@ -28,6 +28,7 @@ from syncrelay.explain import (
     Severity,
     Standstill,
 )
+from syncrelay.explain.finding_log import Remark
 from syncrelay.ros.types import SettlingType
 from syncrelay.sync import DropReason, Match, Message, Outcome
 
@@ -145,6 +146,7 @@ def run(
     facts: Callable[[float], dict[str, Any]] | None = None,
     looks: Sequence[float] | None = None,
     rest_s: float = 0.0,
+    hears: Callable[[float, GroupFacts, tuple[Finding, ...], list[Remark]], None] | None = None,
 ) -> Told:
     """Run a rig for so many seconds, and look at it at each, or at those that are given.
 
@@ -154,13 +156,14 @@ def run(
     listens to a lazy group: it receives nothing. `paused` is when the relay is paused.
 
     `publishers` gives what the graph shows of a topic at a second, `facts` more keywords of `GroupWatch.facts`.
+    `hears` is called at each look with what the group's log would say, and of what.
     """
     config = group_of(sources, options or {})
     names = [topic.topic for topic in config.topics]
     arrivals = merge(
         *(_arrivals(each, names, seconds, _chance(seed, place, each)) for place, each in enumerate(sources))
     )
-    relay = _Relay(config, paused)
+    relay = _Relay(config, paused, hears)
     heard = (each for each in arrivals if _until(sleeps, each[0]) == each[0])
     waiting = sorted((_until(stops, at), index, stamp) for at, index, stamp in heard)
     for index in (index for index, topic in enumerate(config.topics) if topic.stamp == "receive"):
@@ -244,7 +247,13 @@ def _arrivals(
 class _Relay:
     """What the running relay does with a group, but for DDS."""
 
-    def __init__(self, config: GroupConfig, paused: Sequence[tuple[float, float]]) -> None:
+    def __init__(
+        self,
+        config: GroupConfig,
+        paused: Sequence[tuple[float, float]],
+        hears: Callable[[float, GroupFacts, tuple[Finding, ...], list[Remark]], None] | None,
+    ) -> None:
+        self._hears = hears
         self._pauses = [(_ns(begin), _ns(end)) for begin, end in paused]
         self._n_inputs = len(config.topics)
         self._names = [(topic.topic, topic.output) for topic in config.topics]
@@ -326,6 +335,9 @@ class _Relay:
         )
         found = self._judge.judge(self.facts)
         self.found.append((second, found))
-        for remark in self._log.remarks(self.facts, found, self._judge.explained(self.facts)):
+        remarks = [*self._log.remarks(self.facts, found, self._judge.explained(self.facts))]
+        if self._hears is not None:
+            self._hears(second, self.facts, found, remarks)
+        for remark in remarks:
             code = remark.code and remark.code.value
             self.lines.append(Line(second, remark.severity is not Severity.OK, remark.text, code))

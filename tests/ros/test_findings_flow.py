@@ -143,3 +143,26 @@ def test_a_relay_that_cannot_keep_up_is_told(stage: Stage):
     relay = stage.relay(config(many, metrics=ANY_PORT))
     play(stage, merged(stream("/camera", hz=600), stream("/lidar", hz=600)))
     wait_for_finding(relay, "too_slow", text=rf"messages waited up to {LASTED} for the relay")
+
+
+def test_sensors_of_one_node_that_fall_silent_are_one_line_over_all_groups(stage: Stage):
+    hub = ("/imu", "/gps", "/odom")
+    groups = {
+        f"with{topic.replace('/', '_')}": {**APPROXIMATE, "topics": inputs(dict.fromkeys(("/lidar", topic), VECTOR))}
+        for topic in hub
+    }
+    relay = stage.relay(config(groups, metrics=ANY_PORT))
+    play(stage, stream("/lidar", hz=10), node="ouster")
+    stopped = play(stage, merged(*(stream(topic, hz=10) for topic in hub)), node="hub")
+    wait_until(lambda: all(each["rate_hz"] > 5 for each in status(relay)["groups"]), "sets of all groups")
+    stopped.process.send(signal.SIGSTOP)
+    relay.wait_for_log(r"no more sets for ")
+    lines = [line for line in relay.stderr.splitlines() if "no more sets for " in line]
+    stopped.process.send(signal.SIGCONT)
+    assert len(lines) == 1
+    assert re.search(
+        rf"3 groups \(with_imu, with_gps and with_odom\): no more sets for {LASTED}: /imu has been silent for {LASTED};"
+        r".* the same holds for /gps and /odom; check /hub, which",
+        lines[0],
+    ), lines
+    relay.wait_for_log("3 groups (with_imu, with_gps and with_odom): recovered after ")

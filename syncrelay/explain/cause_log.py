@@ -1,0 +1,290 @@
+"""One line of the log for one cause, however many groups it hits: which node it is, and how many groups."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from syncrelay.config.wording import all_of, counted
+from syncrelay.explain import words
+from syncrelay.explain.codes import OF_PUBLISHER, OF_RELAY, Code, Severity
+from syncrelay.explain.facts import GroupFacts
+from syncrelay.explain.finding_log import Remark
+from syncrelay.explain.findings import Finding
+
+_SECOND: Final = 1_000_000_000
+# A group that was not judged for so long, as one that a bug stopped, is waited for no longer.
+_ROUND: Final = 5 * _SECOND
+# Groups that a cause has kept from giving sets recover one after the other, slow ones last.
+_UNTIL_ALL_ARE_BACK: Final = 30 * _SECOND
+# As the log of a group has it: the first reminder after this, then at twice the time.
+_FIRST_PAUSE: Final = 5 * _SECOND
+_LONGEST_PAUSE: Final = 600 * _SECOND
+# Groups are judged about once a second: a reminder may be due so much before its time.
+_EARLY: Final = _SECOND
+_FORGOTTEN: Final = 60 * _SECOND
+# An input that gives nothing gives nothing to whoever uses it, found there already or not.
+_GIVES_NOTHING: Final = frozenset({Code.SILENT, Code.NO_PUBLISHER})
+_NAMED: Final = 3
+
+
+class Line(NamedTuple):
+    """A line for the log, and the groups and the code that it is about."""
+
+    severity: Severity
+    text: str
+    groups: tuple[str, ...]
+    code: Code | None
+
+
+class _Cause(NamedTuple):
+    """A code, and whose it is: the node's that publishes, the relay's if that is empty; a group's if one is named."""
+
+    code: Code | None
+    node: str
+    group: str = ""
+
+
+class _Found(NamedTuple):
+    """A finding that a cause makes in a group, and the topics that it is about there."""
+
+    facts: GroupFacts
+    finding: Finding
+    topics: tuple[str, ...]
+
+
+class _Said:
+    """What was said of a cause: the topics and groups that it hit then, and when it may be said again."""
+
+    def __init__(self) -> None:
+        self.topics: frozenset[str] = frozenset()
+        self.groups: frozenset[str] = frozenset()
+        self.pause = _FIRST_PAUSE
+        self.at = self.again = self.heard = 0
+
+
+class _End:
+    """Groups in which a cause is over, while it goes on in others."""
+
+    def __init__(self, now: int) -> None:
+        self.since = now
+        self.groups: list[str] = []
+        self.remark = Remark(Severity.OK, "")
+
+
+class CauseLog:
+    """Turns what the logs of all groups would say into what is worth saying.
+
+    `now` is of a clock that is never set back, in nanoseconds.
+    """
+
+    def __init__(self) -> None:
+        self._found: dict[str, tuple[GroupFacts, tuple[Finding, ...]]] = {}
+        self._heard: dict[str, int] = {}
+        self._published_by: dict[str, str] = {}
+        self._waiting: list[tuple[str, Remark]] = []
+        self._since = 0
+        self._said: dict[_Cause, _Said] = {}
+        self._hit: dict[tuple[_Cause, Code | None], set[str]] = {}
+        self._silenced_by: dict[str, _Cause] = {}
+        self._ends: dict[tuple[_Cause, Code | None], _End] = {}
+
+    def watch(self, groups: Iterable[str]) -> None:
+        """Forget all groups but these."""
+        names = set(groups)
+        self._found = {name: found for name, found in self._found.items() if name in names}
+        self._waiting = [each for each in self._waiting if each[0] in names]
+        self._hit = {key: hit & names for key, hit in self._hit.items()}
+        # Groups that have yet to be judged are waited for.
+        self._heard = {name: self._heard.get(name, 0) for name in names}
+
+    def hear(self, facts: GroupFacts, findings: tuple[Finding, ...], remarks: Iterable[Remark], *, now: int) -> None:
+        """Take what is found in a group, and what its log would say of that."""
+        self._found[facts.name] = facts, findings
+        self._heard[facts.name] = now
+        for each in facts.inputs:
+            if named := [publisher.node for publisher in each.graph.publishers if publisher.is_named]:
+                self._published_by[each.name] = " and ".join(sorted(set(named)))
+        for remark in remarks:
+            self._wait([(facts.name, remark)], now)
+
+    def _wait(self, remarks: Sequence[tuple[str, Remark]], now: int) -> None:
+        if not self._waiting:
+            self._since = now
+        self._waiting += remarks
+
+    def lines(self, *, now: int, is_last: bool = False) -> Iterator[Line]:
+        """Yield what is to be said, once all groups were judged since the first of them had something to say."""
+        if self._waiting and (is_last or self._is_complete(now)):
+            waiting, self._waiting = self._waiting, []
+            yield from self._told(waiting, now)
+        for key, end in [*self._ends.items()]:
+            if is_last or not self._hit.get(key) or now - end.since >= _UNTIL_ALL_ARE_BACK:
+                del self._ends[key]
+                yield _line(Severity.OK, end.remark.text, end.groups, end.remark.code)
+
+    def _is_complete(self, now: int) -> bool:
+        others = (at for name, at in self._heard.items() if name != self._waiting[0][0])
+        return all(at > self._since for at in others) or now - self._since >= _ROUND
+
+    def _told(self, waiting: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
+        warned: dict[_Cause, list[tuple[str, Remark]]] = {}
+        for group, remark in waiting:
+            if remark.severity is Severity.OK:
+                self._end(group, remark, now)
+                continue
+            for cause in self._causes_of(group, remark):
+                warned.setdefault(cause, []).append((group, remark))
+        for cause, remarks in warned.items():
+            yield from self._warn(cause, remarks, now)
+
+    def _causes_of(self, group: str, remark: Remark) -> Sequence[_Cause]:
+        facts, _ = self._found[group]
+        causes = dict.fromkeys(cause for each in remark.findings for cause in self._topics_by_cause(facts, each))
+        is_silence = any(each.severity is Severity.ERROR for each in remark.findings)
+        for cause in causes:
+            self._hit.setdefault((cause, None if is_silence else cause.code), set()).add(group)
+        if is_silence:
+            self._silenced_by.setdefault(group, next(iter(causes)))
+        return [*causes]
+
+    def _topics_by_cause(self, facts: GroupFacts, finding: Finding) -> Mapping[_Cause, tuple[str, ...]]:
+        """Return the causes of a finding, with the topics that it is about."""
+        if not finding.about and finding.code in OF_RELAY:
+            return {_Cause(finding.code, ""): ()}
+        if not finding.about or finding.code not in OF_PUBLISHER:
+            return {_Cause(finding.code, "", facts.name): tuple(facts.inputs[index].name for index in finding.about)}
+        topics = [facts.inputs[index].name for index in finding.about]
+        nodes = [self._published_by.get(topic, "") for topic in topics]
+        if len(set(nodes)) > 1 and finding.code is Code.SILENT and self._is_all_silent():
+            return {_Cause(finding.code, ""): tuple(topics)}
+        by_cause: dict[_Cause, tuple[str, ...]] = {}
+        for topic, node in zip(topics, nodes, strict=True):
+            cause = _Cause(finding.code, node)
+            by_cause[cause] = (*by_cause.get(cause, ()), topic)
+        return by_cause
+
+    def _is_all_silent(self) -> bool:
+        """Whether nothing comes from anybody: the network, or whoever plays a recording, is the likely cause."""
+        return all(
+            any(each.code is Code.SILENT and len(each.about) == len(facts.inputs) for each in findings)
+            for facts, findings in self._found.values()
+            if not facts.asleep
+        )
+
+    def _warn(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
+        if cause.group:
+            for group, remark in remarks:
+                found, hit = self._found_then(cause, [(group, remark)]), [self._found[group][0]]
+                yield _line(Severity.WARN, _text(cause, found, hit), (group,), cause.code)
+            return
+        said = self._said.setdefault(cause, _Said())
+        if now - said.heard >= _FORGOTTEN and self._hit_by(cause) <= {group for group, _ in remarks}:
+            said = self._said[cause] = _Said()
+        said.heard = now
+        found = self._found_of(cause) or self._found_then(cause, remarks)
+        topics = frozenset(topic for each in found for topic in each.topics)
+        hit = self._groups_of(cause, found, topics)
+        groups = frozenset(each.name for each in hit)
+        is_news = not (topics <= said.topics and groups <= said.groups)
+        if said.groups and now + _EARLY < (said.at + _FIRST_PAUSE if is_news else said.again):
+            if is_news:
+                # Some more may be found meanwhile.
+                self._wait(remarks, now)
+            return
+        said.topics, said.groups, said.at = said.topics | topics, said.groups | groups, now
+        said.again, said.pause = now + said.pause, min(2 * said.pause, _LONGEST_PAUSE)
+        yield _line(Severity.WARN, _text(cause, found, hit), [each.name for each in hit], cause.code)
+
+    def _hit_by(self, cause: _Cause) -> set[str]:
+        return {*self._hit.get((cause, None), ()), *self._hit.get((cause, cause.code), ())}
+
+    def _found_of(self, cause: _Cause) -> list[_Found]:
+        """Return the findings that a cause makes in all groups, those that keep sets from leaving first."""
+        found = [
+            _Found(facts, finding, topics)
+            for facts, findings in self._found.values()
+            for finding in findings
+            if finding.code is cause.code and finding.severity is not Severity.OK
+            for each, topics in self._topics_by_cause(facts, finding).items()
+            if each == cause
+        ]
+        return sorted(found, key=lambda each: (-each.finding.severity, each.finding.input is None))
+
+    def _found_then(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]]) -> list[_Found]:
+        """Return what was found when there was something to say; by now it may be over."""
+        then = [(self._found[group][0], finding) for group, remark in remarks for finding in remark.findings]
+        return [
+            _Found(facts, finding, topics)
+            for facts, finding in then
+            for each, topics in self._topics_by_cause(facts, finding).items()
+            if each == cause
+        ]
+
+    def _groups_of(self, cause: _Cause, found: Sequence[_Found], topics: frozenset[str]) -> list[GroupFacts]:
+        names = {each.facts.name for each in found}
+        return [
+            facts
+            for facts, _ in self._found.values()
+            if facts.name in names
+            or (cause.code in _GIVES_NOTHING and not facts.asleep and any(each.name in topics for each in facts.inputs))
+        ]
+
+    def _end(self, group: str, remark: Remark, now: int) -> None:
+        """Note that a group has recovered, or that a warning no longer holds in it."""
+        facts, _ = self._found[group]
+        if remark.findings:
+            causes = [cause for each in remark.findings for cause in self._topics_by_cause(facts, each)]
+        else:
+            causes = [self._silenced_by.pop(group, _Cause(None, "", group))]
+        key = next(((cause, remark.code) for cause in causes), (_Cause(None, "", group), remark.code))
+        for (cause, code), hit in self._hit.items():
+            if code is remark.code and (code is None or cause in causes):
+                hit.discard(group)
+        end = self._ends.setdefault(key, _End(now))
+        end.groups.append(group)
+        # Who recovers last was silent for longest.
+        end.remark = remark
+
+
+def _line(severity: Severity, text: str, groups: Sequence[str], code: Code | None) -> Line:
+    return Line(severity, f"{_named(groups)}: {text}", tuple(groups), code)
+
+
+def _named(groups: Sequence[str]) -> str:
+    """Return `front`, or `5 groups (front, rear, left and 2 more)`."""
+    if len(groups) == 1:
+        return groups[0]
+    return f"{counted(len(groups), 'group')} ({_listed(groups)})"
+
+
+def _listed(names: Sequence[str]) -> str:
+    rest = len(names) - _NAMED
+    return all_of(names if rest <= 1 else [*names[:_NAMED], f"{rest} more"])
+
+
+def _text(cause: _Cause, found: Sequence[_Found], hit: Sequence[GroupFacts]) -> str:
+    """Say what is so, in the words of the group that it is worst for, and what is not in these."""
+    first = found[0].finding
+    text, said = first.text, f"{first.text} {first.suggestion}"
+    topics = dict.fromkeys(topic for each in found for topic in each.topics)
+    others = [topic for topic in topics if not _names(text, topic)]
+    is_of_all = first.input is None and len(others) == len(topics)
+    if others and not is_of_all:
+        text += f"; the same holds for {_listed(others)}"
+    elif others and len(hit) > 1:
+        text += f": {_listed(others)}"
+    if cause.node and not _names(said, cause.node) and (others or len(hit) > 1):
+        text += f"; {cause.node} published {'them' if len(topics) > 1 else 'it'}"
+    text = f"{text}; {first.suggestion}" if first.suggestion else text
+    silent = [each for each in hit if each.is_silent]
+    if not silent:
+        return text
+    if len(silent) < len(hit):
+        return f"{len(silent)} of them {'gives' if len(silent) == 1 else 'give'} no sets: {text}"
+    ever = "no set" if all(each.figures.last_set is None for each in silent) else "no more sets"
+    return f"{ever} for {words.seconds(max(each.silent_for for each in silent))}: {text}"
+
+
+def _names(text: str, name: str) -> bool:
+    """Whether a text has a name as a whole, and not only as a part of another."""
+    return re.search(rf"(?<![\w/]){re.escape(name)}(?![\w/])", text) is not None
