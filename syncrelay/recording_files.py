@@ -9,13 +9,14 @@ SUFFIXES: Final = (".mcap", ".db3", ".bag", ".active")
 METADATA: Final = "metadata.yaml"
 """What stands beside the files of rosbag2, in a folder that is one recording."""
 
-_COMPRESSED: Final = (".bz2", ".zstd", ".zst", ".gz")
+COMPRESSED: Final = (".bz2", ".zstd", ".zst", ".gz")
+"""What the name of a file that is compressed as a whole ends in."""
 
 
 def is_recording_name(name: str) -> bool:
     """Tell whether a file has the name of a recording, compressed or not."""
     path = PurePosixPath(name)
-    return (PurePosixPath(path.stem).suffix if path.suffix in _COMPRESSED else path.suffix) in SUFFIXES
+    return (PurePosixPath(path.stem).suffix if path.suffix in COMPRESSED else path.suffix) in SUFFIXES
 
 
 def holds_recording(path: str) -> bool:

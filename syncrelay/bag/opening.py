@@ -4,6 +4,7 @@ import bz2
 import gzip
 import heapq
 import zlib
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from errno import ENOSPC
@@ -16,15 +17,16 @@ from typing import Any, Final, TypeAlias
 import zstandard
 
 from syncrelay.bag import mcap_file, ros1_file, sqlite_file
+from syncrelay.bag.attempts import redacted
 from syncrelay.bag.batching import batched, filled
 from syncrelay.bag.effort import TOO_MUCH, room_for
-from syncrelay.bag.names import natural
-from syncrelay.bag.recording import AFTER_ALL, Channel, RawMessage, Recording
+from syncrelay.bag.listing import files_meant, told_of
+from syncrelay.bag.recording import AFTER_ALL, Channel, RawMessage, Recording, is_part
 from syncrelay.bag.sources import LocalFile, NoIndexError
-from syncrelay.bag.storage import files_of, is_url, open_url
-from syncrelay.config.wording import did_you_mean
+from syncrelay.bag.storage import open_url
+from syncrelay.config.wording import counted
 from syncrelay.errors import BagError, StorageError
-from syncrelay.recording_files import METADATA, SUFFIXES, is_recording_name
+from syncrelay.recording_files import METADATA
 
 Tell: TypeAlias = Callable[[str], object]
 """Takes a sentence that is worth a remark and is no fault."""
@@ -52,14 +54,16 @@ _PIECE: Final = 1_000_000
 def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Recording:
     """Open a recording: files, and folders of which all files are one recording, by their paths or URLs.
 
-    Of several files, those that cannot be read are faults of the recording. Raises BagError where none can, and
-    StorageError where one cannot be reached. `tell` takes what has to be copied here first.
+    Of several files, those that cannot be read are faults of the recording, as are those that metadata.yaml names and
+    that are missing. Raises BagError where none can be read, and StorageError where one cannot be reached. `tell` takes
+    what has to be copied here first.
     """
     with ExitStack() as opened:
         files: list[Recording] = []
         unreadable: list[BagError] = []
         faults: list[str] = []
-        for path in _files(paths):
+        told = [told_of(path, faults) for path in paths]
+        for path in files_meant(paths):
             try:
                 if isinstance(path, str):
                     file = _open_remote(path, opened, faults, tell)
@@ -74,31 +78,32 @@ def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Reco
             files.append(file)
         if not files:
             raise unreadable[0]
-        return Files(files, opened.pop_all(), faults=[*map(str, unreadable), *faults])
-
-
-def is_recording(word: str) -> bool:
-    """Tell whether a word means a recording and no topic, and fetch nothing for it.
-
-    A recording is something that is there, a URL, or has a dot, which no topic has.
-    """
-    if is_url(word):
-        return True
-    path = Path(word)
-    try:
-        return "." in path.name or path.is_file() or (path.is_dir() and bool(_files_in(path)))
-    except (OSError, BagError):
-        return False
+        counts = _counts([each.topics for each in told if each is not None]) if None not in told else {}
+        name = redacted(paths[0])
+        return Files(name, files, opened.pop_all(), faults=[*map(str, unreadable), *faults], counts=counts)
 
 
 class Files:
     """Recordings of one drive as one; see Recording."""
 
-    def __init__(self, files: Sequence[Recording], opened: ExitStack, *, faults: Sequence[str]) -> None:
-        """Read from files that `opened` closes; `faults` are those of files that are not among them."""
+    def __init__(
+        self,
+        name: str,
+        files: Sequence[Recording],
+        opened: ExitStack,
+        *,
+        faults: Sequence[str],
+        counts: Mapping[str, int],
+    ) -> None:
+        """Read from files that `opened` closes; `faults` are those of files that are not among them.
+
+        `counts` says how many messages of each topic there should be, and is empty where that is not known.
+        """
+        self._name = name
         self._files = sorted(files, key=lambda file: file.begin)
         self._opened = opened
         self._faults = list(faults)
+        self._counts = counts
         self.channels = tuple(channel for file in self._files for channel in file.channels)
         self.size = sum(file.size for file in files)
         self.begin = min((file.begin for file in self._files if file.end), default=0)
@@ -120,58 +125,35 @@ class Files:
         """See Recording."""
         parts = [file.batches(wanted, begin=begin, end=end) for file in self._files]
         if any(earlier.end > later.begin for earlier, later in pairwise(self._files)):
-            return batched(heapq.merge(*map(chain.from_iterable, parts), key=itemgetter(1)))
-        return filled(chain.from_iterable(parts))
+            found = batched(heapq.merge(*map(chain.from_iterable, parts), key=itemgetter(1)))
+        else:
+            found = filled(chain.from_iterable(parts))
+        return self._counted(found, wanted) if self._counts and not is_part(begin, end) else found
+
+    def _counted(self, found: Iterator[list[RawMessage]], wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+        """Pass on what is read; if it is less than there should be, and no fault explains that, it is one."""
+        count = 0
+        for batch in found:
+            count += len(batch)
+            yield batch
+        among = frozenset(wanted)
+        topics = {channel.topic for channel in among}
+        if self.faults or any(each.topic in topics and each not in among for each in self.channels):
+            return
+        expected = sum(self._counts.get(topic, 0) for topic in topics)
+        if count < expected:
+            missing = counted(expected - count, "message")
+            said = f"{METADATA} counts {expected} of the topics that were read, found {count}"
+            self._faults.append(f"{self._name}: {missing} missing: {said}")
 
     def close(self) -> None:
         """See Recording."""
         self._opened.close()
 
 
-def _files(named: Sequence[str]) -> Iterator[Path | str]:
-    """Yield the paths of files, and the URLs of those that are not here."""
-    for name in named:
-        if is_url(name):
-            yield from files_of(name)
-            continue
-        try:
-            yield from _files_of(Path(name), named)
-        except OSError as error:
-            raise BagError(f"{name}: cannot be read: {error.strerror}") from error
-
-
-def local_files(word: str) -> list[Path]:
-    """Return the files of this machine that open_recording would read; raises BagError where there are none."""
-    return [file for file in _files([word]) if isinstance(file, Path)]
-
-
-def _files_of(path: Path, named: Sequence[str]) -> list[Path]:
-    if path.name == METADATA and path.is_file():
-        path = path.parent
-    if path.is_dir():
-        return _files_in(path)
-    if path.exists():
-        return [path]
-    raise BagError(f"{path}: no such file or folder{_similar(path, named)}")
-
-
-def _files_in(folder: Path) -> list[Path]:
-    files = sorted(
-        (path for path in folder.iterdir() if is_recording_name(path.name)), key=lambda path: natural(path.name)
-    )
-    if not files:
-        raise BagError(f"{folder}: holds no recording, expected files that end in {', '.join(SUFFIXES)}")
-    return files
-
-
-def _similar(path: Path, named: Sequence[str]) -> str:
-    """Return a question for the recording beside a path whose name is most like it, and that is not named already."""
-    try:
-        others = set(path.parent.iterdir()).difference(map(Path, named))
-        beside = [each.name for each in sorted(others) if each.is_dir() or is_recording_name(each.name)]
-    except OSError:
-        return ""
-    return did_you_mean(path.name, beside)
+def _counts(told: Sequence[Mapping[str, int]]) -> Mapping[str, int]:
+    """Return how many messages of each topic several folders hold."""
+    return sum(map(Counter, told), Counter())
 
 
 def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> Recording:

@@ -79,28 +79,31 @@ def output_profile(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) 
 
 def read_profiles(recorded: str) -> tuple[Profile, ...]:
     """Return the profiles of `offered_qos_profiles`, a YAML text; none where it makes no sense."""
-    try:
-        listed = yaml.load(recorded, Loader=LOADER) if _is_plain(recorded) else None  # noqa: S506  a safe one
-    except (yaml.YAMLError, ValueError, OverflowError):
-        return ()
+    listed = plain_yaml(recorded, longest=_LONGEST, deepest=_DEEPEST)
     if not isinstance(listed, list):
         return ()
     return tuple(_read_profile(each) for each in listed if isinstance(each, dict))
 
 
-def _is_plain(text: str) -> bool:
-    """Tell whether a text is no longer and nests no deeper than profiles do, and has neither aliases nor tags.
+def plain_yaml(text: str, *, longest: int, deepest: int) -> Any:
+    """Return what a YAML text says; None where it is faulty, longer or more deeply nested, or has aliases or tags.
 
     Aliases can stand for gigabytes; of a value that is not what its tag says, PyYAML raises anything.
     """
-    if len(text) > _LONGEST:
-        return False
+    try:
+        is_plain = len(text) <= longest and _is_plain(text, deepest)
+        return yaml.load(text, Loader=LOADER) if is_plain else None  # noqa: S506  a safe one
+    except (yaml.YAMLError, ValueError, OverflowError):
+        return None
+
+
+def _is_plain(text: str, deepest: int) -> bool:
     depth = 0
     for event in yaml.parse(text, Loader=LOADER):
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
             return False
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST:
+        if depth > deepest:
             return False
     return True
 

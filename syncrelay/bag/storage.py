@@ -69,6 +69,15 @@ def files_of(word: str) -> list[str]:
     return sorted(files, key=natural)
 
 
+def metadata_of(word: str) -> str | None:
+    """Return the URL of what rosbag2 says of the files of a folder; None where a word means no folder that has it."""
+    if scheme_of(word) not in _STORES or _PATTERN.search(word):
+        return None
+    place = word.rstrip("/").removesuffix(f"/{METADATA}")
+    url = f"{place}/{METADATA}"
+    return url if url in _below(_store(word), place) else None
+
+
 def open_url(url: str, patience: Patience | None = None) -> RemoteFile:
     """Open a file behind a URL; raises StorageError where it cannot be reached, and names the extra if that is it."""
     scheme = scheme_of(url)

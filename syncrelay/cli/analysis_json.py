@@ -22,6 +22,7 @@ def as_json(name: str, analysis: Analysis) -> dict[str, Any]:
         "recording": name,
         "begin": analysis.begin,
         "end": analysis.end,
+        "faults": list(analysis.faults),
         "topics": [asdict(topic) for topic in analysis.topics],
         "groups": [_group(group) for group in analysis.groups],
     }

@@ -20,7 +20,7 @@ from syncrelay.cli.fleet import do_on_many, require_into
 from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
-from syncrelay.cli.reading import reading
+from syncrelay.cli.reading import reading, tell_faults
 from syncrelay.cli.side_by_side import Work, side_by_side
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
@@ -102,24 +102,25 @@ def _analyze_many(parser: Parser, arguments: Namespace, bags: Sequence[str], ask
 
 
 def analyze_bag(bag: str, asked: Asked) -> int:
-    """Print what a recording tells, with neither file nor topics what is in it; 1 if a required topic is not.
+    """Print what a recording tells, with neither file nor topics what is in it.
 
+    Returns 1 if a required topic is not there, or part of the recording is missing or cannot be read.
     Raises ConfigError for a faulty file, BagError for a recording that cannot be read.
     """
     name = redacted(bag)
     with closing(open_recording([bag], tell=remark)) as recording:
         if asked.config is None and not asked.topics:
             put_inventory(name, recording, is_json=asked.json, indent=asked.indent)
-            _tell_faults(recording)
-            return DONE
+            return tell_faults(recording)
         text, bindings = bound(recording, asked)
         for problem in (problem for binding in bindings for problem in binding.problems):
             remark(printable(problem))
         with reading(recording):
             analysis = measured(recording, text, bindings, asked)
-        _tell_faults(recording)
     _print(name, analysis, asked)
-    return DONE if all(binding.is_complete for binding in bindings) else AT_FAULT
+    if tell_faults(recording) or not all(binding.is_complete for binding in bindings):
+        return AT_FAULT
+    return DONE
 
 
 def bound(recording: Recording, asked: Asked) -> tuple[str, tuple[GroupBinding, ...]]:
@@ -142,11 +143,6 @@ def _require_sense(asked: Asked, bags: Sequence[str]) -> None:
         raise UsageError(f"name a file with --config FILE, or the topics to match: there is nothing to write yet{more}")
     if len(bags) > 1 and (asked.write or asked.html):
         raise UsageError(f"--write and --html are for one recording, found {len(bags)}{more}")
-
-
-def _tell_faults(recording: Recording) -> None:
-    for fault in recording.faults:
-        remark(printable(fault))
 
 
 def _proposed(recording: Recording, topics: Sequence[str]) -> str:

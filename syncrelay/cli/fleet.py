@@ -116,9 +116,12 @@ def _tell(finished: Finished, run: Run, shown: "_Shown") -> int:
             raise SyncRelayError(f"ended: {shown.left()}")
         return AT_FAULT
     problems = _problems(run, job)
+    shown.faulty += bool(problems)
     for problem in problems:
         shown.clear()
-        remark(f"{job.source.shown[0]}: {problem}")
+        name = job.source.shown[0]
+        # What is wrong with a file of it is said with the file's name.
+        remark(problem if problem.startswith(name) else f"{name}: {problem}")
     return AT_FAULT if problems else DONE
 
 
@@ -133,6 +136,8 @@ class _Shown:
     """Progress on stderr: one line that is written anew on a terminal, elsewhere a line now and then."""
 
     progress: Progress
+    faulty: int = 0
+    """How many recordings were done though something is wrong with them."""
     _last: float = 0.0
     _is_drawn: bool = False
 
@@ -168,7 +173,8 @@ class _Shown:
         missing = len(progress.jobs) - progress.done - progress.kept - progress.failed
         counts = {"done": progress.done, "done before": progress.kept, "failed": progress.failed, "not done": missing}
         told = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
-        return f"{counted(len(progress.jobs), 'recording')}: {told}"
+        faulty = f"; {self.faulty} with problems" if self.faulty else ""
+        return f"{counted(len(progress.jobs), 'recording')}: {told}{faulty}"
 
 
 class _Stop:

@@ -1,7 +1,7 @@
 """What `replay --into` and `analyze --into` do with each recording."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -108,10 +108,10 @@ class AnalyzeTask:
 
 def about(recording: Recording, bindings: Sequence[GroupBinding], *, more: Sequence[str] = ()) -> dict[str, JSON]:
     """Return when a recording was made, and what is wrong with it: what it lacks, `more`, what could not be read."""
-    lacking = [problem for binding in bindings if not binding.is_complete for problem in binding.problems]
-    lacking += more
+    lacking = (problem for binding in bindings if not binding.is_complete for problem in binding.problems)
+    problems: list[JSON] = [*lacking, *more, *recording.faults]
     facts: dict[str, JSON] = {"begin": recording.begin, "end": recording.end}
-    return {**facts, **_unless_empty(PROBLEMS, lacking), **_unless_empty("faults", recording.faults)}
+    return {**facts, PROBLEMS: problems} if problems else facts
 
 
 def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Sequence[GroupResult]) -> list[str]:
@@ -122,11 +122,6 @@ def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Se
         if binding.is_complete
     ]
     return [sentence for sentence in found if sentence is not None]
-
-
-def _unless_empty(name: str, sentences: Iterable[str]) -> dict[str, JSON]:
-    found: list[JSON] = list(sentences)
-    return {name: found} if found else {}
 
 
 def counts_of(result: GroupResult) -> dict[str, JSON]:

@@ -41,6 +41,7 @@ def inventory_as_json(bag: str, recording: Recording, topics: Sequence[Topic]) -
         "recording": bag,
         "begin": recording.begin,
         "end": recording.end,
+        "faults": recording.faults,
         "topics": [{**asdict(topic.figures), "unfit": topic.unfit} for topic in topics],
         "groups": [],
     }

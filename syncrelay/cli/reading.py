@@ -10,6 +10,8 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from syncrelay.bag import Recording
+from syncrelay.cli.boundary import AT_FAULT, DONE, remark
+from syncrelay.printable import printable
 
 # So many more than before make the collector look: a chunk of small messages.
 _NEW_OBJECTS: Final = 50_000
@@ -40,6 +42,13 @@ def reading(recording: Recording) -> Iterator[None]:
             return
         with _Bar(recording, Console(stderr=True)):
             yield
+
+
+def tell_faults(recording: Recording) -> int:
+    """Say what of a recording is missing or could not be read, and return the exit code for it."""
+    for fault in recording.faults:
+        remark(printable(fault))
+    return AT_FAULT if recording.faults else DONE
 
 
 @contextmanager

@@ -12,7 +12,7 @@ def analyze() -> Parser:
         description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
         "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
         "Each of several recordings is measured by itself, on all cores. "
-        "Exit code 1 if a recording lacks a required topic.",
+        "Exit code 1 if a recording lacks a required topic, or part of it is missing or cannot be read.",
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
     parser.add_argument(
@@ -40,7 +40,8 @@ def replay() -> Parser:
         "syncrelay replay",
         example="syncrelay replay drive.mcap --config fusion.yaml -o sets.mcap",
         description="Runs the groups of a file on a recording, without ROS, and says what became of every message. "
-        "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic.",
+        "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic, "
+        "or part of it is missing or cannot be read.",
     )
     parser.add_argument(
         "bags",
@@ -79,8 +80,8 @@ def export() -> Parser:
         "syncrelay export",
         example="syncrelay export drive.mcap --config fusion.yaml -o dataset",
         description="Writes the sets that the groups of a file make of recordings as a dataset: in Parquet, a row a "
-        "set, with the messages decoded. They are the sets of `syncrelay replay`. Exit code 1 if a recording cannot be "
-        "read or lacks a required topic.",
+        "set, with the messages decoded. They are the sets of `syncrelay replay`. Exit code 1 if a recording lacks a "
+        "required topic, or part of it is missing or cannot be read.",
     )
     parser.add_argument("bags", metavar="BAG", nargs="+", help="a recording as for replay; each is exported by itself")
     parser.add_argument(

@@ -16,7 +16,7 @@ from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.fleet import do_on_many, require_into
 from syncrelay.cli.parser import Parser
-from syncrelay.cli.reading import reading
+from syncrelay.cli.reading import reading, tell_faults
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
 from syncrelay.config import load
@@ -63,7 +63,9 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 
 
 def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> int:
-    """Feed recordings to the groups of files and print what became of them; 1 if a required topic is not there.
+    """Feed recordings to the groups of files and print what became of them.
+
+    Returns 1 if a required topic is not there, or part of the recording is missing or cannot be read.
 
     Lines go to stdout, and the summary then to stderr. Raises ConfigError for a faulty file, BagError for a
     recording that cannot be read, or has not the stamps that the file names.
@@ -84,7 +86,6 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         listeners = [*_printing(wanted, bindings), *([] if written is None else [written.take])]
         with reading(recording):
             results = replay_groups(recording, bindings, listeners=listeners)
-        _say_all(recording.faults)
         _say_all(disturbed.idle() if disturbed is not None else ())
         without_faults = results
         if disturbed is not None:
@@ -99,7 +100,7 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
             tell(line)
     if wanted.what_if:
         _say_all([_compared(*each) for each in zip(results, without_faults, strict=True)])
-    if not all(binding.is_complete for binding in bindings):
+    if tell_faults(recording) or not all(binding.is_complete for binding in bindings):
         return AT_FAULT
     none = [result.name for result in without_faults if not result.sets]
     if none:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema
 
@@ -123,6 +123,14 @@ class LerobotKeys(Keys):
         ),
         examples=["500ms"],
     )
+    incomplete: Literal["leave_out", "keep"] = Field(
+        default="leave_out",
+        description=(
+            "What becomes of a recording that is cut off or damaged, or lacks one of its files: leave_out, or keep what"
+            " can be read as an episode. Default: leave_out."
+        ),
+        examples=["keep"],
+    )
     features: dict[FeatureName, FeatureSources] = Field(
         description=(
             "Columns of the dataset: `action`, and names that begin with `observation.`. TOPIC takes the topic's images"
@@ -177,6 +185,7 @@ class LerobotConfig:
     fps: int
     task: str | ExportSource
     max_gap_ns: int
+    keeps_incomplete: bool
     features: tuple[ExportFeature, ...]
 
 
@@ -198,5 +207,6 @@ def resolve_lerobot(keys: ExportKeys | None, node: NodeConfig, groups: Sequence[
         fps=lerobot.fps,
         task=task if isinstance(task, str) else ExportSource(node.absolute(task.topic), task.field),
         max_gap_ns=_FRAMES_OF_A_GAP * 10**9 // lerobot.fps if lerobot.max_gap is None else lerobot.max_gap,
+        keeps_incomplete=lerobot.incomplete == "keep",
         features=tuple(ExportFeature(name, sources_of(each, node)) for name, each in lerobot.features.items()),
     )

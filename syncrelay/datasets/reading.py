@@ -1,5 +1,6 @@
 """Sets of recordings as tables, read as they are asked for: memory holds some, whatever the recording's size."""
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from os import PathLike, fspath
@@ -80,7 +81,8 @@ def read_sets(
     file's path, or what `syncrelay.config.load` gives; `group` names one of its groups and is needed where it has
     several. `fields` maps an input to dotted paths of the fields that are wanted, None to all; `images` is "png" or
     "jpeg", None for the raw pixels; with `raw` each message is its CDR bytes. A batch holds the sets of about
-    `most_bytes` bytes of messages. The columns: see syncrelay.datasets.tables.
+    `most_bytes` bytes of messages. The columns: see syncrelay.datasets.tables. What is missing of a recording, or
+    cannot be read, is a warning once the rest has been read.
 
     Raises ConfigError for a faulty file, BagError for a recording that cannot be read or lacks a required topic, and
     UsageError for a group or an input that the file does not have.
@@ -97,6 +99,8 @@ def read_sets(
             steps = Replay(recording, [binding], listeners=sets.listeners).steps()
             for part in sets.parts(steps, most_bytes=most_bytes):
                 yield from part.table.combine_chunks().to_batches()
+            for fault in recording.faults:
+                warnings.warn(fault, stacklevel=2)
 
 
 def resolved(fields: Mapping[str, Sequence[str]], config: Config) -> Fields:

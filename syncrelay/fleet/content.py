@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from syncrelay.bag.attempts import redacted
-from syncrelay.bag.opening import local_files
+from syncrelay.bag.listing import local_files
 from syncrelay.bag.storage import files_of, is_url, open_url
 from syncrelay.errors import BagError
 

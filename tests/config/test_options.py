@@ -190,6 +190,7 @@ _OF_LEROBOT: dict[str, dict[str, Any]] = {
     "fps": {"fps": 20},
     "task": {"task": "place"},
     "max_gap": {"max_gap": "3s"},
+    "incomplete": {"incomplete": "keep"},
     "features": {"features": {"action": "/b:height"}},
 }
 OPTIONS |= {

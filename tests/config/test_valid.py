@@ -70,6 +70,7 @@ def test_every_key_arrives_where_it_is_used(environ):
         fps=10,
         task=ExportSource("/back/task", "data"),
         max_gap_ns=300_000_000,
+        keeps_incomplete=True,
         features=(
             ExportFeature("observation.images.back", (ExportSource("/back/image", None),)),
             ExportFeature("observation.state", (covariance, ExportSource("/back/image", "height"))),

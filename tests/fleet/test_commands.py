@@ -88,10 +88,10 @@ def test_a_change_of_the_file_needs_leave_to_replace(tmp_path):
     assert refused.returncode == 1
     assert "out: holds results of another file: name another folder, or replace them with --overwrite" in refused.stderr
     replaced = replay_into(tmp_path, "--overwrite")
-    assert (replaced.returncode, replaced.stdout) == (1, "out: 3 recordings: 3 done\n")
+    assert (replaced.returncode, replaced.stdout) == (1, "out: 3 recordings: 3 done; 3 with problems\n")
     assert "only 0 of 20 possible sets are complete, because of slop 1 ms: without it, 19 would be" in replaced.stderr
     assert {entry["facts"]["groups"][0]["sets"] for entry in entries(tmp_path / "out").values()} == {0}
-    assert replay_into(tmp_path, "--overwrite").stdout == "out: 3 recordings: 3 done before\n"
+    assert replay_into(tmp_path, "--overwrite").stdout == "out: 3 recordings: 3 done before; 3 with problems\n"
 
 
 def test_a_variable_of_the_file_counts_as_its_text(done, tmp_path):

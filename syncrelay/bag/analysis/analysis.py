@@ -67,13 +67,14 @@ class GroupAnalysis:
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """A recording; `text` is the file that its groups are from."""
+    """A recording; `text` is the file that its groups are from, `faults` what of it is missing or cannot be read."""
 
     begin: int
     end: int
     topics: tuple[TopicFigures, ...]
     groups: tuple[GroupAnalysis, ...]
     text: str
+    faults: tuple[str, ...]
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -92,7 +93,7 @@ def analyze(recording: Recording, text: str, bindings: Sequence[GroupBinding]) -
     )
     distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
     topics = tuple(figures_of(stream) for stream in distinct.values() if stream.stamps)
-    return Analysis(recording.begin, recording.end, topics, groups, text)
+    return Analysis(recording.begin, recording.end, topics, groups, text, tuple(recording.faults))
 
 
 def proposed_text(name: str, channels: Sequence[Channel]) -> str:

@@ -30,6 +30,7 @@ def as_html(name: str, analysis: Analysis) -> str:
         began=when(analysis.begin),
         lasts=words.seconds(analysis.end - analysis.begin),
         messages=sum(topic.messages for topic in analysis.topics),
+        faults=list(map(printable, analysis.faults)),
         topics=[topic_row(topic) for topic in analysis.topics],
         columns=TopicRow.COLUMNS,
         groups=told,

@@ -50,8 +50,8 @@ def write_episode(name: str, words: Sequence[str], config: Config, folder: Path)
 
     `words` is what open_recording takes. The facts: how many frames there are, of which `held` show the set of the
     frame before; how many sets were `left_out`, as others were nearer, and `unusable`, by why; and the longest time
-    between a frame and its set; and `problems`: a sentence for each
-    input of which messages could not be decoded, and for what leaves out most of the frames that there could be.
+    between a frame and its set; and `problems`: a sentence for all that is missing or could not be read or decoded, and
+    for what leaves out most of the frames that there could be.
 
     Raises UsageError where the file says nothing of LeRobot, and BagError for a recording that cannot be an episode.
     """
@@ -79,13 +79,15 @@ def _write(
             for each in sets.read(part.table):
                 episode.add(each)
         episode.end()
+    if recording.faults and not lerobot.keeps_incomplete:
+        raise BagError(_incomplete(recording.faults))
     (result,) = replay.results()
     counts = [each.counts for each in result.inputs]
     few = why_few_sets(recording, binding, counts, sets.complete, needed=sets.needed)
     if not episode.grid.frames:
         raise BagError(few or _no_frames(result.sets, sets.unusable))
     facts = episode.write_table()
-    return {**facts, "problems": [*source.faults(), *_lost(few, sets)]}
+    return {**facts, "problems": [*recording.faults, *source.faults(), *_lost(few, sets)]}
 
 
 def _lost(few: str | None, sets: FrameSets) -> Iterator[str]:
@@ -165,6 +167,11 @@ def _column(rows: np.ndarray[Any, Any]) -> pa.Array:
     values = pa.array(rows.reshape(-1))
     # A vector of one value is a number in LeRobot's tables.
     return values if width == 1 else pa.FixedSizeListArray.from_arrays(values, width)
+
+
+def _incomplete(faults: Sequence[str]) -> str:
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{faults[0]}{more}: no episode; write `incomplete: keep` below `lerobot:` to keep what can be read"
 
 
 def _no_frames(count: int, unusable: Mapping[str, int]) -> str:
