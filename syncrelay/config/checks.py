@@ -31,6 +31,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield from _restamp(group, document)
         yield from _trigger(group, document)
         yield from _clock(group, document)
+        yield from _times_of_arrival(group, document)
         yield from _keys(group, document)
         yield from _optional_inputs(group, document)
         yield from _unit(group, document)
@@ -114,6 +115,22 @@ def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
         path = (*group.path, "queue_size")
         at = path if document.has(path) else (*group.path, "max_wait")
         yield document.problem(at, text, code="conflict")
+
+
+def _times_of_arrival(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    """Yield an input whose messages can be in no set: no two clocks are read at the same nanosecond."""
+    tolerance = group.options.tolerance
+    received = [path for path, topic in group.paths() if topic.stamp == "receive"]
+    if not received or tolerance is None or tolerance.takes_times_of_arrival:
+        return
+    needed_by, instead = f"`{tolerance.key}: 0`", f"a larger `{tolerance.key}`, such as 20ms"
+    if tolerance.wider_policy is not None:
+        needed_by, instead = group.options.policy, f"`policy: {tolerance.wider_policy}` with a `{tolerance.key}`"
+    text = (
+        f"a time of arrival never equals another stamp, as {needed_by} needs it: write {instead}, or use a stamp of the"
+        " message"
+    )
+    yield document.problem((*received[0], "stamp"), text, code="conflict")
 
 
 def _inputs(group: GroupConfig) -> list[str]:

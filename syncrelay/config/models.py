@@ -281,6 +281,11 @@ class Tolerance:
         """Whether the group's own policy has the key."""
         return self.wider_policy is None
 
+    @property
+    def takes_times_of_arrival(self) -> bool:
+        """Whether stamps of a set may differ at all: a time of arrival never equals another stamp."""
+        return self.ns != 0
+
 
 class Group(Keys):
     """Keys that the groups of every policy have, and what the rest of the program asks of a policy."""

@@ -16,14 +16,15 @@ def check_types(groups: Sequence[GroupConfig], document: Document, interfaces: I
     for group in groups:
         for path, topic in group.paths():
             if topic.type is not None and (*path, "type") not in document.faulty:
-                yield from _check_topic(topic, topic.type, path, document, interfaces)
+                yield from _check_topic(group, topic, path, document, interfaces)
+        yield from _check_kinds_of_keys(group, document, interfaces)
         yield from _check_restamp(group, document, interfaces)
 
 
 def _check_topic(
-    topic: TopicConfig, type_name: str, path: Path, document: Document, interfaces: Interfaces
+    group: GroupConfig, topic: TopicConfig, path: Path, document: Document, interfaces: Interfaces
 ) -> Iterator[Problem]:
-    of_type = (*path, "type")
+    of_type, type_name = (*path, "type"), topic.type or ""
     package = type_name.partition("/")[0]
     fault = _not_installed(type_name, document, interfaces)
     asked = list(_asked_fields(topic, path, document))
@@ -45,7 +46,35 @@ def _check_topic(
         for each in asked:
             yield from _check_field(type_name, each, document, interfaces)
         if goes_by_header and not _begins_with_header(fields):
-            yield _no_header(type_name, path, fields, document, interfaces)
+            yield _no_header(group, type_name, path, fields, document=document, interfaces=interfaces)
+
+
+def _check_kinds_of_keys(group: GroupConfig, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
+    """Yield the first key that is text where another is a number or a time, or the other way round."""
+    first: tuple[Path, bool] | None = None
+    for path, topic in group.paths():
+        asked = next((each for each in _asked_fields(topic, path, document) if each.wanted is _A_KEY), None)
+        found = asked and topic.type and _field_at(topic.type, asked.steps.split("."), interfaces)
+        if not asked or not found or found.type not in _A_KEY.types or (*path, "type") in document.faulty:
+            continue
+        is_text = found.type == "string"
+        first = first or (path, is_text)
+        if is_text != first[1]:
+            kinds = ("text", "a number or a time")
+            kind, other = kinds if is_text else kinds[::-1]
+            line = document.line((*first[0], "topic"), beside=(*path, "topic"))
+            text = f"the key of this topic is {kind}, that of the topic on {line} is {other}: they are never equal"
+            yield document.problem((*path, "topic"), text, code="conflict")
+            return
+
+
+def _field_at(type_name: str, steps: Sequence[str], interfaces: Interfaces) -> Field | None:
+    """Return the field at the end of a path, None where that cannot be told."""
+    first, *rest = steps
+    field = next((each for each in interfaces.fields(type_name) or () if each.name == first), None)
+    if field is None or field.is_array:
+        return None
+    return _field_at(field.type, rest, interfaces) if rest else field
 
 
 def _asked_fields(topic: TopicConfig, path: Path, document: Document) -> Iterator["_AskedField"]:
@@ -95,13 +124,26 @@ def _begins_with_header(fields: Sequence[Field]) -> bool:
 
 
 def _no_header(
-    type_name: str, path: Path, fields: Sequence[Field], document: Document, interfaces: Interfaces
+    group: GroupConfig,
+    type_name: str,
+    path: Path,
+    fields: Sequence[Field],
+    *,
+    document: Document,
+    interfaces: Interfaces,
 ) -> Problem:
     times = list(_time_paths(fields, interfaces))
-    own = f", or `stamp: {{field: {times[0]}}}`" if times else ""
+    ways = [f"`stamp: {{field: {times[0]}}}`"] if times else []
+    tolerance = group.options.tolerance
+    if tolerance is None or tolerance.takes_times_of_arrival:
+        ways.insert(0, "`stamp: receive` to use the time of arrival")
+    elif not times:
+        ways = [f"`stamp: receive` to use the time of arrival, and a {tolerance.key} above 0"]
+        if tolerance.wider_policy is not None:
+            ways = [f"`stamp: receive` to use the time of arrival, and `policy: {tolerance.wider_policy}`"]
     text = (
         f"{quoted(type_name)} does not begin with a std_msgs/msg/Header, so it has no stamp there:"
-        f" write `stamp: receive` to use the time of arrival{own}"
+        f" write {', or '.join(ways)}"
     )
     key = next((key for key in ("stamp", "type") if document.has((*path, key))), "topic")
     return document.problem((*path, key), text, code="no_header", subject=type_name)

@@ -59,7 +59,7 @@ def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Foun
         )
 
 
-def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def type_not_importable(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find a type that cannot be used here, or not as the file asks."""
     severity = Severity.ERROR if an_input.required else Severity.WARN
     if an_input.graph.not_importable:
@@ -70,11 +70,13 @@ def type_not_importable(_facts: GroupFacts, index: int, an_input: InputFacts) ->
             suggestion = f"write `type: {others[0].type}`, or leave `type` out"
         yield Finding(Code.TYPE_NOT_IMPORTABLE, severity, text, suggestion, index)
     elif an_input.graph.not_readable:
+        needs_stamps = facts.tolerance is not None and not facts.tolerance.takes_times_of_arrival
+        by_arrival = "" if needs_stamps else ", or write `stamp: receive`"
         yield Finding(
             Code.TYPE_NOT_IMPORTABLE,
             severity,
             f"{an_input.name}: {an_input.graph.not_readable.splitlines()[0]}",
-            "name a field that it has at `stamp` or `key`, or write `stamp: receive`, then `syncrelay reload`",
+            f"name a field that it has at `stamp` or `key`{by_arrival}, then `syncrelay reload`",
             index,
         )
 

@@ -78,10 +78,17 @@ def unstamped(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
             Code.UNSTAMPED,
             _blocks_if_most(facts, an_input, count),
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} have stamp 0",
-            f"have {nodes(an_input)} set header.stamp, or write `stamp: receive` at {an_input.name}",
+            f"have {nodes(an_input)} set header.stamp{_or_by_arrival(facts, an_input)}",
             index,
             explains=_matters(facts, an_input, count),
         )
+
+
+def _or_by_arrival(facts: GroupFacts, an_input: InputFacts) -> str:
+    """Offer times of arrival in place of stamps; not where the stamps of a set have to be equal."""
+    if facts.tolerance is not None and not facts.tolerance.takes_times_of_arrival:
+        return ""
+    return f", or write `stamp: receive` at {an_input.name}"
 
 
 def _matters(facts: GroupFacts, an_input: InputFacts, count: int) -> bool:
@@ -120,8 +127,7 @@ def other_clock(facts: GroupFacts) -> Found:
     if epoch := _epoch(an_input, behind):
         what, exactly = epoch
         text = f"stamps of {an_input.name}{shifted} {apart_by}: they {what}"
-        receive = f", or write `stamp: receive` at {an_input.name}"
-        instead = receive if abs(behind) > _BOOT else _or_offset(facts, odd, exactly + offset)
+        instead = _or_by_arrival(facts, an_input) if abs(behind) > _BOOT else _or_offset(facts, odd, exactly + offset)
         suggestion = f"have {nodes(an_input)} stamp with the host's time{instead}"
     else:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"

@@ -1,11 +1,13 @@
 """What the relay's node tells of itself as parameters: for `ros2 param get`, and read-only for all but itself."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
 
+from syncrelay.config.relay_form import RelayForm
+from syncrelay.config.wording import all_of, quoted
 from syncrelay.printable import printable
 
 _GROUPS: Final = "groups"
@@ -47,3 +49,33 @@ class Parameters:
 def _declare(node: Any, name: str, value: Any, descriptor: Any) -> None:
     # What --ros-args or a parameter file says of them is not so.
     node.declare_parameter(name, value, descriptor, ignore_override=True)
+
+
+def misplaced(names: Iterable[str]) -> str | None:
+    """Say where parameters belong that --ros-args or a parameter file sets, and only the relay's file can; or None.
+
+    Parameters of other nodes, which a file may set for all nodes, are passed over.
+    """
+    by_place: dict[str, list[str]] = {}
+    for name in names:
+        place = _place(name)
+        if place is not None:
+            by_place.setdefault(place, []).append(quoted(name))
+    if not by_place:
+        return None
+    places = [f"{all_of(those)} belong{'s' if len(those) == 1 else ''} {place}" for place, those in by_place.items()]
+    return f"these are not set by ROS parameters: {'; '.join(places)}"
+
+
+def _place(name: str) -> str | None:
+    first, *below = name.split(".")
+    levels = list(RelayForm().levels())
+    if name == "config":
+        return "behind `--config`"
+    if first == "qos_overrides":
+        return "in the file, as the `qos` of a topic"
+    if below and first not in levels[0][1].model_fields:
+        return None
+    key = below[-1] if below else first
+    level = next((level for level, model in levels if key in model.model_fields), None)
+    return level and ("in the file" if level == levels[0][0] else f"in the file, in {level}")

@@ -17,6 +17,9 @@ from syncrelay.environment.domain import require_domain
 from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
 from syncrelay.printable import one_entry, printable
 from syncrelay.ros.environment import keep_stdout, log_arguments
+from syncrelay.ros.parameters import misplaced
+
+_LOG = logging.getLogger("syncrelay")
 
 # Where in rcl's sources it gave up: of use to its authors, not to the user.
 _PLACE_IN_RCL: Final = re.compile(r", at [^ ,]+:\d+")
@@ -58,9 +61,9 @@ def make_node(
     ros_args: Sequence[str],
     make: Callable[..., Any] = rclpy.create_node,
 ) -> Any:
-    """Make the relay's node; raises as `start`."""
+    """Make the relay's node, and warn of ROS parameters that have no effect; raises as `start`."""
     try:
-        return make(name, namespace=namespace, context=context)
+        node = make(name, namespace=namespace, context=context)
     except NameValidationException as error:
         what, name, *_ = (line.strip(" '") for line in str(error).splitlines())
         raise _rejected(ros_args, f"{what} {quoted(name)}") from error
@@ -68,6 +71,11 @@ def make_node(
         raise _rejected(ros_args, str(error)) from error
     except _rclpy.RCLError as error:
         raise _refused(f"no node starts: {error}", ros_args) from error
+    overrides = node._parameter_overrides  # noqa: SLF001  rclpy tells them only to who declares them
+    warning = misplaced(parameter for parameter in overrides if not node.has_parameter(parameter))
+    if warning is not None:
+        _LOG.warning("%s", warning)
+    return node
 
 
 def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:

@@ -106,7 +106,7 @@ def _groups(draw, policy):
         topics[2]["required"] = draw(st.booleans())
     if policy != "equal_key":
         topics[1]["offset"] = f"{draw(st.integers(-30, 30))}ms"
-    if draw(st.booleans()):
+    if policy != "exact_time" and draw(st.booleans()):
         topics[1]["stamp"] = "receive"
     return config({"front": keys})
 

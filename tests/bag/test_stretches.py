@@ -57,7 +57,7 @@ def texts(draw, policy):
         topics[2]["required"] = draw(st.booleans())
     if policy != "equal_key":
         topics[1]["offset"] = f"{draw(st.sampled_from((0, -12, 30)))}ms"
-    if draw(st.integers(0, 5)) == 0 and policy != "equal_key":
+    if draw(st.integers(0, 5)) == 0 and policy not in ("equal_key", "exact_time"):
         topics[1]["stamp"] = "receive"
     if "Hz" in keys.get("trigger", "") and draw(st.booleans()):
         keys["restamp"] = "trigger"

@@ -4,6 +4,8 @@ import random
 from array import array
 from itertools import accumulate
 
+import pytest
+
 from syncrelay.bag.analysis.analysis import group_of
 from syncrelay.bag.analysis.changes import with_changes
 from syncrelay.bag.analysis.evaluation import evaluate
@@ -90,6 +92,24 @@ def test_unset_stamps_want_the_receive_time_for_all():
         (0, "stamp"): "receive",
         (1, "stamp"): "receive",
     }
+    assert suggestion.then >= 0.99 * suggestion.possible
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{"policy": "exact_time", "slop": None}, {"policy": "approximate_time", "slop": "0ms"}],
+    ids=["exact_time", "slop_0"],
+)
+@pytest.mark.parametrize("phase", [0, MS])
+def test_receive_times_want_a_tolerance_too_which_no_file_may_go_without(keys, phase):
+    streams = streams_of(every(100 * MS, 50), every(100 * MS, 50, phase=phase))
+    streams[1].stamps = array("q", [0] * 50)
+    suggestion = _suggested(streams, **keys)
+    values = _values(suggestion)
+    assert values[0, "stamp"] == values[1, "stamp"] == "receive"
+    assert values.get((None, "policy"), keys["policy"]) == "approximate_time"
+    assert values[None, "slop"].endswith("ms")
+    assert len(values) == len(suggestion.changes)
     assert suggestion.then >= 0.99 * suggestion.possible
 
 

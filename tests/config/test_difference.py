@@ -99,8 +99,8 @@ def test_inputs_that_come_go_and_change_places_are_told_by_name(environ):
 
 def test_a_key_of_an_input_is_told_wherever_it_stands_now(environ):
     old = file(group("front", "/a", "/b"))
-    new = file(group("front", "/b", "/a")).replace("/a,", "/a, offset: -5ms, stamp: receive,")
-    assert keys(old, new, environ) == [("/a offset", None, "-5ms"), ("/a stamp", None, "receive")]
+    new = file(group("front", "/b", "/a")).replace("/a,", "/a, offset: -5ms, stamp: {field: header.stamp},")
+    assert keys(old, new, environ) == [("/a offset", None, "-5ms"), ("/a stamp", None, "{field: header.stamp}")]
 
 
 def test_a_type_that_another_group_writes_is_told(environ):

@@ -50,7 +50,9 @@ def test_an_overlay_adds_to_what_is_below_and_hides_it(tmp_path, environ):
 def test_a_type_without_its_definition_is_a_note_if_its_stamp_matters(environ):
     (note,) = notes("dock_msgs/msg/Opaque", environ)
     assert (note.path, note.severity, note.code) == ("groups.front.topics[0].type", Severity.NOTE, "not_checked")
-    assert notes("dock_msgs/msg/Opaque, stamp: receive", environ) == ()
+    text = FILE.format(type="dock_msgs/msg/Opaque, stamp: receive")
+    by_trigger = text.replace("exact_time", "latest_time\n    trigger: /b")
+    assert load_text(by_trigger, environ=environ).notes == ()
 
 
 def test_a_package_that_may_come_later_is_a_note(environ):
@@ -63,7 +65,9 @@ def test_a_package_that_may_come_later_is_a_note(environ):
 
 def test_a_restamp_is_believed_if_a_type_cannot_be_looked_into(environ):
     text = FILE.format(type="my_msgs/msg/Mine, stamp: receive").replace("sensor_msgs/msg/Image", "std_msgs/msg/String")
-    text = text.replace("String}", "String, stamp: receive}").replace("exact_time", "exact_time\n    restamp: latest")
+    text = text.replace("String}", "String, stamp: receive}").replace(
+        "exact_time", "latest_time\n    trigger: /a\n    restamp: latest"
+    )
     assert len(load_text(text, environ=environ).notes) == 1
 
 

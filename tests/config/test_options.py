@@ -148,7 +148,7 @@ OPTIONS = {
     ),
     "max_age: own, by a clock": (file(CLOCK), file(CLOCK, first={"max_age": "20ms"}), BY_CLOCK),
     "key": (file(KEYED), file({**KEYED, "key": "header.frame_id"}), of_first_topic("key")),
-    "key: own": (file(KEYED), file(KEYED, first={"key": "header.frame_id"}), of_first_topic("key")),
+    "key: own": (file(KEYED), file(KEYED, first={"key": "header.stamp.sec"}), of_first_topic("key")),
     "offset": (file(), file(first={"offset": "-50ms"}), sets_of((0, 150), (1, 100), (0, 250), (1, 200))),
     "min_period": (file(), file(first={"min_period": "90ms"}), sets_of((0, 14), (1, 15))),
     "topic": (file(), file(first={"topic": "/z"}), of_first_topic("topic")),

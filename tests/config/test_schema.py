@@ -30,6 +30,7 @@ BEYOND_A_SCHEMA = {
     "slop_not_a_number",
     "slop_without_end",
     "manifests_that_meet",
+    "never_equal",
     "message_misspelt",
     "names_too_long_in_full",
     "output_prefix_empty",

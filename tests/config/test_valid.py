@@ -68,7 +68,7 @@ def test_every_key_arrives_where_it_is_used(environ):
     assert config.lerobot == LerobotConfig(
         group="back",
         fps=10,
-        task=ExportSource("/back/task", "data"),
+        task=ExportSource("/back/task", "name"),
         max_gap_ns=300_000_000,
         keeps_incomplete=True,
         features=(

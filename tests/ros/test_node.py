@@ -2,13 +2,14 @@
 
 import itertools
 import json
+import re
 import signal
 from collections.abc import Sequence
 
 import pytest
 
 from tests.ros import relaying
-from tests.ros.cdr_messages import CLOCK, NS_PER_SECOND, VECTOR, serialize, time
+from tests.ros.cdr_messages import CLOCK, NS_PER_SECOND, VECTOR, serialize, stamps_of, time
 from tests.ros.configs import LOSSLESS, config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
@@ -87,6 +88,21 @@ def test_two_robots_that_run_one_file_in_namespaces_of_their_own_keep_their_sets
     for ns, names in outputs.items():
         expected = [(frame.payload, frame.payload) for frame in at("", *offsets[ns])]
         assert relaying.sets_within(recording, collector, names) == expected
+
+
+def test_keys_of_the_file_among_the_parameters_are_warned_of_once_and_change_nothing(stage: Stage):
+    given = stage.folder / "parameters.yaml"
+    given.write_text("/**: {ros__parameters: {queue_size: 5, frame_id: base, use_sim_time: false}}")
+    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 3, 13, 23), at("/camera", 30), at("/lidar", 30))
+    arguments = ["--ros-args", "-p", "slop:=0.5", "--params-file", str(given)]
+    relay, collector = relaying.relay(stage, _front(), recording, _PAIR_OUT, arguments=arguments)
+    assert [stamps_of(list(pair))[0] for pair in relaying.sets_within(recording, collector, _PAIR_OUT)] == [
+        at("", 30)[0].time
+    ]
+    _end(relay)
+    said = [line for line in relay.stderr.splitlines() if "[WARN]" in line and "ROS parameters" in line]
+    assert len(said) == 1
+    assert re.search(r"`(slop|queue_size)` and `(slop|queue_size)` belong in the file, in a group$", said[0])
 
 
 def _tick(seconds: int) -> Frame:

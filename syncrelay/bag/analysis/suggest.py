@@ -82,10 +82,12 @@ def _suggested(
     changes, best = [*stamping], evaluate(base, streams) if stamping else evaluation
     if not _does(base, best, possible):
         for more in _ladder(base, possible):
-            attempt = evaluate(changed([*stamping, *more]), streams)
+            # What was measured takes the place of what stood until then.
+            both = list({(each.topic, each.key): each for each in (*stamping, *more)}.values())
+            attempt = evaluate(changed(both), streams)
             reached = completed(attempt.counts, possible.tightest.pivot)
             if reached >= ENOUGH * most or reached > completed(best.counts, possible.tightest.pivot):
-                changes, best = [*stamping, *more], attempt
+                changes, best = both, attempt
             if reached >= ENOUGH * most:
                 break
     sooner = [*changes, *_periods(changed(changes), streams)]
@@ -139,9 +141,7 @@ def _stamping(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]
     unset = [each for each in figures if each.messages and each.unstamped > _UNSET * each.messages]
     if unset:
         reason = f"{unset[0].unstamped} of {unset[0].messages} messages of {unset[0].topic} have stamp 0"
-        for index, topic in enumerate(group.topics):
-            if topic.stamp != "receive":
-                yield Change(group.name, index, "stamp", "receive", reason)
+        yield from _by_arrival(group, reason)
         return
     delays = {index: each.delay.median for index, each in enumerate(figures) if each.delay is not None}
     usual = sorted(delays.values(), key=abs)[0 if len(delays) <= 2 else (len(delays) - 1) // 2] if delays else 0  # noqa: PLR2004
@@ -149,6 +149,17 @@ def _stamping(group: GroupConfig, streams: Sequence[Stream]) -> Iterator[Change]
         if abs(delay - usual) > _SECOND and not group.topics[index].offset_ns:
             reason = f"its stamps are {words.duration(abs(delay - usual))} off the others'"
             yield Change(group.name, index, "offset", words.exactly(delay - usual), reason)
+
+
+def _by_arrival(group: GroupConfig, reason: str) -> Iterator[Change]:
+    """Go by arrival, with a tolerance, which stands until a better one is measured."""
+    tolerance = group.options.tolerance
+    if tolerance is not None and not tolerance.takes_times_of_arrival:
+        yield from _policy(group, tolerance.wider_policy or group.options.policy, reason)
+        yield Change(group.name, None, tolerance.key, "10ms", reason)
+    for index, topic in enumerate(group.topics):
+        if topic.stamp != "receive":
+            yield Change(group.name, index, "stamp", "receive", reason)
 
 
 def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
@@ -172,7 +183,9 @@ def _does(group: GroupConfig, evaluation: Evaluation, possible: PossibleSets) ->
 def _ladder(group: GroupConfig, possible: PossibleSets) -> Iterator[list[Change]]:
     """Yield values, the tightest first."""
     if possible.is_exact or possible.is_alone:
-        exact = _policy(group, "exact_time", "the stamps of a set are equal") if possible.is_exact else []
+        are_stamps = all(topic.stamp != "receive" for topic in group.topics)
+        is_exact = possible.is_exact and are_stamps
+        exact = _policy(group, "exact_time", "the stamps of a set are equal") if is_exact else []
         yield from ([*exact, *queue] for queue in _queues(group, possible, 0))
         return
     spans, tolerance = possible.spans, group.options.tolerance
