@@ -35,9 +35,9 @@ Finish: TypeAlias = Callable[[Run, Sequence[Source]], int]
 def require_into(parser: Parser, arguments: Namespace) -> None:
     """Refuse options that only go with a folder for many results."""
     if arguments.into is None:
-        for name in ("strict", "overwrite"):
+        for name in ("strict", "overwrite", "time_limit"):
             if getattr(arguments, name):
-                parser.error(f"--{name} goes with --into")
+                parser.error(f"--{name.replace('_', '-')} goes with --into")
         if arguments.engine != "local":
             parser.error("--engine goes with --into")
 
@@ -62,7 +62,7 @@ def do_on_many(
         sources = find_sources(words, into=into)
         engine = engine or engine_of(arguments)
         others = Others.REPLACED if arguments.overwrite else Others.REFUSED
-        with Run(task, sources, into=into, others=others) as run:
+        with Run(task, sources, into=into, others=others, time_limit=arguments.time_limit) as run:
             if run.unreadable:
                 lines = counted(run.unreadable, "line")
                 remark(f"{into}: {lines} of its ledger cannot be read; what was told there is done again")

@@ -1,6 +1,6 @@
 """The options of every command that goes over many recordings. Imports nothing slow, as parsers.py says."""
 
-from syncrelay.cli.parser import Parser, count
+from syncrelay.cli.parser import Parser, count, duration
 
 
 def add_fleet_options(parser: Parser, *into: str) -> None:
@@ -24,5 +24,11 @@ def add_fleet_options(parser: Parser, *into: str) -> None:
         help="local (default), or ray: the cluster of RAY_ADDRESS, or one here",
     )
     add("--jobs", metavar="N", type=count, help="recordings at a time; default: one for each core")
+    add(
+        "--time-limit",
+        metavar="DURATION",
+        type=duration,
+        help="give up a recording that takes longer, such as 90min; default: 10 min and 10 s for each MB of it",
+    )
     add("--strict", action="store_true", help="end at the first recording that is at fault")
     add("--overwrite", action="store_true", help="replace results of another file, version or options")

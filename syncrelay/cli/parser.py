@@ -154,3 +154,16 @@ def seed(text: str) -> int:
         return 0 if text == "0" else count(text)
     except argparse.ArgumentTypeError as error:
         raise argparse.ArgumentTypeError(f"expected a whole number of 0 or more, found {text}") from error
+
+
+def duration(text: str) -> int:
+    """Read a length of time above 0 with its unit, in nanoseconds."""
+    from syncrelay.config.units import parse_duration_text
+
+    try:
+        length, _ = parse_duration_text(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    if length <= 0:
+        raise argparse.ArgumentTypeError(f"expected a duration above 0, found {text}")
+    return length

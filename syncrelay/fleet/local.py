@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from syncrelay.bag.definitions import jazzy_definition
-from syncrelay.fleet.engine import TICK_S, TRIES, Finished, given_up
+from syncrelay.fleet.engine import TICK_S, TRIES, Finished, given_up, took_too_long
 from syncrelay.fleet.work import Failed, Job, Outcome, end_with_parent, perform
 
 LEAST_MEMORY: Final = 1_000_000_000
@@ -109,7 +109,8 @@ def _work(job: Job, parent: int, told: int, memory: int) -> NoReturn:
     try:
         # Ctrl-C comes from the terminal to all of us: what it means, the parent says.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in (signal.SIGTERM, signal.SIGALRM):
+            signal.signal(number, signal.SIG_DFL)
         end_with_parent()
         if os.getppid() == parent:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
@@ -121,7 +122,7 @@ def _work(job: Job, parent: int, told: int, memory: int) -> NoReturn:
 
 
 def _outcome(worker: _Worker) -> Outcome | None:
-    """Return what a process that has ended told, None if it died."""
+    """Return what a process that has ended told or why it was ended, None if it died."""
     _, status = os.waitpid(worker.pid, 0)
     with os.fdopen(worker.told, "rb") as file:
         if status == 0:
@@ -129,4 +130,4 @@ def _outcome(worker: _Worker) -> Outcome | None:
             outcome: Outcome = pickle.load(file)  # noqa: S301  written by a process of ours
             return outcome
     worker.job.remove_scratch()
-    return None
+    return Failed(took_too_long(worker.job)) if os.WTERMSIG(status) == signal.SIGALRM else None

@@ -79,7 +79,8 @@ class RayEngine:
             return Finished(job, Failed(str(error), is_bug=True))
         except self._ray.exceptions.RayError as error:
             job.remove_scratch()
-            why = f"its worker was lost ({type(error).__name__})"
+            # Ray does not tell what ended it.
+            why = f"its worker was lost ({type(error).__name__}), or took longer than --time-limit,"
             return Finished(job, Failed(given_up(job, why)))
 
     @contextmanager

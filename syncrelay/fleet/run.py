@@ -27,12 +27,15 @@ class Others(Enum):
 class Run:
     """A task on recordings, into a folder that this process alone writes to; a context manager."""
 
-    def __init__(self, task: Task, sources: Sequence[Source], *, into: Path, others: Others) -> None:
-        """Open the folder and remove what a killed run left in it.
+    def __init__(
+        self, task: Task, sources: Sequence[Source], *, into: Path, others: Others, time_limit: int | None = None
+    ) -> None:
+        """Open the folder and remove what a killed run left in it. `time_limit` is that of each Job.
 
         Raises SyncRelayError where it cannot be used, or holds what is not to be replaced.
         """
         self._task = task
+        self._time_limit = time_limit
         self._fingerprint = task.fingerprint()
         self._ledger = Ledger(into)
         self.unreadable = self._ledger.unreadable
@@ -74,7 +77,8 @@ class Run:
     def _job(self, source: Source, into: Path, version: str) -> Job:
         entry = self._ledger.entries.get(source.name)
         done = entry if entry is not None and self._is_ours(entry) else None
-        return Job(source, self._task, into, done, size_of(source.words), version)
+        size = size_of(source.words)
+        return Job(source, self._task, into, done, size, version, time_limit=self._time_limit)
 
     def _is_ours(self, entry: Entry) -> bool:
         return entry.state is State.DONE and entry.fingerprint == self._fingerprint

@@ -21,6 +21,10 @@ from syncrelay.fleet.task import JSON, Source, Task
 SCRATCH: Final = ".partial"
 """The folder in OUT where results are written before they are put in place."""
 
+_NS_PER_SECOND: Final = 1_000_000_000
+# Ten minutes, and a hundred kilobytes a second: a tenth of what encoding videos on a slow machine takes.
+_LEAST_LIMIT: Final = 600 * _NS_PER_SECOND
+_LIMIT_PER_BYTE: Final = _NS_PER_SECOND // 100_000
 _PR_SET_PDEATHSIG: Final = 1
 _NO_SPACE: Final = (ENOSPC, EDQUOT, EROFS)
 
@@ -57,6 +61,8 @@ class Job:
     work: Work = whole
     part: str = ""
     content: Content | None = None
+    time_limit: int | None = None
+    """How many nanoseconds it may take; None for what its size makes plausible."""
 
     @property
     def scratch(self) -> Path:
@@ -116,8 +122,29 @@ class Midway:
 Outcome: TypeAlias = Done | Kept | Failed | Midway
 
 
+def limit_of(job: Job, size: int) -> int:
+    """Return how many nanoseconds a job may take whose recording has so many bytes."""
+    return _LEAST_LIMIT + _LIMIT_PER_BYTE * size if job.time_limit is None else job.time_limit
+
+
 def perform(job: Job) -> Outcome:
-    """Do a job; whatever goes wrong is its outcome."""
+    """Do a job; whatever goes wrong is its outcome.
+
+    The kernel ends this process by SIGALRM where that takes too long: nothing that a recording has us do prevents it.
+    """
+    _end_after(limit_of(job, job.size))
+    try:
+        return _performed(job)
+    finally:
+        _end_after(0)
+
+
+def _end_after(duration: int) -> None:
+    """Have SIGALRM end this process after so many nanoseconds, never after 0."""
+    signal.setitimer(signal.ITIMER_REAL, duration / _NS_PER_SECOND)
+
+
+def _performed(job: Job) -> Outcome:
     folder = job.scratch_folder()
     if (why := _unfit(job)) is not None:
         return Failed(why, ends_all=True)
@@ -125,6 +152,8 @@ def perform(job: Job) -> Outcome:
     try:
         found = content_of(job.source.words) if job.content is None else job.content
         content = found.hash
+        # The size of what is behind a URL is known only now.
+        _end_after(limit_of(job, found.size))
         if job.content is None and job.done is not None and job.done.content == content and _is_there(job, job.done):
             return Kept()
         return job.work(job, found, folder)

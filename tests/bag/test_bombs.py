@@ -74,7 +74,8 @@ def _check(each: Drawn) -> None:
     assert sum(len(frame.payload) for frame in found) <= size or each.path.suffix != ".db3"
     assert calls.count < _CALLS
     received = {(frame.topic, frame.time) for frame in found}
-    assert received <= {(frame.topic, frame.time) for frame in FRAMES}
+    # Outside of chunks nothing tells that the record that was cut off was filled up with zeros.
+    assert len(received - {(frame.topic, frame.time) for frame in FRAMES}) <= (each.end is not None)
     assert received >= {(frame.topic, frame.time) for frame in each.readable} or each.path.suffix in _PACKED
     assert faults or len(found) == len(FRAMES)
     if each.end is not None and len(found) < len(FRAMES):

@@ -62,7 +62,7 @@ from argparse import Namespace
 from syncrelay.cli.boundary import guarded
 from syncrelay.cli.fleet import do_on_many
 from tests.fleet.tasks import Obedient
-options = Namespace(into="out", engine="ray", jobs=2, strict=False, overwrite=False)
+options = Namespace(into="out", engine="ray", jobs=2, strict=False, overwrite=False, time_limit=None)
 sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[1:], options)))
 """
 

@@ -1,6 +1,8 @@
 """A task on recordings on this machine's cores: what becomes of each, and what stands in the folder at the end."""
 
+import signal
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ from syncrelay.fleet.ledger import State, read_ledger
 from syncrelay.fleet.local import LocalEngine
 from syncrelay.fleet.recordings import find_sources
 from syncrelay.fleet.run import Others, Run
-from syncrelay.fleet.work import Done, Failed, Kept
+from syncrelay.fleet.work import Done, Failed, Kept, limit_of
 from tests.fleet.fleets import entries, result, tree
 from tests.fleet.tasks import Obedient, attempts_of
 
@@ -23,11 +25,11 @@ def bags(tmp_path):
     return tmp_path / "bags"
 
 
-def go(bags, *, out="out", option=0, jobs=2, others=Others.REFUSED, only="*.mcap"):
+def go(bags, *, out="out", option=0, jobs=2, others=Others.REFUSED, only="*.mcap", time_limit=None):
     """Run the task; the outcome of each recording by its name."""
     into = bags.parent / out
     sources = find_sources([f"{bags}/{only}"], into=into)
-    with Run(Obedient(option), sources, into=into, others=others) as run:
+    with Run(Obedient(option), sources, into=into, others=others, time_limit=time_limit) as run:
         ended = [each for each in run.go(LocalEngine(jobs=jobs, memory=_held() + 500_000_000)) if each is not None]
     assert not (into / ".partial").exists()
     return {each.job.source.name.rpartition("-")[0]: each.outcome for each in ended}
@@ -163,6 +165,28 @@ def test_a_recording_that_takes_too_much_memory_fails_alone(bags):
     outcomes = go(bags)
     assert "takes more memory than a worker has: use fewer --jobs" in outcomes["b"].why
     assert [type(outcomes[name]) for name in "acd"] == [Done] * 3
+
+
+@pytest.mark.parametrize("ignored", [False, True])
+def test_a_recording_that_takes_too_long_is_given_up_alone(ignored, bags):
+    (bags / "b.mcap").write_text("hang")
+    former = signal.signal(signal.SIGALRM, signal.SIG_IGN if ignored else signal.SIG_DFL)
+    try:
+        outcomes = go(bags, time_limit=300_000_000)
+    finally:
+        signal.signal(signal.SIGALRM, former)
+    assert "b.mcap: not done within 0.3 s: check it, or give it longer" in outcomes["b"].why
+    assert attempts_of(bags / "b.mcap") == 1
+    assert [type(outcomes[name]) for name in "acd"] == [Done] * 3
+    assert entries(bags.parent / "out")["b"]["state"] == "failed"
+
+
+def test_a_large_recording_has_longer(bags):
+    into = bags.parent / "out"
+    with Run(Obedient(), find_sources([f"{bags}/a.mcap"], into=into), into=into, others=Others.REFUSED) as run:
+        (job,) = run.jobs
+    assert [limit_of(job, size) / 10**9 for size in (0, 10**6, 10**9)] == [600, 610, 10_600]
+    assert limit_of(replace(job, time_limit=7), 10**9) == 7
 
 
 def test_a_recording_that_is_still_written_is_not_done(bags):
