@@ -15,7 +15,7 @@ from syncrelay.cli.case_reports import REPORTS, FileResult, Report
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import ConfigError
-from syncrelay.config.source import STDIN, listed, read_source, shown_name
+from syncrelay.config.source import STDIN, Patience, listed, read_source, shown_name
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
 
@@ -37,24 +37,25 @@ def test(paths: Sequence[str], output_format: str, *, update: bool) -> int:
     what was found, where they can.
     """
     report = REPORTS[output_format]()
-    results = [result for path in paths for result in _run_all(path, report, update=update)]
+    patience = Patience()
+    results = [result for path in paths for result in _run_all(path, report, patience, update=update)]
     report.end(results)
     return AT_FAULT if any(result.failed for result in results) else DONE
 
 
-def _run_all(path: str, report: Report, *, update: bool) -> Iterator[FileResult]:
+def _run_all(path: str, report: Report, patience: Patience, *, update: bool) -> Iterator[FileResult]:
     try:
         files = listed(path)
     except ConfigError as error:
         yield _faulty(path, error, report)
         return
     for file in files:
-        yield _run(file, report, update=update)
+        yield _run(file, report, patience, update=update)
 
 
-def _run(file: str, report: Report, *, update: bool) -> FileResult:
+def _run(file: str, report: Report, patience: Patience, *, update: bool) -> FileResult:
     try:
-        suite = load_suite(file)
+        suite = load_suite(file, patience=patience)
     except ConfigError as error:
         return _faulty(file, error, report)
     name = shown_name(file)

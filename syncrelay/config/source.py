@@ -34,6 +34,14 @@ _BREAK = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
+@dataclass(slots=True)
+class Patience:
+    """How many seconds pipes that are read together may take to come to their ends, and how many they have taken."""
+
+    seconds: float = PATIENCE_S
+    waited: float = 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """A file's name as the user gave it, its text and its lines; `index` is its place among files read together."""
@@ -79,20 +87,21 @@ def listed(path: str) -> tuple[str, ...]:
     return files
 
 
-def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
+def read_source(path: str, *, patience: Patience | None = None) -> Source:
     """Return the text of a file, `-` for standard input, which alone is waited for without end.
 
-    A pipe has so many seconds to come to its end. Raises ConfigError where there is no text.
+    A pipe has the patience that is left, by default PATIENCE_S. Raises ConfigError where there is no text.
     """
+    patience = patience or Patience()
     if path == STDIN:
         return decode(sys.stdin.buffer.read(_MOST_BYTES + 1), name=shown_name(path))
     if not path:
         raise _unreadable(shown_name(path), "is not a file name")
     try:
-        content = _content(path, patience_s)
+        content = _content(path, patience)
     except TimeoutError as error:
-        text = f"could not be read to its end within {patience_s:g} s: is it a pipe that nobody writes to, or closes?"
-        raise _unreadable(path, text) from error
+        late = f"could not be read to its end within {patience.seconds:g} s"
+        raise _unreadable(path, f"{late}: is it a pipe that nobody writes to, or closes?") from error
     except OSError as error:
         raise _unreadable(path, _reason(path, error)) from error
     except ValueError as error:
@@ -100,7 +109,7 @@ def read_source(path: str, *, patience_s: float = PATIENCE_S) -> Source:
     return decode(content, name=path)
 
 
-def _content(path: str, patience_s: float) -> bytes:
+def _content(path: str, patience: Patience) -> bytes:
     """Return what a file holds, up to one byte more than it may. Raises TimeoutError for a pipe that does not end."""
     kind = _NO_FILES.get(stat.S_IFMT(Path(path).stat().st_mode))
     if kind is not None:
@@ -108,15 +117,18 @@ def _content(path: str, patience_s: float) -> bytes:
         raise _unreadable(path, f"is a {kind}, expected a YAML file")
     # Not to wait until somebody writes to a pipe: the wait has an end below.
     with FileIO(path, opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-        return _read(file, deadline=time.monotonic() + patience_s)
+        return _read(file, patience)
 
 
-def _read(file: FileIO, *, deadline: float) -> bytes:
+def _read(file: FileIO, patience: Patience) -> bytes:
     waiting = select.poll()
     waiting.register(file, select.POLLIN)
     content = bytearray()
     while len(content) <= _MOST_BYTES:
-        if not waiting.poll(max(0.0, deadline - time.monotonic()) * 1000):
+        began = time.monotonic()
+        ready = waiting.poll(max(0.0, patience.seconds - patience.waited) * 1000)
+        patience.waited += time.monotonic() - began
+        if not ready:
             raise TimeoutError
         chunk = file.read(_MOST_BYTES + 1 - len(content))
         if chunk == b"":

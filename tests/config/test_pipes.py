@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import ConfigError, load
+from syncrelay.config.source import Patience, read_source
 
 GOOD = """\
 version: 1
@@ -48,6 +49,37 @@ def text_of(path: Path | str, *, patience_s: float = 0.2) -> str:
 
 def test_a_pipe_that_nobody_writes_to_is_given_up(fifo: Path):
     assert text_of(fifo) == f"{fifo}: {_NO_END}"
+
+
+def test_pipes_that_are_read_together_are_waited_for_together(tmp_path: Path):
+    """They are given up one after another, without a wait for each; what is written to others is read all the same."""
+    patience = Patience(0.2)
+    for number in range(20):
+        os.mkfifo(tmp_path / f"{number}.yaml")
+        with pytest.raises(ConfigError, match=r"within 0\.2 s"):
+            read_source(str(tmp_path / f"{number}.yaml"), patience=patience)
+        assert patience.waited >= 0.2
+    written = os.open(tmp_path / "7.yaml", os.O_RDWR)
+    read_end = os.open(tmp_path / "7.yaml", os.O_RDONLY)
+    os.write(written, b"version: 1")
+    os.close(written)
+    assert read_source(str(tmp_path / "7.yaml"), patience=patience).text == "version: 1"
+    os.close(read_end)
+
+
+def test_a_directory_of_pipes_is_given_up_after_one_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    begun: list[float] = []
+
+    def patience(seconds: float) -> Patience:
+        begun.append(seconds)
+        return Patience(seconds)
+
+    monkeypatch.setattr("syncrelay.config.load.Patience", patience)
+    monkeypatch.setattr("syncrelay.config.source.Patience", patience)
+    for number in range(20):
+        os.mkfifo(tmp_path / f"{number:02}.yaml")
+    assert text_of(tmp_path).count(_NO_END) == 20
+    assert begun == [0.2]
 
 
 @pytest.mark.parametrize("content", ["", GOOD])
