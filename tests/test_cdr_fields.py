@@ -1,5 +1,6 @@
 """One field of a payload, read in place, by bytes written out by hand."""
 
+import random
 import re
 import struct
 
@@ -7,7 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.cdr_fields import TIME, UnreadableFieldError, field_reader
+from syncrelay.cdr_fields import MOST_VALUES, TIME, UnreadableFieldError, field_reader
+from tests.calls import Calls
+from tests.faults.extent import chosen
 
 _TYPES = {
     "a/Track": {
@@ -107,6 +110,62 @@ def test_a_length_that_the_payload_cannot_hold_is_not_counted_down():
     four_billion = _LITTLE_ENDIAN.replace(b"\x02\0\0\0\x02\0\0\0x\0", b"\xff\xff\xff\xff\x02\0\0\0x\0")
     assert four_billion != _LITTLE_ENDIAN
     assert _read("seen", four_billion) is None
+
+
+def test_no_message_is_gone_through_for_long():
+    """Drawn: lists of texts, numbers and messages, in one another, before a number; as many as are gone through."""
+    chance = random.Random(28)
+    counts: list[int] = []
+    for number in range(chosen(short=20, long=1000)):
+        types, payload, values = _drawn(chance)
+        with Calls() as calls:
+            found = field_reader(types.__getitem__, "a/Whole", "last")(payload)
+        told = f"message {number} of seed 28: {types}, {len(payload)} bytes, {values} values"
+        assert found == (7 if values <= MOST_VALUES else None), told
+        # A few for each value; numbers beside each other are passed at once, however many they are.
+        assert calls.count < 10 * min(values, MOST_VALUES) + 100, told
+        counts.append(values)
+    assert min(counts) <= MOST_VALUES < max(counts)
+
+
+def _drawn(chance: random.Random) -> tuple[dict[str, dict[str, str]], bytes, int]:
+    """A type, a message of it with 7 as its last field, and how many values before that are gone through one by one."""
+    kinds = ["string", "uint8", "uint32", "sequence<uint8>"]
+    types = {"a/Element": {f"f{n}": chance.choice(kinds) for n in range(chance.randint(1, 5))}}
+    types["a/Middle"] = {"elements": "sequence<a/Element>", "label": "string"}
+    types["a/Whole"] = {"first": chance.choice(("sequence<a/Middle>", "sequence<a/Element>", "sequence<string>"))}
+    types["a/Whole"]["last"] = "uint32"
+    passed = 0
+
+    def written(name: str, content: bytearray, most: int) -> None:
+        nonlocal passed
+        if name in types:
+            passed += len(types[name])
+            for each in types[name].values():
+                written(each, content, most)
+        elif name == "uint8":
+            content.append(3)
+        elif name.startswith("sequence<a/") or name == "sequence<string>":
+            count = int(most ** chance.uniform(0.3, 1))
+            passed += count
+            _put(content, count)
+            for _ in range(count):
+                written(name[len("sequence<") : -1], content, 8)
+        elif name == "uint32":
+            _put(content, 4)
+        else:
+            size = chance.randint(1, 5)
+            _put(content, size)
+            content += bytes(size)
+
+    content = bytearray()
+    written(types["a/Whole"]["first"], content, 30_000)
+    _put(content, 7)
+    return types, b"\0\1\0\0" + content, passed
+
+
+def _put(content: bytearray, number: int) -> None:
+    content += bytes(-len(content) % 4) + struct.pack("<I", number)
 
 
 @pytest.mark.parametrize(

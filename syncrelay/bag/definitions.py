@@ -25,6 +25,8 @@ _TIME: Final = "builtin_interfaces/msg/Time"
 # Far beyond the definitions of real messages; what is done with them takes seconds.
 _MOST_FIELDS: Final = 20_000
 _DEEPEST: Final = 50
+# A gibibyte of doubles; what else is counted by such a number takes place that no machine has.
+_LONGEST_ARRAY: Final = 1 << 27
 # rosidl's words for the primitives of .msg files, as its Python classes tell them.
 _ROSIDL: Final = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
 
@@ -143,6 +145,8 @@ def _require_bearable(types: Mapping[str, Any]) -> None:
         if kind == Nodetype.BASE:
             return 1
         element, count = what
+        if kind == Nodetype.ARRAY and count > _LONGEST_ARRAY:
+            raise ValueError(f"an array of {count} elements is longer than a message can be")
         # Numbers beside each other are one thing to skip, all else is gone through.
         is_plain = kind == Nodetype.SEQUENCE or (element[0] == Nodetype.BASE and element[1][0] != "string")
         return weight_of_field(element, depth) * (1 if is_plain else count)

@@ -151,8 +151,9 @@ class Code(Enum):
     MALFORMED = _Kind(
         "malformed",
         _WARN_OR_ERROR,
-        "Messages are cut short, or not of their type.",
-        "Check that the publisher uses the same version of the type as is installed where the relay runs.",
+        "Messages are cut short, or not of their type; or more than 20,000 values stand before the field that is read.",
+        "Check that the publisher uses the same version of the type as is installed where the relay runs. Name a `key`,"
+        " or a `field` for the stamp, that stands before long lists.",
     )
     UNSTAMPED = _Kind(
         "unstamped",

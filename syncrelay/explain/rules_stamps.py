@@ -61,10 +61,12 @@ _SLEW: Final = "check what set the clock {where}; NTP and chrony can be told to 
 def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     """Find messages whose stamp or key could not be read."""
     if count := an_input.figures.dropped.get(DropReason.MALFORMED, 0):
+        # A key may stand anywhere in a message.
+        what = "or not of its type" if facts.by_stamp else "not of its type, or have too many values before the key"
         yield Finding(
             Code.MALFORMED,
             _blocks_if_most(facts, an_input, count),
-            f"{counted(count, an_input.figures.fed)} messages of {an_input.name} are cut short, or not of its type",
+            f"{counted(count, an_input.figures.fed)} messages of {an_input.name} are cut short, {what}",
             f"check that {nodes(an_input)} uses the same version of {an_input.type} as is installed here",
             index,
             explains=_matters(facts, an_input, count),

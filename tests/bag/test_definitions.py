@@ -1,5 +1,6 @@
 """A definition that no message can have costs no time and no traceback: its type counts as unknown."""
 
+import random
 import struct
 
 import pytest
@@ -11,6 +12,7 @@ from syncrelay.cdr import LATEST_STAMP
 from syncrelay.config import StampField
 from syncrelay.errors import BagError
 from tests.bag.making import CUSTOM, CUSTOM_TEXT
+from tests.faults.extent import chosen
 
 _TYPE = "rig_msgs/msg/Blip"
 _RULE = "\n" + "=" * 80 + "\n"
@@ -53,6 +55,38 @@ def test_a_definition_of_no_use_leaves_the_type_unknown(text, encoding, form):
         value_reader(channel, "n")
     with pytest.raises(BagError, match="cannot be read"):
         converter(channel)
+
+
+_LONGEST = 2**27
+
+
+def test_no_number_in_a_definition_is_too_large_for_a_reader():
+    """Drawn: arrays, bounded ones and bounded texts, of any count, before and behind a time and a number."""
+    chance = random.Random(28)
+    for number in range(chosen(short=150, long=5000)):
+        lengths, lines = [], []
+        for place in range(chance.randint(1, 4)):
+            count = max(0, int(2 ** chance.uniform(0, chance.choice((30, 70, 900)))) + chance.randint(-1, 1))
+            primitive = chance.choice(("uint8", "char", "bool", "int16", "float32", "float64", "uint64"))
+            form = chance.choice(("{0}[{1}]", "{0}[{1}]", "{0}[<={1}]", "string<={1}", "string<={1}[]", "{0}[]"))
+            lengths += [count] if form == "{0}[{1}]" else []
+            lines.append(f"{form.format(primitive, count)} field_{place}")
+        lines.insert(chance.randint(0, len(lines)), "builtin_interfaces/Time seen")
+        channel = _channel("\n".join([*lines, "uint32 n"]))
+        payload = b"\0\1\0\0" + chance.randbytes(chance.randint(0, 200))
+        told = f"definition {number} of seed 28: {lines}"
+        try:
+            read = [value_reader(channel, "n"), stamp_reader(StampField(field="seen"), channel)]
+            found = [None if each is None else each(payload) for each in read]
+        except BagError:
+            assert max(lengths, default=0) > _LONGEST, told
+            continue
+        except Exception as error:
+            error.add_note(told)
+            raise
+        assert max(lengths, default=0) <= _LONGEST, told
+        assert all(each is None or isinstance(each, int) for each in found), told
+        assert max(lengths, default=0) < len(payload) or None in found, told
 
 
 def _idl(fields: str, constants: str = "") -> str:

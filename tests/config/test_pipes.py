@@ -2,6 +2,7 @@
 
 import os
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -59,11 +60,10 @@ def test_pipes_that_are_read_together_are_waited_for_together(tmp_path: Path):
         with pytest.raises(ConfigError, match=r"within 0\.2 s"):
             read_source(str(tmp_path / f"{number}.yaml"), patience=patience)
         assert patience.waited >= 0.2
-    written = os.open(tmp_path / "7.yaml", os.O_RDWR)
-    read_end = os.open(tmp_path / "7.yaml", os.O_RDONLY)
+    read_end, written = os.pipe()
     os.write(written, b"version: 1")
     os.close(written)
-    assert read_source(str(tmp_path / "7.yaml"), patience=patience).text == "version: 1"
+    assert read_source(f"/dev/fd/{read_end}", patience=patience).text == "version: 1"
     os.close(read_end)
 
 
@@ -74,8 +74,8 @@ def test_a_directory_of_pipes_is_given_up_after_one_wait(tmp_path: Path, monkeyp
         begun.append(seconds)
         return Patience(seconds)
 
-    monkeypatch.setattr("syncrelay.config.load.Patience", patience)
-    monkeypatch.setattr("syncrelay.config.source.Patience", patience)
+    for module in ("load", "source"):
+        monkeypatch.setattr(sys.modules[f"syncrelay.config.{module}"], "Patience", patience)
     for number in range(20):
         os.mkfifo(tmp_path / f"{number:02}.yaml")
     assert text_of(tmp_path).count(_NO_END) == 20

@@ -43,6 +43,13 @@ FOUND = {
         "3 of the last 100 messages of /camera are cut short, or not of its type",
         f"check that /usb_cam uses the same version of {IMAGE} as is installed here",
     ),
+    "messages that are cut short, or whose key stands too far behind": (
+        Code.MALFORMED,
+        Severity.ERROR,
+        a_silent_group(dropped(DropReason.MALFORMED, 100), LIDAR, by_stamp=False, policy="equal_key", tolerance=None),
+        "all 100 messages of /camera are cut short, not of its type, or have too many values before the key",
+        f"check that /usb_cam uses the same version of {IMAGE} as is installed here",
+    ),
     "stamps of 0": (
         Code.UNSTAMPED,
         Severity.ERROR,
