@@ -14,6 +14,7 @@ _SAID_AS = {
     (Severity.WARN,): _WARN,
     (Severity.ERROR,): _ERROR,
     (Severity.WARN, Severity.ERROR): f"{_ERROR} where it keeps sets from leaving, otherwise {_WARN}",
+    (Severity.OK, Severity.WARN): f"{_OK} or {_WARN}",
     tuple(Severity): f"{_OK}, {_WARN} or {_ERROR}",
 }
 

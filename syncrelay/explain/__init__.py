@@ -30,6 +30,7 @@ from syncrelay.explain.lines import GroupLines
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
 from syncrelay.explain.rules_graph import no_other_node
+from syncrelay.explain.standing import Share, Standing
 from syncrelay.explain.tape import Left, Stamps, Tape
 from syncrelay.explain.try_budget import TryBudget
 from syncrelay.explain.watch import GroupWatch
@@ -68,7 +69,9 @@ __all__ = [
     "Refusal",
     "SentSets",
     "Severity",
+    "Share",
     "Stamps",
+    "Standing",
     "Standstill",
     "Step",
     "Tape",

@@ -262,9 +262,12 @@ class Code(Enum):
     )
     FEW_SETS = _Kind(
         "few_sets",
-        _WARN,
-        "Far fewer sets leave than the slowest input allows, and nothing else is found.",
-        "Write what is suggested, if anything that was tried helps; the finding says what became of the messages.",
+        _WARN_OR_ERROR,
+        "Fewer than 80 % of the possible sets left in the last 10 s (longer where few are possible), until 95 % do"
+        " again. One is possible for each message of the slowest required input, those included that it should have"
+        " sent at its steady pace. An error after a silence, until half of the possible sets leave.",
+        "Write what is suggested, if anything that was tried helps; the finding says what became of the messages, or"
+        " whose did not come.",
     )
     SUBSCRIBER_QOS = _Kind(
         "subscriber_qos",
@@ -287,8 +290,8 @@ class Code(Enum):
     )
     STARTING = _Kind(
         "starting",
-        _OK,
-        "No set yet, or none since an input came back a moment ago.",
+        (Severity.OK, Severity.WARN),
+        "No set yet, none since an input came back a moment ago, or too few to judge; a warning after a silence.",
     )
     HEALTHY = _Kind(
         "healthy",

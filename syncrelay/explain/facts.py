@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 from syncrelay.config import Distance, Tolerance
 from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
+from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggestions import Evaluator
 from syncrelay.sync.counts import InputCounts
 
@@ -188,7 +189,7 @@ class GroupFacts:
     what it gives; `empty_graph` the graph, where it holds no node but our own.
     `is_discovering` says that nodes that run may not be in the graph yet, because this one has just joined it.
     `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
-    the name of a managed node that waits to be activated.
+    the name of a managed node that waits to be activated. `standing` is how many of the possible sets leave.
     """
 
     name: str
@@ -218,6 +219,7 @@ class GroupFacts:
     empty_graph: GraphSnapshot | None = None
     is_discovering: bool = False
     inactive: str | None = None
+    standing: Standing = Standing.ENOUGH
 
     @property
     def required_first(self) -> Sequence[int]:

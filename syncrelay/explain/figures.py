@@ -8,6 +8,7 @@ from typing import Final
 
 from syncrelay.explain.clocks import Drift, Step
 from syncrelay.explain.distribution import EMPTY, NOTHING, Distribution, Histogram
+from syncrelay.explain.standing import NOT_KNOWN, Share
 from syncrelay.sync.messages import DropReason
 
 _SHOWN_SETS: Final = 100
@@ -90,7 +91,7 @@ class GroupFigures:
     last messages of the input that sets the pace could have had, measured since `nearest_from`, and since an input last
     changed its pace; `nearest_since` those measured after the last set. `missing` is the share of the window's sets, 0
     to 1, that each input was missing from, `sets_since_without` how many sets had it since. `resumed` is when the first
-    set left after a silence.
+    set left after a silence. `share` says how many of the possible sets left.
     """
 
     now: int
@@ -100,6 +101,7 @@ class GroupFigures:
     best_hz: float = 0.0
     last_set: int | None = None
     resumed: int | None = None
+    share: Share = NOT_KNOWN
     span_histogram: Histogram = EMPTY
     latency_histogram: Histogram = EMPTY
     spans: Distribution = NOTHING

@@ -9,6 +9,7 @@ from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding
 from syncrelay.explain.judge import explanation
 from syncrelay.explain.rules_stamps import may_drift
+from syncrelay.explain.standing import Standing
 
 _SECOND: Final = 1_000_000_000
 _LONGEST_PAUSE: Final = 600 * _SECOND
@@ -23,7 +24,7 @@ _UNTIL_TRIED: Final = 10 * _SECOND
 
 # Who pauses a relay is told so at once.
 _TOLD_ELSEWHERE: Final = frozenset({Code.PAUSED})
-_OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OFFSET})
+_OF_DRIFT: Final = frozenset({Code.UNEXPLAINED, Code.OVER_SLOP, Code.CONSTANT_OFFSET, Code.FEW_SETS})
 
 
 class Remark(NamedTuple):
@@ -80,7 +81,8 @@ class FindingLog:
                 return
         last = facts.figures.last_set
         # After a pause, a group is not silent though no set has left yet.
-        if self._quiet_since is not None and last is not None and last > self._quiet_since:
+        is_back = last is not None and self._quiet_since is not None and last > self._quiet_since
+        if self._quiet_since is not None and is_back and facts.standing is Standing.ENOUGH:
             if self._told:
                 yield Remark(Severity.OK, f"recovered after {words.seconds(now - self._quiet_since)}")
             self._quiet_since, self._told, self._well_since = None, False, now
@@ -117,7 +119,7 @@ class FindingLog:
         # What explains a silence needs no line of its own when the silence is over.
         warning = self._warned.setdefault((finding.code, finding.input), _Warning(finding, now))
         warning.told, warning.holds, warning.seen = True, False, now
-        quiet = words.seconds(now - self._quiet_since)
+        quiet = words.seconds(facts.silent_for)
         ever = "no set" if facts.figures.last_set is None else "no more sets"
         yield Remark(Severity.WARN, f"{ever} for {quiet}: {in_words(finding)}", errors)
 
@@ -125,14 +127,14 @@ class FindingLog:
         self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code], now: int
     ) -> Iterator[Remark]:
         for finding in findings:
-            if finding.severity is Severity.OK or finding.code in _TOLD_ELSEWHERE:
+            if finding.severity is Severity.OK or finding.is_over or finding.code in _TOLD_ELSEWHERE:
                 continue
             warning = self._warned.setdefault((finding.code, finding.input), _Warning(finding, now))
-            if now - warning.seen > _FORGOTTEN:
-                warning.began, warning.told = now, False
-            warning.seen, warning.finding = now, finding
-            lasting = _LASTING + (_UNTIL_TRIED if _awaits_a_try(facts, finding) else 0)
-            if not warning.told and now - warning.began >= lasting:
+            warning.see(finding, now)
+            if finding.code in _OF_DRIFT and may_drift(facts):
+                # The cause may be known soon.
+                warning.began = now
+            if not warning.told and now - warning.began >= _lasting(facts, finding):
                 warning.told = warning.holds = True
                 yield Remark(Severity.WARN, in_words(finding), (finding,))
         for (code, _), warning in self._warned.items():
@@ -149,6 +151,13 @@ def _awaits_a_try(facts: GroupFacts, finding: Finding) -> bool:
     return facts.evaluator is not None and facts.evaluator.awaits((finding.code, finding.input))
 
 
+def _lasting(facts: GroupFacts, finding: Finding) -> int:
+    """Return for how long a finding has to hold to be worth a line."""
+    # What was missed once is missing from the share for as long.
+    missing = facts.figures.share.ns if finding.code is Code.FEW_SETS else 0
+    return _LASTING + missing + (_UNTIL_TRIED if _awaits_a_try(facts, finding) else 0)
+
+
 class _Warning:
     """Since when something is so, when it was last found and how, whether it has been said, and no end of it yet."""
 
@@ -156,6 +165,14 @@ class _Warning:
         self.began = self.seen = now
         self.finding = finding
         self.told = self.holds = False
+
+    def see(self, finding: Finding, now: int) -> None:
+        """Take note that it is so: anew, if it was not for long."""
+        if now - self.seen > _FORGOTTEN:
+            self.began, self.told = now, False
+        elif finding.code is Code.FEW_SETS and now - self.seen > _OVER:
+            self.began = now
+        self.seen, self.finding = now, finding
 
 
 def in_words(finding: Finding) -> str:

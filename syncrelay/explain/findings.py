@@ -15,7 +15,8 @@ class Finding:
     """One thing that is so: a sentence with its figures, and what to do, None where nothing is to be done.
 
     `input` is the index of the input that it is about, None where it is about the group, or about several: these are
-    `inputs`. `explains` is False where it is too small to explain other findings.
+    `inputs`. `explains` is False where it is too small to explain other findings. `is_over` says that it was so until
+    some seconds ago, and that the sets that it cost are still missing from the share.
     """
 
     code: Code
@@ -25,6 +26,7 @@ class Finding:
     input: int | None = None
     explains: bool = True
     inputs: tuple[int, ...] = ()
+    is_over: bool = False
 
     @property
     def about(self) -> tuple[int, ...]:

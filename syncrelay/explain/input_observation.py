@@ -9,7 +9,7 @@ from typing import Final, NamedTuple, TypeAlias
 from syncrelay.explain.clocks import Drift, StampSteps, drift
 from syncrelay.explain.distribution import Distribution, keep_last, no_values
 from syncrelay.explain.figures import InputFigures
-from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, Pace, bursts
+from syncrelay.explain.rhythm import AT_ONCE, LEAST_HELD_NS, Burst, Pace, bursts, steady_period
 from syncrelay.sync.messages import DropReason
 
 Arrivals: TypeAlias = Sequence[tuple[int, int]]
@@ -51,6 +51,7 @@ class InputObservation:
         self._first: int | None = None
         self._flows_since: int | None = None
         self._pace = Pace()
+        self._paced = no_values()
         self._nearest = no_values()
         self._delays = no_values()
         self._faults: deque[_Faults] = deque()
@@ -100,6 +101,7 @@ class InputObservation:
             self._faults.popleft()
         self._faults.append(_Faults(last, duplicates, out_of_order))
         keep_last(self._received, all_received, _LAST_MESSAGES)
+        keep_last(self._paced, all_received, _LAST_MESSAGES)
         keep_last(self._stamps, stamps if delays else (), _TRIED_MESSAGES)
         keep_last(self._delays, delays, _TRIED_MESSAGES)
         # What is held up, and then comes at once, was sent at the pace of its stamps.
@@ -118,6 +120,7 @@ class InputObservation:
     def forget_publishers(self) -> None:
         """Bear that others publish now than did: their rate and their clocks are not those of before."""
         self._pace.forget()
+        del self._paced[:]
         self._steps.forget()
         self.forget_clock()
 
@@ -134,6 +137,21 @@ class InputObservation:
     def slowed_from_hz(self) -> float | None:
         """The steady pace that the input had before it slowed down, None if it has not."""
         return self._pace.slowed_from
+
+    @property
+    def first(self) -> int | None:
+        """When its first message was received."""
+        return self._first
+
+    @property
+    def last(self) -> int | None:
+        """When its last message was received, None also where a clock jumped since."""
+        return self._received[-1] if self._received else None
+
+    @property
+    def steady_period(self) -> float | None:
+        """How long after each other its messages are received while they come, None if they have no steady pace."""
+        return steady_period(self._paced)
 
     @property
     def period(self) -> float:
@@ -187,7 +205,7 @@ class InputObservation:
 
     def _forget(self) -> None:
         """Start afresh: a clock jumped, that of the stamps or this machine's."""
-        for kept in (self._stamps, self._delays, self._received, self._nearest):
+        for kept in (self._stamps, self._delays, self._received, self._paced, self._nearest):
             del kept[:]
         self._faults.clear()
         self._bursts.clear()

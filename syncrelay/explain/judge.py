@@ -20,6 +20,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding, Rule, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
+from syncrelay.explain.standing import BACK, Standing
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
     rules_graph.internal_error,
@@ -188,13 +189,17 @@ _SEEN_SINCE: Final[Mapping[Code, Callable[[GroupFacts], int]]] = {
     Code.NO_CLOCK: lambda facts: facts.figures.now,
     Code.OVER_SLOP: lambda facts: min(facts.figures.nearest_from, facts.figures.now - WINDOW_NS),
     Code.CLOCK_STEP: _first_step,
+    Code.FEW_SETS: lambda facts: facts.figures.now - max(WINDOW_NS, facts.figures.share.ns),
 }
 """Since when the messages came that a finding judges by, where that is not the usual window."""
 
 
 class _Cause(NamedTuple):
+    """A cause, when it last held, and whether it was said then: nothing else explained it."""
+
     finding: Finding
     at: int
+    was_said: bool = False
 
 
 class Judge:
@@ -202,6 +207,7 @@ class Judge:
 
     def __init__(self) -> None:
         self._causes: dict[tuple[Code, int | None], _Cause] = {}
+        self._too_wide: Finding | None = None
 
     def judge(self, facts: GroupFacts) -> tuple[Finding, ...]:
         """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
@@ -215,13 +221,31 @@ class Judge:
                 found += rule(facts)
             elif facts.is_silent:
                 found += [replace(finding, suggestion=_WAIT) for finding in rule(facts)]
+        found += self._still_too_wide(found, facts)
         found += [finding for rule in _OTHER_RULES for finding in rule(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
             found += [_unexplained(facts)] if facts.had_time else []
-        elif _is_well(found) and facts.figures.last_set is not None and not may_drift:
-            # Few sets are what other findings come to: they are said where there is none of those.
-            found += rules_matching.few_sets(facts)
-        return self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
+        said = self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
+        for each in said:
+            cause = self._causes.get((each.code, each.input))
+            if cause is not None and cause.at == facts.figures.now:
+                self._causes[each.code, each.input] = cause._replace(was_said=True)
+        return self._as_bad_as_it_stands(said, facts) if rules_matching.has_few_sets(facts) else said
+
+    def _still_too_wide(self, found: Iterable[Finding], facts: GroupFacts) -> tuple[Finding, ...]:
+        """Return that sets are often too wide, as it was last found, until the share of sets that leave is back.
+
+        Else chance would end it and find it again, and so would a drift that may be the reason now and then.
+        """
+        if facts.is_silent:
+            self._too_wide = None
+            return ()
+        is_back = (facts.figures.share.value or 1) >= BACK
+        wide = next((each for each in found if each.code is Code.OVER_SLOP), None)
+        self._too_wide, before = wide or (None if is_back else self._too_wide), self._too_wide
+        if wide is not None or is_back or before is None or self._is_explained(Code.OVER_SLOP, facts):
+            return ()
+        return (before,)
 
     def explained(self, facts: GroupFacts) -> frozenset[Code]:
         """Return the codes of findings that causes may explain now: that they are not found does not end them."""
@@ -260,6 +284,25 @@ class Judge:
             said = [replace(culprit, severity=Severity.ERROR), *(each for each in said if each is not culprit)]
         return tuple(said)
 
+    def _as_bad_as_it_stands(self, said: tuple[Finding, ...], facts: GroupFacts) -> tuple[Finding, ...]:
+        """Return findings of which one is as bad as the share of sets that left: its cause, or that there are few."""
+        least = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
+        if any(finding.severity >= least for finding in said):
+            return said
+        cause = next((each for each in said if each.severity is not Severity.OK and _gives_few_sets(each.code)), None)
+        if cause is not None:
+            return tuple(replace(each, severity=least) if each is cause else each for each in said)
+        few = next(rules_matching.few_sets(facts))
+        over = [each for each in self._causes.values() if each.was_said and _explains(each, few, facts)]
+        if over:
+            cause, at, _ = max(over, key=lambda each: each.at)
+            until = f"until {words.seconds(facts.figures.now - at)} ago, {cause.text}"
+            text = f"{rules_matching.left_of_possible(facts)}; {until}"
+            few = replace(cause, severity=least, text=text, suggestion=None, is_over=True)
+        elif rules_stamps.may_drift(facts):
+            few = replace(few, suggestion=_WAIT)
+        return (*said, few)
+
     def _root(self, finding: Finding, facts: GroupFacts) -> Finding:
         """Return the cause that explains a finding and that nothing explains, or the finding itself."""
         # A relay that gets too little CPU makes all a little worse: what else is found says more.
@@ -274,8 +317,14 @@ def judge(facts: GroupFacts) -> tuple[Finding, ...]:
     return Judge().judge(facts)
 
 
+def _gives_few_sets(code: Code) -> bool:
+    return code in MATCHING or Code.FEW_SETS in explained_by(code)
+
+
 def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
-    if cause.finding.code in _OF_GRAPH and cause.at < facts.figures.now and finding.severity is Severity.ERROR:
+    looks_back = finding.code is Code.FEW_SETS
+    is_over = cause.at < facts.figures.now and not looks_back
+    if cause.finding.code in _OF_GRAPH and is_over and finding.severity is Severity.ERROR:
         # What the graph shows no more is not why no set leaves now.
         return False
     explained, about = EXPLAINS[cause.finding.code], cause.finding.input
@@ -285,12 +334,12 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     if is_narrow and about is not None and about != finding.input:
         return False
     since = _seen_since(finding.code, facts)
-    if finding.severity is Severity.ERROR:
+    if finding.severity is Severity.ERROR and not looks_back:
         # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
         since = max(since, facts.figures.now - facts.silent_after)
     elif rules_matching.has_few_sets(facts):
         # Nor is it one for sets that are missing of late, however far back the stamps are compared.
-        since = max(since, facts.figures.now - WINDOW_NS)
+        since = max(since, _seen_since(Code.FEW_SETS, facts))
     return cause.at >= since
 
 
@@ -303,15 +352,20 @@ def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...
     """Add to what is not as usual that a group is well, or starts; in figures that cost more than all rules."""
     if facts.asleep or not _is_well(found):
         return found
+    starting = Severity.OK if facts.standing is Standing.ENOUGH else Severity.WARN
     if facts.figures.last_set is None:
         since = words.seconds(facts.figures.now - facts.figures.began)
-        return (*found, Finding(Code.STARTING, Severity.OK, f"no set yet, {since} after the start"))
+        return (*found, Finding(Code.STARTING, starting, f"no set yet, {since} after the start"))
     if facts.is_silent:
         quiet = words.seconds(facts.figures.now - facts.figures.last_set)
         return (
             *found,
-            Finding(Code.STARTING, Severity.OK, f"no set for {quiet}, but {_last_back(facts)} just came back"),
+            Finding(Code.STARTING, starting, f"no set for {quiet}, but {_last_back(facts)} just came back"),
         )
+    share = facts.figures.share
+    if share.value is None and share.left < share.possible:
+        text = f"{share.left} of {share.possible} possible sets so far, which is too soon to judge"
+        return (*found, Finding(Code.STARTING, Severity.OK, text))
     return (*found, _healthy(facts))
 
 

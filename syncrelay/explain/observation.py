@@ -12,6 +12,7 @@ from syncrelay.explain.distribution import Distribution, Tallied, keep_last, no_
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.input_observation import WINDOW_NS, Arrivals, InputObservation
 from syncrelay.explain.nearest import NearestSpans
+from syncrelay.explain.standing import Pace, ShareWindow
 from syncrelay.sync.counts import InputCounts
 
 SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
@@ -33,7 +34,8 @@ class Observation:
     `offsets_ns` are added to stamps as for matching; `distance` is how it is measured how far apart messages are;
     `trigger` is the index of the input whose every message makes a set; `ticks_hz` is the rate of the clock that does,
     where one does. How near the messages of the inputs `apart` are is not measured: they have tolerances of their own.
-    All times are of one clock, that of `began` and of the times of receipt.
+    `every` and `least_period` are how sets are thinned. All times are of one clock, that of `began` and of the times of
+    receipt.
     """
 
     def __init__(
@@ -46,6 +48,8 @@ class Observation:
         trigger: int | None = None,
         ticks_hz: float | None = None,
         apart: Collection[int] = (),
+        every: int = 1,
+        least_period: int | None = None,
     ) -> None:
         self._began = began
         self._offsets = tuple(offsets_ns)
@@ -56,6 +60,13 @@ class Observation:
         self._inputs = [InputObservation() for _ in offsets_ns]
         nothing = tuple(InputCounts(fed=0, matched=0, dropped={}, buffered=0) for _ in offsets_ns)
         self._polls = deque([_Poll(began, nothing, 0, 0, (0,) * len(nothing))])
+        self._share = ShareWindow(
+            self._required,
+            counted=self._required if trigger is None else [trigger],
+            ticks_hz=ticks_hz,
+            every=every,
+            least_period=least_period,
+        )
         self._span_histogram, self._latency_histogram = Tallied(), Tallied()
         self._last_set: int | None = None
         self._resumed: int | None = None
@@ -92,6 +103,8 @@ class Observation:
             self._polls.popleft()
         fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self._inputs, arrivals, strict=True)]
         paces = [each.slowed_from_hz for each in self._inputs]
+        clock = None if by_clock is None else by_clock(now)
+        self._share.add(counts, total_sets, self._steady_paces(), now=now, clock=clock)
         if paces != self._paces:
             # What was measured before says nothing of how it is now.
             self._paces = paces
@@ -113,6 +126,7 @@ class Observation:
             best_hz=self._ticks_hz or min(inputs[index].rate_hz for index in counted),
             last_set=self._last_set,
             resumed=self._resumed,
+            share=self._share.share(),
             span_histogram=self._span_histogram.histogram(),
             latency_histogram=self._latency_histogram.histogram(),
             spans=Distribution(self._spans[:]),
@@ -130,6 +144,7 @@ class Observation:
         self._began, self._last_set, self._resumed = at, None, None
         self._polls = deque(poll._replace(at=at, sent=0) for poll in [*self._polls][-1:])
         self._inputs = [InputObservation() for _ in self._inputs]
+        self._share.clear()
         self._paces = [None] * len(self._inputs)
         self._sets_since_without = [0] * len(self._inputs)
         self._forget_nearest()
@@ -154,6 +169,7 @@ class Observation:
     def _begin_anew(self, now: int) -> None:
         """Bear that this machine's clock was set back: what lies in the future now would count for ever."""
         self._polls.clear()
+        self._share.clear()
         self._forget_nearest()
         self._began = min(self._began, now)
         self._last_set = None if self._last_set is None else now
@@ -203,6 +219,9 @@ class Observation:
         last = self._polls[-1].counts
         before = [each.fed for each in self._polls[0].counts] if len(self._polls) > 1 else [0] * len(last)
         return min(among, key=lambda index: last[index].fed - before[index])
+
+    def _steady_paces(self) -> list[Pace]:
+        return [Pace(each.first, each.last, each.steady_period) for each in self._inputs]
 
     def _take_sets(self, spans: Sequence[int], latencies: Sequence[int], now: int) -> None:
         if self._last_set is None or (now - self._last_set >= _SILENCE and self._saw_none_before()):

@@ -1,5 +1,6 @@
 """The rhythm in which messages come: bursts after they were held up, and a pace that has slowed down."""
 
+from bisect import bisect_left, bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -46,6 +47,33 @@ _ODD: Final = 10
 # Slower than this share of its pace it has slowed down, until it is faster than the other.
 _SLOWED: Final = 0.7
 _RECOVERED: Final = 0.85
+
+
+# Of so many of the last periods, or half as many at least, most are about as long as their median ...
+_LAST_PERIODS: Final = 40
+_ABOUT: Final = 0.25
+# ... and hardly any is far longer: else they come several at once.
+_FAR: Final = 4
+_HARDLY: Final = 0.1
+# What comes faster than this comes at once.
+_LEAST_PERIOD: Final = 1_000_000
+
+
+def steady_period(received: Sequence[int]) -> float | None:
+    """Return the period of messages that come at a steady pace, but for pauses and what was lost; None of others.
+
+    All times are in nanoseconds.
+    """
+    last = received[-_LAST_PERIODS - 1 :]
+    periods = sorted(map(sub, last[1:], last))
+    if len(periods) < _LAST_PERIODS // 2:
+        return None
+    usual = periods[len(periods) // 2]
+    far = periods[round((1 - _HARDLY) * (len(periods) - 1))]
+    if usual < _LEAST_PERIOD or far > _FAR * usual:
+        return None
+    near = periods[bisect_left(periods, (1 - _ABOUT) * usual) : bisect_right(periods, (1 + _ABOUT) * usual)]
+    return sum(near) / len(near) if 2 * len(near) > len(periods) else None
 
 
 class Pace:

@@ -15,6 +15,7 @@ from syncrelay.explain.findings import SECOND, Finding, Found, counted, nodes
 from syncrelay.explain.nearest import signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
+from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggestions import (
     UNTRIED,
     Change,
@@ -39,11 +40,8 @@ _BACK: Final = 3
 _AWAY: Final = 3
 # Of an input that sent one message, no period is known; so long a one is not waited for.
 _UNKNOWN: Final = 2 * SECOND
-# Fewer sets than this share of the possible ones are few, where so many were possible in so long a time.
-_FEW: Final = 0.8
 # Nearly all sets that were possible: then what a queue dropped was not missed.
 _NEARLY_ALL: Final = 0.95
-_POSSIBLE: Final = 10
 _WATCHED: Final = 10 * SECOND
 # Stamps off by so much of a period, and so constantly, may pair the wrong messages; so near is a whole period.
 _ENOUGH: Final = 20
@@ -307,24 +305,32 @@ def few_sets(facts: GroupFacts) -> Found:
     """Find that far fewer sets leave than the input that sets the pace would allow."""
     if not has_few_sets(facts):
         return
-    figures, pacemaker = facts.figures, facts.pacemaker
-    yield Finding(
-        Code.FEW_SETS,
-        Severity.WARN,
-        f"{words.figure(figures.rate_hz)} of {words.figure(facts.possible_hz)} possible sets leave per second;"
-        f" {fates(pacemaker)}",
-        more_sets(facts, Code.FEW_SETS),
-    )
+    share = facts.figures.share
+    pacemaker = facts.pacemaker if share.pacemaker is None else facts.inputs[share.pacemaker]
+    severity = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
+    left = left_of_possible(facts)
+    if 2 * share.absent > share.possible - share.left:
+        yield Finding(
+            Code.FEW_SETS,
+            severity,
+            f"{left}; {share.absent} messages of {pacemaker.name} did not come: it pauses, or they are lost",
+            f"check {nodes(pacemaker)}, and the network to it",
+            share.pacemaker,
+        )
+        return
+    yield Finding(Code.FEW_SETS, severity, f"{left}; {fates(pacemaker)}", more_sets(facts, Code.FEW_SETS))
+
+
+def left_of_possible(facts: GroupFacts) -> str:
+    """Say how many of the possible sets left."""
+    share = facts.figures.share
+    return f"{share.left} of {share.possible} possible sets left in the last {words.seconds(share.ns)}"
 
 
 def has_few_sets(facts: GroupFacts) -> bool:
-    """Return whether far fewer sets left, of late, than the input that sets the pace would allow."""
-    figures = facts.figures
-    # The window's rate counts a silence that is over.
-    since = max(figures.began, figures.resumed or 0)
-    if facts.is_silent or figures.last_set is None or figures.now - since < _WATCHED:
-        return False
-    return facts.possible_hz * _WATCHED >= _POSSIBLE * SECOND and figures.rate_hz < _FEW * facts.possible_hz
+    """Return whether sets leave, but far fewer than the input that sets the pace would allow."""
+    is_known = facts.figures.share.value is not None
+    return facts.standing is not Standing.ENOUGH and is_known and not facts.is_silent
 
 
 def more_sets(facts: GroupFacts, code: Code) -> str | None:

@@ -1,6 +1,7 @@
 """A group of the file under observation: what came and left, and from it, at any moment, the facts."""
 
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.clocks import Step
@@ -16,6 +17,7 @@ from syncrelay.explain.facts import (
 )
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
+from syncrelay.explain.standing import StandingWatch
 from syncrelay.explain.suggestions import Evaluator
 from syncrelay.explain.try_budget import TryBudget
 from syncrelay.sync.counts import InputCounts
@@ -45,7 +47,10 @@ class GroupWatch:
             trigger=config.trigger,
             ticks_hz=self._ticks_hz,
             apart=[index for index, own in enumerate(config.own_tolerances) if own is not None],
+            every=config.options.every,
+            least_period=config.options.max_rate,
         )
+        self._standing = StandingWatch()
         # Keys are not kept: what is matched by them cannot be run again. Nor can what a clock triggered: it may have
         # been a simulated one, and times of receipt are this machine's.
         can_run = config.options.by_stamp and config.ticks is None
@@ -70,6 +75,7 @@ class GroupWatch:
         """
         if woke is not None and woke != self._woke:
             self._woke = woke
+            self._standing = StandingWatch()
             self._observation.begin_again(woke)
             arrivals = [[each for each in came if each[1] >= woke] for came in arrivals]
         self._counts = tuple(counts)
@@ -115,7 +121,7 @@ class GroupWatch:
             self.config.own_tolerances,
             strict=True,
         )
-        return GroupFacts(
+        facts = GroupFacts(
             name=self.config.name,
             policy=options.policy,
             queue_size=options.queue_size,
@@ -157,6 +163,11 @@ class GroupWatch:
             is_discovering=is_discovering,
             inactive=inactive,
         )
+        if asleep:
+            return facts
+        # A group whose publishers have just come has not missed a set yet.
+        is_silent = facts.is_silent and not facts.is_new
+        return replace(facts, standing=self._standing.follow(figures.share, is_silent=is_silent))
 
     def _follow_pauses(self, now: int, *, is_paused: bool) -> None:
         if self._was_paused and not is_paused:

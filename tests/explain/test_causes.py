@@ -13,6 +13,8 @@ from syncrelay.explain import (
     InputGraph,
     Judge,
     Severity,
+    Share,
+    Standing,
     Standstill,
     explanation,
     judge,
@@ -76,7 +78,8 @@ def test_a_cause_that_is_over_does_not_explain_that_few_sets_leave_now():
     assert codes(a_judge.judge(a_group(figures=WIDE, waited=3 * S))) == [Code.TOO_SLOW]
     later = {**WIDE, "nearest_from": NOW - S, "now": NOW + 11 * S, "last_set": NOW + 11 * S}
     assert codes(a_judge.judge(a_group(figures=later))) == []
-    assert codes(a_judge.judge(a_group(figures={**later, "rate_hz": 0.5}))) == [Code.OVER_SLOP]
+    few = {**later, "share": Share(5, 100, 10 * S)}
+    assert codes(a_judge.judge(a_group(figures=few, standing=Standing.FEW))) == [Code.OVER_SLOP]
 
 
 def test_a_cause_explains_a_step_for_as_long_as_the_step_is_told():

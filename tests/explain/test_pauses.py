@@ -51,7 +51,8 @@ def test_a_silence_that_begins_in_a_pause_is_told_after_it():
 def test_a_pause_is_no_recovery_of_what_was_silent_before_it():
     gone = Source("/lidar", hz=10, sends=lambda second: not 20 < second < 80)
     told = run(_CAMERA, gone, seconds=120, options=_SLOP, paused=[(40, 60)])
-    assert [line.second for line in told.lines if "recovered" in line.text] == pytest.approx([81], abs=1)
+    # It is over when the share of the last 10 s is what it was.
+    assert [line.second for line in told.lines if "recovered" in line.text] == pytest.approx([90], abs=1)
 
 
 def test_stamps_that_were_unset_before_a_pause_are_not_said_to_be_mended_by_it():

@@ -1,11 +1,13 @@
 """What the flow tells: facts that come to a finding, and the nearest that do not."""
 
-from syncrelay.explain import Code, Distribution, Pause, Severity, Standstill
+from syncrelay.explain import Code, Distribution, Pause, Severity, Share, Standing, Standstill
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import AGES, LIDAR, camera, dropped, fed, overflowing, without_camera
 from tests.explain.support.groups import MS, NOW, S, a_group, a_silent_group, an_input
 
 HELD_UP = {"bursts": 1, "held": 2 * S, "held_up": [(NOW - 4 * S, NOW - 2 * S)]}
+FEW = {"standing": Standing.FEW}
+_LEFT = "possible sets left in the last 10 s"
 
 
 def held_up(begin, end):
@@ -182,9 +184,28 @@ FOUND = {
     "few sets": (
         Code.FEW_SETS,
         Severity.WARN,
-        a_group(dropped(DropReason.LATE, 60), LIDAR, figures={"rate_hz": 4.0}),
-        "4 of 10 possible sets leave per second; of the last 100 messages of /camera, 60 were dropped as late",
+        a_group(dropped(DropReason.LATE, 60), LIDAR, figures={"share": Share(40, 100, 10 * S, 0)}, **FEW),
+        "40 of 100 possible sets left in the last 10 s; of the last 100 messages of /camera, 60 were dropped as late",
         None,
+    ),
+    "few sets since a silence": (
+        Code.FEW_SETS,
+        Severity.ERROR,
+        a_group(
+            dropped(DropReason.LATE, 60),
+            LIDAR,
+            figures={"share": Share(1, 100, 10 * S, 0)},
+            standing=Standing.NONE,
+        ),
+        "1 of 100 possible sets left in the last 10 s; of the last 100 messages of /camera, 60 were dropped as late",
+        None,
+    ),
+    "few sets of an input that pauses": (
+        Code.FEW_SETS,
+        Severity.WARN,
+        a_group(camera(), LIDAR, figures={"share": Share(60, 100, 10 * S, 0, absent=40)}, **FEW),
+        f"60 of 100 {_LEFT}; 40 messages of /camera did not come: it pauses, or they are lost",
+        "check /usb_cam, and the network to it",
     ),
     "few sets of a trigger, told by its own messages": (
         Code.FEW_SETS,
@@ -192,10 +213,11 @@ FOUND = {
         a_group(
             an_input("/map", figures={"rate_hz": 1.0}),
             dropped(DropReason.EXPIRED, 60),
-            figures={"rate_hz": 4.0},
+            figures={"share": Share(40, 100, 10 * S, 1)},
+            **FEW,
             **AGES,
         ),
-        "4 of 10 possible sets leave per second; of the last 100 messages of /camera, 60 were dropped as expired",
+        f"40 of 100 {_LEFT}; of the last 100 messages of /camera, 60 were dropped as expired",
         None,
     ),
     "what nothing explains": (
@@ -262,17 +284,14 @@ QUIETLY = {
         ),
     ),
     "messages that lay for less than half a second": (Code.TOO_SLOW, a_group(waited=499 * MS)),
-    "four of five possible sets": (Code.FEW_SETS, a_group(figures={"rate_hz": 8.0})),
-    "few sets in the first ten seconds": (Code.FEW_SETS, a_group(figures={"rate_hz": 4.0, "began": NOW - 9 * S})),
-    "few sets in the window of a silence": (
+    "enough sets": (Code.FEW_SETS, a_group(figures={"share": Share(80, 100, 10 * S)})),
+    "few sets while none leaves": (
         Code.FEW_SETS,
-        a_group(figures={"rate_hz": 4.0, "resumed": NOW - 9 * S}),
+        a_silent_group(figures={"share": Share(40, 100, 10 * S)}, standing=Standing.NONE),
     ),
+    "few sets of too few to tell": (Code.FEW_SETS, a_group(figures={"share": Share(1, 9, 10 * S)}, **FEW)),
     "no set yet where something is wrong": (
         Code.STARTING,
         a_group(camera(not_importable="no package"), LIDAR, figures={"began": NOW - 3 * S, "last_set": None}),
     ),
-    "few sets because they are thinned": (Code.FEW_SETS, a_group(figures={"rate_hz": 2.0}, every=5)),
-    "few sets at a greatest rate": (Code.FEW_SETS, a_group(figures={"rate_hz": 2.0}, least_period=500 * MS)),
-    "few sets where few are possible": (Code.FEW_SETS, a_group(figures={"rate_hz": 0.1, "best_hz": 0.9})),
 }

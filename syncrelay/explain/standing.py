@@ -1,0 +1,231 @@
+"""How a group stands: by the share of its possible sets that left, with hysteresis, so that chance changes nothing."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final, NamedTuple
+
+from syncrelay.sync.counts import InputCounts
+from syncrelay.sync.messages import DropReason
+
+_SECOND: Final = 1_000_000_000
+SHARE_WINDOW_NS: Final = 10 * _SECOND
+"""The share is that of about this long, and longer where that holds too few possible sets."""
+_LONGEST: Final = 600 * _SECOND
+# Of fewer possible sets, no share is known; a full window holds so many, and no chance decides.
+_FEWEST: Final = 10
+_ENOUGH_TO_TELL: Final = 30
+# Fewer than this share of the possible sets are few, until it is over the other.
+_FEW: Final = 0.8
+BACK: Final = 0.95
+"""The share at which few sets are enough again."""
+# After a silence, sets leave again once it is half of them: one stray set in 5 s is at most a third.
+_AGAIN: Final = 0.5
+# Of what a steady input should have sent, so much may be missing: its pace is measured as well as that.
+_UNSURE: Final = 0.05
+# A pause is longer than a second, and than so many periods.
+_PAUSE: Final = 5
+# So many periods after the last message of all inputs, none comes any more.
+_LATE: Final = 2
+# They cost no set that was possible: left out on purpose, or replaced by a message of the same stamp.
+_NO_SET_MISSED: Final = frozenset(
+    {
+        DropReason.THINNED,
+        DropReason.DUPLICATE,
+        DropReason.PAUSED,
+        DropReason.SHUTDOWN,
+        DropReason.TIME_JUMP,
+    }
+)
+
+
+class Standing(Enum):
+    """How many of the possible sets leave: enough, few, or none since a silence began that is not over."""
+
+    ENOUGH = "enough"
+    FEW = "few"
+    NONE = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """How many sets left of those that were possible in the last `ns` nanoseconds.
+
+    `possible` goes by the required input of which fewest messages came, or should have: `pacemaker`, None where a clock
+    makes the sets. `absent` of its messages did not come, at the pace that it otherwise has. `is_pausing` says that
+    they still do not: until it is back, or is silent, nobody knows for how long.
+    """
+
+    left: int = 0
+    possible: int = 0
+    ns: int = 0
+    pacemaker: int | None = None
+    absent: int = 0
+    is_pausing: bool = False
+
+    @property
+    def value(self) -> float | None:
+        """From 0 to 1; None of too few to tell."""
+        return min(1.0, self.left / self.possible) if self.possible >= _FEWEST else None
+
+
+NOT_KNOWN: Final = Share()
+
+
+class Pace(NamedTuple):
+    """When the first and the last message of an input were received, None if none was, and how far apart they come.
+
+    `period` is that while they come, None of an input that has no steady one.
+    """
+
+    first: int | None
+    last: int | None
+    period: float | None
+
+
+class _Poll(NamedTuple):
+    """What there was until a poll: sets, and of each counted input messages that came, that left or were thinned.
+
+    `clock` is the time of the clock that makes the sets, `owed` how many messages should have come at a steady pace,
+    `taken` how many of those that came may make sets: that left or are buffered.
+    """
+
+    at: int
+    clock: int
+    sets: int
+    fed: tuple[int, ...]
+    owed: tuple[float, ...]
+    taken: tuple[int, ...]
+    gone: tuple[int, ...]
+    thinned: tuple[int, ...]
+
+
+class ShareWindow:
+    """Measures the share, poll by poll, over the last seconds.
+
+    No set is possible before each of the `required` inputs has come; `counted` are those of them that may set the pace:
+    all, or the trigger. `ticks_hz` is the rate of the clock that makes the sets, None where none does; `every` and
+    `least_period` are how sets are thinned.
+    """
+
+    def __init__(
+        self,
+        required: Sequence[int],
+        *,
+        counted: Sequence[int],
+        ticks_hz: float | None,
+        every: int = 1,
+        least_period: int | None = None,
+    ) -> None:
+        self._required = required
+        self._counted = counted
+        self._ticks_hz = ticks_hz
+        self._every = every
+        self._least_period = least_period
+        self._polls: deque[_Poll] = deque()
+        self._is_pausing: dict[int, bool] = {}
+
+    def clear(self) -> None:
+        """Start afresh: a clock was set, or nothing was fed for a while."""
+        self._polls.clear()
+
+    def add(
+        self, counts: Sequence[InputCounts], sets: int, paces: Sequence[Pace], *, now: int, clock: int | None = None
+    ) -> None:
+        """Take the counts as they are now; `clock` is the time by which sets are made, where it is not `now`."""
+        if any(paces[index].first is None for index in self._required):
+            self._polls.clear()
+        elif self._ticks_hz is not None and self._polls and not self._polls[-1].sets:
+            # The first tick is waited for as long as any, and no message counts how many were.
+            self._polls.clear()
+        inputs = [counts[index] for index in self._counted]
+        thinned = tuple([each.dropped.get(DropReason.THINNED, 0) for each in inputs])
+        missed = [sum(n for why, n in each.dropped.items() if why not in _NO_SET_MISSED) for each in inputs]
+        gone = tuple([each.matched + n for each, n in zip(inputs, missed, strict=True)])
+        taken = tuple([n + each.buffered for each, n in zip(inputs, gone, strict=True)])
+        fed = tuple([each.fed for each in inputs])
+        owed = self._owed(fed, paces, now)
+        self._is_pausing = {index: _is_pausing(paces[index], now) for index in self._counted}
+        self._polls.append(_Poll(now, now if clock is None else clock, sets, fed, owed, taken, gone, thinned))
+        while len(self._polls) > 1 and self._is_full(self._polls[1]):
+            self._polls.popleft()
+
+    def share(self) -> Share:
+        """Return the share of the window."""
+        return self._since(self._polls[0]) if self._polls else NOT_KNOWN
+
+    def _owed(self, fed: tuple[int, ...], paces: Sequence[Pace], now: int) -> tuple[float, ...]:
+        """Return how many messages of each input should have come by now: nothing is missing while none come at all."""
+        if not self._polls:
+            return fed
+        before = self._polls[-1]
+        last = max((each.last for each in paces if each.last is not None), default=before.at)
+        owed = []
+        for index, came, owed_before, fed_before in zip(self._counted, fed, before.owed, before.fed, strict=True):
+            period = paces[index].period
+            if period is None:
+                owed.append(owed_before + came - fed_before)
+            else:
+                owed.append(owed_before + max(0, min(now, round(last + _LATE * period)) - before.at) / period)
+        return tuple(owed)
+
+    def _is_full(self, first: _Poll) -> bool:
+        ns = self._polls[-1].at - first.at
+        if ns < SHARE_WINDOW_NS:
+            return False
+        return ns > _LONGEST or self._since(first).possible >= _ENOUGH_TO_TELL
+
+    def _since(self, first: _Poll) -> Share:
+        last = self._polls[-1]
+        left, ns = last.sets - first.sets, last.at - first.at
+        if self._ticks_hz is not None:
+            elapsed = last.clock - first.clock
+            return Share(left, self._thinned(int(elapsed * self._ticks_hz / _SECOND / self._every), elapsed), ns)
+        due = [(*self._due(place, first, last), index) for place, index in enumerate(self._counted)]
+        possible, absent, pacemaker = min(due)
+        return Share(left, self._thinned(possible, ns), ns, pacemaker, absent, is_pausing=self._is_pausing[pacemaker])
+
+    def _thinned(self, possible: int, ns: int) -> int:
+        return min(possible, ns // self._least_period) if self._least_period else possible
+
+    @staticmethod
+    def _due(place: int, first: _Poll, last: _Poll) -> tuple[int, int]:
+        """Return how many sets an input would have given, and how many of its messages for them did not come."""
+        # What has piled up before the first poll counts for the time before.
+        gone = min(last.gone[place] - first.gone[place], last.taken[place] - first.taken[place])
+        thinned = last.thinned[place] - first.thinned[place]
+        owed = int(last.owed[place] - first.owed[place])
+        absent = owed - (last.fed[place] - first.fed[place])
+        if absent <= 1 + _UNSURE * owed:
+            return gone, 0
+        if thinned:
+            absent = absent * gone // (gone + thinned)
+        return gone + absent, absent
+
+
+def _is_pausing(pace: Pace, now: int) -> bool:
+    if pace.last is None or pace.period is None:
+        return False
+    return now - pace.last > max(_SECOND, _PAUSE * pace.period)
+
+
+class StandingWatch:
+    """Follows how a group stands, from moment to moment."""
+
+    def __init__(self) -> None:
+        self.now = Standing.ENOUGH
+
+    def follow(self, share: Share, *, is_silent: bool) -> Standing:
+        """Return how it stands now; `is_silent` says that no set leaves, though it should have been long ago."""
+        value = share.value
+        if is_silent:
+            self.now = Standing.NONE
+        elif value is not None and not (share.is_pausing and self.now is Standing.ENOUGH):
+            self.now = self._by(value)
+        return self.now
+
+    def _by(self, share: float) -> Standing:
+        if share >= BACK or (share >= _FEW and self.now is Standing.ENOUGH):
+            return Standing.ENOUGH
+        return Standing.NONE if self.now is Standing.NONE and share < _AGAIN else Standing.FEW
