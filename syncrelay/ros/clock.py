@@ -3,12 +3,16 @@
 Else the first never jumps, and the second tells the time that messages are stamped with.
 """
 
+import logging
 import time
 from collections.abc import Callable
 from typing import Any
 
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
+from rosgraph_msgs.msg import Clock
+
+_LOG = logging.getLogger("syncrelay")
 
 # What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
 _JUMP = Duration(nanoseconds=-1_000_000_000)
@@ -22,6 +26,10 @@ class WaitingClock:
         self._clock = node.get_clock()
         self._handle: Any = None
         self.is_simulated = bool(node.get_parameter("use_sim_time").value)
+        for subscription in node.subscriptions:
+            # rclpy's own, which is there from the start where time is simulated.
+            if subscription.msg_type is Clock:
+                subscription.callback = _since_1970(subscription.callback)
         self.now: Callable[[], int] = self._simulated_now if self.is_simulated else time.monotonic_ns
         """The time in nanoseconds, to measure waiting only."""
         self.stamping: Callable[[], int] = self._simulated_now if self.is_simulated else time.time_ns
@@ -45,3 +53,21 @@ class WaitingClock:
         """Follow the clock no longer."""
         if self._handle is not None:
             self._handle.unregister()
+
+
+def _since_1970(take: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Return what takes the messages of /clock but for those of negative times, for which rclpy raises."""
+    was_said = False
+
+    def take_valid(message: Any) -> None:
+        nonlocal was_said
+        if message.clock.sec >= 0:
+            take(message)
+        elif not was_said:
+            was_said = True
+            _LOG.warning(
+                "/clock is at %d s, and no time in ROS is below 0: ignored until it is 0 or more",
+                message.clock.sec,
+            )
+
+    return take_valid
