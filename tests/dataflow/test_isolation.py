@@ -96,6 +96,23 @@ def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then
     ]
 
 
+@pytest.mark.parametrize("failing", [step for step in _STEPS if step not in ("flush", "counts")])
+@pytest.mark.parametrize("waiting", [1, 4, 7])
+def test_what_waits_in_a_group_that_is_stopped_is_dropped_and_counted(failing: str, waiting: int, group: GroupRelay):
+    for index in range(2):
+        group.flow.receive(index, Named(b"set"), BEGIN)
+    for number in range(waiting):
+        group.flow.receive(0, Named(b"lone"), BEGIN + (1 + number) * MS)
+    assert [each.buffered for each in group.counts()] == [waiting, 0]
+    group.engine = _Failing(group.engine, failing)  # type: ignore[assignment]  # it passes all on
+    _drive(group, failing)
+    assert group.failure is not None
+    camera, lidar = group.counts()
+    assert (camera.fed, camera.matched, camera.dropped) == (1 + waiting, 1, {DropReason.SHUTDOWN: waiting})
+    assert (lidar.fed, lidar.matched, lidar.dropped) == (1, 1, {})
+    assert [each.buffered for each in (camera, lidar)] == [0, 0]
+
+
 def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_came(group: GroupRelay):
     outlets = [_Outlet(), _Outlet()]
 
