@@ -32,8 +32,9 @@ from syncrelay.status.taps import TapRefusedError, Taps
 _STALLED_S: Final = 5.0
 # A reader of /status takes milliseconds.
 _CLIENT_TIMEOUT_S: Final = 5
-# Beyond them a client waits until one that idles has timed out. Each takes a file descriptor, of a usual 1024.
+# Each takes a file descriptor, of a usual 1024. Where there are so many, those that have idled longest make room.
 _CONNECTIONS: Final = 256
+_MAKING_ROOM: Final = 64
 _HEADER_BYTES: Final = 16_384
 
 _JSON: Final = "application/json"
@@ -108,10 +109,21 @@ class Server:
             ident=None,
             clear_untrusted_proxy_headers=True,
         )
-        settings = {"timeout": 1, "map": self._channels, "use_poll": True}
-        self._thread = Thread(target=self._server.asyncore.loop, kwargs=settings, name="syncrelay-http")
+        self._thread = Thread(target=self._run, name="syncrelay-http")
         self._thread.start()
         self._announcement = announce(self.place)
+
+    def _run(self) -> None:
+        while self._channels:
+            if len(self._channels) >= _CONNECTIONS:
+                self._make_room()
+            self._server.asyncore.loop(timeout=1, map=self._channels, use_poll=True, count=1)
+
+    def _make_room(self) -> None:
+        """Have connections closed that nothing is answered on, as waitress does once they have timed out."""
+        idle = [each for each in self._server.active_channels.values() if not each.requests]
+        for each in sorted(idle, key=lambda channel: channel.last_activity)[:_MAKING_ROOM]:
+            each.will_close = True
 
 
 def _bound(listen: Listen) -> socket.socket:

@@ -12,7 +12,7 @@ import pytest
 from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
 from syncrelay.explain import Endpoint, Mismatch, Refusal, Tape
-from syncrelay.status import Phase, Taps
+from syncrelay.status import Phase, Taps, server
 from syncrelay.status.server import PATHS_TOLD, Server
 from tests.status.support.serving import ANY, asked, connected, sent, serving
 from tests.status.support.states import CAMERA, relay, started, working
@@ -184,6 +184,18 @@ def test_clients_that_never_read_keep_nobody_from_an_answer():
             client.connect(address)
             client.sendall(b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n" * 5)
         assert asked(address, "/livez")[0] == 200
+
+
+@pytest.mark.parametrize("said", [b"", b"GET /status HTTP/1.1\r\nHost:"], ids=["nothing", "half a request"])
+def test_more_clients_that_stall_than_there_are_connections_keep_nobody_from_an_answer(said, monkeypatch):
+    # None of them times out while the test runs.
+    monkeypatch.setattr(server, "_CLIENT_TIMEOUT_S", 600)
+    with serving(HEALTHY) as address, ExitStack() as stack:
+        for _ in range(400):
+            client = stack.enter_context(connected(address))
+            with suppress(OSError):
+                client.sendall(said)
+        assert asked(address, "/livez") == (200, "receiving\n")
 
 
 def test_two_hundred_idle_connections_keep_nobody_from_an_answer():
