@@ -24,7 +24,7 @@ from tests.ros.cdr_messages import IMAGE
 from tests.ros.frames import Frame
 
 _SEED = 28
-_COUNT = chosen(short=64, long=3000)
+_COUNT = chosen(short=64, long=1000)
 _LARGEST = chosen(short=1 << 25, long=1 << 28)
 # Smaller than they are, so that small bombs are too large.
 _FITS = 1 << 20
@@ -36,6 +36,7 @@ _CALLS = 40_000
 
 
 @pytest.mark.faults
+@pytest.mark.timeout(chosen(short=600, long=3600))
 def test_no_recording_takes_more_than_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(effort, "ALWAYS_FITS", _FITS)
     monkeypatch.setattr(effort, "MOST_RECORDS", _RECORDS)
@@ -77,7 +78,8 @@ def _check(each: Drawn) -> None:
     assert len(received - {(frame.topic, frame.time) for frame in FRAMES}) <= ("cut off" in each.what)
     assert received >= {(frame.topic, frame.time) for frame in each.readable} or each.path.suffix in _PACKED
     assert faults or len(found) == len(FRAMES)
-    if each.end is not None and len(found) < len(FRAMES):
+    # Of a file of which nothing can be read, the error names the first fault alone.
+    if each.end is not None and 0 < len(found) < len(FRAMES):
         (place,) = (re.search(r"cut off or damaged at byte (\d+) of", fault) for fault in faults if "cut off" in fault)
         assert place is not None
         assert abs(int(place[1]) - each.end) < LONGEST_RECORD
