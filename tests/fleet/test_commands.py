@@ -27,6 +27,13 @@ def test_the_sets_are_those_of_replay_alone(done, tmp_path):
         assert (result(done / "out", name) / "sets.mcap").read_bytes() == output.read_bytes()
 
 
+def test_recordings_that_take_longer_than_they_may_have_failed(tmp_path):
+    ended = replay_into(make_fleet(tmp_path, (20, 20)), "--time-limit", "1ms")
+    assert (ended.returncode, ended.stdout) == (1, "out: 2 recordings: 2 failed\n")
+    assert "r0.mcap: not done within 0.001 s: check it, or give it longer by --time-limit" in ended.stderr
+    assert {entry["state"] for entry in entries(tmp_path / "out").values()} == {"failed"}
+
+
 def test_the_ledger_tells_what_became_of_each_input(done):
     inputs = [{"topic": topic, "received": 30, "matched": 29, "dropped": {"shutdown": 1}} for topic in TOPICS]
     assert entries(done / "out")["r1"]["facts"]["groups"] == [{"name": "front", "sets": 29, "inputs": inputs}]
@@ -147,6 +154,12 @@ def test_a_split_recording_is_one(tmp_path):
     [
         (("replay", "bags", "--config", FILE, "--strict"), "--strict goes with --into"),
         (("replay", "bags", "--config", FILE, "--overwrite"), "--overwrite goes with --into"),
+        (("replay", "bags", "--config", FILE, "--time-limit", "2min"), "--time-limit goes with --into"),
+        (
+            ("replay", "bags", "--config", FILE, "--into", "out", "--time-limit", "2"),
+            "has no unit, expected one such as",
+        ),
+        (("analyze", "bags", "--into", "out", "--time-limit", "0s"), "expected a duration above 0, found 0s"),
         (("analyze", "bags", "--engine", "ray"), "--engine goes with --into"),
         (("replay", "bags", "--config", FILE, "--jobs", "2"), "--jobs goes with --into"),
         (
