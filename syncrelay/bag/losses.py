@@ -14,6 +14,10 @@ OF_NO_CHANNEL: Final = "channel not described in the file"
 OF_NO_TIME: Final = "received before 1970 or after 2116"
 
 
+_MOST_SAID: Final = 100
+"""Damaged places of a file that are named; of more, their number tells enough."""
+
+
 class Losses:
     """Gathers them while a file is read."""
 
@@ -21,6 +25,7 @@ class Losses:
         """Begin with none; messages call the file `name`."""
         self._name = name
         self._said: list[str] = []
+        self._more = 0
         self._left_out: Counter[str] = Counter()
         self._too_late = 0
 
@@ -30,6 +35,8 @@ class Losses:
         told = [f"{counted(count, 'message')} left out: {why}" for why, count in self._left_out.items() if count]
         if self._too_late:
             told.append(f"{counted(self._too_late, 'message')} out of order: the index has other times")
+        if self._more:
+            told.append(f"{counted(self._more, 'more place')} that cannot be read")
         return [*self._said, *(f"{self._name}: {each}" for each in told)]
 
     def say(self, what: str) -> None:
@@ -46,6 +53,9 @@ class Losses:
 
     def damaged(self, what: str, fault: BaseException, *, read: int = 0) -> None:
         """Take in that of something, named with its article, only so many messages could be read."""
+        if len(self._said) >= _MOST_SAID:
+            self._more += 1
+            return
         why = "there is not enough memory for it" if isinstance(fault, MemoryError) else fault
         kept = f"after {counted(read, 'readable message')}" if read else "and left out"
         self.say(f"{what} is damaged {kept}{f': {why}' if str(why) else ''}")

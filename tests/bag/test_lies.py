@@ -181,6 +181,20 @@ def test_a_chunk_of_a_wrong_checksum_is_left_out(number, place, tmp_path):
     assert fault.endswith("is damaged and left out: its checksum is wrong")
 
 
+def test_of_many_damaged_places_the_first_are_named_and_the_others_counted(tmp_path):
+    frames = rig(60)
+    path = write_mcap(tmp_path / "rig.mcap", frames, chunk_size=1)
+    content = bytearray(path.read_bytes())
+    for frame in frames:
+        content[content.index(frame.payload)] ^= 1
+    path.write_bytes(content)
+    found, faults = _read(path)
+    assert found == []
+    assert len(faults) == 101
+    assert all(fault.startswith("the chunk at byte") for fault in faults[:-1])
+    assert faults[-1] == "20 more places that cannot be read"
+
+
 def test_an_mcap_file_that_ends_between_two_records_is_said(tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", _RIG, use_chunking=False)
     content = path.read_bytes()
