@@ -4,6 +4,11 @@
 class SyncRelayError(Exception):
     """Base of every error that a user can cause; its text is shown as it stands."""
 
+    @property
+    def outline(self) -> str:
+        """Its text without anything that stands in the user's file: what anybody may know who asks over HTTP."""
+        return str(self)
+
 
 class TypeImportError(SyncRelayError):
     """A message type that exists by name could not be imported."""
@@ -34,4 +39,16 @@ class ListenError(SyncRelayError):
 
 
 class ReloadError(SyncRelayError):
-    """A file that was read again asks for what a running relay cannot take on."""
+    """A file that was read again asks for what a running relay cannot take on; `changes` are the keys at fault."""
+
+    def __init__(self, text: str, *, changes: str = "") -> None:
+        super().__init__(text, changes)
+        self._text, self._changes = text, changes
+
+    def __str__(self) -> str:
+        return f"{self._text} ({self._changes})" if self._changes else self._text
+
+    @property
+    def outline(self) -> str:
+        """See SyncRelayError."""
+        return self._text

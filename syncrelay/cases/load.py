@@ -127,6 +127,8 @@ class _Reader:
         self._folder = folder
 
     def report(self, path: Place, text: str, *, code: str = "bad_value", span: Span | None = None) -> None:
+        if filled_in := self._document.filled_in(path):
+            text = f"expected another value, found {filled_in}"
         problem = self._document.problem(path, text, code=code, span=span)
         self.problems.append(problem)
         if len(self.problems) == MOST_PROBLEMS:

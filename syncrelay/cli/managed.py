@@ -43,7 +43,7 @@ class Managed:
             self._require(config)
             relay.call(lambda: relay.configure(config)).result()
         except SyncRelayError as error:
-            reason = str(error)
+            reason = error.outline
             relay.call(lambda: relay.refuse_reload(reason)).result()
             raise
         node = relay.node.get_fully_qualified_name()

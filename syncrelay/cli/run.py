@@ -157,11 +157,11 @@ def _reload(relay: "Relay", read: Reading, config_paths: Sequence[str], groups: 
     except SyncRelayError as error:
         refusal = f"{_FAILED if relay.groups else _FAILED_WITHOUT_GROUPS}\n{error}"
         LOGGER.error("%s", refusal)
-        relay.refuse_reload(str(error))
+        relay.refuse_reload(error.outline)
     except Exception as error:  # noqa: BLE001  a file that finds a bug of ours is no reason to end what runs
         refusal = f"{_BUG}\n{''.join(traceback.format_exception(error)).rstrip()}"
         LOGGER.exception("%s", _BUG)
-        relay.refuse_reload(refusal)
+        relay.refuse_reload(f"reload failed because of a bug in syncrelay, {type(error).__name__}; see the relay's log")
     else:
         for each in read.asked:
             each.set_result(changed)

@@ -109,7 +109,8 @@ def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
     needed = -(-max_wait // ticks.period_ns) + _HELD_BESIDE
     if needed > size:
         text = (
-            f"queue_size {size} is too short for this max_wait at {ticks}: up to {needed} messages of an input wait for"
+            f"queue_size {document.filled_in((*group.path, 'queue_size')) or size} is too short for this max_wait at"
+            f" {document.filled_in((*group.path, 'trigger')) or ticks}: up to {needed} messages of an input wait for"
             f" their ticks, write {'`queue_size: ' + str(needed) + '`' if needed <= MOST else 'a shorter max_wait'}"
         )
         path = (*group.path, "queue_size")
@@ -172,4 +173,6 @@ def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:
         text = (
             f"{number} without a unit means {number} s: write {number}ms if you mean milliseconds, otherwise {number}s"
         )
+        if filled_in := document.filled_in(path):
+            text = f"a number without a unit means seconds, give {filled_in} a unit: ms or s"
         yield document.problem(path, text, code="unit", severity=Severity.WARNING)

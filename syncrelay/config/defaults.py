@@ -57,6 +57,7 @@ def merged_documents(documents: Sequence[Document]) -> tuple[Document, list[Prob
         {index: source for document in documents for index, source in document.sources.items()},
         MappingNode(first.root.span, {"groups": Entry(first.root.span, groups)}),
         frozenset(path for document in documents for path in document.faulty),
+        {value: written for document in documents for value, written in document.variables.items()},
     )
     problems: list[Problem] = []
     for document in documents:

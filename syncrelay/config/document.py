@@ -6,7 +6,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 from syncrelay.config.problems import ConfigError, Path, Problem, Severity, Span, dotted
 from syncrelay.config.source import Source
-from syncrelay.config.wording import LIKENESS, nearest, or_nearest
+from syncrelay.config.wording import LIKENESS, FilledIn, nearest, or_nearest, without_value
 from syncrelay.printable import printable
 
 Scalar: TypeAlias = str | int | float | bool | None
@@ -23,12 +23,16 @@ MOST_GUESSES: Final = 1000
 
 @dataclass(slots=True)
 class ScalarNode:
-    """A value. `readable` is false where a problem was reported in its place; a long text has the size of several."""
+    """A value. `readable` is false where a problem was reported in its place; a long text has the size of several.
+
+    `written` is what stands in the file where variables were filled in, else None.
+    """
 
     span: Span
     value: Scalar
     readable: bool = True
     size: int = 1
+    written: str | None = None
 
 
 class Entry(NamedTuple):
@@ -63,12 +67,14 @@ Node: TypeAlias = ScalarNode | MappingNode | SequenceNode
 class Document:
     """The tree of a file, or of several that are read together; `sources` by their index.
 
-    `faulty` are the keys whose values are not known: nothing is said that rests on one.
+    `faulty` are the keys whose values are not known: nothing is said that rests on one. `variables` are those that were
+    filled in, by their values, as the file writes them: problems are shown to more people than may know the values.
     """
 
     sources: Mapping[int, Source]
     root: Node
     faulty: frozenset[Path] = frozenset()
+    variables: Mapping[str, str] = field(default_factory=dict)
     guesses: int = MOST_GUESSES
 
     def nearest(self, word: str, candidates: Iterable[str], *, likeness: float = LIKENESS) -> str | None:
@@ -92,11 +98,34 @@ class Document:
         severity: Severity = Severity.ERROR,
         subject: str = "",
     ) -> Problem:
-        """Return a problem of what stands at a path; it is shown there, or at a span."""
+        """Return a problem of what stands at a path; it is shown there, or at a span.
+
+        Values of variables in its text are replaced by the variables. Where a text quotes parts of a value, ask
+        `filled_in` first.
+        """
         span = span or self.value_span(path)
         return self.sources[span.source].problem(
-            text, code=code, span=span, path=dotted(path), severity=severity, subject=subject
+            self._as_written(text),
+            code=code,
+            span=span,
+            path=dotted(path),
+            severity=severity,
+            subject=self._as_written(subject),
         )
+
+    def filled_in(self, path: Path) -> FilledIn | None:
+        """Return what to say in place of a value that has variables; None where all of it is written in the file."""
+        node = self.find(path)
+        written = node.written if isinstance(node, ScalarNode) else None
+        return None if written is None else FilledIn(written)
+
+    def _as_written(self, text: str) -> str:
+        # The longest first: one value may be a part of another.
+        for value in sorted(self.variables, key=len, reverse=True):
+            # A name that is made absolute loses what it begins with.
+            for part in (value, value.strip("~/")):
+                text = without_value(text, printable(part), self.variables[value])
+        return text
 
     def refuse_other_kind(self, key: str, *, own: str, text: str) -> None:
         """Raise ConfigError for a file of another kind: it has this key and not the one of its own kind."""
@@ -164,6 +193,17 @@ def flow(value: Any) -> str:
             return "null"
         case _:
             return printable(str(value)) or '""'
+
+
+def as_written(node: Node) -> Any:
+    """Return the tree as `plain` does, with variables as the file has them, not filled in."""
+    match node:
+        case ScalarNode():
+            return node.value if node.written is None else node.written
+        case SequenceNode():
+            return tuple(as_written(item) for item in node.items)
+        case MappingNode():
+            return {key: as_written(entry.value) for key, entry in node.entries.items()}
 
 
 def _step(node: Node, step: str | int) -> Node | None:

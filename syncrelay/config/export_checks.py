@@ -94,11 +94,14 @@ class _Sources:
         config = inputs.get(source.topic)
         if config is None:
             close = self.document.nearest(source.topic, inputs)
-            text = f"{quoted(source.topic)} is not an input of the group {self.group.name}{or_nearest(close)}"
+            found = self.document.filled_in(topic) or quoted(source.topic)
+            text = f"{found} is not an input of the group {self.group.name}{or_nearest(close)}"
             yield self.document.problem(topic, text, code="bad_value")
         elif config.type is not None:
             text = self._fault(source, config, wanted)
             if text:
+                if filled_in := self.document.filled_in(field):
+                    text = f"expected a field of {config.type} of another type, found {filled_in}"
                 yield self.document.problem(field, text, code="no_such_field", subject=config.type)
 
     def _fault(self, source: ExportSource, config: TopicConfig, wanted: frozenset[str]) -> str:

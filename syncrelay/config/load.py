@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from syncrelay.config.checks import check_groups, check_node
 from syncrelay.config.defaults import merged_documents, merged_files, with_defaults
-from syncrelay.config.document import Document, flow, plain
+from syncrelay.config.document import Document, as_written, flow, plain
 from syncrelay.config.export import LerobotConfig, resolve_lerobot
 from syncrelay.config.export_checks import check_export
 from syncrelay.config.file import FileKeys, file_format
@@ -54,7 +54,7 @@ class Config:
     def written(self, path: Path) -> str | None:
         """Return the value at a path as it is written there or in `defaults`, on one line; None where it is not."""
         node = self.names.document.find(path)
-        return None if node is None else flow(plain(node))
+        return None if node is None else flow(as_written(node))
 
 
 def load(

@@ -16,6 +16,8 @@ Path: TypeAlias = tuple[str | int, ...]
 
 _PLAIN_KEY = re.compile(r"[A-Za-z_][\w-]*")
 _MOST_SHOWN: Final = 100
+# Of problems by their codes, where the code is no word for it.
+_KINDS: Final = {"yaml": "not valid YAML"}
 _TAB_WIDTH: Final = 4
 # A longer line is cut to a window round its token.
 _LONGEST_LINE: Final = 100
@@ -81,6 +83,19 @@ class ConfigError(SyncRelayError):
 
     def __str__(self) -> str:
         return render(self.problems)
+
+    @property
+    def outline(self) -> str:
+        """Return where the errors are and of which kind, as `fusion.yaml:3:5: unknown key`.
+
+        The file may have become a link to one that only the relay may read.
+        """
+        faults = [each for each in self.problems if each.severity is Severity.ERROR]
+        kinds = (_KINDS.get(each.code, each.code.replace("_", " ")) for each in faults)
+        lines = [f"{where(each)}: {kind}" for each, kind in zip(faults[:_MOST_SHOWN], kinds, strict=False)]
+        unshown = len(faults) - len(lines)
+        lines += [f"... and {unshown} more"] if unshown else []
+        return "\n".join([*lines, "the relay's log says more, and so does `syncrelay validate`"])
 
 
 def render(problems: Sequence[Problem], *, colour: bool = False) -> str:

@@ -92,18 +92,24 @@ def _problem(error: ErrorDetails, path: Path, meant: str | None, document: Docum
             text = f"missing, {form.missing(error['loc'])}"
             return document.problem(path, text, code="missing_key", span=_owner_span(path, document))
         case kind if kind in _EXPECTED:
-            text = f"expected {_EXPECTED[kind]}, {_found(error['input'], kind)}{_rather(error, form)}"
+            found = document.filled_in(path)
+            said = f"{_found(error['input'], kind)}{_rather(error, form)}" if found is None else f"found {found}"
+            text = f"expected {_EXPECTED[kind]}, {said}"
             return document.problem(path, text, code="wrong_type", span=document.value_span(path))
         case kind:
             at_key = error["loc"][-1] == "[key]"
             span = document.key_span(path) if at_key else document.value_span(path)
-            return document.problem(path, _bad_value(error, document), code="bad_value", span=span)
+            return document.problem(path, _bad_value(error, path, document, form), code="bad_value", span=span)
 
 
-def _bad_value(error: ErrorDetails, document: Document) -> str:
-    found = error["input"]
+def _bad_value(error: ErrorDetails, path: Path, document: Document, form: Form) -> str:
+    filled_in = document.filled_in(path)
+    found = error["input"] if filled_in is None else filled_in
     context: dict[str, Any] = error.get("ctx", {})
     match error["type"]:
+        case "value_error" if filled_in is not None:
+            # The error's own words may quote any part of the value.
+            return f"expected {_example(error['loc'], form)}, found {filled_in}"
         case "value_error":
             return str(context["error"])
         case "greater_than_equal":
@@ -115,6 +121,16 @@ def _bad_value(error: ErrorDetails, document: Document) -> str:
             return _no_such_word(found, words, error["loc"], document)
         case _:
             return f"{error['msg'][0].lower()}{error['msg'][1:]}, found {describe(found)}"
+
+
+def _example(loc: Location, form: Form) -> str:
+    """Return what a key takes: one of its examples, or the words of its model."""
+    while loc and (isinstance(loc[-1], int) or loc[-1].startswith("<")):
+        loc = loc[:-1]
+    field = form.model(loc[:-1]).model_fields.get(str(loc[-1])) if loc else None
+    example = ((field.examples if field is not None else None) or [None])[0]
+    example = example[0] if isinstance(example, list) else example
+    return f"a value such as `{example}`" if isinstance(example, str | int | float) else "another value"
 
 
 def _no_such_word(found: object, words: Sequence[str], loc: Location, document: Document) -> str:

@@ -34,6 +34,8 @@ def _check_topic(
         # A package may be installed where the relay runs, and replay needs none.
         severity = Severity.NOTE if code == "package_missing" else Severity.ERROR
         subject = package if code == "package_missing" else type_name
+        if filled_in := document.filled_in(of_type):
+            text, subject = f"this message type is not installed here, or not sourced: {filled_in}", ""
         # Of a type that another group writes it is said there.
         if document.has(of_type):
             yield document.problem(of_type, text, code=code, severity=severity, subject=subject)
@@ -180,6 +182,8 @@ _A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a string o
 def _check_field(type_name: str, field: _AskedField, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
     text = _field_fault(type_name, (), field.steps.split("."), field.wanted, interfaces, document=document)
     if text is not None:
+        if filled_in := document.filled_in(field.path):
+            text = f"expected a field of {type_name} that is {field.wanted.name}, found {filled_in}"
         yield document.problem(field.path, text, code="no_such_field", subject=type_name)
 
 

@@ -1,6 +1,7 @@
 """How errors speak: the nearest word, what a value is, a list of choices."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Final
 
@@ -10,6 +11,29 @@ LIKENESS: Final = 0.6
 """From so much of 1 on a word is taken for another that is misspelt."""
 
 _LONGEST_QUOTE: Final = 60
+_CUT: Final = "…"
+# A shorter value is no secret, and may be part of any word.
+_SHORTEST_VALUE: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class FilledIn:
+    """A value in which variables were filled in, in place of which stands what the file has."""
+
+    written: str
+
+    def __str__(self) -> str:
+        return f"what {quoted(self.written)} stands for"
+
+
+def without_value(text: str, value: str, written: str) -> str:
+    """Return a text with what is `written` in place of a variable's value, be it cut off as `quoted` does."""
+    if len(value) < _SHORTEST_VALUE:
+        return text
+    text = text.replace(value, written)
+    for length in range(min(len(value), _LONGEST_QUOTE), _SHORTEST_VALUE - 1, -1):
+        text = text.replace(value[:length] + _CUT, written + _CUT)
+    return text
 
 
 def nearest(word: str, candidates: Iterable[str], *, likeness: float = LIKENESS) -> str | None:
@@ -36,7 +60,7 @@ def quoted(text: str) -> str:
     # What is cut off is not looked at: a value may be long, and be quoted often.
     line = printable(text[: _LONGEST_QUOTE + 1])
     if len(line) > _LONGEST_QUOTE:
-        line = line[: _LONGEST_QUOTE - 1] + "…"
+        line = line[: _LONGEST_QUOTE - 1] + _CUT
     return f"'{line}'" if "`" in line else f"`{line}`"
 
 
@@ -54,7 +78,7 @@ def describe(value: object) -> str:
         case list() | tuple():
             return "a list"
         case _:
-            return "a mapping"
+            return str(value) if isinstance(value, FilledIn) else "a mapping"
 
 
 def counted(number: int, word: str) -> str:

@@ -24,7 +24,7 @@ from syncrelay.config.document import (
 )
 from syncrelay.config.problems import ConfigError, Path, Problem, Span, dotted
 from syncrelay.config.source import Source
-from syncrelay.config.wording import describe, quoted
+from syncrelay.config.wording import FilledIn, describe, quoted
 from syncrelay.config.yaml_errors import DEEPEST, TOO_DEEP, in_words
 
 LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -71,7 +71,7 @@ def compose(source: Source, environ: Mapping[str, str], *, expected: str) -> tup
         raise ConfigError([source.problem(text, span=span, code="yaml")]) from error
     if composer.root is None or (isinstance(composer.root, ScalarNode) and composer.root.value is None):
         raise ConfigError([source.problem(f"the file is empty, expected {expected}", span=None, code="empty")])
-    return Document({source.index: source}, composer.root), composer.problems
+    return Document({source.index: source}, composer.root, variables=composer.variables), composer.problems
 
 
 @dataclass(slots=True)
@@ -95,6 +95,7 @@ class _Composer:
     def __init__(self, source: Source, environ: Mapping[str, str]) -> None:
         self.root: Node | None = None
         self.problems: list[Problem] = []
+        self.variables: dict[str, str] = {}
         self._source = source
         self._environ = environ
         self._open: list[_Open] = []
@@ -167,7 +168,8 @@ class _Composer:
     def _value(self, event: yaml.ScalarEvent, span: Span) -> ScalarNode:
         try:
             value = self._resolved(event)
-            return ScalarNode(span, value, size=1 + (len(value) // _CHARACTERS if isinstance(value, str) else 0))
+            size = 1 + (len(value) // _CHARACTERS if isinstance(value, str) else 0)
+            return ScalarNode(span, value, size=size, written=event.value if "$" in event.value else None)
         except ValueError as error:
             self._report(str(error), span, code="substitution")
             return ScalarNode(span, None, readable=False)
@@ -176,6 +178,7 @@ class _Composer:
         written: str = event.value
         if "$" in written:
             # Read as if it stood there unquoted: within braces a variable has no other way to be a number.
+            self.variables |= variables_in(written, self._environ)
             text = substitute(written, self._environ)
             return read_plain(text) if text else ""
         return read_plain(written) if event.implicit[0] else written
@@ -219,7 +222,9 @@ class _Composer:
                 for key, entry in source.entries.items():
                     top.merged.setdefault(key, entry)
             elif not isinstance(source, ScalarNode) or source.readable:
-                text = f"expected a mapping such as `*name`, or a list of mappings, found {describe(plain(source))}"
+                written = source.written if isinstance(source, ScalarNode) else None
+                found = plain(source) if written is None else FilledIn(written)
+                text = f"expected a mapping such as `*name`, or a list of mappings, found {describe(found)}"
                 self._report(text, at, code="merge_key")
 
     def _awaits_key(self) -> bool:
@@ -276,6 +281,12 @@ def substitute(text: str, environ: Mapping[str, str]) -> str:
     variable without a default and for what only looks like a variable.
     """
     return _DOLLAR.sub(lambda found: _value(found, environ), text)
+
+
+def variables_in(text: str, environ: Mapping[str, str]) -> dict[str, str]:
+    """Return the values that variables in a text have in the environment, each with what stands for it."""
+    named = ((found["name"], found.group()) for found in _DOLLAR.finditer(text))
+    return {environ[name]: written for name, written in named if name and environ.get(name)}
 
 
 def _value(found: re.Match[str], environ: Mapping[str, str]) -> str:

@@ -270,4 +270,4 @@ def _require_same_node(running: Config, asked: Config) -> None:
     """Raise ReloadError for what a running relay cannot change."""
     for key in needs_restart(running, asked):
         changes = ", ".join(str(each) for each in section_changes(running, asked) if each.key.split(".")[0] == key)
-        raise ReloadError(f"`{key}` cannot change while the relay runs ({changes}): restart it")
+        raise ReloadError(f"`{key}` cannot change while the relay runs: restart it", changes=changes)

@@ -202,7 +202,7 @@ class Relay:
         On the main thread; raises as `Groups.reload`, and ReloadError where a managed node has no groups.
         """
         if self._phase in _WITHOUT_GROUPS:
-            raise ReloadError(self._advice)
+            raise ReloadError(str(self._advice))
         changed = self._groups.reload(config)
         # New groups are to be evaluated at once.
         self._next_evaluation = time.monotonic()
