@@ -1,5 +1,6 @@
-"""What the files and folders of recordings are called. Imports nothing slow."""
+"""What the files, folders and URLs of recordings are called. Imports nothing slow."""
 
+import re
 from pathlib import Path, PurePosixPath
 from typing import Final
 
@@ -11,6 +12,15 @@ METADATA: Final = "metadata.yaml"
 
 COMPRESSED: Final = (".bz2", ".zstd", ".zst", ".gz")
 """What the name of a file that is compressed as a whole ends in."""
+
+
+_SCHEME: Final = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
+
+
+def scheme_of(word: str) -> str:
+    """Return the scheme of a URL in lower case; nothing of what is none."""
+    found = _SCHEME.match(word)
+    return found.group(1).lower() if found else ""
 
 
 def is_recording_name(name: str) -> bool:

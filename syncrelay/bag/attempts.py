@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 from syncrelay.errors import StorageError
+from syncrelay.recording_files import scheme_of
 
 _Done = TypeVar("_Done")
-_SCHEME: Final = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 # A name and a password before the host; a password may hold a slash that should have been %2F.
 _LOGIN: Final = re.compile(r"[^/?#]*@|[^/?#:\[]*:(?!\d*(?:[/?#]|$))[^?#]*@")
 _HOW_LONG: Final = 60.0
@@ -36,12 +36,6 @@ class Patience:
     attempts: int = 5
     first_wait: float = 0.3
     answer_within: float = _HOW_LONG
-
-
-def scheme_of(word: str) -> str:
-    """Return the scheme of a URL in lower case; nothing of what is none."""
-    found = _SCHEME.match(word)
-    return found.group(1).lower() if found else ""
 
 
 def redacted(word: str) -> str:

@@ -7,11 +7,11 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from syncrelay.bag.attempts import Patience, persist, redacted, scheme_of
+from syncrelay.bag.attempts import Patience, persist, redacted
 from syncrelay.bag.names import natural
 from syncrelay.bag.remote_file import RemoteFile
 from syncrelay.errors import BagError, StorageError
-from syncrelay.recording_files import METADATA, is_recording_name
+from syncrelay.recording_files import METADATA, is_recording_name, scheme_of
 
 if TYPE_CHECKING:
     from syncrelay.bag.object_store import ObjectStore

@@ -1,6 +1,6 @@
 """The options of every command that goes over many recordings. Imports nothing slow, as parsers.py says."""
 
-from syncrelay.cli.parser import Parser, count, duration
+from syncrelay.cli.parser import Parser, count, duration, output
 
 
 def add_fleet_options(parser: Parser, *into: str) -> None:
@@ -13,6 +13,7 @@ def add_fleet_options(parser: Parser, *into: str) -> None:
         *(into or ("--into",)),
         dest="into",
         metavar="FOLDER",
+        type=output,
         help="do each recording by itself, with its result in FOLDER, unless it is done; BAG may then be a pattern, a"
         " folder of recordings, a URL, or @FILE that lists them",
     )

@@ -6,7 +6,7 @@ A metavar says what kind of word is expected, and so what completes it (syncrela
 from typing import Final
 
 from syncrelay.cli.boundary import EXIT_CODES
-from syncrelay.cli.parser import Parser, count, folded, positive
+from syncrelay.cli.parser import Parser, count, folded, output, positive
 
 _RELAY_USAGE: Final = "syncrelay --config FILE [option ...] | syncrelay COMMAND ..."
 
@@ -126,7 +126,7 @@ def init() -> Parser:
     source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
     source.add_argument("--from-graph", action="store_true", help="listen to what is being published now")
     parser.add_argument("--seconds", metavar="N", type=positive, help="with --from-graph: listen for N s (10)")
-    parser.add_argument("-o", "--output", metavar="NEW", help="write the file here instead of printing it")
+    parser.add_argument("-o", "--output", metavar="NEW", type=output, help="write the file here instead of printing it")
     return parser
 
 
@@ -171,6 +171,7 @@ def demo() -> Parser:
     parser.add_argument(
         "--record",
         metavar="OUT",
+        type=output,
         help="write what the sensors send in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT"
         " as a rosbag2 folder",
     )
@@ -224,7 +225,9 @@ def observe() -> Parser:
     )
     parser.add_argument("--seconds", metavar="N", type=positive, help="end after N s, and print text only")
     parser.add_argument("--json", action="store_true", help="print JSON at the end, for programs")
-    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
+    parser.add_argument(
+        "--write", metavar="NEW", type=output, help="write the file with the suggested values; keeps its comments"
+    )
     parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
     return parser
 

@@ -1,7 +1,7 @@
 """The words that the commands on recordings take; see parsers.py."""
 
 from syncrelay.cli.fleet_options import add_fleet_options
-from syncrelay.cli.parser import Parser, seed
+from syncrelay.cli.parser import Parser, output, seed
 
 
 def analyze() -> Parser:
@@ -19,8 +19,12 @@ def analyze() -> Parser:
         "more", metavar="BAG|TOPIC", nargs="*", help="more recordings; topics to match, if there is no file yet"
     )
     parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
-    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
-    parser.add_argument("--html", metavar="REPORT", help="write a report with charts: one HTML file, opens offline")
+    parser.add_argument(
+        "--write", metavar="NEW", type=output, help="write the file with the suggested values; keeps its comments"
+    )
+    parser.add_argument(
+        "--html", metavar="REPORT", type=output, help="write a report with charts: one HTML file, opens offline"
+    )
     parser.add_argument(
         "--json", action="store_true", help="print all figures as JSON; of several recordings, each in one line"
     )
@@ -57,7 +61,11 @@ def replay() -> Parser:
         help="the file with the groups, or a directory of files; may be repeated",
     )
     parser.add_argument(
-        "-o", "--output", metavar="OUT", help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder"
+        "-o",
+        "--output",
+        metavar="OUT",
+        type=output,
+        help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder",
     )
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
     parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")

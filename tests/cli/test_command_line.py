@@ -255,3 +255,49 @@ def test_the_signals_of_the_relay_are_taken_before_anything_slow_is_imported(tmp
     )
     done = run_python("-c", script, folder=tmp_path)
     assert set(done.stdout.split()) <= {"syncrelay", "collections"}
+
+
+# What options take: of a new one it has to be said here whether it is written.
+_WRITTEN = {"OUT", "FOLDER", "NEW", "REPORT"}
+_OTHERS = {
+    *(
+        "BAG",
+        "DURATION",
+        "ENGINE",
+        "FAULT",
+        "FILE",
+        "FORMAT",
+        "LEVEL",
+        "N",
+        "NAME",
+        "PATTERN",
+        "REASON",
+        "TOPIC",
+        "URL",
+    ),
+    "TOPIC:FIELD,...",
+}
+_OUTPUTS = [
+    (command, option)
+    for command in COMMANDS
+    for action in COMMANDS[command].parser().actions
+    if action.metavar in _WRITTEN
+    for option in action.option_strings
+]
+
+
+def test_of_every_option_that_takes_a_value_it_is_known_whether_it_is_written():
+    options = [action for each in COMMANDS.values() for action in each.parser().actions if action.option_strings]
+    assert {str(action.metavar) for action in options if action.metavar is not None} <= _WRITTEN | _OTHERS
+    assert len(_OUTPUTS) >= 12
+
+
+@pytest.mark.parametrize("url", ["s3://bucket/x", "GS://bucket/x.mcap", "https://key:secret@host/x", "file:///x"])
+@pytest.mark.parametrize(("command", "option"), _OUTPUTS)
+def test_an_output_that_is_a_url_is_refused_and_nothing_is_written(command, option, url, tmp_path):
+    done = run_here(command, option, url, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    scheme = url.partition("://")[0].lower()
+    assert f"expected a file or a folder of this machine, found a URL ({scheme}://): write it here" in done.stderr
+    assert "secret" not in done.stderr
+    assert not list(tmp_path.iterdir())
