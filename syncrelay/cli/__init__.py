@@ -4,16 +4,24 @@ import os
 import sys
 from collections.abc import Sequence
 
-from syncrelay.cli.stop import StopRequest, release_signals
+from syncrelay.cli.stop import TERMINATED, StopRequest, Termination, release_signals
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; arguments default to those of the process."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     _open_closed_streams()
+    if not _runs_until_stopped(words):
+        code = TERMINATED
+        with Termination() as termination:
+            code = _run(words, StopRequest())
+        return TERMINATED if termination.came else code
     stop = StopRequest()
-    if _runs_until_stopped(words):
-        stop.install()
+    stop.install()
+    return _run(words, stop)
+
+
+def _run(words: Sequence[str], stop: StopRequest) -> int:
     release_signals()
     # No model of ours has a use for them, and to find that there are none takes a look at every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")

@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Callable, Mapping
 from typing import Final, TextIO
 
+from syncrelay.cli.stop import TERMINATED, Terminated
 from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
 from syncrelay.printable import one_entry, printable_lines
 
@@ -26,7 +27,8 @@ EXIT_CODES: Final[Mapping[int, str]] = {
     USAGE: "wrong usage",
     UNAVAILABLE: "ROS or a package cannot be used",
     OUR_BUG: "a bug",
-    INTERRUPTED: "interrupted (a relay: by a 2nd Ctrl-C)",
+    INTERRUPTED: "interrupted",
+    TERMINATED: "ended by SIGTERM",
 }
 """What help and docs/reference/command_line.md say of them."""
 
@@ -63,8 +65,8 @@ def _guarded(command: Callable[[], int]) -> int:
     except SyncRelayError as error:
         _tell(error)
         return _code(error)
-    except KeyboardInterrupt:
-        return INTERRUPTED
+    except (KeyboardInterrupt, Terminated) as ended:
+        return TERMINATED if isinstance(ended, Terminated) else INTERRUPTED
     except BrokenPipeError:
         # Who read us has seen enough.
         _abandon(sys.stdout)

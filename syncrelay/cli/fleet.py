@@ -14,6 +14,7 @@ from typing import Any, Final, Self, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, OUR_BUG, put, remark, say
 from syncrelay.cli.parser import Parser
+from syncrelay.cli.stop import TERMINATED
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
 from syncrelay.fleet.engine import Engine, Finished
@@ -85,7 +86,7 @@ def do_on_many(
             remark(f"ended by {stop.asked.name}: {shown.left()}; the same command does the rest")
             if stop.asked is signal.SIGINT:
                 raise KeyboardInterrupt
-            return DONE
+            return TERMINATED
     if finish is None:
         put(summary)
     return code

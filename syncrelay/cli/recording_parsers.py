@@ -12,7 +12,7 @@ def analyze() -> Parser:
         description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
         "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
         "Each of several recordings is measured by itself, on all cores. "
-        "Exit code 1 if a recording lacks a required topic, or part of it is missing or cannot be read.",
+        "Exit code 1 if a required topic, or part of a recording, is missing.",
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
     parser.add_argument(
@@ -44,8 +44,8 @@ def replay() -> Parser:
         "syncrelay replay",
         example="syncrelay replay drive.mcap --config fusion.yaml -o sets.mcap",
         description="Runs the groups of a file on a recording, without ROS, and says what became of every message. "
-        "The sets are those that the relay would have published. Exit code 1 if the recording lacks a required topic, "
-        "or part of it is missing or cannot be read.",
+        "The sets are those that the relay would have published. Exit code 1 if a required topic, or part of "
+        "the recording, is missing.",
     )
     parser.add_argument(
         "bags",

@@ -87,6 +87,7 @@ def _work(work: Work, parent: int, out: int, err: int) -> NoReturn:
     code = OUR_BUG
     try:
         signal.signal(signal.SIGINT, _interrupt_once)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         _end_with(parent)
         os.dup2(out, 1)
         os.dup2(err, 2)

@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM ask for an orderly end, SIGHUP to read the file again.
+"""SIGINT and SIGTERM ask a relay for an orderly end, SIGHUP to read the file again; SIGTERM ends other commands.
 
 Imports nothing slow: the signals must be in hand before anything else is imported.
 """
@@ -17,6 +17,9 @@ _FLAGS_AT = 8 + 128
 _SA_RESETHAND = 0x80000000
 # What a shell says of a process that a signal ended, added to the signal's number.
 _ENDED_BY = 128
+TERMINATED = _ENDED_BY + signal.SIGTERM
+"""The exit code of a command that SIGTERM ended."""
+
 # `systemctl stop` and `timeout` signal all processes of a launch, and launch then signals its nodes once more, which it
 # also does after Ctrl-C where it has no terminal: what comes within a second is one request.
 _ONE_REQUEST_S = 1.0
@@ -28,6 +31,35 @@ def release_signals() -> None:
     The image's entry point blocks them: PID 1 would lose what comes before Python has a handler.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+
+
+class Terminated(BaseException):
+    """SIGTERM came, and work is undone. No Exception: what catches those is not to swallow it."""
+
+
+class Termination:
+    """Has SIGTERM end a command that ends by itself, with what it has begun cleared away; a context manager.
+
+    A second SIGTERM ends the process at once.
+    """
+
+    def __init__(self) -> None:
+        self.came = False
+        """Also where what was raised did not get through, as out of a library's callback."""
+
+    def __enter__(self) -> "Termination":  # noqa: PYI034  typing is not imported before the signals are in hand
+        self._former = signal.signal(signal.SIGTERM, self._end)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_error: object) -> bool:
+        signal.signal(signal.SIGTERM, self._former)
+        return kind is Terminated
+
+    def _end(self, number: int, _frame: FrameType | None) -> None:
+        if self.came:
+            os._exit(_ENDED_BY + number)
+        self.came = True
+        raise Terminated
 
 
 class StopRequest:

@@ -26,7 +26,7 @@ from argparse import Namespace
 from syncrelay.cli.boundary import guarded
 from syncrelay.cli.fleet import do_on_many
 from tests.fleet.tasks import Obedient
-options = Namespace(into="out", engine="local", jobs=2, strict=False, overwrite=False)
+options = Namespace(into="out", engine="local", jobs=2, strict=False, overwrite=False, time_limit=None)
 sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[1:], options)))
 """
 
@@ -74,7 +74,7 @@ def at_work(folder):
             command.kill()
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_it_in_order(number, code, tmp_path):
     with at_work(tmp_path) as (command, workers):
         command.send_signal(number)

@@ -115,7 +115,7 @@ print(code, told)
     ("number", "code", "told"),
     [
         (signal.SIGINT, 130, "ended by SIGINT: 1 recording: 1 not done"),
-        (signal.SIGTERM, 0, "ended by SIGTERM: 1 recording: 1 not done"),
+        (signal.SIGTERM, 143, "ended by SIGTERM: 1 recording: 1 not done"),
         (signal.SIGKILL, -9, ""),
     ],
 )
