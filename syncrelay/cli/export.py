@@ -27,7 +27,7 @@ from syncrelay.datasets.reading import SetsOf, resolved
 from syncrelay.datasets.tables import Content
 from syncrelay.errors import BagError, UsageError
 from syncrelay.fleet.stretched import InStretches, Place
-from syncrelay.fleet.task import JSON, Source, fingerprint_of, text_of
+from syncrelay.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
 
 # Below, reading what leads in would take all the time.
 _SHORTEST_NS: Final = 1_000_000_000
@@ -84,7 +84,12 @@ class ParquetTask:
             "raw": content.raw,
             "stretch_ns": stretch_ns,
         }
-        return cls(config, content, stretch_ns, fingerprint_of("export", config=text_of(config), options=options))
+        return cls(
+            config,
+            content,
+            stretch_ns,
+            fingerprint_of("export", config=what_decides_sets(config.groups), options=options),
+        )
 
     def fingerprint(self) -> str:
         """See Task."""
@@ -97,7 +102,7 @@ class ParquetTask:
             replay = Replay(recording, bindings, listeners=sets.listeners)
             write_parquet(sets, replay.steps(), folder, ending=SUFFIX if self.stretch_ns is None else _ending(1))
             results = replay.results()
-            facts = about(recording, bindings, more=[*sets.faults(), *few_sets(recording, bindings, results)])
+            facts = {**about(recording, bindings, more=sets.faults()), **few_sets(recording, bindings, results)}
             return {**facts, "groups": [counts_of(result) for result in results]}
 
     def cut(self, source: Source) -> tuple[Sequence[Stretch], dict[str, JSON]]:

@@ -18,7 +18,7 @@ from syncrelay.datasets.lerobot import join_episodes, lerobot_of, write_episode
 from syncrelay.errors import SyncRelayError
 from syncrelay.fleet.ledger import State
 from syncrelay.fleet.run import Run
-from syncrelay.fleet.task import JSON, Source, fingerprint_of, text_of
+from syncrelay.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
 from syncrelay.fleet.work import SCRATCH
 from syncrelay.printable import printable
 
@@ -55,8 +55,10 @@ class LerobotTask:
     @classmethod
     def of(cls, config: Config) -> Self:
         """Return the task of a file; raises UsageError where it says nothing of LeRobot."""
-        lerobot_of(config)
-        return cls(config, fingerprint_of("export", config=text_of(config), options={"format": "lerobot"}))
+        lerobot = lerobot_of(config)
+        chosen = [group for group in config.groups if group.name == lerobot.group]
+        options: dict[str, JSON] = {"format": "lerobot", "lerobot": repr(lerobot)}
+        return cls(config, fingerprint_of("export", config=what_decides_sets(chosen), options=options))
 
     def fingerprint(self) -> str:
         """See Task."""

@@ -22,7 +22,7 @@ from syncrelay.fleet.local import LocalEngine
 from syncrelay.fleet.progress import Progress
 from syncrelay.fleet.recordings import find_sources
 from syncrelay.fleet.run import Others, Run
-from syncrelay.fleet.task import PROBLEMS, Source, Task
+from syncrelay.fleet.task import NOTES, PROBLEMS, Source, Task
 from syncrelay.fleet.work import Failed, Job
 from syncrelay.printable import printable
 
@@ -116,19 +116,19 @@ def _tell(finished: Finished, run: Run, shown: "_Shown") -> int:
         if outcome.ends_all:
             raise SyncRelayError(f"ended: {shown.left()}")
         return AT_FAULT
-    problems = _problems(run, job)
+    problems = _told(run, job, PROBLEMS)
     shown.faulty += bool(problems)
-    for problem in problems:
+    for sentence in [*problems, *_told(run, job, NOTES)]:
         shown.clear()
         name = job.source.shown[0]
         # What is wrong with a file of it is said with the file's name.
-        remark(problem if problem.startswith(name) else f"{name}: {problem}")
+        remark(sentence if sentence.startswith(name) else f"{name}: {sentence}")
     return AT_FAULT if problems else DONE
 
 
-def _problems(run: Run, job: Job) -> list[str]:
+def _told(run: Run, job: Job, fact: str) -> list[str]:
     entry = run.entry(job)
-    found = entry.facts.get(PROBLEMS) if entry is not None else None
+    found = entry.facts.get(fact) if entry is not None else None
     return [str(each) for each in found] if isinstance(found, list) else []
 
 

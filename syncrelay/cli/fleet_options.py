@@ -32,4 +32,4 @@ def add_fleet_options(parser: Parser, *into: str) -> None:
         help="give up a recording that takes longer, such as 90min; default: 10 min and 10 s for each MB of it",
     )
     add("--strict", action="store_true", help="end at the first recording that is at fault")
-    add("--overwrite", action="store_true", help="replace results of another file, version or options")
+    add("--overwrite", action="store_true", help="replace results of other values, another version or options")

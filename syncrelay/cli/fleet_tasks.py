@@ -22,7 +22,7 @@ from syncrelay.cli.inventory import inventory_as_json
 from syncrelay.cli.reading import eased_collector
 from syncrelay.config import Config, load_text
 from syncrelay.fleet.documents import ANALYSIS
-from syncrelay.fleet.task import JSON, PROBLEMS, Source, fingerprint_of, text_of
+from syncrelay.fleet.task import JSON, NOTES, PROBLEMS, Source, fingerprint_of, what_decides_outputs, what_decides_sets
 from syncrelay.rig.what_if import Fault
 
 SETS: Final = "sets.mcap"
@@ -42,7 +42,9 @@ class ReplayTask:
     def of(cls, config: Config, what_if: tuple[Fault, ...], seed: int) -> Self:
         """Return the task of a file, with faults laid over each recording whose chance is that of `seed`."""
         options: dict[str, JSON] = {"what_if": [fault.written for fault in what_if], "seed": seed if what_if else 0}
-        return cls(config, what_if, seed, fingerprint_of("replay", config=text_of(config), options=options))
+        return cls(
+            config, what_if, seed, fingerprint_of("replay", config=what_decides_outputs(config.groups), options=options)
+        )
 
     def fingerprint(self) -> str:
         """See Task."""
@@ -58,9 +60,9 @@ class ReplayTask:
                 for binding in bindings:
                     writer.begin(binding)
                 results = replay_groups(recording, bindings, listeners=[writer.take])
-            few = [] if self.what_if else few_sets(recording, bindings, results)
             return {
-                **about(recording, bindings, more=few),
+                **about(recording, bindings),
+                **({} if self.what_if else few_sets(recording, bindings, results)),
                 "messages": writer.messages,
                 "groups": [counts_of(result) for result in results],
             }
@@ -76,7 +78,8 @@ class AnalyzeTask:
     @classmethod
     def of(cls, asked: Asked) -> Self:
         """Return the task of what is asked of each recording."""
-        config = "" if asked.text is None else text_of(load_text(asked.text, name=asked.config or "<text>"))
+        file = None if asked.text is None else load_text(asked.text, name=asked.config or "<text>")
+        config = "" if file is None else what_decides_sets(file.groups)
         return cls(asked, fingerprint_of("analyze", config=config, options={"topics": list(asked.topics)}))
 
     def fingerprint(self) -> str:
@@ -114,14 +117,15 @@ def about(recording: Recording, bindings: Sequence[GroupBinding], *, more: Seque
     return {**facts, PROBLEMS: problems} if problems else facts
 
 
-def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Sequence[GroupResult]) -> list[str]:
-    """Say of each group whose inputs are all there, and that gave few of the possible sets, what costs the others."""
+def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Sequence[GroupResult]) -> dict[str, JSON]:
+    """Return notes: of each group that is complete and gave few of the possible sets, what costs the others."""
     found = [
         why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
         for binding, result in zip(bindings, results, strict=True)
         if binding.is_complete
     ]
-    return [sentence for sentence in found if sentence is not None]
+    notes: list[JSON] = [sentence for sentence in found if sentence is not None]
+    return {NOTES: notes} if notes else {}
 
 
 def counts_of(result: GroupResult) -> dict[str, JSON]:

@@ -14,7 +14,7 @@ from typing import Any, Final, Self
 from syncrelay.errors import SyncRelayError
 from syncrelay.fleet.content import ResultFile, sync_folder
 from syncrelay.fleet.recordings import is_result_name
-from syncrelay.fleet.task import JSON, PROBLEMS
+from syncrelay.fleet.task import JSON, NOTES, PROBLEMS
 
 LEDGER: Final = "ledger.jsonl"
 _HEAD: Final = b'{"syncrelay_ledger": 1}\n'
@@ -59,7 +59,7 @@ class Ledger:
         """
         self.folder = folder
         self.entries: dict[str, Entry] = {}
-        """The last entry of each name; of its facts only PROBLEMS, as there may be very many."""
+        """The last entry of each name; of its facts only PROBLEMS and NOTES, as there may be very many."""
         self.unreadable = 0
         """How many lines told nothing."""
         try:
@@ -130,7 +130,7 @@ class Ledger:
                 self._keep(entry)
 
     def _keep(self, entry: Entry) -> None:
-        facts = {name: fact for name, fact in entry.facts.items() if name == PROBLEMS}
+        facts = {name: fact for name, fact in entry.facts.items() if name in (PROBLEMS, NOTES)}
         self.entries[entry.name] = replace(entry, facts=facts)
 
     def _content(self) -> bytes:

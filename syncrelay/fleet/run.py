@@ -134,7 +134,11 @@ class Run:
 def _refusal(folder: Path, theirs: str, ours: str) -> str:
     """Say what gave the results that are there, by the lines of fingerprint_of."""
     (command, *its), (own, *mine) = theirs.split() or [""], ours.split()
-    parts = {"version": "another version of syncrelay", "config": "another file", "options": "other options"}
+    parts = {
+        "version": "another version of syncrelay",
+        "config": "a file with other values",
+        "options": "other options",
+    }
     differing = [word.partition(":")[0] for word in mine if word not in its]
     what = " and ".join(parts.get(each, each) for each in differing) if command == own else f"`syncrelay {command}`"
     return (

@@ -1,22 +1,28 @@
 """What is done to each recording of many, and to which: the interface between a command and the fleet."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
 from hashlib import blake2b
 from pathlib import Path
 from typing import Final, Protocol, TypeAlias
 
 from syncrelay import own_version
 from syncrelay.bag.attempts import redacted
-from syncrelay.config import Config
-from syncrelay.config.document import plain
+from syncrelay.config import GroupConfig
 
 JSON: TypeAlias = "dict[str, JSON] | list[JSON] | str | int | float | bool | None"
 """What json.dumps takes."""
 
 PROBLEMS: Final = "problems"
 """The fact that lists, in sentences, what is wrong with a recording that was done all the same; the exit code is 1."""
+
+NOTES: Final = "notes"
+"""The fact that lists, in sentences, what its user should know of a recording that was done, and that is not wrong."""
+
+# Options that decide no set: what of them does is resolved, and beside them.
+_NOT_OF_SETS: Final = frozenset({"topics", "trigger", "restamp", "output_prefix", "lazy", "manifest"})
+_NOT_OF_INPUTS: Final = frozenset({"output", "qos"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +56,45 @@ class Task(Protocol):
         ...
 
 
-def text_of(config: Config) -> str:
-    """Return what the files of a configuration say: their text, and all values with environment variables filled in."""
-    return json.dumps([*(source.text for source in config.sources), plain(config.names.document.root)], default=str)
+def what_decides_sets(groups: Iterable[GroupConfig]) -> str:
+    """Return what of groups decides which sets a recording gives them: all their values but those named here.
+
+    How a file is written is none of it: comments, order, units, where a value comes from.
+    """
+    return _as_text(_of_sets(group) for group in groups)
+
+
+def what_decides_outputs(groups: Iterable[GroupConfig]) -> str:
+    """Return what of groups decides the topics that a relay publishes of a recording: their sets, names and QoS."""
+    return _as_text(
+        [
+            _of_sets(group),
+            [(group.inputs.node.absolute(each.output), each.qos) for each in group.topics],
+            group.options.manifest and group.inputs.node.absolute("~"),
+        ]
+        for group in groups
+    )
+
+
+def _of_sets(group: GroupConfig) -> dict[str, object]:
+    options = {name: value for name, value in group.options if name not in _NOT_OF_SETS}
+    topics = [
+        {field.name: getattr(topic, field.name) for field in fields(topic) if field.name not in _NOT_OF_INPUTS}
+        for topic in group.topics
+    ]
+    resolved = (group.inputs.names, group.restamp, group.trigger, group.ticks)
+    return {"name": group.name, "options": options, "topics": topics, "resolved": resolved}
+
+
+def _as_text(values: Iterable[object]) -> str:
+    return json.dumps([*values], sort_keys=True, default=repr)
 
 
 def fingerprint_of(command: str, *, config: str, options: Mapping[str, JSON]) -> str:
-    """Return a line of what decides a command's result: its name, syncrelay's version, the file's text, its options.
+    """Return a line of what decides a command's result: its name, syncrelay's version, the file's values, its options.
 
-    `config` is what text_of gives, `options` what else changes the result: not where it goes, nor how fast. Two
-    lines are equal if all of these are; the words of a line tell which one differs.
+    `config` is what one of the functions above gives, `options` what else changes the result: not where it goes, nor
+    how fast. Two lines are equal if all of these are; the words of a line tell which one differs.
     """
     written = json.dumps(options, sort_keys=True)
     return f"{command} version:{own_version()} config:{_short(config)} options:{_short(written)}"
