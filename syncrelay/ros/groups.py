@@ -246,7 +246,8 @@ class Groups:
         self._loop.call(self._flush_jump)
 
     def _flush_jump(self) -> None:
-        _LOG.warning("the clock jumped back; buffered messages were dropped as time_jump")
+        # A recording that is played in a loop does this each time.
+        _LOG.info("the clock jumped back, as in a looped recording; buffered messages were dropped as time_jump")
         self.flush(DropReason.TIME_JUMP)
 
     def clock_ticked(self) -> None:

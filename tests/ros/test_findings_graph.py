@@ -1,5 +1,6 @@
 """A working rig, broken where the graph shows it: the relay's log and its state say what is wrong."""
 
+import re
 import signal
 from collections.abc import Iterator
 from typing import Any
@@ -195,3 +196,19 @@ def test_nobody_is_missed_before_those_who_run_had_time_to_be_found(stage: Stage
     wait_until(nobody_is_found, "a finding that nobody is there")
     assert said["starting"] < 3.5
     assert min(said.get("alone", 99), said.get("no_publisher", 99)) > 3.5
+
+
+def test_a_recording_that_is_looped_is_no_warning_at_each_loop(stage: Stage):
+    relay = stage.relay(front(top={"node": {"use_sim_time": True}}))
+    once = merged(stream("/camera", hz=20, last_ms=3000), stream("/lidar", hz=10, last_ms=3000))
+    ticks = [
+        Frame("/clock", CLOCK, each, serialize(CLOCK, time(each))) for each in range(BEGIN, BEGIN + 3000 * MS, 20 * MS)
+    ]
+    player = stage.player({"/camera": VECTOR, "/lidar": VECTOR, "/clock": CLOCK})
+    player.match()
+    for _ in range(4):
+        player.play(merged(once, ticks), speed=1)
+    relay.wait_for_log("the clock jumped back")
+    assert not re.findall(r"\[WARN\].*(?:jump|back).*", relay.stderr)
+    said = findings(relay)
+    assert {each["severity"] for each in said.values() if each["code"] == "time_jump"} <= {"ok"}
