@@ -13,8 +13,8 @@ _SAID_AS = {
     (Severity.OK,): _OK,
     (Severity.WARN,): _WARN,
     (Severity.ERROR,): _ERROR,
-    (Severity.WARN, Severity.ERROR): f"{_ERROR} where it keeps sets from leaving, otherwise {_WARN}",
     (Severity.OK, Severity.WARN): f"{_OK} or {_WARN}",
+    (Severity.WARN, Severity.ERROR): f"{_ERROR} where it keeps sets from leaving, otherwise {_WARN}",
     tuple(Severity): f"{_OK}, {_WARN} or {_ERROR}",
 }
 

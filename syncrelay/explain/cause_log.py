@@ -37,11 +37,12 @@ class Line(NamedTuple):
 
 
 class _Cause(NamedTuple):
-    """A code, and whose it is: the node's that publishes, the relay's if that is empty; a group's if one is named."""
+    """A code, and whose it is: a node's, a group's, that of topics which may have other names, else the relay's."""
 
     code: Code | None
-    node: str
+    node: str = ""
     group: str = ""
+    misnamed: tuple[str, ...] = ()
 
 
 class _Found(NamedTuple):
@@ -150,16 +151,18 @@ class CauseLog:
     def _topics_by_cause(self, facts: GroupFacts, finding: Finding) -> Mapping[_Cause, tuple[str, ...]]:
         """Return the causes of a finding, with the topics that it is about."""
         if not finding.about and finding.code in OF_RELAY:
-            return {_Cause(finding.code, ""): ()}
+            return {_Cause(finding.code): ()}
         if not finding.about or finding.code not in OF_PUBLISHER:
-            return {_Cause(finding.code, "", facts.name): tuple(facts.inputs[index].name for index in finding.about)}
+            return {_Cause(finding.code, group=facts.name): tuple(facts.inputs[index].name for index in finding.about)}
         topics = [facts.inputs[index].name for index in finding.about]
         nodes = [self._published_by.get(topic, "") for topic in topics]
         if len(set(nodes)) > 1 and finding.code is Code.SILENT and self._is_all_silent():
-            return {_Cause(finding.code, ""): tuple(topics)}
+            return {_Cause(finding.code): tuple(topics)}
         by_cause: dict[_Cause, tuple[str, ...]] = {}
         for topic, node in zip(topics, nodes, strict=True):
-            cause = _Cause(finding.code, node)
+            # What is suggested for one topic is not for others.
+            is_misnamed = not node and any(facts.inputs[index].graph.alike for index in finding.about)
+            cause = _Cause(finding.code, node, misnamed=tuple(topics) if is_misnamed else ())
             by_cause[cause] = (*by_cause.get(cause, ()), topic)
         return by_cause
 
@@ -204,7 +207,7 @@ class CauseLog:
             _Found(facts, finding, topics)
             for facts, findings in self._found.values()
             for finding in findings
-            if finding.code is cause.code and finding.severity is not Severity.OK
+            if finding.code is cause.code and finding.severity is not Severity.OK and not finding.is_over
             for each, topics in self._topics_by_cause(facts, finding).items()
             if each == cause
         ]
@@ -235,8 +238,8 @@ class CauseLog:
         if remark.findings:
             causes = [cause for each in remark.findings for cause in self._topics_by_cause(facts, each)]
         else:
-            causes = [self._silenced_by.pop(group, _Cause(None, "", group))]
-        key = next(((cause, remark.code) for cause in causes), (_Cause(None, "", group), remark.code))
+            causes = [self._silenced_by.pop(group, _Cause(None, group=group))]
+        key = next(((cause, remark.code) for cause in causes), (_Cause(None, group=group), remark.code))
         for (cause, code), hit in self._hit.items():
             if code is remark.code and (code is None or cause in causes):
                 hit.discard(group)
@@ -264,17 +267,16 @@ def _listed(names: Sequence[str]) -> str:
 
 def _text(cause: _Cause, found: Sequence[_Found], hit: Sequence[GroupFacts]) -> str:
     """Say what is so, in the words of the group that it is worst for, and what is not in these."""
-    first = found[0].finding
+    first, own = found[0].finding, found[0].topics
     text, said = first.text, f"{first.text} {first.suggestion}"
-    topics = dict.fromkeys(topic for each in found for topic in each.topics)
-    others = [topic for topic in topics if not _names(text, topic)]
-    is_of_all = first.input is None and len(others) == len(topics)
-    if others and not is_of_all:
+    others = [topic for topic in dict.fromkeys(each for one in found for each in one.topics) if topic not in own]
+    is_shared = bool(others) or len(hit) > 1
+    if others:
         text += f"; the same holds for {_listed(others)}"
-    elif others and len(hit) > 1:
-        text += f": {_listed(others)}"
-    if cause.node and not _names(said, cause.node) and (others or len(hit) > 1):
-        text += f"; {cause.node} published {'them' if len(topics) > 1 else 'it'}"
+    elif is_shared and len(own) > 1 and not any(_names(text, topic) for topic in own):
+        text += f": {_listed(own)}"
+    if is_shared and cause.node and not _names(said, cause.node):
+        text += f"; {cause.node} published {'them' if others or len(own) > 1 else 'it'}"
     text = f"{text}; {first.suggestion}" if first.suggestion else text
     silent = [each for each in hit if each.is_silent]
     if not silent:

@@ -15,6 +15,8 @@ class Severity(IntEnum):
 _OK: Final = (Severity.OK,)
 _WARN: Final = (Severity.WARN,)
 _ERROR: Final = (Severity.ERROR,)
+_OK_OR_WARN: Final = (Severity.OK, Severity.WARN)
+_ANY: Final = tuple(Severity)
 _WARN_OR_ERROR: Final = (Severity.WARN, Severity.ERROR)
 
 
@@ -106,8 +108,9 @@ class Code(Enum):
     )
     NO_PUBLISHER = _Kind(
         "no_publisher",
-        _WARN_OR_ERROR,
-        "Nobody publishes a topic, or nobody any more.",
+        _ANY,
+        "Nobody publishes a topic, or nobody any more. Nothing to mend once that of an optional input has lasted for a"
+        " minute.",
         "Start the node that publishes it, or correct the topic's name: a topic of that type (of any, where the file"
         " has none) and a similar name is suggested, or the namespace in which all that are missing are published.",
     )
@@ -143,8 +146,9 @@ class Code(Enum):
     )
     SILENT = _Kind(
         "silent",
-        _WARN_OR_ERROR,
-        "A publisher is there, and sends nothing, or nothing any more; all inputs at once are one finding.",
+        _ANY,
+        "A publisher is there, and sends nothing, or nothing any more; all inputs at once are one finding. Nothing to"
+        " mend once that of an optional input has lasted for a minute.",
         "Check with `ros2 topic hz TOPIC` whether the publisher is sending; if so, run"
         " `syncrelay doctor --config FILE --live`. A node that was killed stays in the graph for 20 s.",
     )
@@ -209,7 +213,7 @@ class Code(Enum):
     )
     TIME_JUMP = _Kind(
         "time_jump",
-        (Severity.OK, *_WARN_OR_ERROR),
+        _ANY,
         "Stamps jumped back, as those of a looped recording do, and matching restarted: nothing to mend. Worse than ok"
         " if they jump back and forth.",
         "If they jump back and forth, check whether the publisher stamps by two clocks, or two nodes publish the"
@@ -236,7 +240,7 @@ class Code(Enum):
     )
     WAITING_FOR_OPTIONAL = _Kind(
         "waiting_for_optional",
-        _WARN,
+        _OK_OR_WARN,
         "Sets leave without an optional input; why, where that was seen: it is silent, arrives too late, or its stamps"
         " fit no set.",
         "Check the publisher, or write what is suggested: a `max_wait`, a `slop` or an `offset` that was tried.",

@@ -127,7 +127,12 @@ class FindingLog:
         self, facts: GroupFacts, findings: tuple[Finding, ...], explained: Collection[Code], now: int
     ) -> Iterator[Remark]:
         for finding in findings:
-            if finding.severity is Severity.OK or finding.is_over or finding.code in _TOLD_ELSEWHERE:
+            if finding.severity is Severity.OK:
+                # No longer worth a warning is not over.
+                if (known := self._warned.get((finding.code, finding.input))) is not None:
+                    known.seen = now
+                continue
+            if finding.is_over or finding.code in _TOLD_ELSEWHERE:
                 continue
             warning = self._warned.setdefault((finding.code, finding.input), _Warning(finding, now))
             warning.see(finding, now)

@@ -8,6 +8,8 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 
 SECOND: Final = 1_000_000_000
+# What has been away for so long was said, and is no news.
+_USUAL: Final = 60 * SECOND
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,13 @@ def of_each_input(rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:
 def blocks(facts: GroupFacts, an_input: InputFacts) -> Severity:
     """Return how bad it is that an input gives nothing."""
     return Severity.ERROR if an_input.required and facts.is_silent else Severity.WARN
+
+
+def absence(facts: GroupFacts, an_input: InputFacts) -> Severity:
+    """Return how bad it is that an input is away: a minute later, a group without an optional one is as usual."""
+    away = facts.figures.now - max(facts.figures.began, an_input.figures.last_received or 0)
+    is_usual = not an_input.required and not facts.is_recorded and away >= _USUAL
+    return Severity.OK if is_usual else blocks(facts, an_input)
 
 
 def counted(count: int, fed: int) -> str:

@@ -7,7 +7,7 @@ from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
-from syncrelay.explain.findings import SECOND, Finding, Found, blocks
+from syncrelay.explain.findings import SECOND, Finding, Found, absence, blocks
 
 _NO_MESSAGE: Final = 5 * SECOND
 # Fast DDS's lease: for so long one that was killed is still in the graph.
@@ -157,7 +157,7 @@ def no_publisher(facts: GroupFacts) -> Found:
 
 
 def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: tuple[str, str]) -> Finding:
-    severity = max(blocks(facts, facts.inputs[index]) for index in indices)
+    severity = max(absence(facts, facts.inputs[index]) for index in indices)
     one = indices[0] if len(indices) == 1 else None
     return Finding(Code.NO_PUBLISHER, severity, *words_of_it, one, inputs=tuple(indices))
 
@@ -307,7 +307,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
         lately = " lately" if an_input.counts.fed else ""
         return Finding(
             Code.SILENT,
-            blocks(facts, an_input),
+            absence(facts, an_input),
             f"{node} publishes {an_input.name}, but no message has arrived{lately}",
             f"check with `ros2 topic hz {an_input.name}` whether {node} is sending; if so, run `syncrelay doctor"
             " --config FILE --live`",
@@ -318,7 +318,7 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
     until_then = f"; before that its rate was {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
     return Finding(
         Code.SILENT,
-        blocks(facts, an_input),
+        absence(facts, an_input),
         f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
         f"check whether recording of {an_input.name} stopped"
         if facts.is_recorded

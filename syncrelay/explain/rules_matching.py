@@ -11,7 +11,7 @@ from syncrelay.explain import words
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Finding, Found, counted, nodes
+from syncrelay.explain.findings import SECOND, Finding, Found, absence, counted, nodes
 from syncrelay.explain.nearest import signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
@@ -224,7 +224,7 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     why, what_helps = away or _why_without(facts, index, an_input)
     yield Finding(
         Code.WAITING_FOR_OPTIONAL,
-        Severity.WARN,
+        absence(facts, an_input) if away else Severity.WARN,
         f"{words.share(missing)} of the sets leave without {an_input.name}{waits}{'' if away else slow}{why}",
         what_helps,
         index,

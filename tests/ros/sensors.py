@@ -60,7 +60,11 @@ def warnings_of(relay: Process, group: str) -> list[dict[str, Any]]:
     """What a relay whose log is in JSON has warned of that is about this group, or about none."""
     *lines, _ = relay.stderr.split("\n")
     said = [json.loads(line) for line in lines if line.startswith("{")]
-    return [line for line in said if line["level"] not in ("info", "debug") and line.get("group", group) == group]
+    return [
+        line
+        for line in said
+        if line["level"] not in ("info", "debug") and group in line.get("groups", [line.get("group", group)])
+    ]
 
 
 def assert_looked_at_a_healthy_rig(look: Process) -> None:

@@ -85,7 +85,7 @@ FOUND = {
     ),
     "an optional input that never came": (
         Code.WAITING_FOR_OPTIONAL,
-        Severity.WARN,
+        Severity.OK,
         without_camera(last_received=None),
         "100 % of the sets leave without /camera after waiting 100 ms for it: no message of it has arrived",
         "check /usb_cam",
