@@ -124,7 +124,8 @@ class Document:
         for value in sorted(self.variables, key=len, reverse=True):
             # A name that is made absolute loses what it begins with.
             for part in (value, value.strip("~/")):
-                text = without_value(text, printable(part), self.variables[value])
+                for shown in (part, printable(part)):
+                    text = without_value(text, shown, self.variables[value])
         return text
 
     def refuse_other_kind(self, key: str, *, own: str, text: str) -> None:
