@@ -28,7 +28,7 @@ _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 _BLOCKS = [block for page in _PAGES.values() for block in _BLOCK.findall(page)]
 _YAML = [text for kind, text in _BLOCKS if kind == "yaml"]
 _FILES = [text for text in _YAML if text.startswith("version:") and "\ncases:" not in text]
-# That of the tutorial is run by test_tutorials.py.
+# That of the tutorial is run by test_consoles.py.
 _SUITES = [text for text in _YAML if "\ncases:" in text and "config: ../" in text]
 _SHOWN = [line.removeprefix("$ ") for kind, text in _BLOCKS if kind == "console" for line in text.splitlines()]
 _INLINE = [each for page in _PAGES.values() for each in re.findall(r"`((?:syncrelay|make|pip install) [^`]+)`", page)]
