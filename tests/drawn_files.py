@@ -34,7 +34,7 @@ def drawn_files(seed: str) -> Iterator[str]:
         model = GROUP_MODELS[number % len(GROUP_MODELS)]
         inputs = rng.randint(2, 4)
         required = 1 if number < 2 * len(GROUP_MODELS) else rng.randint(1, inputs)
-        for _ in range(50):
+        for _ in range(1_000):
             text = yaml.safe_dump({"version": 1, "groups": {"drawn": _group(rng, model, inputs, required)}})
             try:
                 load_text(text)
