@@ -10,7 +10,6 @@ from syncrelay.explain.codes import OF_PUBLISHER, OF_RELAY, Code, Severity
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.findings import Finding
-from syncrelay.explain.rules_graph import narrowed
 
 _SECOND: Final = 1_000_000_000
 # A group that was not judged for so long, as one that a bug stopped, is waited for no longer.
@@ -122,8 +121,8 @@ class CauseLog:
         for key, end in [*self._ends.items()]:
             if is_last or not self._hit.get(key) or now - end.since >= _UNTIL_ALL_ARE_BACK:
                 del self._ends[key]
-                groups = [name for name in self._heard if name in end.groups]
-                yield _line(Severity.OK, end.remark.text, groups, end.remark.code)
+                if groups := [name for name in self._found if name in end.groups]:
+                    yield _line(Severity.OK, end.remark.text, groups, end.remark.code)
 
     def _is_complete(self, now: int) -> bool:
         others = (at for name, at in self._heard.items() if name != self._waiting[0][0])
@@ -205,22 +204,25 @@ class CauseLog:
 
     def _found_of(self, cause: _Cause) -> list[_Found]:
         """Return the findings that a cause makes in all groups, those that keep sets from leaving first."""
-        return self._made_by(cause, self._found.values())
-
-    def _found_then(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]]) -> list[_Found]:
-        """Return what was found when there was something to say; by now it may be over."""
-        return self._made_by(cause, ((self._found[group][0], remark.findings) for group, remark in remarks))
-
-    def _made_by(self, cause: _Cause, of: Iterable[tuple[GroupFacts, tuple[Finding, ...]]]) -> list[_Found]:
         found = [
-            _Found(facts, narrowed(facts, finding, _places(facts, finding, topics)), topics)
-            for facts, findings in of
+            _Found(facts, finding, topics)
+            for facts, findings in self._found.values()
             for finding in findings
             if finding.code is cause.code and finding.severity is not Severity.OK and not finding.is_over
             for each, topics in self._topics_by_cause(facts, finding).items()
             if each == cause
         ]
-        return sorted(found, key=lambda each: -each.finding.severity)
+        return sorted(found, key=lambda each: (-each.finding.severity, each.finding.input is None))
+
+    def _found_then(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]]) -> list[_Found]:
+        """Return what was found when there was something to say; by now it may be over."""
+        then = [(self._found[group][0], finding) for group, remark in remarks for finding in remark.findings]
+        return [
+            _Found(facts, finding, topics)
+            for facts, finding in then
+            for each, topics in self._topics_by_cause(facts, finding).items()
+            if each == cause
+        ]
 
     def _groups_of(self, cause: _Cause, found: Sequence[_Found], topics: frozenset[str]) -> list[GroupFacts]:
         names = {each.facts.name for each in found}
@@ -252,10 +254,6 @@ def _line(severity: Severity, text: str, groups: Sequence[str], code: Code | Non
     return Line(severity, f"{_named(groups)}: {text}", tuple(groups), code)
 
 
-def _places(facts: GroupFacts, finding: Finding, topics: Sequence[str]) -> list[int]:
-    return [index for index in finding.about if facts.inputs[index].name in topics]
-
-
 def _named(groups: Sequence[str]) -> str:
     """Return `front`, or `5 groups (front, rear, left and 2 more)`."""
     if len(groups) == 1:
@@ -273,13 +271,13 @@ def _text(cause: _Cause, found: Sequence[_Found], hit: Sequence[GroupFacts]) -> 
     first, own = found[0].finding, found[0].topics
     text, said = first.text, f"{first.text} {first.suggestion}"
     others = [topic for topic in dict.fromkeys(each for one in found for each in one.topics) if topic not in own]
+    is_shared = bool(others) or len(hit) > 1
     if others:
         text += f"; the same holds for {_listed(others)}"
-    elif len(hit) > 1 and len(own) > 1 and not any(_names(text, topic) for topic in own):
+    elif is_shared and len(own) > 1 and not any(_names(text, topic) for topic in own):
         text += f": {_listed(own)}"
-    if cause.node and not _names(said, cause.node):
-        verb = "published" if cause.code is Code.NO_PUBLISHER else "publishes"
-        text += f"; {cause.node} {verb} {'them' if others or len(own) > 1 else 'it'}"
+    if is_shared and cause.node and not _names(said, cause.node):
+        text += f"; {cause.node} published {'them' if others or len(own) > 1 else 'it'}"
     text = f"{text}; {first.suggestion}" if first.suggestion else text
     silent = [each for each in hit if each.is_silent]
     if not silent:

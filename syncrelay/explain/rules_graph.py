@@ -1,7 +1,6 @@
 """Findings about the graph and what we have there: publishers, subscribers, types, QoS, and who has gone silent."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 from syncrelay.config.wording import all_of, one_of
@@ -225,20 +224,6 @@ def _no_longer_published(facts: GroupFacts, gone: Sequence[InputFacts]) -> tuple
         return text, f"restart the node that published {only.name}"
     text = f"nobody publishes {one_of(each.name for each in gone)} any more; the last message arrived {last} ago"
     return text, "restart the nodes that published them"
-
-
-def narrowed(facts: GroupFacts, finding: Finding, indices: Sequence[int]) -> Finding:
-    """Return what a finding about several inputs says of only some of them."""
-    if set(finding.about) <= set(indices):
-        return finding
-    inputs = [facts.inputs[index] for index in indices]
-    if finding.code is Code.NO_PUBLISHER:
-        is_gone = inputs[0].figures.last_received is not None
-        text, suggestion = (_no_longer_published if is_gone else _never_published)(facts, inputs)
-        return replace(finding, text=text, suggestion=suggestion, inputs=tuple(indices))
-    if finding.code is Code.SILENT:
-        return _silent(facts, indices[0], inputs[0]) or finding
-    return finding
 
 
 def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:

@@ -86,12 +86,11 @@ _CASES = {
 
 
 def text_of(case):
-    """A group for each policy, and two more: one with an optional input and max_wait, one that is thinned."""
+    """A group for each policy that goes by such stamps, one with an optional input, and one that is thinned."""
     topics = [{"topic": topic, "stamp": case.stamp} for topic in case.topics]
     optional = [*topics[:-1], {**topics[-1], "required": len(topics) == 1}]
     near = {"slop": case.slop, "topics": topics}
     groups = {
-        "exact": {"policy": "exact_time", "topics": topics},
         "near": {"policy": "approximate_time", **near},
         "eager": {"policy": "approximate_time_eager", **near},
         "epsilon": {"policy": "approximate_epsilon_time", **near},
@@ -100,6 +99,7 @@ def text_of(case):
         "thinned": {"policy": "approximate_time", **near, "max_rate": "2 Hz"},
     }
     if case.stamp == "header":
+        groups["exact"] = {"policy": "exact_time", "topics": topics}
         groups["keyed"] = {"policy": "equal_key", "key": "header.stamp", "topics": topics}
     return config(groups)
 

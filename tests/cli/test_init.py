@@ -13,6 +13,7 @@ from tests.ros.summary import read_summary
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("init")
     write_mcap(made / "rig.mcap", rig(100))
+    (made / "mine.yaml").touch()
     return made
 
 
@@ -59,7 +60,7 @@ def test_what_it_writes_for_packages_that_are_not_installed_is_in_order_too(fold
         (["--from-graph", "--seconds", "0"], 2, "argument --seconds: expected a number above 0, found 0"),
         (["--from-bag", "none.mcap"], 1, "none.mcap: no such file or folder"),
         (["--from-bag", "x" * 300], 1, f"{'x' * 300}: cannot be read: File name too long"),
-        (["--from-bag", "rig.mcap", "-o", "rig.mcap"], 1, "rig.mcap: already exists and is not overwritten"),
+        (["--from-bag", "rig.mcap", "-o", "mine.yaml"], 1, "mine.yaml: already exists and is not overwritten"),
     ],
 )
 def test_what_is_wrong_is_said(words, code, said, folder):

@@ -218,7 +218,7 @@ def test_far_fewer_sets_than_possible_are_told(relay: Process):
         relay,
         "few_sets",
         "half_of_the_keys",
-        text=r"[\d.]+ of [\d.]+ possible sets leave per second; of the last \d+ messages of"
+        text=r"\d+ of \d+ possible sets left in the last [\d.]+ s; of the last \d+ messages of"
         r" /half_of_the_keys/(camera|lidar), .*",
     )
 

@@ -143,8 +143,9 @@ class Watch:
         *said, _ = self._relay.stderr.split("\n")
         for text in said[self._read :]:
             line = json.loads(text) if text.startswith("{") else {}
-            if "group" in line:
-                about = Line(self._act, line["group"], line.get("finding", ""), line["message"])
+            # What hits several groups is one line.
+            for group in line.get("groups", [line["group"]] if "group" in line else []):
+                about = Line(self._act, group, line.get("finding", ""), line["message"])
                 self.lines.append((line["level"], about))
         self._read = len(said)
 

@@ -19,6 +19,8 @@ from syncrelay.sync import Match, Message
 
 MS = 1_000_000
 S = 1_000_000_000
+# As long as the relay takes to find who is there.
+_DISCOVERED_S = 4
 _BEGAN = 1_760_000_000 * S
 _RECENT = 256
 
@@ -91,7 +93,9 @@ def _report(config: GroupConfig, sensors: Mapping[str, Sensor], seconds: int, rn
                     recent.append(RecentDrop(outcome.message.input, outcome.message.stamp, outcome.reason))
         watch.add(arrivals, sets, engine.counts(), engine.sets, now=now)
     facts = watch.facts(
-        [_graph(config, index, sensor) for index, sensor in enumerate(chosen)], now=_BEGAN + seconds * S
+        [_graph(config, index, sensor) for index, sensor in enumerate(chosen)],
+        now=_BEGAN + seconds * S,
+        is_discovering=seconds < _DISCOVERED_S,
     )
     return GroupReport(facts, judge(facts), tuple(recent[-_RECENT:]))
 
