@@ -1,4 +1,4 @@
-"""OUT/ledger.jsonl: what was done to which recording, a line each, written before its result is put in place."""
+"""OUT/_ledger.jsonl: what was done to which recording, a line each, written before its result is put in place."""
 
 import fcntl
 import json
@@ -16,7 +16,8 @@ from syncrelay.fleet.content import ResultFile, sync_folder
 from syncrelay.fleet.recordings import is_result_name
 from syncrelay.fleet.task import JSON, NOTES, PROBLEMS
 
-LEDGER: Final = "ledger.jsonl"
+# What reads a folder of Parquet files as one table skips names that begin with `_`.
+LEDGER: Final = "_ledger.jsonl"
 _HEAD: Final = b'{"syncrelay_ledger": 1}\n'
 
 

@@ -19,7 +19,8 @@ _LIST: Final = "@"
 # Of UTF-8: with the hash behind it, a name stays below the 255 bytes that file systems allow.
 _LONGEST_STEM: Final = 100
 _HASH_BYTES: Final = 8
-_RESULT_NAME: Final = re.compile(rf"(?!\.)[^/\0]*-[0-9a-f]{{{2 * _HASH_BYTES}}}", re.DOTALL)
+# What reads a folder of Parquet files as one table skips names that begin with `_` or `.`.
+_RESULT_NAME: Final = re.compile(rf"(?![._])[^/\0]*-[0-9a-f]{{{2 * _HASH_BYTES}}}", re.DOTALL)
 _MOST_LISTED_BYTES: Final = 100_000_000
 
 
@@ -49,14 +50,14 @@ def names_recordings(word: str) -> bool:
 def result_name(place: str) -> str:
     """Return a name for the result of a recording by its absolute path or URL: a file name, always the same for it.
 
-    It begins with the recording's own name, as far as any folder can hold that, and ends with a hash of the whole path:
-    recordings of one name in several folders stay apart.
+    It begins with the recording's own name, as far as any folder can hold that and without `_` in front, and ends with
+    a hash of the whole path: recordings of one name in several folders stay apart.
     """
     # Who signs a URL anew means the same recording.
     place = redacted(place)
     own = place.rstrip("/").rpartition("/")[2]
     stem = own.partition(".")[0] or own
-    plain = "".join(each if each.isalnum() or each in "-_" else "_" for each in stem)
+    plain = "".join(each if each.isalnum() or each in "-_" else "_" for each in stem).lstrip("_")
     short = plain.encode(errors="replace")[:_LONGEST_STEM].decode(errors="ignore")
     return f"{short}-{blake2b(os.fsencode(place), digest_size=_HASH_BYTES).hexdigest()}"
 

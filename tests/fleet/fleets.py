@@ -10,7 +10,7 @@ from tests.ros.configs import config, inputs
 
 TOPICS = ("/camera", "/lidar")
 FILE = "f.yaml"
-LEDGER = "ledger.jsonl"
+LEDGER = "_ledger.jsonl"
 
 
 def file_text(slop="5ms", topics=TOPICS):

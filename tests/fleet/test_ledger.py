@@ -97,7 +97,7 @@ def test_another_file_of_its_name_is_refused(text, out):
 
 def test_a_folder_that_holds_something_else_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(SyncRelayError, match=r"holds files and no ledger\.jsonl: name an empty folder"):
+    with pytest.raises(SyncRelayError, match=r"holds files and no _ledger\.jsonl: name an empty folder"):
         Ledger(tmp_path)
 
 

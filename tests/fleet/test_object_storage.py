@@ -196,7 +196,7 @@ def test_many_are_done_by_workers_once_and_again_only_when_they_change(command, 
     counts = [
         [
             entry["facts"]["groups"]
-            for entry in map(json.loads, (folder / into / "ledger.jsonl").read_text().splitlines()[1:])
+            for entry in map(json.loads, (folder / into / "_ledger.jsonl").read_text().splitlines()[1:])
         ]
         for into in ("out", "here")
     ]
@@ -206,7 +206,7 @@ def test_many_are_done_by_workers_once_and_again_only_when_they_change(command, 
     write_mcap(folder / "b.mcap", rig(20))
     put(folder / "b.mcap", below)
     assert run(*words, folder=folder).stdout == "out: 2 recordings: 1 done, 1 done before\n"
-    assert _KEY not in (folder / "out" / "ledger.jsonl").read_text()
+    assert _KEY not in (folder / "out" / "_ledger.jsonl").read_text()
 
 
 def test_google_cloud_storage_gives_the_same_sets(folder, monkeypatch):

@@ -160,7 +160,7 @@ def start(*words):
     return subprocess.Popen([*command, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 def lines():
-    return Path("out/ledger.jsonl").read_text().count("\\n") if Path("out/ledger.jsonl").exists() else 0
+    return Path("out/_ledger.jsonl").read_text().count("\\n") if Path("out/_ledger.jsonl").exists() else 0
 
 def wait_until(condition, deadline_s=300):
     end = time.monotonic() + deadline_s
@@ -226,7 +226,7 @@ def test_a_node_that_is_lost_midway_loses_and_doubles_nothing(isolated, tmp_path
     done, megabytes = figures_told.split()
     assert told == f"out: {_RECORDINGS} recordings: {_RECORDINGS} done"
     assert when < int(done) < _RECORDINGS
-    assert len((tmp_path / "out" / "ledger.jsonl").read_text().splitlines()) == 1 + _RECORDINGS
+    assert len((tmp_path / "out" / "_ledger.jsonl").read_text().splitlines()) == 1 + _RECORDINGS
     assert tree(tmp_path / "out") == tree(tmp_path / "local")
     figures(
         f"Ray, {_RECORDINGS} recordings on 2 nodes, one killed when {done} were done: each is there once;"

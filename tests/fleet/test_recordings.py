@@ -146,7 +146,9 @@ def test_names_of_results_stay_in_their_folder_and_apart(tmp_path):
     assert len(list(tmp_path.iterdir())) == len(names)
 
 
-@pytest.mark.parametrize("name", ["..", "ledger.jsonl", "../x-0123456789abcdef", ".-0123456789abcdef", "x-012345678"])
+@pytest.mark.parametrize(
+    "name", ["..", "_ledger.jsonl", "../x-0123456789abcdef", ".-0123456789abcdef", "_x-0123456789abcdef", "x-012345678"]
+)
 def test_what_is_no_name_of_a_result_is_told_from_them(name):
     assert not is_result_name(name)
 

@@ -252,7 +252,7 @@ def test_the_documents_in_a_folder_are_those_of_its_results(tmp_path):
         (tmp_path / name).mkdir()
         if text is not None:
             (tmp_path / name / "analysis.json").write_text(text)
-    (tmp_path / "ledger.jsonl").write_text("{}\n")
+    (tmp_path / "_ledger.jsonl").write_text("{}\n")
     assert list(documents_in(tmp_path)) == [("/fleet/r1/a.mcap", told), (str(tmp_path / "b-2" / "analysis.json"), None)]
     with pytest.raises(SyncRelayError, match="none: cannot be read: No such file"):
         list(documents_in(tmp_path / "none"))

@@ -56,9 +56,9 @@ def test_two_workers_leave_what_one_leaves(bags):
 
 def test_the_same_run_again_does_nothing(bags):
     go(bags)
-    before = (bags.parent / "out" / "ledger.jsonl").read_bytes()
+    before = (bags.parent / "out" / "_ledger.jsonl").read_bytes()
     assert set(go(bags).values()) == {Kept()}
-    assert (bags.parent / "out" / "ledger.jsonl").read_bytes() == before
+    assert (bags.parent / "out" / "_ledger.jsonl").read_bytes() == before
     assert {attempts_of(bags / f"{name}.mcap") for name in "abcd"} == {1}
 
 
@@ -117,7 +117,7 @@ def test_a_recording_that_has_become_faulty_keeps_no_result_of_what_it_was(bags)
     go(bags)
     (bags / "b.mcap").write_text("refuse")
     go(bags)
-    assert sorted(path.name[0] for path in (bags.parent / "out").iterdir()) == ["a", "c", "d", "l"]
+    assert sorted(path.name[0] for path in (bags.parent / "out").iterdir()) == ["_", "a", "c", "d"]
 
 
 def test_a_recording_that_cannot_be_reached_keeps_its_result(bags):
@@ -209,7 +209,7 @@ def test_replacing_leaves_nothing_of_what_was_there(bags):
     out = bags.parent / "out"
     found = {name: entry for name, entry in entries(out).items() if entry["state"] != "removed"}
     assert found == entries(bags.parent / "anew")
-    assert {path.name[0] for path in out.iterdir()} == {"a", "b", "l"}
+    assert {path.name[0] for path in out.iterdir()} == {"_", "a", "b"}
     # That it was replaced is done.
     assert set(go(bags, option=1, only="[ab].mcap").values()) == {Kept()}
 
