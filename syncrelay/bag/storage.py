@@ -125,7 +125,7 @@ def _store(word: str) -> "ObjectStore":
 def _missing(word: str, error: ImportError) -> StorageError:
     return StorageError(
         f"{redacted(word)}: {error.name or 'a library'} is not installed, which reads {scheme_of(word)}:// URLs: "
-        "pip install 'syncrelay[fleet]'"
+        "pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
     )
 
 

@@ -39,7 +39,7 @@ class RayEngine:
             import ray  # noqa: PLC0415  of the extra `fleet`, and takes half a second
         except ImportError as error:
             raise SyncRelayError(
-                "--engine ray needs Ray, which is not installed: pip install 'syncrelay[fleet]'"
+                "--engine ray needs Ray, which is not installed: pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
             ) from error
         self._ray: Any = ray
         self._jobs = jobs

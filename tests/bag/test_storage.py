@@ -342,7 +342,7 @@ def test_a_url_of_another_kind_is_refused_with_those_that_are_read(word):
 def test_where_the_library_is_missing_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "aiohttp", None)
     monkeypatch.delitem(sys.modules, "syncrelay.bag.http_file", raising=False)
-    with pytest.raises(StorageError, match=r"aiohttp is not installed, .*: pip install 'syncrelay\[fleet\]'"):
+    with pytest.raises(StorageError, match=r"aiohttp is not installed, .*: pip install 'FOLDER-OF-SYNCRELAY\[fleet\]'"):
         open_recording(["https://host/rig.mcap"])
 
 

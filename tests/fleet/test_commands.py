@@ -186,7 +186,8 @@ def test_ray_that_is_missing_is_told(done, tmp_path):
     words = ("replay", "bags", "--config", FILE, "--engine", "ray", "--into", str(tmp_path / "out"))
     ended = run_python("-c", script, *words, folder=done)
     assert ended.returncode == 1
-    assert ended.stderr == "syncrelay: --engine ray needs Ray, which is not installed: pip install 'syncrelay[fleet]'\n"
+    install = "pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
+    assert ended.stderr == f"syncrelay: --engine ray needs Ray, which is not installed: {install}\n"
 
 
 def test_on_a_terminal_progress_is_one_line_that_is_gone_at_the_end(done, tmp_path):
