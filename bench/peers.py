@@ -16,6 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 from peer_jobs import JOBS
 from rosbags.highlevel import AnyReader
@@ -79,8 +80,10 @@ def pairs(out, topics):
     if (out / "pairs.json").exists():
         return json.loads((out / "pairs.json").read_text())
     (table,) = (pq.ParquetFile(path) for path in out.rglob("*.parquet"))
-    if "stamps_ns" in table.schema_arrow.names:
-        return [[row[topic] for topic in topics] for row in table.read(["stamps_ns"])["stamps_ns"].to_pylist()]
+    if "stamps" in table.schema_arrow.names:
+        stamps = table.read(["stamps"]).flatten()
+        columns = [stamps[f"stamps.{topic}"].cast(pa.int64()).to_pylist() for topic in topics]
+        return [list(row) for row in zip(*columns, strict=True)]
     if "header.stamp.sec" in table.schema_arrow.names:
         keys = [f"header.stamp.{part}{side}" for side in ("", " b") for part in ("sec", "nanosec")]
         rows = (list(row.values()) for row in table.read(keys).to_pylist())

@@ -12,6 +12,6 @@ from syncrelay.datasets import read_sets
 config, *recordings = sys.argv[1:]
 for batch in read_sets(recordings, config):
     spans = batch["span_ns"]
-    topics = [field.name for field in batch.schema.field("stamps_ns").type]
+    topics = [field.name for field in batch.schema.field("stamps").type]
     print(f"{batch.num_rows} sets of {', '.join(topics)}: {pc.mean(spans).as_py() / 1e6:.2f} ms apart on average,")
     print(f"at most {pc.max(spans).as_py() / 1e6:.2f} ms; the last from {batch['recording'][-1].as_py()}")

@@ -22,6 +22,7 @@ from syncrelay.cli import parsers
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.dispatch import COMMANDS, COMPLETES
 from syncrelay.cli.parser import ROS_ARGS, Parser
+from syncrelay.cli.recording_parsers import IMAGE_FORMATS
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 from syncrelay.yaml_files import yaml_files
@@ -104,6 +105,11 @@ def _called(completer: _Completer) -> Callable[..., Iterable[str] | Mapping[str,
 
 def _nothing(_typed: str, _arguments: Namespace) -> Iterable[str]:
     return ()
+
+
+def _image_formats(typed: str, _arguments: Namespace) -> Iterable[str]:
+    topic = "".join(typed.rpartition("=")[:2])
+    return [f"{topic}{each}" for each in IMAGE_FORMATS]
 
 
 def _commands(_typed: str, _arguments: Namespace) -> Mapping[str, str]:
@@ -201,6 +207,7 @@ COMPLETERS: Final[Mapping[str, _Completer]] = {
     # No file's name is empty: only folders are left.
     "FOLDER": _files(""),
     "BAG|TOPIC": _recordings_and_topics,
+    "[TOPIC=]FORMAT": _image_formats,
     "REPORT": _files(r".*\.html"),
 }
 """What completes a word, by its metavar. Where there are choices they do, and a number or a URL nothing does."""

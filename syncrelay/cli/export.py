@@ -6,7 +6,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Final, Self
+from typing import Final, Self, cast
 
 from syncrelay.bag import Recording, open_recording
 from syncrelay.bag.bindings import GroupBinding, bind
@@ -18,10 +18,12 @@ from syncrelay.cli.fleet import do_on_many, engine_of
 from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of, few_sets
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import eased_collector
+from syncrelay.cli.recording_parsers import IMAGE_FORMATS
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, load
 from syncrelay.config.units import parse_duration_text
 from syncrelay.config.wording import all_of, did_you_mean
+from syncrelay.datasets.images import ImageFormat
 from syncrelay.datasets.parquet import SUFFIX, write_parquet
 from syncrelay.datasets.reading import SetsOf, resolved
 from syncrelay.datasets.tables import Content
@@ -54,7 +56,10 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     if arguments.images:
         # In a worker it would be a bug.
         import_module("PIL.Image")
-    content = Content(resolved(_parsed(arguments.fields), config), arguments.images, arguments.raw)
+    by_topic, others = _formats(arguments.images)
+    content = Content(
+        resolved(_parsed(arguments.fields), config), resolved(by_topic, config), others, raw=arguments.raw
+    )
     stretch_ns = _length(arguments.stretch)
     task = ParquetTask.of(config, content, stretch_ns)
     engine = None if stretch_ns is None else InStretches(engine_of(arguments), task)
@@ -80,7 +85,8 @@ class ParquetTask:
             "format": "parquet",
             "groups": groups,
             "fields": fields,
-            "images": content.images,
+            "images": dict(content.images),
+            "other_images": content.other_images,
             "raw": content.raw,
             "stretch_ns": stretch_ns,
         }
@@ -175,3 +181,17 @@ def _parsed(words: Sequence[str]) -> dict[str, list[str]]:
             raise UsageError(f"--fields {word}: expected TOPIC:FIELD,FIELD, such as /imu/data:linear_acceleration")
         fields.setdefault(topic, []).extend(named)
     return fields
+
+
+def _formats(words: Sequence[str]) -> tuple[dict[str, ImageFormat], ImageFormat | None]:
+    """Return what the images of each named input become and what all others do, from words as /depth=png and jpeg."""
+    formats: dict[str, ImageFormat] = {}
+    for word in words:
+        topic, equals, found = word.rpartition("=")
+        if found not in IMAGE_FORMATS or bool(topic) != bool(equals):
+            raise UsageError(f"--images {word}: expected png or jpeg, or TOPIC=png or TOPIC=jpeg")
+        if topic in formats:
+            raise UsageError(f"--images {word}: a format is named twice for {topic or 'all images'}: name one")
+        formats[topic] = cast("ImageFormat", found)
+    others = formats.pop("", None)
+    return formats, others

@@ -1,5 +1,7 @@
 """The words that the commands on recordings take; see parsers.py."""
 
+from typing import Final
+
 from syncrelay.cli.fleet_options import add_fleet_options
 from syncrelay.cli.parser import Parser, output, seed
 
@@ -82,6 +84,10 @@ def replay() -> Parser:
     return parser
 
 
+IMAGE_FORMATS: Final = ("png", "jpeg")
+"""What --images can make of an image."""
+
+
 def export() -> Parser:
     """Return the parser of `syncrelay export`."""
     parser = Parser(
@@ -119,7 +125,12 @@ def export() -> Parser:
         " be repeated",
     )
     parser.add_argument(
-        "--images", choices=("png", "jpeg"), metavar="FORMAT", help="write images as png or jpeg instead of raw pixels"
+        "--images",
+        metavar="[TOPIC=]FORMAT",
+        action="append",
+        default=[],
+        help="write images as png or jpeg instead of raw pixels: those of this input, or all that no --images names;"
+        " may be repeated, as in --images jpeg --images /depth=png",
     )
     parser.add_argument("--raw", action="store_true", help="write each message as the CDR bytes that were recorded")
     parser.add_argument(

@@ -112,7 +112,7 @@ def encoded(pixels: np.ndarray[Any, Any], image_format: ImageFormat, topic: str)
     from PIL import Image  # noqa: PLC0415  an extra's, and needed here alone
 
     if image_format == "jpeg" and pixels.dtype.itemsize > 1:
-        raise BagError(f"{topic}: JPEG cannot hold 16 bit images: use --images png")
+        raise BagError(f"{topic}: JPEG cannot hold 16 bit images: use --images {topic}=png")
     order = "<" if sys.byteorder == "little" else ">"
     plain = np.ascontiguousarray(pixels, dtype=pixels.dtype.newbyteorder(order))
     picture = Image.fromarray(plain)

@@ -1,6 +1,6 @@
 """Sets of many recordings as a dataset of Ray Data: read by the cluster, block by block, while training goes on."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from os import PathLike, fspath
 from typing import Any
@@ -22,7 +22,7 @@ def ray_dataset(
     *,
     group: str | None = None,
     fields: Fields | None = None,
-    images: ImageFormat | None = None,
+    images: ImageFormat | Mapping[str, ImageFormat] | None = None,
     raw: bool = False,
     most_bytes: int = MOST_BYTES,
     **options: Any,

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from os import PathLike, fspath
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 import pyarrow as pa
 
@@ -16,6 +16,8 @@ from syncrelay.config.wording import all_of, did_you_mean
 from syncrelay.datasets.images import ImageFormat
 from syncrelay.datasets.tables import Content, Fields, SetTable
 from syncrelay.errors import BagError, UsageError
+
+T = TypeVar("T")
 
 MOST_BYTES: Final = 32_000_000
 """How many bytes of messages are held until they become a table."""
@@ -71,7 +73,7 @@ def read_sets(
     *,
     group: str | None = None,
     fields: Fields | None = None,
-    images: ImageFormat | None = None,
+    images: ImageFormat | Mapping[str, ImageFormat] | None = None,
     raw: bool = False,
     most_bytes: int = MOST_BYTES,
 ) -> Iterator[pa.RecordBatch]:
@@ -80,16 +82,18 @@ def read_sets(
     Each of `recordings` (a file, a rosbag2 folder or a URL) is read by itself and after the one before. `config` is a
     file's path, or what `syncrelay.config.load` gives; `group` names one of its groups and is needed where it has
     several. `fields` maps an input to dotted paths of the fields that are wanted, None to all; `images` is "png" or
-    "jpeg", None for the raw pixels; with `raw` each message is its CDR bytes. A batch holds the sets of about
-    `most_bytes` bytes of messages. The columns: see syncrelay.datasets.tables. What is missing of a recording, or
-    cannot be read, is a warning once the rest has been read.
+    "jpeg" for all images, or maps an input to one of them; images that it leaves out stay raw pixels. With `raw` each
+    message is its CDR bytes. A batch holds the sets of about `most_bytes` bytes of messages. The columns: see
+    syncrelay.datasets.tables. What is missing of a recording, or cannot be read, is a warning once the rest has been
+    read.
 
     Raises ConfigError for a faulty file, BagError for a recording that cannot be read or lacks a required topic, and
     UsageError for a group or an input that the file does not have.
     """
     loaded = config if isinstance(config, Config) else load(fspath(config))
     chosen = _chosen(loaded, group)
-    content = Content(resolved(fields or {}, loaded), images, raw)
+    by_input, others = (images, None) if isinstance(images, Mapping) else ({}, images)
+    content = Content(resolved(fields or {}, loaded), resolved(by_input, loaded), others, raw)
     words = [recordings] if isinstance(recordings, str | PathLike) else recordings
     for word in [fspath(each) for each in words]:
         with closing(open_recording([word])) as recording:
@@ -103,15 +107,15 @@ def read_sets(
                 warnings.warn(fault, stacklevel=2)
 
 
-def resolved(fields: Mapping[str, Sequence[str]], config: Config) -> Fields:
-    """Return fields by the inputs' full names; raises UsageError for an input that no group has."""
+def resolved(by_input: Mapping[str, T], config: Config) -> dict[str, T]:
+    """Return what is said of inputs by their full names; raises UsageError for an input that no group has."""
     topics = [full_name(topic.topic, config) for group in config.groups for topic in group.topics]
-    found: dict[str, Sequence[str]] = {}
-    for named, paths in fields.items():
+    found: dict[str, T] = {}
+    for named, said in by_input.items():
         name = full_name(named, config)
         if name not in topics:
             raise UsageError(f"{named} is no input of the file{did_you_mean(named, topics)}; it has {all_of(topics)}")
-        found[name] = paths
+        found[name] = said
     return found
 
 

@@ -1,10 +1,10 @@
 """Sets of a group as rows of a table: when they were, and each input's message.
 
-Columns: `set` (from 1), `stamp_ns` (what restamping gave it, else the tick of the clock that triggered it, else the
-newest), `left_ns`, `span_ns` (with the inputs' offsets), `latency_ns` (since its last message was received),
-`recording`, `stamps_ns` and `received_ns` (structs with a field for each input), and a column for each input, named as
-its topic, null where the set lacks an optional one. Times are nanoseconds since 1970 (UTC), or of whatever clock the
-recording has.
+Columns: `set` (from 1), `stamp` (what restamping gave it, else the tick of the clock that triggered it, else the
+newest), `left_at`, `span_ns` (with the inputs' offsets), `latency_ns` (since its last message was received),
+`recording`, `stamps` and `received` (structs with a field for each input), and a column for each input, named as its
+topic, null where the set lacks an optional one. Times are timestamps of nanoseconds in UTC; where the recording's clock
+does not count from 1970, neither do they.
 """
 
 import json
@@ -27,7 +27,7 @@ from syncrelay.datasets.message_types import only, type_tree
 from syncrelay.errors import BagError
 from syncrelay.sync import Match, Message, Outcome
 
-_TIME: Final = pa.int64()
+_TIME: Final = pa.timestamp("ns", tz="UTC")
 METADATA: Final = b"syncrelay"
 """The key of a schema's metadata under which a JSON document says what the table is made of."""
 
@@ -35,13 +35,18 @@ _CLOUD: Final = "sensor_msgs/msg/PointCloud2"
 Fields: TypeAlias = Mapping[str, Sequence[str]]
 """Dotted paths of the fields that are asked for, by an input's full name; all fields of one that isn't there."""
 
+Images: TypeAlias = Mapping[str, ImageFormat]
+"""What an input's images become, by its full name."""
+
 
 @dataclass(frozen=True, slots=True)
 class Content:
     """What a table holds of messages: fields, images as PNG or JPEG, or with `raw` each payload as CDR bytes."""
 
     fields: Fields = field(default_factory=dict)
-    images: ImageFormat | None = None
+    images: Images = field(default_factory=dict)
+    other_images: ImageFormat | None = None
+    """What images of inputs that `images` does not name become; None leaves their pixels raw."""
     raw: bool = False
 
 
@@ -89,8 +94,8 @@ class SetTable:
         names = [each.topic for each in self.binding.inputs]
         columns = {
             "set": pa.array(numbers, pa.int64()),
-            "stamp_ns": pa.array(map(_stamp_of, matches), _TIME),
-            "left_ns": pa.array(left, _TIME),
+            "stamp": pa.array(map(_stamp_of, matches), _TIME),
+            "left_at": pa.array(left, _TIME),
             "span_ns": pa.array(map(self._span, stamps), pa.int64()),
             "latency_ns": pa.array(
                 [at - max(filter(None, some)) for at, some in zip(left, arrivals, strict=True)], pa.int64()
@@ -98,8 +103,8 @@ class SetTable:
             "recording": pa.DictionaryArray.from_arrays(
                 pa.array([0] * len(matches), pa.int32()), pa.array([self._recording])
             ),
-            "stamps_ns": _times(names, stamps),
-            "received_ns": _times(names, arrivals),
+            "stamps": _times(names, stamps),
+            "received": _times(names, arrivals),
         }
         for index, column in enumerate(self._columns):
             columns[column.topic] = column.column([(match.messages[index], match.stamp) for match in matches])
@@ -146,12 +151,15 @@ class _InputColumn:
         self.arrow: pa.DataType = pa.binary() if content.raw else pa.null()
         if content.raw:
             return
+        if each.topic in content.images and self.type not in (IMAGE, ""):
+            raise BagError(f"{each.topic} is {self.type}, expected {IMAGE}: --images does not go with it")
         paths = content.fields.get(each.topic)
         if paths is not None and not paths:
             # No field is asked for: a column of nulls, of whatever type the messages are.
             return
-        if content.images is not None and self.type == IMAGE and (paths is None or "data" in paths):
-            self._images = ImageColumn(each.topic, content.images)
+        image_format = content.images.get(each.topic, content.other_images)
+        if image_format is not None and self.type == IMAGE and (paths is None or "data" in paths):
+            self._images = ImageColumn(each.topic, image_format)
         by_definition: dict[Any, Decoder] = {}
         for channel in each.channels:
             if channel.definition not in by_definition:

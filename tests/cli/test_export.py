@@ -15,7 +15,8 @@ from syncrelay.cli.demo import shipped_config
 from syncrelay.datasets import read_sets
 from tests.bag.making import rig, write_mcap, write_rosbag2
 from tests.cli.command import run, run_python
-from tests.ros.cdr_messages import STORE, header
+from tests.datasets.times import rows_of
+from tests.ros.cdr_messages import IMAGE, STORE, header, serialize
 from tests.ros.frames import Frame
 
 PAIR = """
@@ -39,6 +40,18 @@ def rigged(tmp_path_factory):
     return folder
 
 
+def pictures() -> list[Frame]:
+    """Colours of a camera, beside depths of 16 bits."""
+    encodings = {"/camera": ("rgb8", 3), "/lidar": ("16UC1", 2)}
+    frames = []
+    for number in range(5):
+        for topic, (encoding, size) in encodings.items():
+            stamp = 10**18 + number * 10**8
+            payload = serialize(IMAGE, header(stamp), 2, 4, encoding, 0, 4 * size, np.zeros(8 * size, np.uint8))
+            frames.append(Frame(topic, IMAGE, stamp, payload))
+    return frames
+
+
 def exported(folder: Path, group: str):
     (path,) = folder.glob(f"out/*/{group}.parquet")
     return pq.ParquetFile(path)
@@ -48,8 +61,8 @@ def exported(folder: Path, group: str):
 def test_the_rows_are_the_sets_that_replay_prints(rigged, group):
     lines = run("replay", "rig.mcap", "--config", "demo.yaml", "--json", folder=rigged).stdout.splitlines()
     told = [line for line in map(json.loads, lines) if line["group"] == group]
-    rows = exported(rigged, group).read(["stamps_ns", "left_ns", "span_ns", "latency_ns"]).to_pylist()
-    assert [(row["stamps_ns"], row["left_ns"], row["span_ns"], row["latency_ns"]) for row in rows] == [
+    rows = rows_of(exported(rigged, group).read(["stamps", "left_at", "span_ns", "latency_ns"]))
+    assert [(row["stamps"], row["left_at"], row["span_ns"], row["latency_ns"]) for row in rows] == [
         (line["stamps"], line["time"], line["span"], line["latency"]) for line in told
     ]
     assert len(rows) > 20
@@ -86,12 +99,33 @@ def test_pictures_are_not_compressed_again(rigged, tmp_path):
     assert list(tmp_path.glob("out/*/lidar_imu.parquet")) == []
 
 
+def test_each_input_may_have_a_picture_format_of_its_own(tmp_path):
+    write_mcap(tmp_path / "bag.mcap", pictures())
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    words = ["export", "bag.mcap", "--config", "pair.yaml"]
+    for name, formats, camera in (
+        ("one", ["/lidar=png"], b"\0\0"),
+        ("each", ["/camera=jpeg", "/lidar=png"], b"\xff\xd8"),
+        ("rest", ["jpeg", "/lidar=png"], b"\xff\xd8"),
+    ):
+        options = [word for each in formats for word in ("--images", each)]
+        done = run(*words, *options, "-o", f"{name}/out", folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+        (row, *_) = rows_of(exported(tmp_path / name, "front").read())
+        assert (row["/camera"]["data"][:2], row["/lidar"]["data"][:4]) == (camera, b"\x89PNG")
+    refused = run(*words, "--images", "png", "-o", "each/out", folder=tmp_path)
+    assert (refused.returncode, "holds results of other options" in refused.stderr) == (1, True)
+    sixteen = run(*words, "--images", "jpeg", "-o", "sixteen", folder=tmp_path)
+    assert sixteen.returncode == 1
+    assert "/lidar: JPEG cannot hold 16 bit images: use --images /lidar=png" in sixteen.stderr
+
+
 def test_fields_and_raw_bytes_are_chosen_on_the_command_line(rigged, tmp_path):
     fields = ["--fields", "/demo/imu/data:angular_velocity, header.stamp", "--fields", "/demo/lidar/points:width"]
     words = ["export", "rig.mcap", "--config", "demo.yaml", "--group", "lidar_imu"]
     run(*words, *fields, "-o", str(tmp_path / "fields/out"), folder=rigged)
     run(*words, "--raw", "-o", str(tmp_path / "raw/out"), folder=rigged)
-    row = exported(tmp_path / "fields", "lidar_imu").read().to_pylist()[0]
+    row = rows_of(exported(tmp_path / "fields", "lidar_imu").read())[0]
     assert row["/demo/imu/data"].keys() == {"header", "angular_velocity"}
     assert row["/demo/lidar/points"].keys() == {"width"}
     with (rigged / "rig.mcap").open("rb") as file:
@@ -155,6 +189,13 @@ def test_messages_that_cannot_be_decoded_are_told(tmp_path):
         (["--fields", "/camra:x"], 2, "/camra is no input of the file, did you mean `/camera`?"),
         (["--fields", "/camera:vectr"], 1, "has no field `vectr`, did you mean `vector`?"),
         (["--group", "frnt"], 2, "--group frnt: no such group, did you mean `front`?; the file has front"),
+        (["--images", "jpg"], 2, "--images jpg: expected png or jpeg, or TOPIC=png or TOPIC=jpeg"),
+        (["--images", "=png"], 2, "--images =png: expected png or jpeg"),
+        (["--images", "/camera=jpg"], 2, "--images /camera=jpg: expected png or jpeg"),
+        (["--images", "/camra=png"], 2, "/camra is no input of the file, did you mean `/camera`?"),
+        (["--images", "/camera=png", "--images", "/camera=jpeg"], 2, "a format is named twice for /camera: name one"),
+        (["--images", "png", "--images", "png"], 2, "a format is named twice for all images: name one"),
+        (["--images", "/lidar=png"], 1, "/lidar is geometry_msgs/msg/Vector3Stamped, expected sensor_msgs/msg/Image"),
         (["--raw", "--images", "png"], 2, "--raw keeps each message as it is"),
         (["--format", "mcap", "--raw"], 2, "--format mcap writes whole messages"),
     ],

@@ -16,6 +16,7 @@ from syncrelay.datasets import read_sets
 from syncrelay.errors import BagError, UsageError
 from syncrelay.sync import Match
 from tests.bag.making import CUSTOM, CUSTOM_STORE, rig, write_mcap, write_ros1, write_rosbag2
+from tests.datasets import times
 from tests.ros.cdr_messages import STORE, VECTOR
 from tests.ros.frames import Frame
 from tests.ros.streams import MS
@@ -38,7 +39,7 @@ def config(more=""):
 
 
 def rows_of(*args, **options):
-    return [row for batch in read_sets(*args, **options) for row in batch.to_pylist()]
+    return [row for batch in read_sets(*args, **options) for row in times.rows_of(batch)]
 
 
 def replayed(path, loaded):
@@ -60,7 +61,7 @@ def test_a_row_is_a_set_of_replay(tmp_path):
     bag = write_mcap(tmp_path / "bag.mcap", rig())
     rows = rows_of(bag, config())
     assert [
-        ((row["stamps_ns"]["/camera"], row["stamps_ns"]["/lidar"]), row["left_ns"], row["latency_ns"]) for row in rows
+        ((row["stamps"]["/camera"], row["stamps"]["/lidar"]), row["left_at"], row["latency_ns"]) for row in rows
     ] == replayed(bag, config())
     assert len(rows) > 30
     assert [row["set"] for row in rows] == list(range(1, len(rows) + 1))
@@ -72,8 +73,8 @@ def test_a_row_tells_spans_with_offsets_and_its_newest_stamp(tmp_path):
     loaded = load_text(GROUP.format(more="").replace("/camera}", "/camera, offset: -3ms}"))
     rows = rows_of(bag, loaded)
     assert {row["span_ns"] for row in rows} == {0}
-    assert all(row["stamp_ns"] == max(row["stamps_ns"].values()) for row in rows)
-    assert {row["received_ns"]["/lidar"] - row["stamps_ns"]["/lidar"] for row in rows} == {5 * MS}
+    assert all(row["stamp"] == max(row["stamps"].values()) for row in rows)
+    assert {row["received"]["/lidar"] - row["stamps"]["/lidar"] for row in rows} == {5 * MS}
 
 
 def test_messages_leave_with_the_stamp_of_their_set(tmp_path):
@@ -81,7 +82,7 @@ def test_messages_leave_with_the_stamp_of_their_set(tmp_path):
     rows = rows_of(bag, config("restamp: earliest"))
     for row in rows:
         stamp = row["/camera"]["header"]["stamp"]
-        assert stamp["sec"] * 10**9 + stamp["nanosec"] == row["stamp_ns"] == min(row["stamps_ns"].values())
+        assert stamp["sec"] * 10**9 + stamp["nanosec"] == row["stamp"] == min(row["stamps"].values())
 
 
 def test_missing_optional_messages_are_null(tmp_path):
@@ -89,9 +90,9 @@ def test_missing_optional_messages_are_null(tmp_path):
     bag = write_mcap(tmp_path / "bag.mcap", frames)
     loaded = load_text(GROUP.format(more="max_wait: 50ms").replace("/lidar}", "/lidar, required: false}"))
     rows = rows_of(bag, loaded)
-    missing = [row["stamps_ns"]["/lidar"] is None for row in rows]
+    missing = [row["stamps"]["/lidar"] is None for row in rows]
     assert [row["/lidar"] is None for row in rows] == missing
-    assert [row["received_ns"]["/lidar"] is None for row in rows] == missing
+    assert [row["received"]["/lidar"] is None for row in rows] == missing
     assert 10 < sum(missing) < len(rows) - 10
 
 
@@ -111,7 +112,7 @@ def test_all_sets_come_whatever_the_size_of_a_batch(tmp_path):
     whole = rows_of(bag, config())
     batches = list(read_sets(bag, config(), most_bytes=1))
     assert len(batches) > 3
-    assert [row for batch in batches for row in batch.to_pylist()] == whole
+    assert [row for batch in batches for row in times.rows_of(batch)] == whole
     assert len({batch.schema.serialize().to_pybytes() for batch in batches}) == 1
 
 
@@ -169,7 +170,7 @@ def test_ros_1_messages_are_those_of_ros_2(tmp_path):
     rows = rows_of(bag, config())
     assert rows[0]["/camera"]["header"].keys() == {"stamp", "frame_id"}
     stamps = [row["/camera"]["header"]["stamp"] for row in rows]
-    assert [each["sec"] * 10**9 + each["nanosec"] for each in stamps] == [row["stamps_ns"]["/camera"] for row in rows]
+    assert [each["sec"] * 10**9 + each["nanosec"] for each in stamps] == [row["stamps"]["/camera"] for row in rows]
 
 
 @pytest.mark.parametrize("image_format", ["png", "jpeg"])
@@ -199,8 +200,31 @@ def test_depth_images_of_16_bits_are_whole_in_png(tmp_path, big_endian):
     bag = write_mcap(tmp_path / "bag.mcap", images("16UC1", pixels, big_endian=big_endian))
     (tmp_path / "picture").write_bytes(rows_of(bag, config(), images="png")[0]["/camera"]["data"])
     assert np.array_equal(np.asarray(Image.open(tmp_path / "picture")), pixels)
-    with pytest.raises(BagError, match="JPEG cannot hold 16 bit images: use --images png"):
+    with pytest.raises(BagError, match="JPEG cannot hold 16 bit images: use --images /camera=png"):
         rows_of(bag, config(), images="jpeg")
+
+
+@pytest.mark.parametrize(
+    ("chosen", "camera", "lidar"),
+    [
+        ("jpeg", "jpeg", "jpeg"),
+        ({"/camera": "jpeg", "/lidar": "png"}, "jpeg", "png"),
+        ({"/lidar": "png"}, None, "png"),
+        ({}, None, None),
+    ],
+)
+def test_each_input_may_have_a_format_of_its_own(tmp_path, chosen, camera, lidar):
+    frames = images("rgb8", np.zeros((3, 4, 3), "u1"), topics=("/camera", "/lidar"))
+    (row, *_) = rows_of(write_mcap(tmp_path / "bag.mcap", frames), config(), images=chosen)
+    assert (row["/camera"].get("format"), row["/lidar"].get("format")) == (camera, lidar)
+
+
+def test_a_format_for_what_has_no_images_is_refused(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", images("rgb8", np.zeros((3, 4, 3), "u1")))
+    with pytest.raises(BagError, match=f"/lidar is {VECTOR}, expected sensor_msgs/msg/Image: --images does not go"):
+        rows_of(bag, config(), images={"/lidar": "png"})
+    with pytest.raises(UsageError, match="/lidr is no input of the file, did you mean `/lidar`"):
+        rows_of(bag, config(), images={"/lidr": "png"})
 
 
 def test_an_encoding_that_no_picture_holds_is_named(tmp_path):
@@ -268,12 +292,12 @@ def test_a_recording_without_a_required_topic_is_refused(tmp_path):
         next(read_sets(bag, config()))
 
 
-def images(encoding, pixels, *, big_endian=0, height=None):
-    """Images of a camera, and a lidar beside it."""
+def images(encoding, pixels, *, big_endian=0, height=None, topics=("/camera",)):
+    """Images of some topics, of a camera alone unless said otherwise, with a lidar beside it."""
     types = STORE.types
     frames = []
     for frame in rig(10):
-        if frame.topic == "/camera":
+        if frame.topic in topics:
             found: Any = STORE.deserialize_cdr(frame.payload, frame.type_name)
             image = types["sensor_msgs/msg/Image"](
                 header=found.header,

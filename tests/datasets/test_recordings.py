@@ -12,6 +12,7 @@ from syncrelay.config import load_text
 from syncrelay.datasets.reading import SetsOf
 from syncrelay.datasets.tables import Content
 from syncrelay.sync import Match
+from tests.datasets.times import rows_of
 
 pytestmark = pytest.mark.real_data
 
@@ -47,12 +48,12 @@ def test_every_set_is_a_row_and_every_message_is_decoded(name, real_data):
         steps = Replay(recording, bindings, listeners=sets.listeners).steps()
         for group, table in sets.parts(steps, most_bytes=100_000):
             inputs = [each.topic for each in group.binding.inputs]
-            stamps = table["stamps_ns"].combine_chunks()
+            stamps = table["stamps"].combine_chunks()
             for topic in inputs:
                 assert table[topic].combine_chunks().is_null().equals(stamps.field(topic).is_null())
             rows[group.binding.group.name] += [
-                (tuple(row["stamps_ns"].values()), row["left_ns"], row["latency_ns"])
-                for row in table.select(["stamps_ns", "left_ns", "latency_ns"]).to_pylist()
+                (tuple(row["stamps"].values()), row["left_at"], row["latency_ns"])
+                for row in rows_of(table.select(["stamps", "left_at", "latency_ns"]))
             ]
     assert rows == told
     assert sum(map(len, rows.values()))

@@ -75,7 +75,7 @@ class FrameSets:
         finite = np.all([np.isfinite(rows).all(axis=1) for rows in vectors], axis=0)
         self.unusable[NOT_FINITE] += len(places) - int(finite.sum())
         tasks = self._tasks(table, chosen)
-        stamps = table["stamp_ns"].to_numpy()
+        stamps = table["stamp"].cast(pa.int64()).to_numpy()
         for number in np.flatnonzero(finite).tolist():
             place = int(places[number])
             try:
