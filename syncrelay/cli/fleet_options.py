@@ -14,22 +14,22 @@ def add_fleet_options(parser: Parser, *into: str) -> None:
         dest="into",
         metavar="FOLDER",
         type=output,
-        help="do each recording by itself, with its result in FOLDER, unless it is done; BAG may then be a pattern, a"
-        " folder of recordings, a URL, or @FILE that lists them",
+        help="do each recording by itself, unless its result is in FOLDER already; BAG may be a pattern, a folder, a"
+        " URL, or @FILE that lists them",
     )
     add(
         "--engine",
         choices=("local", "ray"),
         default="local",
         metavar="ENGINE",
-        help="local (default), or ray: the cluster of RAY_ADDRESS, or one here",
+        help="local (default), or ray, at RAY_ADDRESS or here",
     )
     add("--jobs", metavar="N", type=count, help="recordings at a time; default: one for each core")
     add(
         "--time-limit",
-        metavar="DURATION",
+        metavar="TIME",
         type=duration,
-        help="give up a recording that takes longer, such as 90min; default: 10 min and 10 s for each MB of it",
+        help="give up a recording after TIME, such as 90min; default: 10 min and 10 s for each MB",
     )
     add("--strict", action="store_true", help="end at the first recording that is at fault")
-    add("--overwrite", action="store_true", help="replace results of other values, another version or options")
+    add("--overwrite", action="store_true", help="replace results that other values or options gave")
