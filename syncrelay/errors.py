@@ -1,5 +1,11 @@
 """What the user can mend: where it is, what was found, what was expected. Anything else is our bug."""
 
+from errno import EDQUOT, EFBIG, ENOSPC
+from typing import Final
+
+NO_SPACE: Final = frozenset({EDQUOT, EFBIG, ENOSPC})
+"""The system's errors that only writing gives, and that writing the next file would give too."""
+
 
 class SyncRelayError(Exception):
     """Base of every error that a user can cause; its text is shown as it stands."""
@@ -24,6 +30,10 @@ class BagError(SyncRelayError):
 
 class StorageError(BagError):
     """A recording in object storage or on a server cannot be reached, or not to its end."""
+
+
+class OutputError(SyncRelayError):
+    """A file or folder cannot be written; where the disk is full, neither could the next."""
 
 
 class NothingToMatchError(SyncRelayError):

@@ -1,16 +1,17 @@
 """A new recording: MCAP as rosbag2 writes it, alone or in a rosbag2 folder with its metadata."""
 
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, BinaryIO, Final, Self
 
 import yaml
 from mcap.writer import Writer
 
 from syncrelay.bag.qos import Profile, write_profile
 from syncrelay.bag.recording import Definition, Encoding
-from syncrelay.errors import BagError
+from syncrelay.output_files import cannot_be_written, require_new, written_whole
 
 MCAP_SUFFIX: Final = ".mcap"
 _PROFILE: Final = "ros2"
@@ -31,22 +32,24 @@ class Output:
 
 
 class McapOutput:
-    """Writes CDR messages; a context manager that ends the file in order, also after an error."""
+    """Writes CDR messages; a context manager after which the recording is there, or after an error is not."""
 
     def __init__(self, path: Path) -> None:
-        """Begin a file, if the name ends in .mcap, or a folder; raises BagError where it exists or can't be made."""
-        self._folder = None if path.suffix == MCAP_SUFFIX else path
-        self._path = path if self._folder is None else path / f"{path.name}_0{MCAP_SUFFIX}"
-        if path.exists():
-            raise BagError(f"{path}: already exists and is not overwritten")
-        try:
+        """Begin a file, if the name ends in .mcap, or a folder; raises OutputError where it exists or can't be made."""
+        with ExitStack() as opened:
+            if path.suffix != MCAP_SUFFIX:
+                _make_parents(path)
+            require_new(path)
+            scratch = opened.enter_context(written_whole(path))
+            self._folder = None if path.suffix == MCAP_SUFFIX else scratch
             if self._folder is not None:
-                self._folder.mkdir(parents=True)
+                self._folder.mkdir()
+            self._path = scratch if self._folder is None else scratch / f"{path.name}_0{MCAP_SUFFIX}"
             self._file = self._path.open("xb")
-        except OSError as error:
-            raise BagError(f"{self._path}: cannot be written: {error.strerror}") from error
-        self._writer = Writer(self._file)
-        self._writer.start(_PROFILE)
+            opened.callback(_close, self._file)
+            self._writer = Writer(self._file)
+            self._writer.start(_PROFILE)
+            self._opened = opened.pop_all()
         self._outputs: list[Output] = []
         self._schemas: dict[str, int] = {}
         self._begin: int | None = None
@@ -57,12 +60,16 @@ class McapOutput:
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]  # mcap's
-        self._file.close()
-        if self._folder is not None:
-            text = yaml.safe_dump(self._metadata(), sort_keys=False)
-            (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
+    ) -> bool | None:
+        if error is not None:
+            return self._opened.__exit__(kind, error, trace)
+        with self._opened:
+            self._writer.finish()  # type: ignore[no-untyped-call]  # mcap's
+            self._file.close()
+            if self._folder is not None:
+                text = yaml.safe_dump(self._metadata(), sort_keys=False)
+                (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
+        return None
 
     @property
     def count(self) -> int:
@@ -109,6 +116,19 @@ class McapOutput:
             "ros_distro": "jazzy",
         }
         return {"rosbag2_bagfile_information": about}
+
+
+def _close(file: BinaryIO) -> None:
+    # Where there is no space, closing it fails once more.
+    with suppress(OSError):
+        file.close()
+
+
+def _make_parents(path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_be_written(path, error) from error
 
 
 def _topic_metadata(output: Output) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Final, TextIO
 
 from syncrelay.cli.stop import TERMINATED, Terminated
-from syncrelay.errors import RosUnavailableError, SyncRelayError, UsageError
+from syncrelay.errors import NO_SPACE, RosUnavailableError, SyncRelayError, UsageError
 from syncrelay.printable import one_entry, printable_lines
 
 DONE: Final = 0
@@ -72,19 +72,31 @@ def _guarded(command: Callable[[], int]) -> int:
         _abandon(sys.stdout)
         return AT_FAULT
     except Exception as error:  # noqa: BLE001  the boundary: everything else is our bug
-        if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
-            remark(_lacking(error, error.name.partition(".")[0]))
-            return UNAVAILABLE
-        say(traceback.format_exc())
-        remark("this is a bug in syncrelay, please report it with the lines above and your file")
-        return OUR_BUG
+        return _of_machine_or_bug(error)
     return code
 
 
+def _of_machine_or_bug(error: Exception) -> int:
+    """Say what this machine lacks, a package or space on a disk, or else that it is our bug."""
+    if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
+        remark(_lacking(error, error.name.partition(".")[0]))
+        return UNAVAILABLE
+    if isinstance(error, OSError) and error.errno in NO_SPACE:
+        where = f"{error.filename}: " if error.filename else ""
+        remark(f"{where}cannot be written: {error.strerror}")
+        return AT_FAULT
+    say(traceback.format_exc())
+    remark("this is a bug in syncrelay, please report it with the lines above and your file")
+    return OUR_BUG
+
+
 def say(text: str) -> None:
-    """Print talk on stderr, as `put` does."""
-    sys.stderr.write(f"{_safe(text, sys.stderr)}\n")
-    sys.stderr.flush()
+    """Print talk on stderr, as `put` does; where nobody takes it, or it finds no space, that is no failure."""
+    try:
+        sys.stderr.write(f"{_safe(text, sys.stderr)}\n")
+        sys.stderr.flush()
+    except OSError:
+        _abandon(sys.stderr)
 
 
 def remark(sentence: str) -> None:

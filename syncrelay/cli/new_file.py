@@ -1,11 +1,11 @@
 """Files that a command writes, and never over something of the user's."""
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import remark
-from syncrelay.errors import BagError
+from syncrelay.errors import OutputError
+from syncrelay.output_files import require_new, written_whole
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,26 +15,10 @@ if TYPE_CHECKING:
 _HEAD: Final = 500
 
 
-def require_new(name: str) -> None:
-    """Raise BagError where a file is there already, or has no folder to be in, before work is done for it."""
-    path = Path(name)
-    if os.path.lexists(path):
-        raise BagError(_is_there(path))
-    if not path.parent.is_dir():
-        raise BagError(f"{path}: cannot be written: {path.parent} is not a folder")
-
-
 def write_new(name: str, text: str) -> None:
-    """Write a file that is not there yet, and say so; raises BagError for one that is, or cannot be written."""
-    path = Path(name)
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError as error:
-        raise BagError(_is_there(path)) from error
-    except OSError as error:
-        raise BagError(f"{path}: cannot be written: {error.strerror}") from error
-    remark(f"wrote {path}")
+    """Write a file that is not there yet, and say so; raises OutputError for one that is, or cannot be written."""
+    require_new(Path(name))
+    _write(Path(name), text)
 
 
 def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
@@ -50,13 +34,15 @@ def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
 def write_again(name: str, text: str, *, mark: str) -> None:
     """Write a file as write_new does, but also over one that has a mark near its begin: a former one of the kind."""
     path = Path(name)
-    if path.is_file() and _bears(path, mark):
-        path.unlink()
-    write_new(name, text)
+    if not (path.is_file() and _bears(path, mark)):
+        require_new(path)
+    _write(path, text)
 
 
-def _is_there(path: Path) -> str:
-    return f"{path}: already exists and is not overwritten"
+def _write(path: Path, text: str) -> None:
+    with written_whole(path) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+    remark(f"wrote {path}")
 
 
 def _bears(path: Path, mark: str) -> bool:
@@ -64,4 +50,4 @@ def _bears(path: Path, mark: str) -> bool:
         with path.open("rb") as file:
             return mark.encode() in file.read(_HEAD)
     except OSError as error:
-        raise BagError(f"{path}: cannot be read: {error.strerror}") from error
+        raise OutputError(f"{path}: cannot be read: {error.strerror}") from error

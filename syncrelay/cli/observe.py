@@ -9,15 +9,17 @@ from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
-from syncrelay.cli.new_file import require_new, write_suggested
+from syncrelay.cli.new_file import write_suggested
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
 from syncrelay.errors import UsageError
+from syncrelay.output_files import require_new
 
 if TYPE_CHECKING:
     from syncrelay.bag.analysis import GroupAnalysis
@@ -61,7 +63,7 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     if arguments.write is not None:
         if len(arguments.config) > 1:
             parser.error(_ONE_FILE)
-        require_new(arguments.write)
+        require_new(Path(arguments.write))
     asked = Asked(
         files=tuple(arguments.config),
         groups=tuple(arguments.group),

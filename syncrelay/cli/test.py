@@ -2,7 +2,6 @@
 
 import os
 import stat
-import tempfile
 from argparse import Namespace
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -18,6 +17,7 @@ from syncrelay.config import ConfigError
 from syncrelay.config.source import STDIN, Patience, listed, read_source, shown_name
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
+from syncrelay.output_files import written_whole
 
 _WRITABLE: Final = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 
@@ -111,10 +111,8 @@ def replace_text(file: str, text: str, *, before: str) -> None:
             raise SyncRelayError(f"{file}: cannot be written: it is read-only")
         if read_source(str(path)).text != before:
             raise SyncRelayError(f"{file}: was changed while its cases ran: run them again to update it")
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".syncrelay-") as folder:
-            written = Path(folder, path.name)
+        with written_whole(path) as written:
             written.write_bytes(text.encode())
             written.chmod(stat.S_IMODE(mode))
-            written.replace(path)
     except OSError as error:
         raise SyncRelayError(f"{file}: cannot be written: {error.strerror}") from error

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from syncrelay.datasets.reading import SetsOf
 from syncrelay.datasets.tables import SetTable
-from syncrelay.errors import BagError
+from syncrelay.output_files import cannot_be_written
 
 SUFFIX: Final = ".parquet"
 # Its higher levels take twice the time for a tenth of the size.
@@ -20,7 +20,7 @@ _ZSTD_LEVEL: Final = 1
 def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path, *, ending: str = SUFFIX) -> None:
     """Write the sets of each group that leave in the steps of a replay, a row group at a time.
 
-    Each group has a file in the folder, its name and `ending`. Raises BagError where a file cannot be written.
+    Each group has a file in the folder, its name and `ending`. Raises OutputError where a file cannot be written.
     """
     with ExitStack() as opened:
         writers: dict[SetTable, pq.ParquetWriter] = {}
@@ -39,7 +39,7 @@ def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path, *, ending: 
                 if group not in writers:
                     write(group, group.table())
         except OSError as error:
-            raise BagError(f"{folder}: cannot be written: {error.strerror or error}") from error
+            raise cannot_be_written(folder, error) from error
 
 
 def _open(path: Path, schema: pa.Schema) -> pq.ParquetWriter:

@@ -11,10 +11,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from syncrelay.errors import SyncRelayError
+from syncrelay.errors import OutputError, SyncRelayError
 from syncrelay.fleet.content import ResultFile, sync_folder
 from syncrelay.fleet.recordings import is_result_name
 from syncrelay.fleet.task import JSON, NOTES, PROBLEMS
+from syncrelay.output_files import cannot_be_written
 
 # What reads a folder of Parquet files as one table skips names that begin with `_`.
 LEDGER: Final = "_ledger.jsonl"
@@ -69,12 +70,14 @@ class Ledger:
                 raise SyncRelayError(f"{folder}: holds files and no {LEDGER}: name an empty folder, or one that is new")
             self._file = FileIO(folder / LEDGER, "a+")
         except OSError as error:
-            raise SyncRelayError(f"{folder}: cannot be written: {error.strerror}") from error
+            raise cannot_be_written(folder, error) from error
         try:
             self._lock()
             self._read()
-        except BaseException:
+        except BaseException as error:
             self._file.close()
+            if isinstance(error, OSError):
+                raise cannot_be_written(folder / LEDGER, error) from error
             raise
 
     def __enter__(self) -> Self:
@@ -94,10 +97,10 @@ class Ledger:
             os.fsync(self._file.fileno())
         except OSError as error:
             self._file.truncate(end)
-            raise SyncRelayError(f"{self.folder / LEDGER}: cannot be written: {error.strerror}") from error
+            raise cannot_be_written(self.folder / LEDGER, error) from error
         if written != len(line):
             self._file.truncate(end)
-            raise SyncRelayError(f"{self.folder / LEDGER}: cannot be written: no space left")
+            raise OutputError(f"{self.folder / LEDGER}: cannot be written: no space left")
         self._keep(entry)
 
     def _lock(self) -> None:

@@ -15,6 +15,7 @@ from syncrelay.fleet.engine import Engine, Finished
 from syncrelay.fleet.ledger import Entry, Ledger, State
 from syncrelay.fleet.task import Source, Task
 from syncrelay.fleet.work import SCRATCH, Done, Failed, Job, Kept
+from syncrelay.output_files import cannot_be_written
 
 
 class Others(Enum):
@@ -153,7 +154,7 @@ def _clear(scratch: Path) -> None:
             shutil.rmtree(scratch)
         scratch.mkdir()
     except OSError as error:
-        raise SyncRelayError(f"{scratch}: cannot be written: {error.strerror}") from error
+        raise cannot_be_written(scratch, error) from error
 
 
 def _put_in_place(finished: Path, place: Path) -> None:

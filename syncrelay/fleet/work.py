@@ -7,13 +7,13 @@ import socket
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
-from errno import EDQUOT, ENOSPC, EROFS
+from errno import EROFS
 from pathlib import Path
 from typing import Any, Final, Protocol, TypeAlias
 from uuid import uuid4
 
 from syncrelay import own_version
-from syncrelay.errors import BagError, SyncRelayError
+from syncrelay.errors import NO_SPACE, BagError, OutputError, SyncRelayError
 from syncrelay.fleet.content import Content, ResultFile, are_intact, content_of, marks_of, results_in
 from syncrelay.fleet.ledger import LEDGER, Entry
 from syncrelay.fleet.task import JSON, Source, Task
@@ -26,7 +26,6 @@ _NS_PER_SECOND: Final = 1_000_000_000
 _LEAST_LIMIT: Final = 600 * _NS_PER_SECOND
 _LIMIT_PER_BYTE: Final = _NS_PER_SECOND // 100_000
 _PR_SET_PDEATHSIG: Final = 1
-_NO_SPACE: Final = (ENOSPC, EDQUOT, EROFS)
 
 
 class Work(Protocol):
@@ -158,11 +157,11 @@ def _performed(job: Job) -> Outcome:
             return Kept()
         return job.work(job, found, folder)
     except SyncRelayError as error:
-        failed = Failed(str(error), content)
+        failed = Failed(str(error), content, ends_all=isinstance(error, OutputError))
     except MemoryError:
         failed = Failed(f"{job.source.shown[0]}: takes more memory than a worker has: use fewer --jobs", content)
     except OSError as error:
-        if error.errno not in _NO_SPACE:
+        if error.errno not in (*NO_SPACE, EROFS):
             failed = Failed(traceback.format_exc(), content, is_bug=True)
         else:
             failed = Failed(f"{job.into}: cannot be written: {error.strerror}", content, ends_all=True)

@@ -262,7 +262,6 @@ _WRITTEN = {"OUT", "FOLDER", "NEW", "REPORT"}
 _OTHERS = {
     *(
         "BAG",
-        "DURATION",
         "ENGINE",
         "FAULT",
         "FILE",
@@ -272,6 +271,7 @@ _OTHERS = {
         "NAME",
         "PATTERN",
         "REASON",
+        "TIME",
         "TOPIC",
         "URL",
     ),

@@ -24,7 +24,7 @@ groups:
   rear: {policy: exact_time, topics: []}
 """
 # What a word of the line may be that no completion knows: a number, a place, a sentence.
-_UNKNOWN = {"N", "URL", "FAULT", "GROUP", "TOPIC", "TOPIC:FIELD,...", "PATTERN", "DURATION"}
+_UNKNOWN = {"N", "URL", "FAULT", "GROUP", "TOPIC", "TOPIC:FIELD,...", "PATTERN", "TIME"}
 
 
 # One process for many lines; all that argcomplete is told by a shell but where to write.

@@ -18,6 +18,7 @@ from syncrelay.datasets.lerobot.episode import ABOUT, TABLE, TASK, as_lists, ler
 from syncrelay.datasets.lerobot.stats import Stats, stats_of, together
 from syncrelay.datasets.lerobot.videos import JoinedVideo, described
 from syncrelay.errors import BagError
+from syncrelay.output_files import cannot_be_written
 
 _SCRATCH: Final = ".episodes"
 # A row has some kilobytes of statistics.
@@ -75,7 +76,7 @@ def join_episodes(episodes: Mapping[str, Path], folder: Path) -> dict[str, Any]:
 
     The facts: `total_episodes`, `total_frames`, `total_tasks`, `held` and `left_out` as of write_episode, and
     `problems`, a sentence for each episode that has other features than the first and was left out. meta/info.json is
-    written last. The same episodes give the same bytes. Raises BagError where the folder cannot be written.
+    written last. The same episodes give the same bytes. Raises OutputError where the folder cannot be written.
     """
     try:
         with ExitStack() as opened:
@@ -85,7 +86,7 @@ def join_episodes(episodes: Mapping[str, Path], folder: Path) -> dict[str, Any]:
             dataset.end()
         dataset.write_meta()
     except OSError as error:
-        raise BagError(f"{folder}: cannot be written: {error.strerror or error}") from error
+        raise cannot_be_written(folder, error) from error
     return dataset.facts()
 
 

@@ -1,0 +1,83 @@
+"""Commands that write, on disks that are too small: each says so, leaves nothing broken, and succeeds later."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.bag.making import rig, write_mcap
+from tests.cli.command import GOOD, ROOT, run_here
+from tests.cli.full_disk import COMMANDS
+from tests.cli.test_export_lerobot import FILE
+from tests.datasets.drives import drive
+from tests.ros.cdr_messages import VECTOR
+
+_LONG = os.environ.get("SYNCRELAY_FAULTS") == "long"
+_SIZES = 20 if _LONG else 3
+_SEED = os.urandom(4).hex() if _LONG else "full disk"
+_UNSHARE = ("unshare", "--mount", "--map-root-user")
+# Slop is too small, so that there are values to suggest.
+_FUSION = {
+    "policy": "approximate_time",
+    "slop": "1ms",
+    "topics": [{"topic": "/camera", "type": VECTOR}, {"topic": "/lidar", "type": VECTOR}],
+}
+_TESTS = """\
+version: 1
+config: ../fusion.yaml
+cases:
+  all:
+    recording: ../rig.mcap
+    expect: {sets: 7}
+"""
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    if not shutil.which("unshare") or subprocess.run([*_UNSHARE, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this machine gives no mounts of its own")
+    folder = tmp_path_factory.mktemp("full")
+    write_mcap(folder / "rig.mcap", rig(400))
+    drive(folder / "drive.mcap")
+    (folder / "lerobot.yaml").write_text(FILE)
+    (folder / "fusion.yaml").write_text(yaml.safe_dump({"version": 1, "groups": {"front": _FUSION}}))
+    (folder / "tests.yaml").write_text(_TESTS)
+    argv = [*_UNSHARE, sys.executable, "-m", "tests.cli.full_disk", _SEED, str(_SIZES), str(folder)]
+    done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.faults
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_full_disk_is_said_and_the_command_succeeds_once_there_is_room(told, name):
+    one = told[name]
+    assert one["code"] == 0, one["stderr"]
+    for each in one["tries"]:
+        case = f"seed {_SEED}: {json.dumps(each, indent=2)}"
+        assert each["code"] in (0, 1), case
+        assert "Traceback" not in each["stderr"], case
+        if each["code"]:
+            assert "No space left on device" in each["stderr"] or "no space left" in each["stderr"], case
+            assert each["broken"] == [], case
+        assert each["again"][0] == 0 or each["code"] == 0, case
+        assert each["same"], case
+    assert any(each["code"] for each in one["tries"]), one
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_talk_that_finds_no_space_is_no_failure(tmp_path):
+    (tmp_path / "good.yaml").write_text(GOOD)
+    (tmp_path / "bad.yaml").write_text(GOOD.replace("exact_time", "nonsense"))
+    for name, code in (("good.yaml", 0), ("bad.yaml", 1), ("none.yaml", 1)):
+        with Path("/dev/full").open("w") as full:
+            argv = [sys.executable, "-m", "syncrelay", "validate", name]
+            environ = {**os.environ, "PYTHONPATH": str(ROOT)}
+            done = subprocess.run(argv, cwd=tmp_path, env=environ, stderr=full, stdout=subprocess.DEVNULL, check=False)
+        assert done.returncode == code
+    assert run_here("validate", "good.yaml", folder=tmp_path).returncode == 0
