@@ -150,7 +150,7 @@ def test_nothing_is_overwritten(tmp_path):
     bag = write_mcap(tmp_path / "rig.mcap", _RIG)
     with pytest.raises(OutputError, match=r"rig\.mcap: already exists and is not overwritten"):
         _written(bag, bag)
-    with pytest.raises(OutputError, match="cannot be written: .*none is not a folder"):
+    with pytest.raises(OutputError, match=r"cannot be written: .*none is not a folder"):
         _written(bag, tmp_path / "none" / "out.mcap")
 
 

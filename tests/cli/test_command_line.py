@@ -275,7 +275,7 @@ _OTHERS = {
         "TOPIC",
         "URL",
     ),
-    "TOPIC:FIELD,...",
+    *("TOPIC:FIELD,...", "[TOPIC=]FORMAT"),
 }
 _OUTPUTS = [
     (command, option)
