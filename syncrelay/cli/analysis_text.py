@@ -8,6 +8,7 @@ from syncrelay.bag.analysis.nearest import Pair, worth_seeing
 from syncrelay.bag.analysis.suggest import Suggestion
 from syncrelay.bag.analysis.topics import TopicFigures
 from syncrelay.bag.analysis.unneeded import InputFates
+from syncrelay.cli.summary import why_unneeded
 from syncrelay.config.wording import counted
 from syncrelay.explain import in_words, words
 from syncrelay.printable import printable
@@ -138,7 +139,7 @@ def _fates(row: InputFates) -> Iterator[str]:
 
 def unneeded_line(row: InputFates) -> str:
     """Return why messages of an input were not needed; asked only where there are some."""
-    return f"no message of {' or '.join(row.lacking)} left to pair with"
+    return why_unneeded(row.lacking)
 
 
 def promise(suggestion: Suggestion) -> str:

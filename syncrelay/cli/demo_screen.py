@@ -8,20 +8,18 @@ from typing import Final
 from rich.console import Group as Lines
 from rich.text import Text
 
-from syncrelay.sync import DropReason
+from syncrelay.explain import RecentDrop
 from syncrelay.top import group_blocks, phrases
 from syncrelay.top.pieces import line
 from syncrelay.top.plain import group_lines
 from syncrelay.top.state import Group, State
-from syncrelay.top.strip import COLUMN_NS, Sweep, letter_style, newest_stamp
+from syncrelay.top.strip import COLUMN_NS, UNNEEDED, Sweep, letter_style, mark_of, newest_stamp
 
 _TITLE: Final = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
 # Reports come once a second, and hold what left by then. Shown so much later, the strip moves on between them.
 _DELAY_NS: Final = 1_250_000_000
 # On a wider strip what a report holds of a 100 Hz input would not reach back to the begin.
 WIDEST_STRIP: Final = 65
-# What every newcomer meets, whether it has happened yet or not.
-_ALWAYS_EXPLAINED: Final = (DropReason.TOO_FAR, DropReason.SUPERSEDED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,9 +92,10 @@ def _title(moment: Moment, width: int) -> Text:
 def _legend(groups: Sequence[Group], sweep: Sweep, width: int) -> Iterator[Text]:
     letters = Text(" ").join(Text(letter, letter_style(number)) for number, letter in enumerate("ABC"))
     yield line(letters, "  each letter is a set: messages matched by time and sent on together")
-    occurred = {DropReason(reason) for group in groups for each in group.inputs for reason in each.dropped}
-    styles = dict.fromkeys((*_ALWAYS_EXPLAINED, *occurred), "bold")
-    yield from group_blocks.side_by_side(group_blocks.marks(styles), width)
+    drops = [each for group in groups for each in group_blocks.as_matched(group) if isinstance(each, RecentDrop)]
+    occurred = {mark_of(each) for each in drops if sweep.column(each.stamp) is not None}
+    # What every newcomer meets, whether it has happened yet or not.
+    yield from group_blocks.side_by_side(group_blocks.marks({UNNEEDED, *occurred}), width)
     column, strip_s = phrases.duration(COLUMN_NS / 1e6), sweep.width * COLUMN_NS / 1e9
     yield line((f"a column is {column}; after {strip_s:.1f} s it starts again on the left; Ctrl-C ends it", "dim"))
 

@@ -19,9 +19,9 @@ from syncrelay.cli.parser import Parser
 from syncrelay.cli.reading import reading, tell_faults
 from syncrelay.cli.stop import StopRequest
 from syncrelay.cli.summary import summarize
-from syncrelay.config import load
+from syncrelay.config import GroupConfig, load
 from syncrelay.config.wording import all_of, counted
-from syncrelay.explain import GroupLines, RecentDrop
+from syncrelay.explain import DropFates, GroupLines, RecentDrop, drop_fates, may_set_pace
 from syncrelay.printable import printable
 from syncrelay.rig.what_if import Fault, parse_fault
 from syncrelay.sync import Match, Outcome
@@ -95,8 +95,9 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
         sets = sum(result.sets for result in results)
         remark(f"wrote {wanted.output}: {counted(written.messages, 'message')} of {counted(sets, 'set')}")
     tell = say if wanted.sets or wanted.drops else put
-    for result in results:
-        for line in summarize(result.name, result.sets, [(each.topic, each.counts) for each in result.inputs]):
+    for result, binding in zip(results, bindings, strict=True):
+        inputs = [(each.topic, each.counts) for each in result.inputs]
+        for line in summarize(result.name, result.sets, inputs, _drop_fates(result, binding.group)):
             tell(line)
     if wanted.what_if:
         _say_all([_compared(*each) for each in zip(results, without_faults, strict=True)])
@@ -106,6 +107,12 @@ def replay(bags: Sequence[str], config_paths: Sequence[str], wanted: Wanted) -> 
     if none:
         remark(f"no sets of {all_of(none)}: `syncrelay analyze` with this recording and file tells why")
     return DONE
+
+
+def _drop_fates(result: GroupResult, group: GroupConfig) -> tuple[DropFates, ...]:
+    required = [topic.required for topic in group.topics]
+    counted = may_set_pace(required, trigger=group.trigger, by_clock=group.ticks is not None)
+    return drop_fates([each.counts.dropped for each in result.inputs], counted)
 
 
 def _compared(result: GroupResult, without_faults: GroupResult) -> str:

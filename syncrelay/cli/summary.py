@@ -1,6 +1,6 @@
 """What became of every message: the last thing that a relay and a replay say."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from syncrelay.config.wording import counted
@@ -8,28 +8,40 @@ from syncrelay.logs import LOGGER
 from syncrelay.sync.counts import InputCounts
 
 if TYPE_CHECKING:
-    from syncrelay.explain import GroupReport
+    from syncrelay.explain import DropFates, GroupReport
 
 
 def log_summary(reports: "Iterable[GroupReport]") -> None:
     """Log what became of every message of groups."""
     for report in reports:
         facts = report.facts
-        for line in summarize(facts.name, facts.figures.sets, [(each.name, each.counts) for each in facts.inputs]):
+        inputs = [(each.name, each.counts) for each in facts.inputs]
+        for line in summarize(facts.name, facts.figures.sets, inputs, facts.fates):
             LOGGER.info(line, extra={"group": facts.name})
 
 
-def summarize(group: str, sets: int, inputs: Iterable[tuple[str, InputCounts]]) -> Iterator[str]:
+def summarize(
+    group: str, sets: int, inputs: Sequence[tuple[str, InputCounts]], fates: Sequence["DropFates"]
+) -> Iterator[str]:
     """Return a line for a group, and one for each of its inputs, which are named by their topics."""
     yield f"{group}: {counted(sets, 'set')}"
-    for topic, counts in inputs:
-        yield f"{group}:   {topic}: {_fates(counts)}"
+    for (topic, counts), each in zip(inputs, fates, strict=True):
+        lacking = [inputs[other][0] for other in each.lacking]
+        yield f"{group}:   {topic}: {_fates(counts, each, lacking)}"
 
 
-def _fates(counts: InputCounts) -> str:
-    text = f"{counts.fed} received, {counts.matched} in sets, {sum(counts.dropped.values())} dropped"
-    if counts.dropped:
-        reasons = sorted(counts.dropped.items(), key=lambda item: -item[1])
+def why_unneeded(lacking: Sequence[str]) -> str:
+    """Return why messages were not needed: which topics had none for them, or, where none lacked, what served."""
+    return f"no message of {' or '.join(lacking)} left to pair with" if lacking else "a newer one served"
+
+
+def _fates(counts: InputCounts, fates: "DropFates", lacking: Sequence[str]) -> str:
+    text = f"{counts.fed} received, {counts.matched} in sets"
+    if fates.unneeded:
+        text += f", {fates.unneeded} not needed ({why_unneeded(lacking)})"
+    text += f", {sum(fates.others.values())} dropped"
+    if fates.others:
+        reasons = sorted(fates.others.items(), key=lambda item: -item[1])
         text += f" ({', '.join(f'{reason.value} {count}' for reason, count in reasons)})"
     if counts.needed_queue is not None:
         text += "; some left the full queue before their partners came"

@@ -97,7 +97,10 @@ def _after(stamp: int | None, first: int) -> str:
 def _of_drop(begin: str, line: DropLine) -> str:
     """Say what the reason means where that fits."""
     meaning = {each.value: f" ({each.meaning})" for each in DropReason}.get(line.reason, "")
-    what, waited = f"{begin} drop, {line.topic} {line.reason}", f" after {words.duration(line.time - line.received)}"
+    waited = f" after {words.duration(line.time - line.received)}"
+    if line.unneeded:
+        return f"{begin} drop, {line.topic} not needed ({line.reason}){waited}"
+    what = f"{begin} drop, {line.topic} {line.reason}"
     return f"{what}{meaning if len(what + meaning + waited) <= _WIDTH else ''}{waited}"
 
 

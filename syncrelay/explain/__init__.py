@@ -28,15 +28,18 @@ from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.judge import Judge, explanation, judge, with_ok
 from syncrelay.explain.lines import GroupLines
 from syncrelay.explain.observation import Observation, SentSets
-from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet, recent
+from syncrelay.explain.report import GroupReport, RecentDrop, RecentSet
 from syncrelay.explain.rules_graph import no_other_node
-from syncrelay.explain.standing import Share, Standing
+from syncrelay.explain.standing import NO_SET_MISSED, Share, Standing
 from syncrelay.explain.tape import Left, Stamps, Tape
 from syncrelay.explain.try_budget import TryBudget
+from syncrelay.explain.unneeded import FOR_WANT_OF_A_PARTNER, DropFates, drop_fates, may_set_pace
 from syncrelay.explain.watch import GroupWatch
 
 __all__ = [
     "BOUNDS_NS",
+    "FOR_WANT_OF_A_PARTNER",
+    "NO_SET_MISSED",
     "STEP_NS",
     "UNREADABLE",
     "Arrivals",
@@ -44,6 +47,7 @@ __all__ = [
     "ClockState",
     "Code",
     "Distribution",
+    "DropFates",
     "DryRun",
     "Endpoint",
     "EngineDriver",
@@ -77,10 +81,12 @@ __all__ = [
     "Tape",
     "Tolerance",
     "TryBudget",
+    "drop_fates",
     "dry_run",
     "explanation",
     "in_words",
     "judge",
+    "may_set_pace",
     "no_other_node",
     "recent",
     "with_ok",

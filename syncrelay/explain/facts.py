@@ -9,6 +9,7 @@ from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggestions import Evaluator
+from syncrelay.explain.unneeded import DropFates, drop_fates, may_set_pace
 from syncrelay.sync.counts import InputCounts
 
 _SECOND: Final = 1_000_000_000
@@ -241,6 +242,21 @@ class GroupFacts:
         if self.trigger is not None:
             return self.inputs[self.trigger]
         return min((each for each in self.inputs if each.required), key=lambda each: each.figures.rate_hz)
+
+    @property
+    def fates(self) -> tuple[DropFates, ...]:
+        """What became of the dropped messages of each input since the group's start."""
+        return drop_fates([each.counts.dropped for each in self.inputs], self._counted)
+
+    @property
+    def fates_lately(self) -> tuple[DropFates, ...]:
+        """What became of those of the last seconds."""
+        return drop_fates([each.figures.dropped for each in self.inputs], self._counted)
+
+    @property
+    def _counted(self) -> tuple[int, ...]:
+        required = [each.required for each in self.inputs]
+        return may_set_pace(required, trigger=self.trigger, by_clock=self.ticks_hz is not None)
 
     def lag(self, index: int) -> int | None:
         """Return how long after their stamps an input's messages come, in nanoseconds; None if no clock can tell."""

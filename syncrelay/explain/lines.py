@@ -41,17 +41,16 @@ class GroupLines:
         return form % (left, *there, max(matched) - min(matched), left - received)
 
     def of_drop(self, drop: RecentDrop, *, left: int, received: int) -> str:
-        """Return the line of a message that leaves unmatched, as `of_set` does."""
-        return json.dumps(
-            {
-                "group": self.group.name,
-                "time": left,
-                "topic": self.topics[drop.input],
-                "stamp": drop.stamp,
-                "received": received,
-                "reason": drop.reason.value,
-            }
-        )
+        """Return the line of a message that leaves unmatched, as `of_set` does; `unneeded` only where that is known."""
+        line = {
+            "group": self.group.name,
+            "time": left,
+            "topic": self.topics[drop.input],
+            "stamp": drop.stamp,
+            "received": received,
+            "reason": drop.reason.value,
+        }
+        return json.dumps(line if drop.unneeded is None else {**line, "unneeded": drop.unneeded})
 
     def _form(self, kept: Sequence[bool]) -> str:
         """Return the line of every set that has these inputs, with `%d` for each number."""

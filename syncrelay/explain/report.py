@@ -1,6 +1,6 @@
 """A group at one moment: what is known, what follows from it, what happened last."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from statistics import median_low
@@ -24,20 +24,19 @@ class RecentSet(NamedTuple):
 
 
 class RecentDrop(NamedTuple):
-    """A message that left unmatched; its stamp as it came, in nanoseconds."""
+    """A message that left unmatched; its stamp as it came, in nanoseconds.
+
+    `unneeded` says whether it cost no set, None where nobody has told.
+    """
 
     input: int
     stamp: int
     reason: DropReason
+    unneeded: bool | None = None
 
     def shifted(self, offsets: Sequence[int]) -> Self:
         """Return it with its input's offset added, in nanoseconds, as for matching."""
         return self._replace(stamp=self.stamp + offsets[self.input])
-
-
-def recent(last: Iterable[tuple[int | None, ...] | RecentDrop]) -> tuple[RecentSet | RecentDrop, ...]:
-    """Return what left last, sets by their stamps alone, for those who are told of it."""
-    return tuple(each if isinstance(each, RecentDrop) else RecentSet(each) for each in last)
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,20 @@ class GroupReport:
     @cached_property
     def recent(self) -> tuple[RecentSet | RecentDrop, ...]:
         """What left last, oldest first."""
-        return recent(self.last)
+        return tuple(self.told(each) if isinstance(each, RecentDrop) else RecentSet(each) for each in self.last)
+
+    def told(self, drop: RecentDrop) -> RecentDrop:
+        """Return a drop with whether it was needed: by what most of its input's drops of its reason were."""
+        reasons = self._unneeded[drop.input] if drop.input < len(self._unneeded) else frozenset()
+        return drop._replace(unneeded=drop.reason in reasons)
+
+    @cached_property
+    def _unneeded(self) -> tuple[frozenset[DropReason], ...]:
+        """Which reasons say of an input that a message was not needed: lately, or else since the start."""
+        pairs = zip(self.facts.fates_lately, self.facts.fates, strict=True)
+        return tuple(
+            lately.mostly_unneeded | (whole.mostly_unneeded - lately.dropped.keys()) for lately, whole in pairs
+        )
 
     @property
     def span_without_offsets(self) -> int | None:

@@ -28,8 +28,7 @@ _UNSURE: Final = 0.05
 _PAUSE: Final = 5
 # So many periods after the last message of all inputs, none comes any more.
 _LATE: Final = 2
-# They cost no set that was possible: left out on purpose, or replaced by a message of the same stamp.
-_NO_SET_MISSED: Final = frozenset(
+NO_SET_MISSED: Final = frozenset(
     {
         DropReason.THINNED,
         DropReason.DUPLICATE,
@@ -38,6 +37,7 @@ _NO_SET_MISSED: Final = frozenset(
         DropReason.TIME_JUMP,
     }
 )
+"""Reasons that cost no set that was possible: left out on purpose, or replaced by a message of the same stamp."""
 
 
 class Standing(Enum):
@@ -141,7 +141,7 @@ class ShareWindow:
             self._polls.clear()
         inputs = [counts[index] for index in self._counted]
         thinned = tuple([each.dropped.get(DropReason.THINNED, 0) for each in inputs])
-        missed = [sum(n for why, n in each.dropped.items() if why not in _NO_SET_MISSED) for each in inputs]
+        missed = [sum(n for why, n in each.dropped.items() if why not in NO_SET_MISSED) for each in inputs]
         gone = tuple([each.matched + n for each, n in zip(inputs, missed, strict=True)])
         taken = tuple([n + each.buffered for each, n in zip(inputs, gone, strict=True)])
         fed = tuple([each.fed for each in inputs])

@@ -9,7 +9,7 @@ from std_msgs.msg import Float64
 
 from syncrelay.config import Config
 from syncrelay.config.names_in_graph import DIAGNOSTICS, SCALARS
-from syncrelay.explain import Distribution, GroupReport, InputFacts, explanation
+from syncrelay.explain import Distribution, DropFates, GroupReport, InputFacts, explanation
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.status import Level, level
 
@@ -152,18 +152,20 @@ def _values(report: GroupReport) -> Iterator[tuple[str, str]]:
     yield "possible sets (Hz)", f"{facts.possible_hz:.2f}"
     yield from _percentiles("span", figures.spans)
     yield from _percentiles("latency", figures.latencies)
-    for each in facts.inputs:
-        yield from _of_input(each, figures.now)
+    for each, fates in zip(facts.inputs, facts.fates, strict=True):
+        yield from _of_input(each, fates, figures.now)
 
 
-def _of_input(each: InputFacts, now: int) -> Iterator[tuple[str, str]]:
+def _of_input(each: InputFacts, fates: DropFates, now: int) -> Iterator[tuple[str, str]]:
     figures = each.figures
     yield f"{each.name} rate (Hz)", f"{figures.rate_hz:.2f}"
     if figures.last_received is not None:
         yield f"{each.name} age (s)", f"{(now - figures.last_received) / _NS_PER_SECOND:.2f}"
     yield f"{each.name} received", str(each.counts.fed)
     yield f"{each.name} matched", str(each.counts.matched)
-    for reason, count in sorted(each.counts.dropped.items(), key=lambda item: item[0].value):
+    if fates.unneeded:
+        yield f"{each.name} not needed", str(fates.unneeded)
+    for reason, count in sorted(fates.others.items(), key=lambda item: item[0].value):
         yield f"{each.name} dropped, {reason.value}", str(count)
 
 

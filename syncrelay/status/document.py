@@ -1,22 +1,24 @@
 """The state of a relay as JSON: what /status gives and `syncrelay top` reads."""
 
 import os
+from collections.abc import Mapping
 from typing import Any, Final
 
 from syncrelay import own_version
 from syncrelay.config import Tolerance
 from syncrelay.explain import (
     Distribution,
+    DropFates,
     Endpoint,
     Finding,
     GroupFacts,
     GroupReport,
-    InputFacts,
     RecentDrop,
     RecentSet,
     explanation,
 )
 from syncrelay.status.state import RelayState, is_ready, level
+from syncrelay.sync import DropReason
 
 _NS_PER_MS: Final = 1_000_000
 
@@ -47,6 +49,7 @@ def document(state: RelayState) -> dict[str, Any]:
 def group_document(report: GroupReport) -> dict[str, Any]:
     """Return what there is to say of a group as what json.dumps takes."""
     facts, figures = report.facts, report.facts.figures
+    fates, lately = facts.fates, facts.fates_lately
     return {
         "name": facts.name,
         "policy": facts.policy,
@@ -63,7 +66,7 @@ def group_document(report: GroupReport) -> dict[str, Any]:
         "latency_ms": _percentiles(figures.latencies),
         "nearest_ms": _percentiles(figures.nearest),
         "last_sets": [{"span_ms": _ms(span), "latency_ms": _ms(late)} for span, late in reversed(figures.last_sets)],
-        "inputs": [_input(facts, index, each) for index, each in enumerate(facts.inputs)],
+        "inputs": [_input(facts, index, *each) for index, each in enumerate(zip(fates, lately, strict=True))],
         "findings": [_finding(facts, finding) for finding in _explanation_first(report.findings)],
         "recent": [_recent(outcome) for outcome in report.recent],
     }
@@ -75,7 +78,8 @@ def _tolerance(tolerance: Tolerance | None) -> dict[str, Any] | None:
     return {"key": tolerance.key, "ms": _ms(tolerance.ns)}
 
 
-def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
+def _input(facts: GroupFacts, index: int, fates: DropFates, lately: DropFates) -> dict[str, Any]:
+    each = facts.inputs[index]
     figures, counts = each.figures, each.counts
     return {
         "topic": each.name,
@@ -91,13 +95,21 @@ def _input(facts: GroupFacts, index: int, each: InputFacts) -> dict[str, Any]:
         "received": counts.fed,
         "matched": counts.matched,
         "buffered": counts.buffered,
-        "dropped": {reason.value: count for reason, count in counts.dropped.items()},
-        "dropped_lately": {reason.value: count for reason, count in figures.dropped.items()},
+        "dropped": _by_reason(counts.dropped),
+        "unneeded": fates.unneeded,
+        "other_drops": _by_reason(fates.others),
+        "dropped_lately": _by_reason(figures.dropped),
+        "unneeded_lately": lately.unneeded,
+        "other_drops_lately": _by_reason(lately.others),
         "lost": each.graph.lost,
         "missing": round(facts.figures.missing[index], 3),
         "publishers": [_endpoint(publisher) for publisher in each.graph.publishers],
         "subscribers": [_endpoint(subscriber) for subscriber in each.graph.subscribers],
     }
+
+
+def _by_reason(drops: Mapping[DropReason, int]) -> dict[str, int]:
+    return {reason.value: count for reason, count in drops.items()}
 
 
 def _endpoint(endpoint: Endpoint) -> dict[str, Any]:
@@ -125,7 +137,8 @@ def _finding(facts: GroupFacts, finding: Finding) -> dict[str, Any]:
 def _recent(outcome: RecentSet | RecentDrop) -> dict[str, Any]:
     if isinstance(outcome, RecentSet):
         return {"set": list(outcome.stamps)}
-    return {"drop": {"input": outcome.input, "stamp": outcome.stamp, "reason": outcome.reason.value}}
+    told = {"input": outcome.input, "stamp": outcome.stamp, "reason": outcome.reason.value}
+    return {"drop": {**told, "unneeded": outcome.unneeded}}
 
 
 def _percentiles(sample: Distribution) -> dict[str, float | None] | None:

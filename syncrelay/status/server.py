@@ -21,6 +21,7 @@ from waitress.wasyncore import close_all
 from syncrelay.config import Listen
 from syncrelay.config.wording import all_of
 from syncrelay.errors import ListenError
+from syncrelay.explain import GroupReport
 from syncrelay.status.announcement import Place, announce
 from syncrelay.status.document import document
 from syncrelay.status.hosts import Hosts
@@ -214,12 +215,12 @@ def _of_page(path: str) -> _Answer:
 
 
 def _tapped(start: _Start, taps: Taps, query: str, state: Callable[[], RelayState]) -> list[bytes]:
-    def groups() -> list[str]:
+    def reports() -> dict[str, GroupReport | None]:
         now = state()
-        return [*(report.facts.name for report in now.groups), *now.unjudged]
+        return {**{report.facts.name: report for report in now.groups}, **dict.fromkeys(now.unjudged)}
 
     try:
-        return _answer(start, "200 OK", taps.answer(query, groups=groups), _JSON)
+        return _answer(start, "200 OK", taps.answer(query, reports=reports), _JSON)
     except TapRefusedError as error:
         return _text(start, error.status, str(error))
 

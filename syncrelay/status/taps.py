@@ -7,7 +7,7 @@ the server, and of one that stalls there is nothing but a connection, which ends
 import json
 import re
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from typing import Final, Self
@@ -16,7 +16,7 @@ from urllib.parse import parse_qs
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import one_of
 from syncrelay.errors import SyncRelayError
-from syncrelay.explain import GroupLines, Left, RecentDrop, Tape
+from syncrelay.explain import GroupLines, GroupReport, Left, RecentDrop, Tape
 from syncrelay.explain.tape import UNHEARD_S
 from syncrelay.sync import DropReason
 
@@ -128,11 +128,12 @@ class Taps:
         self._asked: dict[str, float] = {}
         self._lock = Lock()
 
-    def answer(self, text: str, *, groups: Callable[[], Collection[str]] = tuple) -> bytes:
+    def answer(self, text: str, *, reports: Callable[[], Mapping[str, GroupReport | None]] = dict) -> bytes:
         """Return what has left since, as JSON. Raises TapRefusedError.
 
-        A tap that begins may name none but these groups, where there are any. One that goes on may: a reload may have
-        taken its group away, and may bring it back.
+        `reports` gives the latest report of each group by its name, None before the first one. A tap that begins may
+        name none but these groups, where there are any. One that goes on may: a reload may have taken its group away,
+        and may bring it back.
 
         `after` is what to ask with next, `more` says that there is more at once. `lost` counts sets and drops of all
         groups that were too old to be given; it is null where nobody counted. While taps have taken more than their
@@ -141,7 +142,7 @@ class Taps:
         query = Query.of(text)
         # The relay's state is not to be had for nothing.
         if query.after is None and query.wanted.groups:
-            _require_known(query.wanted.groups, groups())
+            _require_known(query.wanted.groups, reports())
         was_there = self._enter(query.name)
         last = self.tape.last
         if query.after is None or not was_there or query.after > last:
@@ -151,7 +152,8 @@ class Taps:
         began = self._processor_s()
         left, lost = self.tape.after(query.after, most=_MOST_LINES)
         after = left[-1].number if left else query.after
-        lines = [line for each in left if (line := self._line(each, query.wanted)) is not None]
+        judged = reports() if left else {}
+        lines = [line for each in left if (line := self._line(each, query.wanted, judged)) is not None]
         told = _told(after, more=after < last, lost=lost, lines=lines)
         with self._lock:
             self._left_s -= self._processor_s() - began
@@ -178,12 +180,14 @@ class Taps:
             self.tape.listen()
         return was_there
 
-    def _line(self, each: Left, wanted: Wanted) -> str | None:
+    def _line(self, each: Left, wanted: Wanted, judged: Mapping[str, GroupReport | None]) -> str | None:
         lines = self._lines_of(each.group)
         if not wanted.holds(each, lines.topics):
             return None
         if isinstance(each.outcome, RecentDrop):
-            return lines.of_drop(each.outcome, left=each.left, received=each.received)
+            report = judged.get(each.group.name)
+            drop = each.outcome if report is None else report.told(each.outcome)
+            return lines.of_drop(drop, left=each.left, received=each.received)
         return lines.of_set(each.outcome, left=each.left, received=each.received)
 
     def _lines_of(self, group: GroupConfig) -> GroupLines:

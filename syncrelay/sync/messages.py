@@ -60,7 +60,7 @@ class DropReason(Enum):
         "overflow",
         "its queue was full",
         "Its queue was full: `queue_size` is too short for the gap in rates, or no partner was left for it, as for most"
-        " of a fast topic beside a slow one: then no set is lost, and `analyze` calls it not needed.",
+        " of a fast topic beside a slow one: then no set is missed.",
     )
     SUPERSEDED = _Why(
         "superseded",

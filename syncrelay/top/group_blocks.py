@@ -1,17 +1,27 @@
 """What there is to see of one group, in blocks of lines: figures, findings, inputs, recent sets, connections."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Final
 
 from rich.text import Text
 
 from syncrelay.explain import RecentDrop, RecentSet
-from syncrelay.sync import DropReason
 from syncrelay.top import phrases
 from syncrelay.top.names import fitted, fitted_names, short_names
 from syncrelay.top.pieces import STYLES, bar, line, sparkline, wrapped
 from syncrelay.top.state import Endpoint, Finding, Group, Input, Percentiles
-from syncrelay.top.strip import MARKS, Axis, Lanes, drop_style, letter_style, newest_stamp, strip, window_of
+from syncrelay.top.strip import (
+    MARKS,
+    UNNEEDED,
+    Axis,
+    Lanes,
+    Mark,
+    letter_style,
+    mark_of,
+    newest_stamp,
+    strip,
+    window_of,
+)
 
 _LABEL: Final = 9
 _BAR: Final = 24
@@ -102,25 +112,20 @@ def _notes(each: Input, problem: Finding | None) -> Iterator[str | tuple[str, st
     if problem is not None:
         yield (problem.label, STYLES[problem.severity])
     if each.dropped_lately or problem is None:
-        yield f"{'; ' if problem else ''}{phrases.drops(each.dropped_lately)}"
+        yield f"{'; ' if problem else ''}{phrases.drops_lately(each)}"
 
 
 def recent_sets(group: Group, width: int) -> Iterator[Text]:
     """Draw the strip of recent sets, with a legend of what is on it."""
     if not group.recent:
         return
-    recent, fed = as_matched(group), _fed(group)
+    recent = as_matched(group)
     window = window_of(recent, min(width - LANE_LABEL - 2, _WIDEST_STRIP))
     yield from lanes(group, recent, window)
     shown = [each for each in recent if window.column(newest_stamp([each])) is not None]
     drops = [each for each in shown if isinstance(each, RecentDrop)]
     sets = [line(*_letters(), " sets")] if len(drops) < len(shown) else []
-    # The style that stands out is the longer.
-    styles = {
-        reason: max((drop_style(fed, each.input) for each in drops if each.reason is reason), key=len)
-        for reason in {each.reason for each in drops}
-    }
-    yield from side_by_side([*sets, *marks(styles)], width)
+    yield from side_by_side([*sets, *marks({mark_of(each) for each in drops})], width)
     yield line((f"a column is {phrases.duration(window.column_ns / _NS_PER_MS)}, the newest is on the right", "dim"))
 
 
@@ -132,7 +137,7 @@ def as_matched(group: Group) -> tuple[RecentSet | RecentDrop, ...]:
 
 def lanes(group: Group, recent: Sequence[RecentSet | RecentDrop], axis: Axis) -> Iterator[Text]:
     """Draw a lane for each input, what left recently on it, and the spans of the sets below."""
-    drawn = strip(Lanes(_fed(group), group.sets, tuple(recent)), axis)
+    drawn = strip(Lanes(len(group.inputs), group.sets, tuple(recent)), axis)
     for index, name in enumerate(short_names([each.topic for each in group.inputs])):
         shift = f" {group.inputs[index].offset_ms:+g} ms" if group.inputs[index].offset_ms else ""
         label = f"{fitted(name, LANE_LABEL - len(shift))}{shift}".rjust(LANE_LABEL)
@@ -141,19 +146,17 @@ def lanes(group: Group, recent: Sequence[RecentSet | RecentDrop], axis: Axis) ->
         yield line((below.rjust(LANE_LABEL), "dim"), (" ▏", "dim"), drawn[2 * index + 1])
 
 
-def _fed(group: Group) -> tuple[int, ...]:
-    return tuple(each.received for each in group.inputs)
-
-
 def _letters() -> list[tuple[str, str]]:
     return [(letter, letter_style(number)) for number, letter in enumerate("ABC")]
 
 
-def marks(styles: Mapping[DropReason, str]) -> Iterator[Text]:
-    """Say what the marks of dropped messages mean, each in its style."""
-    for reason in MARKS:
-        if reason in styles:
-            yield line((MARKS[reason], styles[reason]), f" {reason.value}: {reason.meaning}")
+def marks(shown: Collection[Mark]) -> Iterator[Text]:
+    """Say what marks of dropped messages mean, each in its style."""
+    if UNNEEDED in shown:
+        yield line(UNNEEDED, " not needed")
+    for reason, mark in MARKS.items():
+        if mark in shown:
+            yield line(mark, f" {reason.value}: {reason.meaning}")
 
 
 def side_by_side(texts: Iterable[Text], width: int) -> Iterator[Text]:

@@ -98,12 +98,21 @@ def drops(dropped: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {reason}" for reason, count in by_count) or "none"
 
 
+def drops_lately(an_input: Input) -> str:
+    """Return `1 late, 66 not needed`, or `none`."""
+    others = an_input.dropped_lately if an_input.other_drops_lately is None else an_input.other_drops_lately
+    if not an_input.unneeded_lately:
+        return drops(others)
+    return f"{f'{drops(others)}, ' if others else ''}{an_input.unneeded_lately} not needed"
+
+
 def fates(an_input: Input) -> str:
     """Say what became of all messages of an input."""
     lost = f"; {an_input.lost} lost on the way" if an_input.lost else ""
-    dropped = sum(an_input.dropped.values())
-    reasons = f" ({drops(an_input.dropped)})" if dropped else ""
+    others = an_input.dropped if an_input.other_drops is None else an_input.other_drops
+    unneeded = f" {an_input.unneeded} not needed," if an_input.unneeded else ""
+    reasons = f" ({drops(others)})" if others else ""
     return (
-        f"{an_input.received} received, {an_input.matched} in sets, {an_input.buffered} waiting,"
-        f" {dropped} dropped{reasons}{lost}"
+        f"{an_input.received} received, {an_input.matched} in sets, {an_input.buffered} waiting,{unneeded}"
+        f" {sum(others.values())} dropped{reasons}{lost}"
     )

@@ -89,7 +89,7 @@ def _input(each: Input, problem: Finding | None) -> Iterator[tuple[str, str]]:
     if each.jitter_ms is not None:
         figures.append(f"jitter {phrases.duration(each.jitter_ms)}")
     if each.dropped_lately:
-        figures.append(f"dropped in the last 10 s: {phrases.drops(each.dropped_lately)}")
+        figures.append(f"dropped in the last 10 s: {phrases.drops_lately(each)}")
     optional = "" if each.required else " (optional)"
     yield f"{each.topic}{optional}: {', '.join(figures) or 'no message yet'}", "  "
     yield phrases.fates(each), "    "

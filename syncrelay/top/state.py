@@ -81,7 +81,10 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """An input and its output. `dropped_lately` counts the last ten seconds, `missing` is a share of the sets."""
+    """An input and its output. What is `lately` is of the last ten seconds, `missing` a share of the sets.
+
+    `other_drops` are the dropped messages but for those that were not needed, None where that is not told.
+    """
 
     topic: Text
     type: Text | None
@@ -101,6 +104,10 @@ class Input:
     publishers: tuple[Endpoint, ...]
     subscribers: tuple[Endpoint, ...]
     offset_ms: float = 0.0
+    unneeded: int = 0
+    unneeded_lately: int = 0
+    other_drops: Mapping[Text, int] | None = None
+    other_drops_lately: Mapping[Text, int] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 from types import MappingProxyType
-from typing import Protocol, TypeAlias
+from typing import Final, NamedTuple, Protocol, TypeAlias
 
 from rich.text import Text
 
-from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.explain import NO_SET_MISSED, RecentDrop, RecentSet
 from syncrelay.sync.messages import DropReason
 
 Outcome: TypeAlias = RecentSet | RecentDrop
@@ -29,25 +29,43 @@ _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 # dark ground can be told, whatever the terminal's theme makes of `green`.
 _COLOURS = tuple(f"color({number})" for number in (37, 71, 172, 133))
 
-MARKS: Mapping[DropReason, str] = MappingProxyType(
+
+class Mark(NamedTuple):
+    """The character of a dropped message, and its style."""
+
+    character: str
+    style: str
+
+
+UNNEEDED: Final = Mark("·", "dim")
+
+_CHARACTERS: Final = {
+    DropReason.TOO_FAR: "×",  # noqa: RUF001  the sign, a cross
+    DropReason.SUPERSEDED: "»",
+    DropReason.LATE: "<",
+    DropReason.DUPLICATE: "=",
+    DropReason.OVERFLOW: "!",
+    DropReason.EXPIRED: "~",
+    DropReason.TIME_JUMP: "^",
+    DropReason.UNSTAMPED: "0",
+    DropReason.MALFORMED: "?",
+    DropReason.THINNED: "-",
+    DropReason.PAUSED: ":",
+    DropReason.SHUTDOWN: "|",
+}
+
+MARKS: Final[Mapping[DropReason, Mark]] = MappingProxyType(
     {
-        DropReason.TOO_FAR: "×",  # noqa: RUF001  the sign, a cross
-        DropReason.SUPERSEDED: "·",
-        DropReason.LATE: "<",
-        DropReason.DUPLICATE: "=",
-        DropReason.OVERFLOW: "!",
-        DropReason.EXPIRED: "~",
-        DropReason.TIME_JUMP: "^",
-        DropReason.UNSTAMPED: "0",
-        DropReason.MALFORMED: "?",
-        DropReason.THINNED: "-",
-        DropReason.PAUSED: ":",
-        DropReason.SHUTDOWN: "|",
+        reason: Mark(character, "dim" if reason in NO_SET_MISSED else "bold red")
+        for reason, character in _CHARACTERS.items()
     }
 )
+"""Of messages that were needed: what costs sets stands out."""
 
-# What becomes of most messages of a fast input.
-_USUAL = frozenset({DropReason.TOO_FAR, DropReason.SUPERSEDED})
+
+def mark_of(drop: RecentDrop) -> Mark:
+    """Return how a dropped message is drawn."""
+    return UNNEEDED if drop.unneeded else MARKS[drop.reason]
 
 
 def letter_style(number: int) -> str:
@@ -55,20 +73,11 @@ def letter_style(number: int) -> str:
     return f"color(16) on {_COLOURS[number % len(_COLOURS)]}"
 
 
-def drop_style(fed: Sequence[int], lane: int) -> str:
-    """Return the style of an input's drops, from how many messages each input was given.
-
-    What a faster input has too much of is dim, a lost set stands out: sets are lost by drops of the slowest input, and
-    of those hardly faster.
-    """
-    return "bold red" if fed[lane] <= 1.5 * min(fed) else "dim"
-
-
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """A group as the strip draws it: what each input was `fed`, how many `sets` left, what happened last."""
+    """A group as the strip draws it: how many inputs it has, how many `sets` left, what happened last."""
 
-    fed: tuple[int, ...]
+    n_inputs: int
     sets: int
     recent: tuple[Outcome, ...]
 
@@ -167,11 +176,10 @@ def strip(lanes: Lanes, axis: Axis) -> list[Text]:
 
     Two inputs make four lines, each input more makes two more.
     """
-    drawing = _Drawing(lanes=len(lanes.fed), width=axis.width)
-    styles = [drop_style(lanes.fed, lane) for lane in range(len(lanes.fed))]
+    drawing = _Drawing(lanes=lanes.n_inputs, width=axis.width)
     for outcome in lanes.recent:
         if isinstance(outcome, RecentDrop):
-            _draw_drop(drawing, outcome, axis, styles[outcome.input])
+            _draw_drop(drawing, outcome, axis)
     for number, a_set in _numbered_sets(lanes):
         _draw_set(drawing, number, a_set, axis)
     return drawing.lines()
@@ -183,12 +191,12 @@ def _numbered_sets(lanes: Lanes) -> Iterator[tuple[int, RecentSet]]:
     return enumerate(recent, start=lanes.sets - len(recent))
 
 
-def _draw_drop(drawing: "_Drawing", drop: RecentDrop, axis: Axis, style: str) -> None:
-    column = axis.column(drop.stamp)
-    # Where several share a column, it is the unusual that must be seen.
-    if column is None or (drop.reason in _USUAL and drawing.taken(2 * drop.input, column)):
+def _draw_drop(drawing: "_Drawing", drop: RecentDrop, axis: Axis) -> None:
+    column, mark = axis.column(drop.stamp), mark_of(drop)
+    # Where several share a column, it is what was needed that must be seen.
+    if column is None or (mark is UNNEEDED and drawing.taken(2 * drop.input, column)):
         return
-    drawing.put(2 * drop.input, column, MARKS[drop.reason], style)
+    drawing.put(2 * drop.input, column, *mark)
 
 
 def _draw_set(drawing: "_Drawing", number: int, a_set: RecentSet, axis: Axis) -> None:

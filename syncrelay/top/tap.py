@@ -29,7 +29,7 @@ class SetLine:
 
 @dataclass(frozen=True, slots=True)
 class DropLine:
-    """A message that left unmatched; times in nanoseconds."""
+    """A message that left unmatched; times in nanoseconds. `unneeded`: it cost no set, as far as the relay tells."""
 
     group: Text
     time: int
@@ -37,6 +37,7 @@ class DropLine:
     stamp: int
     received: int
     reason: Text
+    unneeded: bool = False
 
 
 @dataclass(frozen=True, slots=True)

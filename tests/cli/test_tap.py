@@ -80,11 +80,11 @@ def test_a_set_is_shown_as_it_was_matched_with_the_offsets_of_the_file():
     assert plain_line(line).endswith("set, span 0 s, latency 2 ms: /camera +0 s, /lidar +0 s, /imu missing")
 
 
-def test_json_lines_are_those_of_replay(tmp_path):
+def test_json_lines_are_those_of_replay_and_say_what_was_not_needed(tmp_path):
     with leaving(A_SET, A_DROP) as url:
         done = run("tap", "front", "--json", "--url", url, "-n", "2", folder=tmp_path)
     assert done.returncode == 0
-    assert sorted(map(json.loads, done.stdout.splitlines()), key=len) == [
+    assert sorted(map(json.loads, done.stdout.splitlines()), key=lambda line: "stamps" in line) == [
         {
             "group": "front",
             "time": _LEFT,
@@ -92,6 +92,7 @@ def test_json_lines_are_those_of_replay(tmp_path):
             "stamp": _AT,
             "received": _RECEIVED,
             "reason": "overflow",
+            "unneeded": False,
         },
         {
             "group": "front",
@@ -163,7 +164,9 @@ groups:
     ).groups
     lines = lines_of(group)
     a_set = lines.of_set((_AT, _AT + 7 * _MS), left=_AT + 9_200_000, received=_AT + 8 * _MS)
-    a_drop = lines.of_drop(RecentDrop(0, _AT, DropReason.TOO_FAR), left=_AT + 63 * _MS, received=_AT + 2 * _MS)
+    a_drop = lines.of_drop(
+        RecentDrop(0, _AT, DropReason.TOO_FAR, unneeded=True), left=_AT + 63 * _MS, received=_AT + 2 * _MS
+    )
     page = (Path(__file__).parents[2] / "docs" / "howto" / "observe.md").read_text()
     for line in (a_set, a_drop):
         assert plain_line(json.loads(line)).split(maxsplit=1)[1] in page

@@ -27,7 +27,7 @@ def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
     assert "  ERROR: stamps of /rear/image_raw are 37.2 s behind those of /lidar/points" in lines
     assert "    fix: synchronize the clocks of their machines, or write `offset: 37.156s` at" in lines
     assert "  /radar/points: no publisher" in lines
-    assert "    900 received, 300 in sets, 2 waiting, 598 dropped (598 too_far)" in lines
+    assert "    900 received, 300 in sets, 2 waiting, 598 not needed, 0 dropped" in lines
     assert max(map(len, lines)) <= 80
     assert shown.stdout.isascii()
 

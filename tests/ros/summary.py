@@ -7,6 +7,7 @@ from typing import NamedTuple
 class InputSummary(NamedTuple):
     received: int
     matched: int
+    unneeded: int
     dropped: dict[str, int]
 
 
@@ -18,7 +19,7 @@ class GroupSummary(NamedTuple):
 _GROUP = re.compile(r"(?P<group>\w+): (?P<sets>\d+) sets?$")
 _INPUT = re.compile(
     r"(?P<group>\w+):   (?P<topic>/\S+): (?P<received>\d+) received, (?P<matched>\d+) in sets,"
-    r" (?P<dropped>\d+) dropped(?: \((?P<reasons>[^)]*)\))?(?:; .*)?$"
+    r"(?: (?P<unneeded>\d+) not needed \([^)]*\),)? (?P<dropped>\d+) dropped(?: \((?P<reasons>[^)]*)\))?(?:; .*)?$"
 )
 
 
@@ -33,6 +34,6 @@ def read_summary(stderr: str) -> dict[str, GroupSummary]:
             counts = {reason: int(count) for reason, count in reasons}
             assert sum(counts.values()) == int(found["dropped"])
             groups[found["group"]].inputs[found["topic"]] = InputSummary(
-                int(found["received"]), int(found["matched"]), counts
+                int(found["received"]), int(found["matched"]), int(found["unneeded"] or 0), counts
             )
     return groups

@@ -112,7 +112,7 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
     player.play(at("/camera", *range(5000, 5005)))
     wait_until(lambda: first_group(relay)["inputs"][0]["buffered"] == 5, "the messages that wait")
     assert manager.change("deactivate")
-    assert read_summary(relay.stderr)["front"].inputs["/camera"].dropped["shutdown"] == 5
+    assert read_summary(relay.stderr)["front"].inputs["/camera"].unneeded == 5
     wait_until(lambda: not _endpoints(collector), "the end of all that the relay had on topics")
     player.play(next(_pairs(6000)))
 

@@ -72,7 +72,7 @@ def test_what_is_said_of_a_group():
                 "topics": [],
             }
         ],
-        "recent": [{"set": [BEGAN, None]}, {"drop": {"input": 0, "stamp": BEGAN, "reason": "late"}}],
+        "recent": [{"set": [BEGAN, None]}, {"drop": {"input": 0, "stamp": BEGAN, "reason": "late", "unneeded": False}}],
     }
 
 
@@ -92,7 +92,11 @@ def test_what_is_said_of_an_input():
         "matched": 30,
         "buffered": 1,
         "dropped": {"late": 1, "too_far": 2},
+        "unneeded": 2,
+        "other_drops": {"late": 1},
         "dropped_lately": {"late": 1, "too_far": 2},
+        "unneeded_lately": 2,
+        "other_drops_lately": {"late": 1},
         "lost": 0,
         "missing": 0.0,
         "publishers": [{"node": "/usb_cam", "type": "sensor_msgs/msg/Image", "mismatch": None}],

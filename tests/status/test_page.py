@@ -72,8 +72,10 @@ def test_everything_is_shown_without_a_complaint_or_a_request_elsewhere(scheme, 
         assert "10 of 10 sets/s" in page.locator("#groups .figures").first.text_content()
         assert page.locator("#group .spark").all_inner_texts()[1].startswith("latency: p50 2.56 ms, p95 9.01 ms")
         assert page.locator("#group .lanes .joint").count() > 5
-        assert page.locator("#group .lanes .fate-too_far").count() > 5
-        assert "too_far: no partner near enough" in page.locator("#group .keys").text_content()
+        assert page.locator("#group .lanes .fate-unneeded").count() > 5
+        assert page.locator("#group .lanes .fate-too_far").count() == 0
+        assert page.locator("#group .keys").text_content() == "joined: a set not needed"
+        assert "200 not needed" in page.locator("#group .input dl").first.text_content()
         assert page.locator("#group h4").all_text_contents() == ["/camera/image_raw", "/lidar/points"]
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate("getComputedStyle(document.body).backgroundColor") == _STATES[scheme]

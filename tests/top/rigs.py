@@ -27,7 +27,10 @@ _RECENT = 256
 
 @dataclass(frozen=True)
 class Sensor:
-    """Publishes from the start until `until_s`; stamps are `behind_ms` behind the clock, receipt `lag_ms` later."""
+    """Publishes from the start until `until_s`; stamps are `behind_ms` behind the clock, receipt `lag_ms` later.
+
+    Between the begin and end of each of `gaps_ms` it publishes nothing.
+    """
 
     rate_hz: float
     jitter_ms: float = 1.0
@@ -39,6 +42,7 @@ class Sensor:
     type: str | None = None
     mismatch: Mismatch | None = None
     unstamped: bool = False
+    gaps_ms: tuple[tuple[float, float], ...] = ()
 
 
 def simulated(
@@ -103,6 +107,8 @@ def _report(config: GroupConfig, sensors: Mapping[str, Sensor], seconds: int, rn
 def _messages(sensor: Sensor, seconds: int, rng: random.Random) -> Iterator[tuple[int, int]]:
     for number in range(int(min(seconds, sensor.until_s) * sensor.rate_hz)):
         at = number / sensor.rate_hz * S + sensor.shift_ms * MS + rng.gauss(0, sensor.jitter_ms) * MS
+        if any(begin * MS < at < end * MS for begin, end in sensor.gaps_ms):
+            continue
         taken = _BEGAN + max(0, round(at))
         lag = sensor.lag_ms * MS * rng.uniform(1, 1.2)
         yield taken + round(lag), 0 if sensor.unstamped else taken - round(sensor.behind_ms * MS)

@@ -6,7 +6,7 @@ import pytest
 
 from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.sync.messages import DropReason
-from syncrelay.top.strip import MARKS, Lanes, Sweep, Window, drop_style, newest_stamp, strip, window_of
+from syncrelay.top.strip import MARKS, UNNEEDED, Lanes, Sweep, Window, mark_of, newest_stamp, strip, window_of
 
 MS = 1_000_000
 # A column is 20 ms.
@@ -17,13 +17,13 @@ def a_set(*stamps_ms):
     return RecentSet(tuple(None if stamp is None else round(stamp * MS) for stamp in stamps_ms))
 
 
-def a_drop(lane, stamp_ms, reason=DropReason.SUPERSEDED):
-    return RecentDrop(lane, round(stamp_ms * MS), reason)
+def a_drop(lane, stamp_ms, reason=DropReason.SUPERSEDED, *, unneeded=None):
+    return RecentDrop(lane, round(stamp_ms * MS), reason, unneeded)
 
 
-def lanes_of(recent, *, fed=(10, 10), sets=None):
+def lanes_of(recent, *, inputs=2, sets=None):
     """Lanes that have given just their recent sets, unless said otherwise."""
-    return Lanes(fed, sum(hasattr(each, "stamps") for each in recent) if sets is None else sets, tuple(recent))
+    return Lanes(inputs, sum(hasattr(each, "stamps") for each in recent) if sets is None else sets, tuple(recent))
 
 
 def drawn(lanes, *, head=_HEAD, width=20):
@@ -69,7 +69,7 @@ def plain(lanes, axis):
         ),
         pytest.param(
             [a_drop(0, 40), a_drop(0, 60, DropReason.LATE), a_drop(1, 80, DropReason.TOO_FAR)],
-            ["  ·<", "", "    ×", ""],
+            ["  »<", "", "    ×", ""],
             id="unmatched messages are marked by their reason",
         ),
         pytest.param(
@@ -78,9 +78,9 @@ def plain(lanes, axis):
             id="where several share a column, a set hides drops",
         ),
         pytest.param(
-            [a_drop(0, 40, DropReason.OVERFLOW), a_drop(0, 45)],
+            [a_drop(0, 40, DropReason.OVERFLOW), a_drop(0, 45, unneeded=True)],
             ["  !", "", "", ""],
-            id="where several share a column, a loss hides what was superseded",
+            id="where several share a column, a loss hides what was not needed",
         ),
         pytest.param(
             [a_set(45, None), a_set(None, 145)],
@@ -128,13 +128,14 @@ def test_a_set_keeps_its_letter_when_older_ones_are_forgotten():
 
 
 def test_three_inputs_have_three_lanes():
-    assert drawn(lanes_of([a_set(40, 60, 60)], fed=(10, 10, 10))) == ["  A", "  ╰╮", "   A", "   │", "   A", "  20.0"]
+    assert drawn(lanes_of([a_set(40, 60, 60)], inputs=3)) == ["  A", "  ╰╮", "   A", "   │", "   A", "  20.0"]
 
 
 def test_each_reason_has_a_mark_of_its_own():
     assert set(MARKS) == set(DropReason)
-    assert len(set(MARKS.values())) == len(DropReason)
-    assert all(len(mark) == 1 and not mark.isupper() for mark in MARKS.values())
+    characters = [mark.character for mark in (UNNEEDED, *MARKS.values())]
+    assert len(set(characters)) == len(DropReason) + 1
+    assert all(len(each) == 1 and not each.isupper() for each in characters)
 
 
 def test_the_newest_stamp_is_looked_for_in_sets_and_drops():
@@ -143,11 +144,17 @@ def test_the_newest_stamp_is_looked_for_in_sets_and_drops():
 
 
 @pytest.mark.parametrize(
-    ("fed", "styles"),
-    [((30, 10), ["dim", "bold red"]), ((100, 100), ["bold red", "bold red"]), ((14, 10), ["bold red", "bold red"])],
+    ("reason", "unneeded", "mark"),
+    [
+        (DropReason.TOO_FAR, False, ("×", "bold red")),
+        (DropReason.TOO_FAR, None, ("×", "bold red")),
+        (DropReason.TOO_FAR, True, ("·", "dim")),
+        (DropReason.THINNED, False, ("-", "dim")),
+        (DropReason.LATE, False, ("<", "bold red")),
+    ],
 )
-def test_a_drop_stands_out_where_it_costs_a_set(fed, styles):
-    assert [drop_style(fed, lane) for lane in range(2)] == styles
+def test_a_drop_stands_out_where_it_costs_a_set(reason, unneeded, mark):
+    assert mark_of(RecentDrop(0, 1, reason, unneeded)) == mark
 
 
 def test_sets_are_told_apart_by_colour_and_by_letter():

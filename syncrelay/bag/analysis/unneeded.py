@@ -12,14 +12,11 @@ from syncrelay.bag.analysis.evaluation import Evaluation
 from syncrelay.bag.analysis.nearest import shifted
 from syncrelay.bag.columns import Nanoseconds
 from syncrelay.config import GroupConfig
+from syncrelay.explain import FOR_WANT_OF_A_PARTNER
 from syncrelay.sync import DropReason
 
 _Flags: TypeAlias = npt.NDArray[np.bool_]
 
-# What matching gives for a message that found no partner. The other reasons are faults of its stamp, or thinning.
-_FOR_WANT_OF_A_PARTNER: Final = frozenset(
-    {DropReason.OVERFLOW, DropReason.SUPERSEDED, DropReason.TOO_FAR, DropReason.EXPIRED, DropReason.SHUTDOWN}
-)
 # These could not have been a partner: no stamp, a newer message in their place, a set that was thinned.
 _NO_PARTNER: Final = frozenset({DropReason.MALFORMED, DropReason.UNSTAMPED, DropReason.DUPLICATE, DropReason.THINNED})
 
@@ -80,16 +77,17 @@ def find_unneeded(group: GroupConfig, evaluation: Evaluation, reach: int | None)
     A message that was dropped for want of a partner is not needed where, for one of the other required inputs at
     least, each message within `reach` of its stamp, offsets included, had gone into a set with another message of its
     input, or there is none. `reach` is the span of the widest possible set; None where possible sets are not known:
-    then no message is called unneeded.
+    then no message is called unneeded. But where a clock makes the sets, each message is that gave way to a newer one.
     """
     drops = evaluation.drops
-    flags = np.zeros(len(drops), dtype=np.bool_)
+    gave_way = [group.ticks is not None and drop.reason is DropReason.SUPERSEDED for drop in drops]
+    flags = np.array(gave_way, dtype=np.bool_)
     lacking: list[tuple[int, ...]] = [() for _ in group.topics]
     if reach is None:
         return Unneeded(flags, tuple(lacking))
     for index in range(len(group.topics)):
         places = np.array(
-            [at for at, drop in enumerate(drops) if drop.input == index and drop.reason in _FOR_WANT_OF_A_PARTNER],
+            [at for at, drop in enumerate(drops) if drop.input == index and drop.reason in FOR_WANT_OF_A_PARTNER],
             dtype=np.int64,
         )
         stamps = _stamps(group, index, [drops[at].stamp for at in places.tolist()])

@@ -46,8 +46,8 @@ def page_file(path: str) -> File:
 
 
 def _fates() -> list[dict[str, object]]:
-    meanings = {reason.value: reason.meaning for reason in DropReason}
+    meanings = {reason.value: f"{reason.value}: {reason.meaning}" for reason in DropReason}
     return [
-        {"name": fate.name, "path": fate.path, "filled": fate.is_filled, "meaning": meanings.get(fate.name)}
+        {"name": fate.name, "path": fate.path, "filled": fate.is_filled, "meaning": meanings.get(fate.name, fate.word)}
         for fate in FATES
     ]

@@ -60,7 +60,7 @@ function lanes(group, width) {
   const shifts = group.inputs.map((input) => input.offset_ms * NS_PER_MS);
   const recent = group.recent.map((each) => each.set
     ? {stamps: each.set.map((stamp, at) => (stamp === null ? null : stamp + shifts[at]))}
-    : {stamp: each.drop.stamp + shifts[each.drop.input], input: each.drop.input, reason: each.drop.reason});
+    : {stamp: each.drop.stamp + shifts[each.drop.input], input: each.drop.input, reason: each.drop.unneeded ? "unneeded" : each.drop.reason});
   const times = recent.flatMap((each) => each.stamps ? each.stamps.filter((stamp) => stamp !== null) : [each.stamp]);
   const longest = Math.max(...group.inputs.map((input) => printable(input.topic).length));
   const label = Math.min((longest + 1) * LETTER, width * LABEL_SHARE);
@@ -131,7 +131,7 @@ function mark(name, x, y) {
 
 function legend(reasons, hasSets) {
   return element("div", {class: "keys"}, ...(hasSets ? [element("span", {}, "joined: a set")] : []), ...reasons.map((reason) => element("span", {},
-    drawn("svg", {viewBox: "-5 -5 10 10", "aria-hidden": "true"}, mark(reason, 0, 0)), ` ${reason}: ${FATES.get(reason)?.meaning ?? "dropped"}`)));
+    drawn("svg", {viewBox: "-5 -5 10 10", "aria-hidden": "true"}, mark(reason, 0, 0)), ` ${FATES.get(reason)?.meaning ?? `${reason}: dropped`}`)));
 }
 
 // The end of a topic tells more than its begin.

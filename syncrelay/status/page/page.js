@@ -164,8 +164,8 @@ function input(group, each) {
     rate: `${each.rate_hz ? `${figure(each.rate_hz)} Hz` : "–"}, lag ${duration(each.lag_ms)}, jitter ${duration(each.jitter_ms)}`,
     type: each.type ?? "not known yet",
     offset: each.offset_ms ? duration(each.offset_ms) : null,
-    "dropped in the last 10 s": counts(each.dropped_lately),
-    "in total": `${each.received} received, ${each.matched} in sets, ${each.buffered} waiting, dropped: ${counts(each.dropped)}${lost}`,
+    "dropped in the last 10 s": counts(each.unneeded_lately, each.other_drops_lately),
+    "in total": `${each.received} received, ${each.matched} in sets, ${each.buffered} waiting, dropped: ${counts(each.unneeded, each.other_drops)}${lost}`,
     from: nodes(each.publishers) || "no publishers",
     to: `${each.output}: ${nodes(each.subscribers) || "no subscribers"}`,
   };
@@ -175,8 +175,9 @@ function input(group, each) {
     ...notes.map((note) => element("span", {class: `level ${note === "optional" ? "" : problem.severity}`}, ` ${note}`))), list);
 }
 
-function counts(dropped) {
-  return Object.entries(dropped).sort(([, one], [, other]) => other - one).map(([reason, count]) => `${count} ${reason}`).join(", ") || "none";
+function counts(unneeded, others) {
+  const reasons = Object.entries(others).sort(([, one], [, other]) => other - one).map(([reason, count]) => `${count} ${reason}`);
+  return [...reasons, ...(unneeded ? [`${unneeded} not needed`] : [])].join(", ") || "none";
 }
 
 function nodes(endpoints) {
