@@ -9,6 +9,8 @@ from typing import NamedTuple, Self
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding
 from syncrelay.explain.judge import with_ok
+from syncrelay.explain.standing import Standing
+from syncrelay.explain.unneeded import DropFates
 from syncrelay.sync.messages import DropReason
 
 
@@ -58,7 +60,10 @@ class GroupReport:
         return tuple(self.told(each) if isinstance(each, RecentDrop) else RecentSet(each) for each in self.last)
 
     def told(self, drop: RecentDrop) -> RecentDrop:
-        """Return a drop with whether it was needed: by what most of its input's drops of its reason were."""
+        """Return a drop with whether it was needed: by what its input's drops of its reason were.
+
+        While enough sets leave, by what most of them were. Else each may be what is to be seen, unless none was needed.
+        """
         reasons = self._unneeded[drop.input] if drop.input < len(self._unneeded) else frozenset()
         return drop._replace(unneeded=drop.reason in reasons)
 
@@ -66,9 +71,10 @@ class GroupReport:
     def _unneeded(self) -> tuple[frozenset[DropReason], ...]:
         """Which reasons say of an input that a message was not needed: lately, or else since the start."""
         pairs = zip(self.facts.fates_lately, self.facts.fates, strict=True)
-        return tuple(
-            lately.mostly_unneeded | (whole.mostly_unneeded - lately.dropped.keys()) for lately, whole in pairs
-        )
+        return tuple(self._told_of(lately) | (self._told_of(whole) - lately.dropped.keys()) for lately, whole in pairs)
+
+    def _told_of(self, fates: DropFates) -> frozenset[DropReason]:
+        return fates.mostly_unneeded if self.facts.standing is Standing.ENOUGH else fates.all_unneeded
 
     @property
     def span_without_offsets(self) -> int | None:

@@ -42,8 +42,13 @@ class DropFates:
 
     @property
     def mostly_unneeded(self) -> frozenset[DropReason]:
-        """The reasons of which most drops were not needed: what is said of a single one."""
+        """The reasons of which most drops were not needed."""
         return frozenset(reason for reason, count in self.dropped.items() if 2 * self.others.get(reason, 0) < count)
+
+    @property
+    def all_unneeded(self) -> frozenset[DropReason]:
+        """The reasons of which no drop was needed."""
+        return frozenset(self.dropped.keys() - self.others.keys())
 
 
 def may_set_pace(required: Sequence[bool], *, trigger: int | None, by_clock: bool) -> tuple[int, ...]:

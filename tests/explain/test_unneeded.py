@@ -138,3 +138,17 @@ def test_each_message_of_a_lidar_without_a_partner_is_costly_and_no_more(seed):
         assert each["unneeded"] + sum(each["other_drops"].values()) == drops, drawn.how
     recent = [each["drop"] for each in told["groups"][0]["recent"] if "drop" in each]
     assert not any(each["unneeded"] for each in recent if each["input"] == 1), drawn.how
+
+
+@pytest.mark.parametrize("seed", range(_RIGS))
+def test_no_drop_is_shown_as_not_needed_where_each_may_be_why_no_set_leaves(seed):
+    chance = random.Random(f"apart {seed}")
+    lidar_hz = chance.choice([4, 5, 8, 10])
+    camera_hz = lidar_hz * chance.choice([1, 2, 3, 10])
+    config = file(front=group({"/camera": IMAGE, "/lidar": CLOUD}, queue_size=chance.choice([5, 20])))
+    camera = Sensor(camera_hz, behind_ms=chance.choice([-1, 1]) * chance.uniform(6000, 50_000))
+    state = simulated(config, {"/camera": camera, "/lidar": Sensor(lidar_hz)}, seconds=20, seed=seed)
+    told = document(state)["groups"][0]
+    how = f"seed {seed}, camera {camera_hz} Hz {camera.behind_ms:.0f} ms behind, lidar {lidar_hz} Hz"
+    assert not any(each["drop"]["unneeded"] for each in told["recent"]), how
+    assert all(each["other_drops_lately"] for each in told["inputs"]), how
