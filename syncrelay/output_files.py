@@ -28,12 +28,14 @@ def written_whole(path: Path) -> Iterator[Path]:
     Raises OutputError where there is no space, or the folder may not be written.
     """
     try:
-        scratch = Path(tempfile.mkdtemp(dir=path.parent, prefix=_PREFIX))
+        # Both names from the root: a folder that was entered from another mount namespace is not the one of that name.
+        target = path.absolute()
+        scratch = Path(tempfile.mkdtemp(dir=target.parent, prefix=_PREFIX))
     except OSError as error:
         raise cannot_be_written(path, error) from error
     try:
         yield scratch / path.name
-        (scratch / path.name).replace(path)
+        (scratch / path.name).replace(target)
     except OSError as error:
         # What is read meanwhile may fail, too.
         if error.errno in NO_SPACE or str(error.filename).startswith(str(scratch)):

@@ -233,7 +233,6 @@ sys.stdin.read()
 
 @pytest.mark.ros
 @pytest.mark.faults
-@pytest.mark.skipif(not IS_LONG, reason="takes 30 s of CPU: `make faults` does it")
 def test_the_tutorial_of_the_first_hour_does_what_it_says(tmp_path, ros_domain):
     with _own_network() as inside:
         reader = Reader(tmp_path, domain=ros_domain, may_replace=False, inside=inside)
