@@ -7,12 +7,6 @@ import pytest
 from syncrelay.collector import resting_collector
 
 
-@pytest.fixture(autouse=True)
-def _thawed():
-    yield
-    gc.unfreeze()
-
-
 def test_nothing_is_collected_and_what_exists_by_the_end_is_passed_over_from_then_on():
     with resting_collector():
         assert not gc.isenabled()
