@@ -11,6 +11,7 @@ from syncrelay.bag import open_recording
 from syncrelay.bag.stretches import cut
 from tests.bag.making import write_mcap
 from tests.bag.stretch_tasks import Stretches, one_pass
+from tests.faults.extent import IS_LONG
 from tests.ros import recordings
 from tests.ros.configs import config
 
@@ -33,6 +34,7 @@ class Case:
     counts: tuple[int, ...] = _EACH
     stamp: str = "header"
     is_regular: bool = True
+    is_large: bool = False
 
 
 _CASES = {
@@ -64,6 +66,7 @@ _CASES = {
         "20ms",
         5178,
         (2,),
+        is_large=True,
     ),
     "time of flight": Case(
         "multicam_tagslam/test_21.tag_detections.bag.bz2",
@@ -79,9 +82,11 @@ _CASES = {
         0,
         is_regular=False,
     ),
-    "husky": Case(recordings.HUSKY, ("/fix", "/husky_velocity_controller/odom", "/imu/data"), "60ms", 928, (3,)),
+    "husky": Case(
+        recordings.HUSKY, ("/fix", "/husky_velocity_controller/odom", "/imu/data"), "60ms", 928, (3,), is_large=True
+    ),
     "vehicle": Case(recordings.VEHICLE, ("/imu_data", "/magnetic_vector", "/scan"), "30ms", 178),
-    "kinect": Case("tum", (recordings.RGB, recordings.DEPTH), "20ms", 696),
+    "kinect": Case("tum", (recordings.RGB, recordings.DEPTH), "20ms", 696, is_large=True),
 }
 
 
@@ -112,9 +117,12 @@ def path_of(case, data: Path, folder: Path) -> Path:
     )
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("name", _CASES)
 def test_two_to_seven_stretches_give_the_sets_of_one_pass(name, real_data, tmp_path):
     case = _CASES[name]
+    if case.is_large and not IS_LONG:
+        pytest.skip("takes 2 to 4 s of CPU: `make faults` does it")
     path, text = path_of(case, real_data, tmp_path), text_of(case)
     opened = partial(open_recording, [str(path)])
     whole = one_pass(opened, text)

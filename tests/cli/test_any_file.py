@@ -24,7 +24,7 @@ from tests.drawn_files import drawn_files, frames_for
 from tests.ros.frames import Frame
 
 _LONG = os.environ.get("SYNCRELAY_FAULTS") == "long"
-_PARTS, _FILES_A_PART = (240, 25) if _LONG else (6, 4)
+_PARTS, _FILES_A_PART = (240, 25) if _LONG else (4, 4)
 _SEED = os.urandom(4).hex() if _LONG else "any file"
 _BLOCK = re.compile(r"^```yaml\n(version:.*?)^```", re.DOTALL | re.MULTILINE)
 _PAGES = [ROOT / "README.md", *(ROOT / "docs").glob("*/*.md")]

@@ -17,6 +17,7 @@ from syncrelay.bag.definitions import typestore
 from syncrelay.bag.recording import Definition
 from syncrelay.datasets.decoding import Decoder
 from syncrelay.datasets.message_types import type_tree
+from tests.faults.extent import chosen
 
 mcap_ros2 = pytest.importorskip("mcap_ros2._dynamic")
 
@@ -28,9 +29,10 @@ _MEMBER = re.compile(r"^\s*([\w/]+?)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w+", re.MULTILI
 # Rows that are alike are decoded as columns, others one by one; those from 64 kB on without a copy.
 _SIZES = ("alike", "unlike", "large")
 _LARGE = 70_000
-_DRAWN = 2
+_DRAWN = chosen(short=1, long=20)
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("package", _PACKAGES)
 def test_every_cell_is_what_was_serialized_and_what_a_second_decoder_reads(package):
     for name in (each for each in _FILES if each.startswith(f"{package}/")):

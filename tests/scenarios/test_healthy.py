@@ -29,7 +29,7 @@ RIGS = {
         options={"queue_size": 100, "slop": "50ms"},
     ),
 }
-_QUIET_S, _BUSY_S = chosen(short=(15, 6), long=(25, 10))
+_QUIET_S, _BUSY_S = chosen(short=(10, 6), long=(25, 10))
 _HOG = "while True: pass"
 
 
