@@ -2,6 +2,7 @@
 
 import gc
 import importlib.util
+import itertools
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -34,6 +35,23 @@ def pytest_configure(config: pytest.Config) -> None:
     named = os.environ.get(_REAL_DATA)
     if named and not Path(named).is_dir():
         raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Spread the modules with ROS, which wait more than they compute, among the others; what takes a minute is first.
+
+    Workers of pytest-xdist take stretches of this order: else one has all that waits, and at the end all cores rest.
+    """
+    modules = [list(module) for _, module in itertools.groupby(items, key=lambda item: item.path)]
+    placed: list[tuple[float, list[pytest.Item]]] = []
+    for with_ros in (True, False):
+        alike = [each for each in modules if any(item.get_closest_marker("ros") for item in each) is with_ros]
+        begins = itertools.accumulate(map(len, alike), initial=0)
+        whole = sum(map(len, alike))
+        placed += [(begin / whole, module) for begin, module in zip(begins, alike, strict=False)]
+    placed.sort(key=lambda each: each[0])
+    spread = [item for _, module in placed for item in module]
+    items[:] = sorted(spread, key=lambda item: item.get_closest_marker("first") is None)
 
 
 def pytest_collection_finish() -> None:

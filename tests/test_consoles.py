@@ -231,6 +231,7 @@ sys.stdin.read()
 """
 
 
+@pytest.mark.first
 @pytest.mark.ros
 @pytest.mark.faults
 def test_the_tutorial_of_the_first_hour_does_what_it_says(tmp_path, ros_domain):

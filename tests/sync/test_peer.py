@@ -103,6 +103,7 @@ def through_group(policy):
     return lambda message: group.add(message, now=0)
 
 
+@pytest.mark.first
 @pytest.mark.peer
 def test_approximate_and_exact_time_agree_with_message_filters(driver):
     streams = [draw(seed) for seed in range(STREAMS)]
