@@ -17,10 +17,9 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
 
-# Many tests wait on real processes, so two more than twice as many run at once as there are cores; who is done first takes
-# from others.
+# Many tests wait on real processes, so twice as many run at once as there are cores; who is done first takes from others.
 test: $(VENV)/test
-	$(BIN)/python -m pytest -n $(shell expr 2 \* $$(nproc) + 2) --dist worksteal --durations=30 --durations-min=2 $(ARGS)
+	$(BIN)/python -m pytest -n $(shell expr 2 \* $$(nproc)) --dist worksteal --durations=30 --durations-min=2 $(ARGS)
 
 # Most of the tests in under a minute, for after each change: what needs no DDS, no process, no browser and no seconds,
 # and of each property fewer examples. One that starts a process all the same fails.
