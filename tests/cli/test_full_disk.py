@@ -81,3 +81,15 @@ def test_talk_that_finds_no_space_is_no_failure(tmp_path):
             done = subprocess.run(argv, cwd=tmp_path, env=environ, stderr=full, stdout=subprocess.DEVNULL, check=False)
         assert done.returncode == code
     assert run_here("validate", "good.yaml", folder=tmp_path).returncode == 0
+
+
+def test_a_relative_name_is_written_where_another_folder_was_mounted_over_the_working_one(tmp_path):
+    if not shutil.which("unshare") or subprocess.run([*_UNSHARE, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this machine gives no mounts of its own")
+    (tmp_path / "here").mkdir()
+    (tmp_path / "over").mkdir()
+    script = f'mount --bind ../over . && exec "{sys.executable}" -m syncrelay demo --seconds 1 --record rig.mcap'
+    argv = [*_UNSHARE, "bash", "-c", script]
+    done = subprocess.run(argv, cwd=tmp_path / "here", capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "over" / "rig.mcap").exists()
