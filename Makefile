@@ -26,7 +26,7 @@ test: $(VENV)/test
 test-fast: $(VENV)/test
 	$(BIN)/python -m pytest -n $(shell nproc) --dist worksteal -p tests.no_processes --hypothesis-profile=quick \
 		-m "not (ros or browser or process or peer or real_data or faults or long)" \
-		$(addprefix tests/,bag cases config dataflow datasets explain status sync) $(ARGS)
+		$(addprefix tests/,config dataflow explain recordings status sync) $(ARGS)
 
 # The relay on ROS 2 Kilted: the path through librcl proves itself, and messages are relayed over DDS. ARGS=tests/ros runs
 # all of these tests.
@@ -50,13 +50,13 @@ test-release: $(VENV)/test
 # SYNCRELAY_FAULTS=long takes 1,000 recordings. Not in CI: what it installs takes two minutes.
 test-fleet: $(VENV)/fleet
 	.ci/network-tools
-	$(BIN)/python -m pytest -m "ray or storage" tests/fleet $(ARGS)
+	$(BIN)/python -m pytest -m "ray or storage" tests/recordings/fleet $(ARGS)
 
 # Has lerobot's own loader read what `export --format lerobot` writes. Not in CI: lerobot needs PyTorch, which comes with
 # CUDA, 5.5 GB on the disk. Needs Python 3.12 or later, as lerobot does.
 test-lerobot:
 	$(MAKE) .venv-lerobot/lerobot VENV=.venv-lerobot
-	.venv-lerobot/bin/python -m pytest tests/datasets/test_lerobot_loader.py tests/datasets/test_lerobot.py $(ARGS)
+	.venv-lerobot/bin/python -m pytest tests/recordings/datasets/test_lerobot_loader.py tests/recordings/datasets/test_lerobot.py $(ARGS)
 
 # Breaks what a robot breaks, at length, and prints what was survived; compares the engine with C++ on many more streams,
 # and tries what must hold of all inputs on many more of them. `make test` has the short form of each.

@@ -7,7 +7,7 @@ import sys
 
 import pyarrow.compute as pc
 
-from syncrelay.datasets import read_sets
+from syncrelay.recordings.datasets import read_sets
 
 config, *recordings = sys.argv[1:]
 for batch in read_sets(recordings, config):

@@ -8,7 +8,7 @@ import sys
 import torch
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
-from syncrelay.datasets import read_sets
+from syncrelay.recordings.datasets import read_sets
 
 
 class Sets(IterableDataset):

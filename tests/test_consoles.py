@@ -13,11 +13,11 @@ from typing import Final
 import numpy as np
 import pytest
 
-from tests.bag.making import write_mcap
 from tests.cli.command import run
 from tests.consoles import Reader, blocks_of, commands_of, is_like, is_live
-from tests.datasets.drives import START, image, joints
 from tests.faults.extent import IS_LONG
+from tests.recordings.bag.making import write_mcap
+from tests.recordings.datasets.drives import START, image, joints
 from tests.ros.cdr_messages import STORE, serialize
 from tests.ros.domain import claimed_domain
 from tests.ros.frames import Frame

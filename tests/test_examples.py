@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import syncrelay.sync
-from tests.bag.making import write_mcap
+from tests.recordings.bag.making import write_mcap
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame

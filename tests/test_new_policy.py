@@ -10,18 +10,18 @@ import pytest
 from jsonschema import Draft7Validator
 from pydantic import Field, create_model
 
-from syncrelay.bag import open_recording
-from syncrelay.bag.analysis import GroupAnalysis, analyze
-from syncrelay.bag.bindings import bind
 from syncrelay.cli.analysis_html import as_html
 from syncrelay.config import ConfigError, Tolerance, load_text, policies
 from syncrelay.config.keys import Duration, TopicName
 from syncrelay.config.models import Group, Inputs, Topic, Topics
 from syncrelay.config.schema import json_schema
 from syncrelay.explain import Code
+from syncrelay.recordings.analysis import GroupAnalysis, analyze
+from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.bindings import bind
 from syncrelay.sync import ApproximateEpsilonTime
-from tests.bag.making import write_mcap
 from tests.faults.extent import chosen
+from tests.recordings.bag.making import write_mcap
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame

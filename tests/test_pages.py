@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from syncrelay.cases import check, load_suite_text
 from syncrelay.cli.diff import difference_lines
 from syncrelay.cli.graph.drawing import drawing_of
 from syncrelay.cli.graph.mermaid import as_mermaid
 from syncrelay.config import load_text
 from syncrelay.config.difference import difference
 from syncrelay.config.file import file_format
+from syncrelay.recordings.cases import check, load_suite_text
 from tests.sync.support.timeline import play_group
 from tests.test_launch_files import declared
 

@@ -6,12 +6,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from syncrelay.bag.analysis import Analysis, GroupAnalysis
-from syncrelay.bag.analysis.buckets import counted_in_buckets
-from syncrelay.bag.analysis.nearest import Pair
-from syncrelay.bag.analysis.suggest import Suggestion
-from syncrelay.bag.analysis.topics import spread
-from syncrelay.bag.analysis.watching import LastingFinding
+from syncrelay.recordings.analysis import Analysis, GroupAnalysis
+from syncrelay.recordings.analysis.buckets import counted_in_buckets
+from syncrelay.recordings.analysis.nearest import Pair
+from syncrelay.recordings.analysis.suggest import Suggestion
+from syncrelay.recordings.analysis.topics import spread
+from syncrelay.recordings.analysis.watching import LastingFinding
 
 _LONGEST: Final = 2**63 - 1
 

@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator, Sequence
 
-from syncrelay.bag.analysis import Analysis, GroupAnalysis, patch
-from syncrelay.bag.analysis.curves import Curves, Point, slop_key
-from syncrelay.bag.analysis.nearest import Pair, worth_seeing
-from syncrelay.bag.analysis.suggest import Suggestion
-from syncrelay.bag.analysis.topics import TopicFigures
-from syncrelay.bag.analysis.unneeded import InputFates
 from syncrelay.cli.summary import why_unneeded
 from syncrelay.config.wording import counted
 from syncrelay.explain import in_words, words
 from syncrelay.printable import printable
+from syncrelay.recordings.analysis import Analysis, GroupAnalysis, patch
+from syncrelay.recordings.analysis.curves import Curves, Point, slop_key
+from syncrelay.recordings.analysis.nearest import Pair, worth_seeing
+from syncrelay.recordings.analysis.suggest import Suggestion
+from syncrelay.recordings.analysis.topics import TopicFigures
+from syncrelay.recordings.analysis.unneeded import InputFates
 
 _SECOND = 1_000_000_000
 

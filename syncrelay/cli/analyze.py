@@ -9,10 +9,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from syncrelay.bag import Channel, Recording, is_recording, open_recording
-from syncrelay.bag.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
-from syncrelay.bag.attempts import redacted
-from syncrelay.bag.bindings import GroupBinding, bind
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
@@ -27,9 +23,13 @@ from syncrelay.config import load_text
 from syncrelay.config.source import read_source
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, UsageError
-from syncrelay.fleet.recordings import names_recordings
-from syncrelay.fleet.robots import RobotPattern
 from syncrelay.printable import printable
+from syncrelay.recordings.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
+from syncrelay.recordings.bag import Channel, Recording, is_recording, open_recording
+from syncrelay.recordings.bag.attempts import redacted
+from syncrelay.recordings.bag.bindings import GroupBinding, bind
+from syncrelay.recordings.fleet.recordings import names_recordings
+from syncrelay.recordings.fleet.robots import RobotPattern
 
 _GROUP = "matched"
 

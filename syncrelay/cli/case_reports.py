@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol
 from xml.sax.saxutils import escape, quoteattr
 
-from syncrelay.cases import Mismatch, Result
-from syncrelay.cases.drawing import lanes
 from syncrelay.cli.boundary import put, remark, say, wants_colour
 from syncrelay.cli.problems import inert, problem_as_json, problem_command, workflow_command
 from syncrelay.config import Problem, render
 from syncrelay.config.problems import dotted
 from syncrelay.printable import one_entry, printable, printable_lines
+from syncrelay.recordings.cases import Mismatch, Result
+from syncrelay.recordings.cases.drawing import lanes
 
 _BOLD, _RED, _RESET = "\033[1m", "\033[31m", "\033[0m"
 

@@ -182,8 +182,8 @@ class _Opened:
 
 def _recordings_and_topics(typed: str, arguments: Namespace) -> Iterator[str]:
     """Give the topics of the recording that is named first; where none begins so, more recordings."""
-    from syncrelay.bag import is_url, open_recording
     from syncrelay.errors import BagError
+    from syncrelay.recordings.bag import is_url, open_recording
 
     topics = set[str]()
     # Nobody pays for a press of the Tab key, or waits for a server.

@@ -6,12 +6,12 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Final
 
-from syncrelay.bag.definitions import jazzy_definition
-from syncrelay.bag.mcap_output import McapOutput
-from syncrelay.bag.qos import Profile
 from syncrelay.cdr import patch_stamp
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.printable import printable
+from syncrelay.recordings.bag.definitions import jazzy_definition
+from syncrelay.recordings.bag.mcap_output import McapOutput
+from syncrelay.recordings.bag.qos import Profile
 from syncrelay.rig.scene import SCENES
 from syncrelay.rig.schedule import SENSORS, schedule
 

@@ -8,11 +8,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final, Self, cast
 
-from syncrelay.bag import Recording, open_recording
-from syncrelay.bag.bindings import GroupBinding, bind
-from syncrelay.bag.replay import Replay
-from syncrelay.bag.stretch_replay import StretchReplay, run_stretch
-from syncrelay.bag.stretches import Stretch, StretchResult, cut, lead_in, total
 from syncrelay.cli.export_lerobot import export_lerobot
 from syncrelay.cli.fleet import do_on_many, engine_of
 from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of, few_sets
@@ -23,13 +18,18 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.config import Config, load
 from syncrelay.config.units import parse_duration_text
 from syncrelay.config.wording import all_of, did_you_mean
-from syncrelay.datasets.images import ImageFormat
-from syncrelay.datasets.parquet import SUFFIX, write_parquet
-from syncrelay.datasets.reading import SetsOf, resolved
-from syncrelay.datasets.tables import Content
 from syncrelay.errors import BagError, UsageError
-from syncrelay.fleet.stretched import InStretches, Place
-from syncrelay.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
+from syncrelay.recordings.bag import Recording, open_recording
+from syncrelay.recordings.bag.bindings import GroupBinding, bind
+from syncrelay.recordings.bag.replay import Replay
+from syncrelay.recordings.bag.stretch_replay import StretchReplay, run_stretch
+from syncrelay.recordings.bag.stretches import Stretch, StretchResult, cut, lead_in, total
+from syncrelay.recordings.datasets.images import ImageFormat
+from syncrelay.recordings.datasets.parquet import SUFFIX, write_parquet
+from syncrelay.recordings.datasets.reading import SetsOf, resolved
+from syncrelay.recordings.datasets.tables import Content
+from syncrelay.recordings.fleet.stretched import InStretches, Place
+from syncrelay.recordings.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
 
 # Below, reading what leads in would take all the time.
 _SHORTEST_NS: Final = 1_000_000_000

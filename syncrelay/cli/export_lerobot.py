@@ -14,13 +14,13 @@ from syncrelay.cli.fleet import do_on_many
 from syncrelay.cli.reading import eased_collector
 from syncrelay.config import Config
 from syncrelay.config.wording import counted
-from syncrelay.datasets.lerobot import join_episodes, lerobot_of, write_episode
 from syncrelay.errors import SyncRelayError
-from syncrelay.fleet.ledger import State
-from syncrelay.fleet.run import Run
-from syncrelay.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
-from syncrelay.fleet.work import SCRATCH
 from syncrelay.printable import printable
+from syncrelay.recordings.datasets.lerobot import join_episodes, lerobot_of, write_episode
+from syncrelay.recordings.fleet.ledger import State
+from syncrelay.recordings.fleet.run import Run
+from syncrelay.recordings.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
+from syncrelay.recordings.fleet.work import SCRATCH
 
 EPISODES: Final = ".episodes"
 """The folder in OUT with each recording's episode, so that only what is missing is done again."""

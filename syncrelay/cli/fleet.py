@@ -17,14 +17,14 @@ from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import TERMINATED
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
-from syncrelay.fleet.engine import Engine, Finished
-from syncrelay.fleet.local import LocalEngine
-from syncrelay.fleet.progress import Progress
-from syncrelay.fleet.recordings import find_sources
-from syncrelay.fleet.run import Others, Run
-from syncrelay.fleet.task import NOTES, PROBLEMS, Source, Task
-from syncrelay.fleet.work import Failed, Job
 from syncrelay.printable import printable
+from syncrelay.recordings.fleet.engine import Engine, Finished
+from syncrelay.recordings.fleet.local import LocalEngine
+from syncrelay.recordings.fleet.progress import Progress
+from syncrelay.recordings.fleet.recordings import find_sources
+from syncrelay.recordings.fleet.run import Others, Run
+from syncrelay.recordings.fleet.task import NOTES, PROBLEMS, Source, Task
+from syncrelay.recordings.fleet.work import Failed, Job
 
 _EVERY_S: Final = 10.0
 _CLEARED: Final = "\r\033[K"
@@ -97,7 +97,7 @@ def engine_of(arguments: Namespace) -> Engine:
     jobs = arguments.jobs or len(os.sched_getaffinity(0))
     if arguments.engine == "local":
         return LocalEngine(jobs=jobs)
-    from syncrelay.fleet.on_ray import RayEngine
+    from syncrelay.recordings.fleet.on_ray import RayEngine
 
     return RayEngine(jobs=jobs)
 

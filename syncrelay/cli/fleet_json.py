@@ -3,10 +3,10 @@
 from dataclasses import asdict
 from typing import Any
 
-from syncrelay.fleet.figures import RULE, Figures, Ranking, Row
-from syncrelay.fleet.report import FleetReport, Recording
-from syncrelay.fleet.report_findings import Found
-from syncrelay.fleet.suggestions import Suggested
+from syncrelay.recordings.fleet.figures import RULE, Figures, Ranking, Row
+from syncrelay.recordings.fleet.report import FleetReport, Recording
+from syncrelay.recordings.fleet.report_findings import Found
+from syncrelay.recordings.fleet.suggestions import Suggested
 
 
 def fleet_as_json(report: FleetReport) -> dict[str, Any]:

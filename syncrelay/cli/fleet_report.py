@@ -8,9 +8,9 @@ from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.fleet_json import fleet_as_json
 from syncrelay.cli.fleet_text import fleet_lines
 from syncrelay.cli.new_file import write_again
-from syncrelay.fleet.documents import documents_in
-from syncrelay.fleet.ledger import State, read_ledger
-from syncrelay.fleet.report import Failure, fleet_report
+from syncrelay.recordings.fleet.documents import documents_in
+from syncrelay.recordings.fleet.ledger import State, read_ledger
+from syncrelay.recordings.fleet.report import Failure, fleet_report
 
 
 @dataclass(frozen=True, slots=True)

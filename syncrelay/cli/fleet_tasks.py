@@ -7,22 +7,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
 
-from syncrelay.bag import Recording, open_recording
-from syncrelay.bag.analysis import inventory
-from syncrelay.bag.analysis.few_sets import why_few_sets
-from syncrelay.bag.bindings import GroupBinding, bind
-from syncrelay.bag.mcap_output import McapOutput
-from syncrelay.bag.replay import GroupResult
-from syncrelay.bag.replay import replay as replay_groups
-from syncrelay.bag.what_if import Disturbed
-from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analyze import Asked, bound, measured
 from syncrelay.cli.inventory import inventory_as_json
 from syncrelay.cli.reading import eased_collector
 from syncrelay.config import Config, load_text
-from syncrelay.fleet.documents import ANALYSIS
-from syncrelay.fleet.task import JSON, NOTES, PROBLEMS, Source, fingerprint_of, what_decides_outputs, what_decides_sets
+from syncrelay.recordings.analysis import inventory
+from syncrelay.recordings.analysis.few_sets import why_few_sets
+from syncrelay.recordings.bag import Recording, open_recording
+from syncrelay.recordings.bag.bindings import GroupBinding, bind
+from syncrelay.recordings.bag.mcap_output import McapOutput
+from syncrelay.recordings.bag.replay import GroupResult
+from syncrelay.recordings.bag.replay import replay as replay_groups
+from syncrelay.recordings.bag.what_if import Disturbed
+from syncrelay.recordings.bag.writing import SetWriter
+from syncrelay.recordings.fleet.documents import ANALYSIS
+from syncrelay.recordings.fleet.task import (
+    JSON,
+    NOTES,
+    PROBLEMS,
+    Source,
+    fingerprint_of,
+    what_decides_outputs,
+    what_decides_sets,
+)
 from syncrelay.rig.what_if import Fault
 
 SETS: Final = "sets.mcap"

@@ -25,12 +25,12 @@ from syncrelay.cli.fleet_words import (
     where_text,
 )
 from syncrelay.config.wording import counted
-from syncrelay.fleet.cells import MOST_ROWS
-from syncrelay.fleet.figures import Figures, Ranking, Row
-from syncrelay.fleet.report import FleetReport, Recording
-from syncrelay.fleet.report_findings import Found
-from syncrelay.fleet.suggestions import Suggested
 from syncrelay.printable import printable
+from syncrelay.recordings.fleet.cells import MOST_ROWS
+from syncrelay.recordings.fleet.figures import Figures, Ranking, Row
+from syncrelay.recordings.fleet.report import FleetReport, Recording
+from syncrelay.recordings.fleet.report_findings import Found
+from syncrelay.recordings.fleet.suggestions import Suggested
 
 MOST: Final = 10
 """So many of each kind are told."""

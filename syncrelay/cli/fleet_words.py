@@ -5,12 +5,12 @@ from typing import Final
 
 from syncrelay.config.wording import counted
 from syncrelay.explain import words
-from syncrelay.fleet.figures import RULE, Counts, Figures, Row
-from syncrelay.fleet.report import FleetReport
-from syncrelay.fleet.report_findings import Found
-from syncrelay.fleet.suggestions import Gain, Suggested, Value, Where
-from syncrelay.fleet.tally import Drift, Quantiles
 from syncrelay.printable import printable
+from syncrelay.recordings.fleet.figures import RULE, Counts, Figures, Row
+from syncrelay.recordings.fleet.report import FleetReport
+from syncrelay.recordings.fleet.report_findings import Found
+from syncrelay.recordings.fleet.suggestions import Gain, Suggested, Value, Where
+from syncrelay.recordings.fleet.tally import Drift, Quantiles
 
 NO_RATE: Final = "unknown"
 ORDER: Final = f"Worst first: {RULE}."

@@ -7,11 +7,6 @@ from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from syncrelay.bag import Channel, Encoding, open_recording
-from syncrelay.bag.analysis import Proposal, inventory_of, propose, propose_for
-from syncrelay.bag.analysis.inventory import no_header
-from syncrelay.bag.analysis.streams import Stream
-from syncrelay.bag.qos import Profile
 from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
 from syncrelay.cli.parser import Parser
@@ -20,6 +15,11 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
 from syncrelay.explain import UNREADABLE
 from syncrelay.printable import printable
+from syncrelay.recordings.analysis import Proposal, inventory_of, propose, propose_for
+from syncrelay.recordings.analysis.inventory import no_header
+from syncrelay.recordings.analysis.streams import Stream
+from syncrelay.recordings.bag import Channel, Encoding, open_recording
+from syncrelay.recordings.bag.qos import Profile
 
 if TYPE_CHECKING:
     from syncrelay.ros.listening import Heard

@@ -6,8 +6,6 @@ from dataclasses import asdict
 from shlex import quote
 from typing import Any, Final
 
-from syncrelay.bag import Recording
-from syncrelay.bag.analysis import Topic, inventory
 from syncrelay.cli.analysis_text import faults_of
 from syncrelay.cli.boundary import put
 from syncrelay.cli.reading import reading
@@ -15,6 +13,8 @@ from syncrelay.config.wording import counted
 from syncrelay.doctor.text import aligned
 from syncrelay.explain import words
 from syncrelay.printable import printable
+from syncrelay.recordings.analysis import Topic, inventory
+from syncrelay.recordings.bag import Recording
 
 _HEADING: Final = ("topic", "type", "messages", "rate", "stamps")
 

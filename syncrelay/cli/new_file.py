@@ -10,7 +10,7 @@ from syncrelay.output_files import require_new, written_whole
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from syncrelay.bag.analysis.changes import Change
+    from syncrelay.recordings.analysis.changes import Change
 
 _HEAD: Final = 500
 
@@ -26,7 +26,7 @@ def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
     if not changes:
         remark(f"no values to change: {name} was not written")
         return
-    from syncrelay.bag.analysis import file_with_changes
+    from syncrelay.recordings.analysis import file_with_changes
 
     write_new(name, file_with_changes(text, changes))
 

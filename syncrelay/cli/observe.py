@@ -22,9 +22,9 @@ from syncrelay.errors import UsageError
 from syncrelay.output_files import require_new
 
 if TYPE_CHECKING:
-    from syncrelay.bag.analysis import GroupAnalysis
     from syncrelay.config import Config
     from syncrelay.explain import GroupReport
+    from syncrelay.recordings.analysis import GroupAnalysis
     from syncrelay.ros.relay import Relay
     from syncrelay.status import RelayState
     from syncrelay.top.client import Answer
@@ -104,7 +104,7 @@ def observe(asked: Asked, *, stop: StopRequest) -> int:
 
 def _observed(asked: Asked, config: "Config", stop: StopRequest) -> Observed:
     with resting_collector():
-        from syncrelay.bag.analysis.live import LiveStreams, analyze_live
+        from syncrelay.recordings.analysis.live import LiveStreams, analyze_live
         from syncrelay.ros.entities import Purpose
         from syncrelay.ros.relay import Relay
 

@@ -9,9 +9,9 @@ from typing import Final
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from syncrelay.bag import Recording
 from syncrelay.cli.boundary import AT_FAULT, DONE, remark
 from syncrelay.printable import printable
+from syncrelay.recordings.bag import Recording
 
 # So many more than before make the collector look: a chunk of small messages.
 _NEW_OBJECTS: Final = 50_000

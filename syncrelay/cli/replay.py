@@ -6,13 +6,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from syncrelay.bag import Encoding, open_recording
-from syncrelay.bag.bindings import GroupBinding, bind
-from syncrelay.bag.mcap_output import McapOutput
-from syncrelay.bag.replay import GroupResult, Listener, received
-from syncrelay.bag.replay import replay as replay_groups
-from syncrelay.bag.what_if import Disturbed
-from syncrelay.bag.writing import SetWriter
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.fleet import do_on_many, require_into
 from syncrelay.cli.parser import Parser
@@ -23,6 +16,13 @@ from syncrelay.config import GroupConfig, load
 from syncrelay.config.wording import all_of, counted
 from syncrelay.explain import DropFates, GroupLines, RecentDrop, drop_fates, may_set_pace
 from syncrelay.printable import printable
+from syncrelay.recordings.bag import Encoding, open_recording
+from syncrelay.recordings.bag.bindings import GroupBinding, bind
+from syncrelay.recordings.bag.mcap_output import McapOutput
+from syncrelay.recordings.bag.replay import GroupResult, Listener, received
+from syncrelay.recordings.bag.replay import replay as replay_groups
+from syncrelay.recordings.bag.what_if import Disturbed
+from syncrelay.recordings.bag.writing import SetWriter
 from syncrelay.rig.what_if import Fault, parse_fault
 from syncrelay.sync import Match, Outcome
 

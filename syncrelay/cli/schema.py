@@ -12,7 +12,7 @@ from syncrelay.config.schema import Schema, json_schema
 def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay schema`."""
     if arguments.test:
-        from syncrelay.cases.schema import cases_schema
+        from syncrelay.recordings.cases.schema import cases_schema
 
         return _print(cases_schema())
     return _print(json_schema())

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from syncrelay.cases import Result, Suite, check, load_suite, updated
 from syncrelay.cli.boundary import AT_FAULT, DONE, remark
 from syncrelay.cli.case_reports import REPORTS, FileResult, Report
 from syncrelay.cli.parser import Parser
@@ -18,6 +17,7 @@ from syncrelay.config.source import STDIN, Patience, listed, read_source, shown_
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
 from syncrelay.output_files import written_whole
+from syncrelay.recordings.cases import Result, Suite, check, load_suite, updated
 
 _WRITABLE: Final = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 

@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from syncrelay.bag import open_recording
-from syncrelay.bag.analysis import Analysis, analyze
-from syncrelay.bag.bindings import bind
 from syncrelay.config import load_text
-from tests.bag.making import write_mcap
+from syncrelay.recordings.analysis import Analysis, analyze
+from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.bindings import bind
+from tests.recordings.bag.making import write_mcap
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame

@@ -4,8 +4,8 @@ import shlex
 import pytest
 
 from syncrelay.cli.demo import shipped_config
-from tests.bag.making import rig, write_mcap
 from tests.cli.command import run, run_here
+from tests.recordings.bag.making import rig, write_mcap
 from tests.ros.cdr_messages import STRING, VECTOR, serialize, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame

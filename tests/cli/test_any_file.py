@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 import yaml
 
-from syncrelay.bag.analysis.live import LiveStreams, analyze_live
 from syncrelay.cli.analysis_json import suggestion_as_json
 from syncrelay.cli.analysis_text import suggestion_lines
 from syncrelay.config import Config, load_text
-from tests.bag.making import write_mcap
+from syncrelay.recordings.analysis.live import LiveStreams, analyze_live
 from tests.cli.command import ROOT, run_here
 from tests.drawn_files import drawn_files, frames_for
+from tests.recordings.bag.making import write_mcap
 from tests.ros.frames import Frame
 
 _LONG = os.environ.get("SYNCRELAY_FAULTS") == "long"

@@ -13,9 +13,9 @@ import pytest
 from syncrelay.cli import parsers
 from syncrelay.cli.completion import COMPLETERS, group_names
 from syncrelay.cli.dispatch import COMMANDS
-from tests.bag.making import rig, write_mcap, write_rosbag2
 from tests.cli.command import ROOT, run, run_python
 from tests.cli.shells import Shell
+from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
 
 _FILE = """\
 version: 1

@@ -12,10 +12,10 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType
 
 from syncrelay.cli.demo import shipped_config
-from syncrelay.datasets import read_sets
-from tests.bag.making import rig, write_mcap, write_rosbag2
+from syncrelay.recordings.datasets import read_sets
 from tests.cli.command import run, run_python
-from tests.datasets.times import rows_of
+from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
+from tests.recordings.datasets.times import rows_of
 from tests.ros.cdr_messages import IMAGE, STORE, header, serialize
 from tests.ros.frames import Frame
 

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.cli.command import run
-from tests.datasets.drives import drive
+from tests.recordings.datasets.drives import drive
 
 FILE = """
 version: 1

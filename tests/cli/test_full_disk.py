@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.bag.making import rig, write_mcap
 from tests.cli.command import GOOD, ROOT, run_here
 from tests.cli.full_disk import COMMANDS
 from tests.cli.test_export_lerobot import FILE
-from tests.datasets.drives import drive
+from tests.recordings.bag.making import rig, write_mcap
+from tests.recordings.datasets.drives import drive
 from tests.ros.cdr_messages import VECTOR
 
 _LONG = os.environ.get("SYNCRELAY_FAULTS") == "long"

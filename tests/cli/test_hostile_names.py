@@ -24,10 +24,10 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.status import document
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
-from tests.bag.making import rig
 from tests.cli.command import BAD, GOOD, ROOT
 from tests.cli.terminals import read_to_the_end
 from tests.hostile_names import assert_shown_safely, hostile_name
+from tests.recordings.bag.making import rig
 from tests.ros.cdr_messages import STORE, VECTOR
 from tests.ros.configs import config, inputs
 from tests.top import states

@@ -15,9 +15,9 @@ from syncrelay.cli.analysis_html.lanes import Lanes, lanes_of
 from syncrelay.cli.analysis_html.packing import pack
 from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
-from tests.bag.making import rig, write_mcap
 from tests.cli.command import run_here
 from tests.cli.html_reports import HOSTILE, analyzed, drawings_in, drive, renamed, unpacked
+from tests.recordings.bag.making import rig, write_mcap
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
 

@@ -9,7 +9,7 @@ from tests.cli.command import GOOD, run_python
 # What only other commands need: packages, and the parts of ours that they are for.
 _OF_OTHERS = {
     *("argcomplete", "jinja2", "lz4", "mcap", "numpy", "packaging", "prometheus_client", "rich", "rosbags", "ruamel"),
-    *("textual", "zstandard", "syncrelay.bag", "syncrelay.doctor", "syncrelay.rig", "syncrelay.top"),
+    *("textual", "zstandard", "syncrelay.recordings.bag", "syncrelay.doctor", "syncrelay.rig", "syncrelay.top"),
 }
 _OF_THE_RELAY = {"rclpy", "std_msgs", "waitress", "syncrelay.explain", "syncrelay.ros", "syncrelay.status"}
 _OF_FILES = {"pydantic", "yaml", "syncrelay.config"}

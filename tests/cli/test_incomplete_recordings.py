@@ -10,9 +10,9 @@ import yaml
 from mcap.writer import CompressionType
 from rosbags.rosbag2 import CompressionMode
 
-from tests.bag.making import rig, write_mcap, write_rosbag2
 from tests.cli.command import run, run_here
 from tests.faults.extent import chosen
+from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame

@@ -1,8 +1,8 @@
 import pytest
 
-from tests.bag.making import CUSTOM, CUSTOM_STORE, blip, rig, write_mcap
 from tests.cli.command import run, run_here
 from tests.config.ament import make_index
+from tests.recordings.bag.making import CUSTOM, CUSTOM_STORE, blip, rig, write_mcap
 from tests.ros.cdr_messages import STRING, VECTOR, serialize
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS, at, merged

@@ -5,9 +5,9 @@ from contextlib import closing
 
 import pytest
 
-from syncrelay.bag import open_recording
 from syncrelay.cli.reading import reading
-from tests.bag.making import rig, write_mcap
+from syncrelay.recordings.bag import open_recording
+from tests.recordings.bag.making import rig, write_mcap
 
 
 def test_the_garbage_collector_looks_less_often_while_a_recording_is_read_however_that_ends(tmp_path):

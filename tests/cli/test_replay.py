@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from tests.bag.making import rig, write_mcap, write_ros1
 from tests.cli.command import ROOT, run, run_here
 from tests.cli.terminals import read_to_the_end
+from tests.recordings.bag.making import rig, write_mcap, write_ros1
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.summary import read_summary

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from tests.bag.making import rig, write_mcap
 from tests.cli.command import ROOT, run, run_python
+from tests.recordings.bag.making import rig, write_mcap
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 

@@ -14,8 +14,8 @@ import pytest
 from syncrelay.cli import parsers
 from syncrelay.cli.test import command, replace_text
 from syncrelay.errors import SyncRelayError, UsageError
-from tests.cases.suites import write
 from tests.hostile_names import assert_shown_safely, hostile_name
+from tests.recordings.cases.suites import write
 
 SUITE = """\
 version: 1

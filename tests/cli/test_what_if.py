@@ -5,8 +5,8 @@ import pytest
 from syncrelay.cli import recording_parsers
 from syncrelay.cli.replay import command
 from syncrelay.errors import UsageError
-from tests.bag.making import rig, write_mcap
-from tests.cases.suites import write
+from tests.recordings.bag.making import rig, write_mcap
+from tests.recordings.cases.suites import write
 from tests.ros.cdr_messages import VECTOR
 
 _TOPICS = [{"topic": "/camera", "type": VECTOR}, {"topic": "/lidar", "type": VECTOR}]

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 import yaml
 
-from syncrelay.cases.load import load_suite_text
 from syncrelay.cli.problems import problem_as_json, problem_command
 from syncrelay.config import Config, ConfigError, load_text, render
 from syncrelay.config.difference import difference
+from syncrelay.recordings.cases.load import load_suite_text
 from tests.config.test_schema import Yaml12Loader
 from tests.faults.extent import chosen
 

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from tests.bag.making import write_mcap, write_ros1
 from tests.cli.command import run
+from tests.recordings.bag.making import write_mcap, write_ros1
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame

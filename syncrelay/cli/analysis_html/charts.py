@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from syncrelay.bag.analysis.nearest import Pair
 from syncrelay.config import GroupConfig
+from syncrelay.recordings.analysis.nearest import Pair
 
 _BINS: Final = 60
 # What lies so many times farther out than most do is counted, not drawn: it would press all others into one bar.

@@ -2,13 +2,13 @@
 
 from typing import Any, Final
 
-from syncrelay.bag.analysis import Analysis, file_with_changes
 from syncrelay.cli.analysis_html.drawings import drawings_of
 from syncrelay.cli.analysis_html.words import TopicRow, group_words, topic_row
 from syncrelay.cli.pages import MARK, content_hash, joined, template, when
 from syncrelay.errors import BagError
 from syncrelay.explain import words
 from syncrelay.printable import printable, printable_lines
+from syncrelay.recordings.analysis import Analysis, file_with_changes
 from syncrelay.status.fates import FATES, Fate
 
 _PACKAGE: Final = "syncrelay.cli.analysis_html"

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from syncrelay.bag.analysis import GroupAnalysis
-from syncrelay.bag.columns import Nanoseconds
 from syncrelay.explain import UNREADABLE
+from syncrelay.recordings.analysis import GroupAnalysis
+from syncrelay.recordings.bag.columns import Nanoseconds
 from syncrelay.status.fates import CODES, MATCHED, UNNEEDED
 
 _SECOND: Final = 1_000_000_000

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from syncrelay.bag.columns import Nanoseconds
+from syncrelay.recordings.bag.columns import Nanoseconds
 
 _LARGEST: Final = 2**31 - 1
 

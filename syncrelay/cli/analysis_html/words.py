@@ -4,11 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from syncrelay.bag.analysis import GroupAnalysis, patch
-from syncrelay.bag.analysis.nearest import Pair, worth_seeing
-from syncrelay.bag.analysis.topics import TopicFigures
-from syncrelay.bag.analysis.unneeded import InputFates
-from syncrelay.bag.analysis.watching import LastingFinding, alike
 from syncrelay.cli.analysis_html.drawings import Drawings
 from syncrelay.cli.analysis_text import (
     delay_line,
@@ -24,6 +19,11 @@ from syncrelay.cli.analysis_text import (
 )
 from syncrelay.config.wording import all_of, counted
 from syncrelay.explain import Severity, in_words, words
+from syncrelay.recordings.analysis import GroupAnalysis, patch
+from syncrelay.recordings.analysis.nearest import Pair, worth_seeing
+from syncrelay.recordings.analysis.topics import TopicFigures
+from syncrelay.recordings.analysis.unneeded import InputFates
+from syncrelay.recordings.analysis.watching import LastingFinding, alike
 from syncrelay.status.fates import FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 

@@ -22,9 +22,9 @@ from syncrelay.cli.fleet_words import (
 )
 from syncrelay.cli.pages import MARK, content_hash, joined, template
 from syncrelay.config.wording import counted
-from syncrelay.fleet.figures import Figures, Ranking
-from syncrelay.fleet.report import FleetReport
 from syncrelay.printable import printable
+from syncrelay.recordings.fleet.figures import Figures, Ranking
+from syncrelay.recordings.fleet.report import FleetReport
 
 _PACKAGE: Final = "syncrelay.cli"
 _STYLES: Final = ("../status/page/colours.css", "analysis_html/page/report.css", "fleet_html/page/fleet.css")

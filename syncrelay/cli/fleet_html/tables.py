@@ -22,14 +22,14 @@ from syncrelay.cli.fleet_words import (
 from syncrelay.cli.pages import when
 from syncrelay.config.wording import counted
 from syncrelay.explain import words
-from syncrelay.fleet.cells import MOST_ROWS
-from syncrelay.fleet.figures import Figures, Ranking, Row
-from syncrelay.fleet.report import FleetReport, Recording
-from syncrelay.fleet.report_findings import Found
-from syncrelay.fleet.robots import common_folders, folders_of
-from syncrelay.fleet.suggestions import Gain, Suggested
-from syncrelay.fleet.tally import Quantiles
 from syncrelay.printable import printable
+from syncrelay.recordings.fleet.cells import MOST_ROWS
+from syncrelay.recordings.fleet.figures import Figures, Ranking, Row
+from syncrelay.recordings.fleet.report import FleetReport, Recording
+from syncrelay.recordings.fleet.report_findings import Found
+from syncrelay.recordings.fleet.robots import common_folders, folders_of
+from syncrelay.recordings.fleet.suggestions import Gain, Suggested
+from syncrelay.recordings.fleet.tally import Quantiles
 
 _QUANTILES: Final = "median / 95 % / most"
 _MIDDLE: Final = "median / most"

@@ -1,11 +1,11 @@
-"""Drawn cases for policies and groups alone; see syncrelay.cases.drawing for what is drawn how.
+"""Drawn cases for policies and groups alone; see syncrelay.recordings.cases.drawing for what is drawn how.
 
 A column is a tick of 10 ms.
 """
 
 from dataclasses import dataclass, replace
 
-from syncrelay.cases.drawing import parse as parse_drawing
+from syncrelay.recordings.cases.drawing import parse as parse_drawing
 from syncrelay.sync import Drop, Match, Message
 
 TICK_NS = 10_000_000

@@ -1,7 +1,0 @@
-"""Tests of a configuration: drawn, simulated or recorded, and what a file's groups shall make of them."""
-
-from syncrelay.cases.checking import Mismatch, Result, check
-from syncrelay.cases.load import Suite, load_suite, load_suite_text
-from syncrelay.cases.update import updated
-
-__all__ = ["Mismatch", "Result", "Suite", "check", "load_suite", "load_suite_text", "updated"]

@@ -1,0 +1,149 @@
+"""A recording and a file: figures of topics and pairs, what each group gives, and what it could give."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import yaml
+
+from syncrelay.config import GroupConfig, load_text
+from syncrelay.config.load import spelt_out
+from syncrelay.recordings.analysis.changes import Change, with_changes
+from syncrelay.recordings.analysis.curves import Curves, curves_of
+from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
+from syncrelay.recordings.analysis.nearest import Pair, PossibleSets, pair
+from syncrelay.recordings.analysis.streams import Stream, read_streams
+from syncrelay.recordings.analysis.suggest import Suggestion, possible_sets, stamped, suggest
+from syncrelay.recordings.analysis.topics import TopicFigures, figures_of
+from syncrelay.recordings.analysis.unneeded import InputFates, Unneeded, find_unneeded, input_fates
+from syncrelay.recordings.analysis.watching import LastingFinding, watch_group
+from syncrelay.recordings.bag.bindings import GroupBinding
+from syncrelay.recordings.bag.definitions import begins_with_header
+from syncrelay.recordings.bag.recording import Channel, Recording
+
+
+# No slots: what takes long is found when it is first asked for, and kept.
+@dataclass(frozen=True)
+class GroupAnalysis:
+    """One group, and the group with the suggested values.
+
+    `possible` is None where no measure tells which messages belong together, or a required input has no stamps.
+    """
+
+    group: GroupConfig
+    suggested: GroupConfig
+    streams: tuple[Stream, ...]
+    pairs: tuple[Pair, ...]
+    possible: PossibleSets | None
+    evaluation: Evaluation
+    suggestion: Suggestion
+
+    @cached_property
+    def findings(self) -> tuple[LastingFinding, ...]:
+        """What the running relay would have found, the worst first: it judges once a second of the recording."""
+        return watch_group(self.group, self.streams)
+
+    @cached_property
+    def unneeded(self) -> Unneeded:
+        """Which dropped messages cost no set."""
+        if self.possible is None or not self.possible.spans:
+            return find_unneeded(self.group, self.evaluation, None)
+        slop = self.group.options.tolerance.ns if self.group.options.tolerance else 0
+        return find_unneeded(self.group, self.evaluation, slop if self.possible.is_alone else self.possible.widest)
+
+    @property
+    def fates(self) -> tuple[InputFates, ...]:
+        """Where the messages of each input went."""
+        return input_fates(self.group, self.evaluation, self.unneeded)
+
+    @cached_property
+    def curves(self) -> Curves | None:
+        """What other values would give; None where possible sets are not known."""
+        if self.possible is None:
+            return None
+        return curves_of(self.group, self.suggested, self.streams, self.possible)
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """A recording; `text` is the file that its groups are from, `faults` what of it is missing or cannot be read."""
+
+    begin: int
+    end: int
+    topics: tuple[TopicFigures, ...]
+    groups: tuple[GroupAnalysis, ...]
+    text: str
+    faults: tuple[str, ...]
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """All that is suggested."""
+        return tuple(change for each in self.groups for change in each.suggestion.changes)
+
+
+def analyze(recording: Recording, text: str, bindings: Sequence[GroupBinding]) -> Analysis:
+    """Read a recording to its end and return what it tells, and what the groups of a file's text make of it.
+
+    Raises BagError for a stamp or key that a recorded type does not have.
+    """
+    streams = read_streams(recording, bindings)
+    groups = tuple(
+        analyze_group(binding.group, of_group, text) for binding, of_group in zip(bindings, streams, strict=True)
+    )
+    distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
+    topics = tuple(figures_of(stream) for stream in distinct.values() if stream.stamps)
+    return Analysis(recording.begin, recording.end, topics, groups, text, tuple(recording.faults))
+
+
+def proposed_text(name: str, channels: Sequence[Channel]) -> str:
+    """Return a file's text with one group of channels, and values that stand until better ones are measured."""
+    topics = [{"topic": channel.topic, "type": channel.type} for channel in channels]
+    for topic, channel in zip(topics, channels, strict=True):
+        if begins_with_header(channel) is False:
+            topic["stamp"] = "receive"
+    group = {"policy": "approximate_time", "slop": "10ms", "topics": topics}
+    return yaml.safe_dump({"version": 1, "groups": {name: group}}, sort_keys=False)
+
+
+def settled(analysis: Analysis) -> Analysis:
+    """Return the analysis of the file with all that was suggested."""
+    text = with_changes(analysis.text, analysis.changes)
+    groups = []
+    for each in analysis.groups:
+        group = group_of(text, each.group.name)
+        groups.append(analyze_group(group, tuple(stamped(group, each.streams)), text))
+    return replace(analysis, groups=tuple(groups), text=text)
+
+
+def group_of(text: str, name: str) -> GroupConfig:
+    """Return a group of a file's text."""
+    groups = load_text(text).groups
+    return next(group for group in groups if group.name == name)
+
+
+def analyze_group(group: GroupConfig, streams: tuple[Stream, ...], text: str) -> GroupAnalysis:
+    """Return what a group of a file's text makes of the streams of its inputs."""
+    evaluation = evaluate(group, streams)
+    offsets = [topic.offset_ns for topic in group.topics]
+    pairs = [
+        pair(streams[first], streams[second], (offsets[first], offsets[second]))
+        for first, second in combinations(range(len(streams)), 2)
+    ]
+
+    # Where groups share values, those of this one alone are tried.
+    apart = spelt_out(text)
+
+    def changed(changes: Sequence[Change]) -> GroupConfig:
+        return group_of(with_changes(apart, changes), group.name) if changes else group
+
+    suggestion = suggest(group, streams, evaluation, changed)
+    return GroupAnalysis(
+        group=group,
+        suggested=changed(suggestion.changes),
+        streams=streams,
+        pairs=tuple(each for each in pairs if each is not None),
+        possible=possible_sets(group, streams),
+        evaluation=evaluation,
+        suggestion=suggestion,
+    )

@@ -1,0 +1,150 @@
+"""A file for topics of which nothing is known: groups, types and values as measured, the evidence as comments."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Final
+
+from syncrelay.config import GroupConfig
+from syncrelay.config.wording import counted
+from syncrelay.errors import NothingToMatchError
+from syncrelay.explain import words
+from syncrelay.printable import printable
+from syncrelay.recordings.analysis.analysis import analyze_group, group_of, proposed_text
+from syncrelay.recordings.analysis.changes import Change, with_changes, with_evidence
+from syncrelay.recordings.analysis.curves import LARGEST_QUEUE
+from syncrelay.recordings.analysis.evaluation import completed, evaluate
+from syncrelay.recordings.analysis.inventory import FEWEST, Topic, inventory
+from syncrelay.recordings.analysis.nearest import pair
+from syncrelay.recordings.analysis.topics import TopicFigures
+from syncrelay.recordings.bag.recording import Recording
+
+# Topics of one rate whose stamps lie within a tenth of a period of each other come from one epoch.
+_TOGETHER: Final = 0.1
+_SAME_RATE: Final = 1.1
+_EPOCH: Final = "epoch"
+_FUSED: Final = "fused"
+_SECOND: Final = 1_000_000_000
+_QUEUE_SIZE: Final = "queue_size"
+_HEAD: Final = "version: 1\ngroups:\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """The text of a file, and of each topic that it leaves out why, a sentence each."""
+
+    text: str
+    left_out: tuple[str, ...]
+
+
+def propose(recording: Recording) -> Proposal:
+    """Read a recording to its end and return a file that gives sets of it, as propose_for does."""
+    return propose_for(inventory(recording), source="the recording")
+
+
+def propose_for(topics: Sequence[Topic], *, source: str) -> Proposal:
+    """Return a file that gives sets of topics with stamps; `source` says what they were measured in.
+
+    Topics that one driver stamps together become a group each, and one topic of each of those and all others one
+    more. Raises NothingToMatchError, with what there is, where there are no two topics to match.
+    """
+    epochs = list(_epochs([topic for topic in topics if topic.unfit is None]))
+    together = [epoch for epoch in epochs if len(epoch) > 1]
+    groups = {f"{_EPOCH}_{number}": epoch for number, epoch in enumerate(together, start=1)}
+    if len(epochs) > 1:
+        groups[_FUSED] = [epoch[0] for epoch in epochs]
+    if not groups:
+        raise _nothing(
+            f"no two topics of {source} have stamps and at least {FEWEST} messages: there is nothing to match", topics
+        )
+    texts = {name: text for name, members in groups.items() if (text := _measured(name, members, source))}
+    if not texts:
+        raise _nothing(f"no two topics of {source} form a set", topics)
+    taken = {topic.channel for name in texts for topic in groups[name]}
+    left_out = tuple(_left_out(topic) for topic in topics if topic.channel not in taken)
+    return Proposal(_HEAD + "".join(text.removeprefix(_HEAD) for text in texts.values()), left_out)
+
+
+def _nothing(why: str, topics: Sequence[Topic]) -> NothingToMatchError:
+    return NothingToMatchError("\n  ".join([why, *(printable(_left_out(topic)) for topic in topics)]))
+
+
+def _left_out(topic: Topic) -> str:
+    channel = topic.channel
+    why = topic.unfit or f"none of its {counted(topic.figures.messages, 'message')} forms a set with the others"
+    return f"{channel.topic} ({channel.type or 'a type without a name'}): {why}"
+
+
+def _epochs(topics: Sequence[Topic]) -> Iterator[list[Topic]]:
+    """Yield topics that are stamped together, the slowest first."""
+    left = sorted(topics, key=lambda each: each.figures.rate_hz)
+    while left:
+        first, *rest = left
+        epoch = [first, *(each for each in rest if _are_together(first, each))]
+        yield epoch
+        left = [each for each in rest if each not in epoch]
+
+
+def _are_together(first: Topic, second: Topic) -> bool:
+    """Tell whether two topics, the slower first, run at one rate and are stamped at one time."""
+    found = pair(first.stream, second.stream, (0, 0))
+    if found is None or second.figures.rate_hz > _SAME_RATE * first.figures.rate_hz:
+        return False
+    return found.distance.high <= _TOGETHER * (first.figures.period or 0)
+
+
+def _measured(name: str, members: Sequence[Topic], source: str) -> str | None:
+    """Return the text of a file with one group and the values that fit, None where it gives no set."""
+    text = proposed_text(name, [each.channel for each in members])
+    streams = tuple(each.stream for each in members)
+    suggestion = analyze_group(group_of(text, name), streams, text).suggestion
+    if not suggestion.then:
+        return None
+    changed = with_changes(text, _with_room(name, members, suggestion.changes, text))
+    sets = f"{suggestion.then} of {suggestion.possible} possible sets of {source}"
+    hints = "".join(f"    # {hint}\n" for hint in suggestion.hints)
+    told = changed.replace(f"  {name}:\n", f"  {name}:  # {sets}\n{hints}", 1)
+    return with_evidence(told, name, [_evidence(each) for each in members])
+
+
+def _with_room(name: str, members: Sequence[Topic], changes: Sequence[Change], text: str) -> Sequence[Change]:
+    """Return changes with the queue_size that the README's rule asks for, where that is more and as many sets come.
+
+    The rule: what an input brings while the slowest is awaited, for a period of it and its latency, and twice that.
+    """
+    slowest = min(members, key=lambda each: each.figures.rate_hz).figures
+    fastest = max(members, key=lambda each: each.figures.rate_hz).figures
+    wait = (slowest.period or 0) + _latency(slowest)
+    come = ceil(wait * fastest.rate_hz / _SECOND)
+    size = min(2 * come, LARGEST_QUEUE)
+    narrow = group_of(with_changes(text, changes), name)
+    if size <= narrow.options.queue_size:
+        return changes
+    reason = f"twice the {come} messages of {fastest.topic} that may arrive before one of {slowest.topic}"
+    others = [change for change in changes if change.key != _QUEUE_SIZE]
+    wide = [*others, Change(name, None, _QUEUE_SIZE, size, reason)]
+    gives = [_sets(group, members) for group in (narrow, group_of(with_changes(text, wide), name))]
+    return wide if gives[1] >= gives[0] else changes
+
+
+def _sets(group: GroupConfig, members: Sequence[Topic]) -> int:
+    streams = tuple(each.stream for each in members)
+    rarest = min(range(len(streams)), key=lambda index: len(streams[index].stamps))
+    return completed(evaluate(group, streams).counts, rarest)
+
+
+def _latency(figures: TopicFigures) -> int:
+    """Return what a topic's messages take at the 95th percentile; 0 where its clock is another and cannot tell."""
+    delay = figures.delay
+    return max(0, delay.high) if delay is not None and abs(delay.median) < _SECOND else 0
+
+
+def _evidence(topic: Topic) -> str:
+    figures = topic.figures
+    said = [words.rate(figures.rate_hz)]
+    if figures.delay is not None:
+        said.append(f"received {words.span_of_time(figures.delay.median)} after the stamp")
+    said += [counted(figures.gaps, "gap")] if figures.gaps else []
+    said += [f"{figures.duplicates} repeated"] if figures.duplicates else []
+    said += sorted({profile.reliability for profile in topic.channel.qos})
+    return ", ".join(said)

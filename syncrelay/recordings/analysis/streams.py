@@ -1,0 +1,129 @@
+"""The stamps of a recording, read once: all that the analysis asks for comes from these arrays."""
+
+from array import array
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import repeat
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from syncrelay.config import StampSource
+from syncrelay.recordings.bag.bindings import GroupBinding
+from syncrelay.recordings.bag.columns import (
+    Batch,
+    Column,
+    Columns,
+    Nanoseconds,
+    ReadColumn,
+    column_reader,
+    in_order,
+    keys_in_order,
+    stamp_or_receipt_column,
+)
+from syncrelay.recordings.bag.recording import Channel, Encoding, Recording
+from syncrelay.sync import Message
+
+# So many messages of a group are made at a time.
+_AT_ONCE: Final = 10_000
+
+
+@dataclass(slots=True)
+class Stream:
+    """One input's messages as they were received: stamps, times of receipt, places in the whole recording, keys.
+
+    Where no stamp or no key could be read, the stamp is UNREADABLE. `type` is empty where the file has none and nothing
+    was recorded.
+    """
+
+    topic: str
+    type: str
+    stamps: "array[int]" = field(default_factory=lambda: array("q"))
+    received: "array[int]" = field(default_factory=lambda: array("q"))
+    places: "array[int]" = field(default_factory=lambda: array("q"))
+    keys: list[Hashable] | None = None
+
+    def by_receipt(self) -> "Stream":
+        """Give the same messages with the times of receipt for stamps."""
+        return Stream(self.topic, self.type, self.received, self.received, self.places, self.keys)
+
+    def numbers(self) -> tuple[Nanoseconds, Nanoseconds, Nanoseconds]:
+        """Give stamps, times of receipt and places as arrays for arithmetic."""
+        return _array(self.stamps), _array(self.received), _array(self.places)
+
+    def add(self, column: Column, batch: Batch, begin: int) -> None:
+        """Take messages of a batch, which begins at a place of the recording."""
+        self.stamps.frombytes(column.stamps.tobytes())
+        self.received.frombytes(batch.received[column.places].tobytes())
+        self.places.frombytes((column.places + begin).tobytes())
+        if self.keys is not None:
+            self.keys += column.keys or repeat(None, len(column.places))
+
+
+_Wanted: TypeAlias = tuple[str, StampSource, str | None, bool]
+_Filled: TypeAlias = list[tuple[Stream, list[tuple[Channel, ReadColumn]]]]
+
+
+def read_streams(recording: Recording, bindings: Sequence[GroupBinding]) -> tuple[tuple[Stream, ...], ...]:
+    """Read a recording to its end; give a stream for each input of each group.
+
+    Raises BagError for a stamp or key that a recorded type does not have.
+    """
+    streams: dict[_Wanted, Stream] = {}
+    filled: _Filled = []
+    chosen: list[tuple[Stream, ...]] = []
+    for binding in bindings:
+        of_group = []
+        for index, each in enumerate(binding.inputs):
+            topic = each.config
+            needs_place = binding.group.restamp is not None and topic.stamp != "header"
+            wanted = (each.topic, topic.stamp, topic.key, needs_place)
+            if wanted not in streams:
+                streams[wanted] = Stream(each.topic, topic.type or "", keys=None if topic.key is None else [])
+                readers = [(channel, column_reader(binding.group, index, channel)) for channel in each.channels]
+                filled.append((streams[wanted], readers))
+            of_group.append(streams[wanted])
+        chosen.append(tuple(of_group))
+    _pour(recording, filled)
+    return tuple(chosen)
+
+
+def read_topics(recording: Recording) -> tuple[tuple[Channel, Stream], ...]:
+    """Read a recording to its end; give a channel and a stream for each topic and type that it has.
+
+    Stamps are those of the headers; of a topic without, or whose type is not known, the times of receipt.
+    """
+    found: dict[tuple[str, str, Encoding | str], list[Channel]] = {}
+    for channel in recording.channels:
+        found.setdefault((channel.topic, channel.type, channel.encoding), []).append(channel)
+    filled: _Filled = [
+        (Stream(topic, type_name), [(channel, stamp_or_receipt_column(channel)) for channel in channels])
+        for (topic, type_name, _), channels in found.items()
+    ]
+    _pour(recording, filled)
+    return tuple((readers[0][0], stream) for stream, readers in filled)
+
+
+def messages(streams: Sequence[Stream]) -> Iterator[Message]:
+    """Yield the messages of a group's inputs in the order of the recording; the payload is the time of receipt."""
+    numbers = [stream.numbers() for stream in streams]
+    places = [places for _, _, places in numbers]
+    order, inputs = in_order(places)
+    stamps, received = (np.concatenate([each[column] for each in numbers])[order] for column in (0, 1))
+    keys = iter(keys_in_order([(stream.keys, len(stream.places)) for stream in streams], order) or repeat(None))
+    for begin in range(0, len(order), _AT_ONCE):
+        among = slice(begin, begin + _AT_ONCE)
+        yield from map(Message, inputs[among].tolist(), stamps[among].tolist(), received[among].tolist(), keys)
+
+
+def _pour(recording: Recording, filled: _Filled) -> None:
+    columns = Columns([readers for _, readers in filled])
+    begin = 0
+    for batch in map(Batch, recording.batches(columns.channels)):
+        for index, column in columns.read(batch):
+            filled[index][0].add(column, batch, begin)
+        begin += len(batch.rows)
+
+
+def _array(values: "array[int]") -> Nanoseconds:
+    return np.frombuffer(values, dtype=np.int64) if values else np.zeros(0, dtype=np.int64)

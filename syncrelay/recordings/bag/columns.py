@@ -1,0 +1,213 @@
+"""Stamps and keys of a batch of messages as columns: the stamps of leading headers are read all at once."""
+
+from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from functools import cached_property
+from itertools import chain, repeat
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from syncrelay.cdr import LATEST_STAMP, read_stamp
+from syncrelay.config import GroupConfig, StampSource
+from syncrelay.explain import UNREADABLE
+from syncrelay.recordings.bag.definitions import begins_with_header
+from syncrelay.recordings.bag.payloads import ReadMessage, ReadStamp, message_reader, read_ros1_stamp, stamp_reader
+from syncrelay.recordings.bag.recording import Channel, Encoding, RawMessage
+
+Nanoseconds: TypeAlias = npt.NDArray[np.int64]
+Places: TypeAlias = npt.NDArray[np.intp]
+Heads: TypeAlias = npt.NDArray[np.void]
+"""What each payload begins with, as far as the stamp of a leading Header goes."""
+
+_NS_PER_SECOND: Final = 1_000_000_000
+# Where a payload begins with a Header, its stamp ends here.
+_HEAD: Final = 12
+# As DDS serializes it, and as ROS 1 does behind its `seq`.
+_LITTLE: Final = np.dtype([("kind", "<u2"), ("options", "V2"), ("seconds", "<i4"), ("nanoseconds", "<u4")])
+_BIG: Final = np.dtype([("kind", "<u2"), ("options", "V2"), ("seconds", ">i4"), ("nanoseconds", ">u4")])
+_ROS1: Final = np.dtype([("seq", "<u4"), ("seconds", "<u4"), ("nanoseconds", "<u4")])
+_CDR_BE, _CDR_LE, _CDR2_BE, _CDR2_LE = 0x0000, 0x0100, 0x0600, 0x0700
+
+
+class Batch:
+    """Messages that follow each other, with what is read of all of them."""
+
+    def __init__(self, rows: Sequence[RawMessage]) -> None:
+        self.rows = rows
+
+    @cached_property
+    def received(self) -> Nanoseconds:
+        """The times of receipt."""
+        return np.array([received for _, received, _ in self.rows], dtype=np.int64)
+
+    @cached_property
+    def heads(self) -> Heads:
+        """What each payload begins with; of one that is shorter, bytes that no stamp can be read from."""
+        heads = [payload[:_HEAD] for _, _, payload in self.rows]
+        joined = b"".join(heads)
+        if len(joined) != _HEAD * len(heads):
+            joined = b"".join([head if len(head) == _HEAD else b"\xff" * _HEAD for head in heads])
+        return np.frombuffer(joined, dtype=f"V{_HEAD}")
+
+
+class Column(NamedTuple):
+    """The messages of a batch that one reader has read: their places in it, their stamps or UNREADABLE, their keys."""
+
+    places: Places
+    stamps: Nanoseconds
+    keys: Sequence[Hashable] | None
+
+
+ReadColumn: TypeAlias = Callable[[Batch, Places], tuple[Nanoseconds, Sequence[Hashable] | None]]
+"""From the messages at some places of a batch to their stamps, UNREADABLE where none can be used, and their keys."""
+
+
+def column_reader(group: GroupConfig, index: int, channel: Channel) -> ReadColumn:
+    """Return what reads the messages of a channel for one input of a group, as `message_reader` does one by one.
+
+    Raises BagError where the channel's type has no such stamp or key.
+    """
+    topic = group.topics[index]
+    if topic.key is None and (group.restamp is None or topic.stamp == "header"):
+        return _stamp_column(topic.stamp, channel)
+    return _one_by_one(message_reader(group, index, channel))
+
+
+def stamp_or_receipt_column(channel: Channel) -> ReadColumn:
+    """Return what reads the headers' stamps, or the times of receipt of a type that is not known or has no header."""
+    has_header = isinstance(channel.encoding, Encoding) and bool(begins_with_header(channel))
+    return _stamp_column("header" if has_header else "receive", channel)
+
+
+def _stamp_column(source: StampSource, channel: Channel) -> ReadColumn:
+    read = stamp_reader(source, channel)
+    if read is None:
+        return lambda batch, places: (batch.received[places], None)
+    if read in _IN_ONE_GO:
+        read_all = _IN_ONE_GO[read]
+        return lambda batch, places: (read_all(batch.heads[places]), None)
+    return _one_by_one(lambda raw: (read(raw[2]), None))
+
+
+def _one_by_one(read: ReadMessage) -> ReadColumn:
+    def read_column(batch: Batch, places: Places) -> tuple[Nanoseconds, Sequence[Hashable]]:
+        found = [read(batch.rows[place]) for place in places.tolist()]
+        stamps = np.array([UNREADABLE if stamp is None else stamp for stamp, _ in found], dtype=np.int64)
+        return stamps, [key for _, key in found]
+
+    return read_column
+
+
+def cdr_stamps(heads: Heads) -> Nanoseconds:
+    """Return what `read_stamp` gives of payloads that begin so, UNREADABLE for None."""
+    stamps, is_good = _nanoseconds(heads.view(_LITTLE))
+    kinds = heads.view(_LITTLE)["kind"]
+    is_little = (kinds == _CDR_LE) | (kinds == _CDR2_LE)
+    if not is_little.all():
+        is_big = (kinds == _CDR_BE) | (kinds == _CDR2_BE)
+        big_stamps, big_is_good = _nanoseconds(heads.view(_BIG))
+        stamps = np.where(is_big, big_stamps, stamps)
+        is_good = np.where(is_big, big_is_good, is_good & is_little)
+    return np.where(is_good, stamps, UNREADABLE)
+
+
+def ros1_stamps(heads: Heads) -> Nanoseconds:
+    """Return what `read_ros1_stamp` gives of payloads that begin so, UNREADABLE for None."""
+    stamps, is_good = _nanoseconds(heads.view(_ROS1))
+    return np.where(is_good & (stamps <= LATEST_STAMP), stamps, UNREADABLE)
+
+
+def _nanoseconds(times: npt.NDArray[np.void]) -> tuple[Nanoseconds, npt.NDArray[np.bool_]]:
+    """Return times as numbers, and which of them have no more nanoseconds than a second has."""
+    stamps = times["seconds"].astype(np.int64) * _NS_PER_SECOND + times["nanoseconds"]
+    return stamps, times["nanoseconds"] < _NS_PER_SECOND
+
+
+_IN_ONE_GO: Final[Mapping[ReadStamp, Callable[[Heads], Nanoseconds]]] = {
+    read_stamp: cdr_stamps,
+    read_ros1_stamp: ros1_stamps,
+}
+
+
+class Columns:
+    """Reads the batches of a recording for the inputs that its channels fill.
+
+    Each input has one channel or more, with what reads them.
+    """
+
+    def __init__(self, inputs: Sequence[Sequence[tuple[Channel, ReadColumn]]]) -> None:
+        self._numbers: dict[Channel, int] = {}
+        for channel, _ in chain.from_iterable(inputs):
+            self._numbers.setdefault(channel, len(self._numbers))
+        self._inputs = [[(self._numbers[channel], read) for channel, read in each] for each in inputs]
+
+    @property
+    def channels(self) -> Collection[Channel]:
+        """All that are read."""
+        return self._numbers.keys()
+
+    def read(self, batch: Batch) -> Iterator[tuple[int, Column]]:
+        """Yield the column of each input that the batch has messages of, by its index."""
+        numbers = np.array([self._numbers[channel] for channel, _, _ in batch.rows], dtype=np.intp)
+        there = set(np.flatnonzero(np.bincount(numbers)).tolist())
+        places = {number: np.flatnonzero(numbers == number) for number in there}
+        for index, each in enumerate(self._inputs):
+            found = [Column(places[number], *read(batch, places[number])) for number, read in each if number in there]
+            if found:
+                yield index, _combined(found)
+
+    def in_order(self, batch: Batch) -> Iterator[tuple[int, RawMessage, int, Hashable]]:
+        """Yield the messages of a batch: of what input by its index, as recorded, the stamp or UNREADABLE, the key.
+
+        A message that is for two inputs comes in their order.
+        """
+        found = dict(self.read(batch))
+        if not found:
+            return iter(())
+        inputs, columns = list(found), list(found.values())
+        order, of = in_order([column.places for column in columns])
+        whole = _joined(columns, order)
+        return zip(
+            np.array(inputs)[of].tolist(),
+            map(batch.rows.__getitem__, whole.places.tolist()),
+            whole.stamps.tolist(),
+            whole.keys or repeat(None),
+            strict=False,
+        )
+
+
+def _combined(columns: Sequence[Column]) -> Column:
+    """Return the messages of several channels in the order of their places."""
+    if len(columns) == 1:
+        return columns[0]
+    order, _ = in_order([each.places for each in columns])
+    return _joined(columns, order)
+
+
+def _joined(columns: Sequence[Column], order: Places) -> Column:
+    """Return columns, one behind another, in another order."""
+    return Column(
+        np.concatenate([each.places for each in columns])[order],
+        np.concatenate([each.stamps for each in columns])[order],
+        keys_in_order([(each.keys, len(each.places)) for each in columns], order),
+    )
+
+
+def in_order(places: Sequence[Places]) -> tuple[Places, Places]:
+    """Return the order of columns, one behind another, by their places, and of what column each message then is.
+
+    Of equal places, the first column's comes first.
+    """
+    order = np.argsort(np.concatenate(places), kind="stable")
+    return order, np.repeat(np.arange(len(places)), [len(each) for each in places])[order]
+
+
+def keys_in_order(columns: Sequence[tuple[Sequence[Hashable] | None, int]], order: Places) -> Sequence[Hashable] | None:
+    """Return the keys of columns of a length, one behind another, in another order; None where no column has keys."""
+    if all(keys is None for keys, _ in columns):
+        return None
+    joined: list[Hashable] = []
+    for keys, length in columns:
+        joined += [None] * length if keys is None else keys
+    return [joined[at] for at in order.tolist()]

@@ -1,0 +1,182 @@
+"""Types by their definitions: as recorded, or as ROS 2 Jazzy has them where the recording tells nothing.
+
+The definitions are read by rosbags, whose typestore has those of Jazzy's common packages; no ROS is needed.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any, Final, TypeAlias
+
+from rosbags.convert.converter import is_same_wireformat
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from syncrelay.errors import BagError
+from syncrelay.recordings.bag.plain_definitions import plain_idl, plain_msg
+from syncrelay.recordings.bag.recording import Channel, Definition
+
+Convert: TypeAlias = Callable[[bytes], bytes | None]
+"""From a ROS 1 payload to the same message as CDR; None where it is malformed."""
+
+_HEADER: Final = "std_msgs/msg/Header"
+_TIME: Final = "builtin_interfaces/msg/Time"
+# Far beyond the definitions of real messages; what is done with them takes seconds.
+_MOST_FIELDS: Final = 20_000
+_DEEPEST: Final = 50
+# A gibibyte of doubles; what else is counted by such a number takes place that no machine has.
+_LONGEST_ARRAY: Final = 1 << 27
+# rosidl's words for the primitives of .msg files, as its Python classes tell them.
+_ROSIDL: Final = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
+
+
+def typestore(type_name: str, definition: Definition | None) -> Typestore | None:
+    """Return what decodes messages of a type, as CDR; None where neither its definition nor ROS 2 tells of it."""
+    store = _store_of(type_name, definition)
+    return store if type_name in store.fielddefs else None
+
+
+def fields_of(channel: Channel) -> Callable[[str], Mapping[str, str]] | None:
+    """Return what tells the fields of a type (`pkg/Name`) that the channel's is made of, as rosidl's classes would.
+
+    None where the channel's type is known neither to the recording nor to ROS 2.
+    """
+    store = _store_of(channel.type, channel.definition)
+    if channel.type not in store.fielddefs:
+        return None
+
+    def fields(name: str) -> Mapping[str, str]:
+        package, _, message = name.partition("/")
+        definition = store.fielddefs.get(f"{package}/msg/{message}", ([], []))
+        return {field: _rosidl_type(description) for field, description in definition[1]}
+
+    return fields
+
+
+def begins_with_header(channel: Channel) -> bool | None:
+    """Tell whether payloads begin with a std_msgs/Header; None where the type is not known."""
+    fields = _store_of(channel.type, channel.definition).fielddefs.get(channel.type)
+    if fields is None:
+        return None
+    return bool(fields[1]) and fields[1][0][1] == (Nodetype.NAME, _HEADER)
+
+
+def stamp_fields(type_name: str, definition: Definition | None = None) -> tuple[str, ...]:
+    """Return the fields of a type that `stamp: {field: ...}` can name as they are, none where the type is not known."""
+    _, fields = _store_of(type_name, definition).fielddefs.get(type_name, ([], []))
+    return tuple(name for name, description in fields if description == (Nodetype.NAME, _TIME))
+
+
+def converter(channel: Channel) -> Convert:
+    """Return what makes CDR of the payloads of a ROS 1 channel; raises BagError where its definition is no use."""
+    store = _store_of(channel.type, channel.definition)
+    if channel.type not in store.fielddefs:
+        raise BagError(f"{channel.topic}: the definition of {channel.type} in the bag cannot be read")
+
+    def convert(payload: bytes) -> bytes | None:
+        # No element is smaller than a byte: a larger count is a lie, and would be counted down for hours.
+        store.max_sequence_length = max(1, len(payload))
+        try:
+            return bytes(store.ros1_to_cdr(payload, channel.type))
+        except SerdeError:
+            return None
+
+    return convert
+
+
+def as_ros2(channel: Channel) -> tuple[Definition | None, str]:
+    """Return the definition and the hash (RIHS01) that a ROS 2 recording of the channel has."""
+    store = _store_of(channel.type, channel.definition)
+    is_known = channel.type in store.fielddefs
+    if channel.definition is not None and channel.definition.format != "ros1msg":
+        return channel.definition, channel.type_hash or (store.hash_rihs01(channel.type) if is_known else "")
+    if not is_known:
+        return None, channel.type_hash
+    jazzy = _jazzy()
+    if channel.type in jazzy.fielddefs and is_same_wireformat(store, jazzy, channel.type, channel.type):
+        store = jazzy
+    text, _ = store.generate_msgdef(channel.type, ros_version=2)
+    return Definition("ros2msg", text), channel.type_hash or store.hash_rihs01(channel.type)
+
+
+def jazzy_definition(type_name: str) -> tuple[Definition, str]:
+    """Return the definition and the hash of a type of ROS 2 Jazzy's common packages."""
+    text, _ = _jazzy().generate_msgdef(type_name, ros_version=2)
+    return Definition("ros2msg", text), _jazzy().hash_rihs01(type_name)
+
+
+@lru_cache(maxsize=256)
+def _store_of(type_name: str, definition: Definition | None) -> Typestore:
+    """A store of what a definition holds: the type and all that it is made of; Jazzy's where that is of no use."""
+    if definition is None:
+        return _jazzy()
+    store = get_typestore(Stores.EMPTY)
+    try:
+        types = _parsed(type_name, definition)
+        # ROS 1's Header begins with `seq`, which rosbags skips by itself.
+        types.pop(_HEADER, None)
+        types = {_HEADER: _jazzy().fielddefs[_HEADER], **types}
+        types = {name: fields for name, fields in types.items() if name not in store.fielddefs}
+        _require_bearable({**store.fielddefs, **types})
+        store.register(types)
+    except Exception:  # noqa: BLE001  the parser asserts and recurses, and what it read becomes code: it may raise anything
+        return _jazzy()
+    return store
+
+
+def _require_bearable(types: Mapping[str, Any]) -> None:
+    """Raise ValueError or KeyError where types hold themselves, what is not there, or more than a message can."""
+    weights: dict[str, int] = {}
+
+    def weight_of(name: str, depth: int) -> int:
+        if depth > _DEEPEST:
+            raise ValueError(f"{name} contains itself")
+        if name not in weights:
+            weights[name] = sum(weight_of_field(description, depth) for _, description in types[name][1])
+        if weights[name] > _MOST_FIELDS:
+            raise ValueError(f"{name} has more fields than a message can")
+        return weights[name]
+
+    def weight_of_field(description: Any, depth: int) -> int:
+        kind, what = description
+        if kind == Nodetype.NAME:
+            return weight_of(what, depth + 1)
+        if kind == Nodetype.BASE:
+            return 1
+        element, count = what
+        if kind == Nodetype.ARRAY and count > _LONGEST_ARRAY:
+            raise ValueError(f"an array of {count} elements is longer than a message can be")
+        # Numbers beside each other are one thing to skip, all else is gone through.
+        is_plain = kind == Nodetype.SEQUENCE or (element[0] == Nodetype.BASE and element[1][0] != "string")
+        return weight_of_field(element, depth) * (1 if is_plain else count)
+
+    for name in types:
+        weight_of(name, 0)
+
+
+def _parsed(type_name: str, definition: Definition) -> dict[str, Any]:
+    if definition.format != "ros2idl":
+        return dict(get_types_from_msg(plain_msg(definition.text), type_name))
+    types: dict[str, Any] = {}
+    for text in plain_idl(definition.text):
+        types |= get_types_from_idl(text)
+    return types
+
+
+@lru_cache(maxsize=1)
+def _jazzy() -> Typestore:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def _rosidl_type(description: Any) -> str:
+    kind, what = description
+    if kind == Nodetype.BASE:
+        name, bound = what
+        return f"{_ROSIDL.get(name, name)}<{bound}>" if bound else _ROSIDL.get(name, name)
+    if kind == Nodetype.NAME:
+        return str(what).replace("/msg/", "/")
+    element, count = what
+    if kind == Nodetype.ARRAY:
+        return f"{_rosidl_type(element)}[{count}]"
+    return f"sequence<{_rosidl_type(element)}, {count}>" if count else f"sequence<{_rosidl_type(element)}>"

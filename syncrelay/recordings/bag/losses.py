@@ -1,0 +1,86 @@
+"""What of a file cannot be read: damaged places a sentence each, single messages a sentence for each cause."""
+
+from collections import Counter
+from typing import Final
+
+from syncrelay.config.wording import counted
+from syncrelay.errors import BagError
+from syncrelay.recordings.bag.recording import LATEST, Channel, RawMessage
+
+STRAY: Final[RawMessage] = (Channel(-1, "", "", ""), -1, b"")
+"""Stands in place of a message channel not described in the file: of a time before all others."""
+
+OF_NO_CHANNEL: Final = "channel not described in the file"
+OF_NO_TIME: Final = "received before 1970 or after 2116"
+
+
+_MOST_SAID: Final = 100
+"""Damaged places of a file that are named; of more, their number tells enough."""
+
+
+class Losses:
+    """Gathers them while a file is read."""
+
+    def __init__(self, name: str) -> None:
+        """Begin with none; messages call the file `name`."""
+        self._name = name
+        self._said: list[str] = []
+        self._more = 0
+        self._left_out: Counter[str] = Counter()
+        self._too_late = 0
+
+    @property
+    def sentences(self) -> list[str]:
+        """All so far."""
+        told = [f"{counted(count, 'message')} left out: {why}" for why, count in self._left_out.items() if count]
+        if self._too_late:
+            told.append(f"{counted(self._too_late, 'message')} out of order: the index has other times")
+        if self._more:
+            told.append(f"{counted(self._more, 'more place')} that cannot be read")
+        return [*self._said, *(f"{self._name}: {each}" for each in told)]
+
+    def say(self, what: str) -> None:
+        """Take in what is wrong with the file."""
+        self._said.append(f"{self._name}: {what}")
+
+    def cut_off(self, place: int, size: int) -> None:
+        """Take in that nothing can be read from a byte on."""
+        self.say(f"cut off or damaged at byte {place} of {size}; read up to there")
+
+    def not_closed(self) -> None:
+        """Take in that the file ends where more could follow."""
+        self.say("was not closed, or is cut off; read to its end")
+
+    def damaged(self, what: str, fault: BaseException, *, read: int = 0) -> None:
+        """Take in that of something, named with its article, only so many messages could be read."""
+        if len(self._said) >= _MOST_SAID:
+            self._more += 1
+            return
+        why = "there is not enough memory for it" if isinstance(fault, MemoryError) else fault
+        kept = f"after {counted(read, 'readable message')}" if read else "and left out"
+        self.say(f"{what} is damaged {kept}{f': {why}' if str(why) else ''}")
+
+    def leave_out(self, why: str, count: int = 1) -> None:
+        """Count messages that are left out for a reason that tells no place."""
+        self._left_out[why] += count
+
+    def too_late(self, count: int) -> None:
+        """Count messages that are read, but behind later ones."""
+        self._too_late += count
+
+    def not_in_parts(self, place: int) -> BagError:
+        """Return the error for messages at a byte that are of other times than the index says."""
+        return BagError(
+            f"{self._name}: the messages at byte {place} are of other times than the index says, so that no part of the"
+            " recording can be told by time: read it as a whole"
+        )
+
+    def kept(self, messages: list[RawMessage]) -> list[RawMessage]:
+        """Return those of messages, sorted by their times, that are of a channel and of a time; count the others."""
+        if not messages or (messages[0][1] >= 0 and messages[-1][1] <= LATEST):
+            return messages
+        good = [each for each in messages if 0 <= each[1] <= LATEST]
+        strays = sum(each is STRAY for each in messages)
+        self.leave_out(OF_NO_CHANNEL, strays)
+        self.leave_out(OF_NO_TIME, len(messages) - len(good) - strays)
+        return good

@@ -1,0 +1,142 @@
+"""A new recording: MCAP as rosbag2 writes it, alone or in a rosbag2 folder with its metadata."""
+
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Final, Self
+
+import yaml
+from mcap.writer import Writer
+
+from syncrelay.output_files import cannot_be_written, require_new, written_whole
+from syncrelay.recordings.bag.qos import Profile, write_profile
+from syncrelay.recordings.bag.recording import Definition, Encoding
+
+MCAP_SUFFIX: Final = ".mcap"
+_PROFILE: Final = "ros2"
+# The version of rosbag2's metadata that Jazzy writes.
+_METADATA_VERSION: Final = 9
+
+
+@dataclass(slots=True)
+class Output:
+    """One topic of a new recording: its channel's number, what is said about it, how many messages it has."""
+
+    channel: int
+    topic: str
+    type: str
+    type_hash: str
+    profile: Profile
+    count: int = 0
+
+
+class McapOutput:
+    """Writes CDR messages; a context manager after which the recording is there, or after an error is not."""
+
+    def __init__(self, path: Path) -> None:
+        """Begin a file, if the name ends in .mcap, or a folder; raises OutputError where it exists or can't be made."""
+        with ExitStack() as opened:
+            if path.suffix != MCAP_SUFFIX:
+                _make_parents(path)
+            require_new(path)
+            scratch = opened.enter_context(written_whole(path))
+            self._folder = None if path.suffix == MCAP_SUFFIX else scratch
+            if self._folder is not None:
+                self._folder.mkdir()
+            self._path = scratch if self._folder is None else scratch / f"{path.name}_0{MCAP_SUFFIX}"
+            self._file = self._path.open("xb")
+            opened.callback(_close, self._file)
+            self._writer = Writer(self._file)
+            self._writer.start(_PROFILE)
+            self._opened = opened.pop_all()
+        self._outputs: list[Output] = []
+        self._schemas: dict[str, int] = {}
+        self._begin: int | None = None
+        self._end = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> bool | None:
+        if error is not None:
+            return self._opened.__exit__(kind, error, trace)
+        with self._opened:
+            self._writer.finish()  # type: ignore[no-untyped-call]  # mcap's
+            self._file.close()
+            if self._folder is not None:
+                text = yaml.safe_dump(self._metadata(), sort_keys=False)
+                (self._folder / "metadata.yaml").write_text(text, encoding="utf-8")
+        return None
+
+    @property
+    def count(self) -> int:
+        """How many messages have been written."""
+        return sum(output.count for output in self._outputs)
+
+    def add(self, topic: str, type_name: str, definition: Definition | None, type_hash: str, qos: Profile) -> Output:
+        """Begin a topic."""
+        if type_name not in self._schemas:
+            text = definition.text.encode() if definition else b""
+            encoding = definition.format if definition else ""
+            self._schemas[type_name] = self._writer.register_schema(type_name, encoding, text)
+        profiles = yaml.safe_dump([write_profile(qos)], sort_keys=False).strip()
+        about = {"offered_qos_profiles": profiles, "topic_type_hash": type_hash}
+        number = self._writer.register_channel(topic, Encoding.CDR.value, self._schemas[type_name], about)
+        output = Output(number, topic, type_name, type_hash, qos)
+        self._outputs.append(output)
+        return output
+
+    def write(self, output: Output, payload: bytes, now: int) -> None:
+        """Write a message that is received at `now`, in nanoseconds."""
+        self._writer.add_message(output.channel, now, payload, now, output.count)
+        output.count += 1
+        self._begin = now if self._begin is None else min(now, self._begin)
+        self._end = max(self._end, now)
+
+    def _metadata(self) -> dict[str, Any]:
+        begin = self._begin or 0
+        span = {
+            "starting_time": {"nanoseconds_since_epoch": begin},
+            "duration": {"nanoseconds": self._end - begin if self.count else 0},
+            "message_count": self.count,
+        }
+        about = {
+            "version": _METADATA_VERSION,
+            "storage_identifier": "mcap",
+            **span,
+            "topics_with_message_count": [_topic_metadata(output) for output in self._outputs],
+            "compression_format": "",
+            "compression_mode": "",
+            "relative_file_paths": [self._path.name],
+            "files": [{"path": self._path.name, **span}],
+            "custom_data": None,
+            "ros_distro": "jazzy",
+        }
+        return {"rosbag2_bagfile_information": about}
+
+
+def _close(file: BinaryIO) -> None:
+    # Where there is no space, closing it fails once more.
+    with suppress(OSError):
+        file.close()
+
+
+def _make_parents(path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_be_written(path, error) from error
+
+
+def _topic_metadata(output: Output) -> dict[str, Any]:
+    about = {
+        "name": output.topic,
+        "type": output.type,
+        "serialization_format": Encoding.CDR.value,
+        "offered_qos_profiles": [write_profile(output.profile)],
+        "type_description_hash": output.type_hash,
+    }
+    return {"topic_metadata": about, "message_count": output.count}

@@ -1,0 +1,124 @@
+"""What need not be read of an MCAP file: chunks of other channels and, of a far one, what else plain chunks hold."""
+
+from bisect import bisect_right
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from mcap.opcode import Opcode
+from mcap.records import ChunkIndex, MessageIndex
+
+from syncrelay.recordings.bag.mcap_records import RECORD, UNREADABLE, parsed
+from syncrelay.recordings.bag.recording import Channel
+from syncrelay.recordings.bag.segments import Segment
+from syncrelay.recordings.bag.sources import Source, Span
+
+# Chunks whose messages are looked up together.
+_STRETCH: Final = 64
+# A chunk of which more than one part in so many is wanted is read as a whole, and its checksum is checked.
+_PART: Final = 2
+# Opcode and length, channel.
+_NUMBER: Final = slice(9, 11)
+
+
+@dataclass(frozen=True, slots=True)
+class PlainChunk:
+    """Where the records of a chunk that is not compressed begin and end, and where the index of its messages ends."""
+
+    begin: int
+    end: int
+    index_end: int
+
+
+def plain_chunk(index: ChunkIndex) -> PlainChunk | None:
+    """Return a chunk of which single messages can be read; None where that takes all of it."""
+    end = index.chunk_start_offset + index.chunk_length
+    if index.compression or not index.message_index_length or index.compressed_size != index.uncompressed_size:
+        return None
+    begin = end - index.compressed_size
+    return PlainChunk(begin, end, end + index.message_index_length) if begin > index.chunk_start_offset else None
+
+
+def is_needed(held: Collection[int] | None, channels: Mapping[int, Channel | None]) -> bool:
+    """Tell whether a chunk is read: not if an index that can be trusted names only what is not wanted.
+
+    `held` are the channels that the index names, nothing where it tells none; `channels` are None where not wanted.
+    """
+    return not held or any(number not in channels or channels[number] is not None for number in held)
+
+
+def is_mixed(held: Collection[int] | None, channels: Mapping[int, Channel | None]) -> bool:
+    """Tell whether a chunk that is needed holds other channels too, all of them known."""
+    return (
+        bool(held) and all(each in channels for each in held or ()) and None in {channels[each] for each in held or ()}
+    )
+
+
+class Parts:
+    """The records of wanted messages, chunk by chunk in a given order; each stretch of chunks is planned at once."""
+
+    def __init__(
+        self, source: Source, segments: Sequence[Segment], plain: dict[Segment, PlainChunk], wanted: Collection[int]
+    ) -> None:
+        """Read from a source; segments that are not in `plain` are left to the caller, who reads them as a whole."""
+        self._source = source
+        self._segments = segments
+        self._plain = plain
+        self._wanted = frozenset(wanted)
+        self._place = {segment: number for number, segment in enumerate(segments)}
+        self._spans: dict[Segment, tuple[Span, ...]] = {}
+
+    def of(self, segment: Segment) -> bytes | None:
+        """Return the records of a chunk's wanted messages; None where all of it is to be read."""
+        place = self._place[segment]
+        if place % _STRETCH == 0:
+            self._plan(self._segments[place : place + _STRETCH])
+        spans = self._spans.pop(segment, None)
+        if spans is None:
+            return None
+        records = [self._bytes(begin, size) for begin, size in spans]
+        return b"".join(records) if all(map(self._is_wanted, records)) else None
+
+    def _is_wanted(self, record: bytes) -> bool:
+        """Tell whether a record is a wanted message, as the index has it."""
+        return record[:1] == bytes([Opcode.MESSAGE]) and int.from_bytes(record[_NUMBER], "little") in self._wanted
+
+    def _plan(self, segments: Sequence[Segment]) -> None:
+        chunks = {each: self._plain[each] for each in segments if each in self._plain}
+        self._source.expect([(each.end, each.index_end - each.end) for each in chunks.values()])
+        for segment, chunk in chunks.items():
+            try:
+                spans = tuple(self._looked_up(chunk))
+            except UNREADABLE:
+                continue
+            if sum(size for _, size in spans) * _PART < segment.size:
+                self._spans[segment] = spans
+        read = ([*self._spans[each]] if each in self._spans else [(each.offset, each.size)] for each in segments)
+        self._source.expect([span for spans in read for span in spans])
+
+    def _looked_up(self, chunk: PlainChunk) -> Iterator[Span]:
+        """Yield where the wanted messages of a chunk stand, each up to the next message; raises one of UNREADABLE."""
+        content = self._bytes(chunk.end, chunk.index_end - chunk.end)
+        size = chunk.end - chunk.begin
+        places: list[int] = []
+        wanted: list[int] = []
+        at = 0
+        while at < len(content):
+            opcode, length = RECORD.unpack_from(content, at)
+            at += RECORD.size + length
+            if opcode != Opcode.MESSAGE_INDEX or at > len(content):
+                raise ValueError("it is no index of messages")
+            index = parsed(MessageIndex, content[at - length : at])
+            offsets = [offset for _, offset in index.records]
+            places += offsets
+            wanted += offsets if index.channel_id in self._wanted else ()
+        places = sorted({*places, size})
+        if places[-1] > size or not wanted:
+            raise ValueError("it points past its chunk")
+        for offset in sorted(set(wanted)):
+            following = places[bisect_right(places, offset)]
+            yield chunk.begin + offset, following - offset
+
+    def _bytes(self, place: int, size: int) -> bytes:
+        self._source.seek(place)
+        return self._source.read(size)

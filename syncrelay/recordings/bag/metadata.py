@@ -1,0 +1,97 @@
+"""What rosbag2's metadata.yaml says that a folder holds, compared with what is there."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath, PurePosixPath
+from typing import Any, Final
+
+from syncrelay.config.wording import all_of, counted
+from syncrelay.errors import BagError
+from syncrelay.printable import printable
+from syncrelay.recording_files import COMPRESSED, METADATA
+from syncrelay.recordings.bag.names import topic_name
+from syncrelay.recordings.bag.qos import plain_yaml
+
+LARGEST: Final = 4_000_000
+"""Bytes of a metadata.yaml that is read: some 10,000 files are named in so many."""
+
+# A topic's profiles, which have durations.
+_DEEPEST: Final = 8
+_ROOT: Final = "rosbag2_bagfile_information"
+_NAMED: Final = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Metadata:
+    """The files of a recording, with how many messages each holds, None where that is not said, and each topic's."""
+
+    files: Mapping[str, int | None]
+    topics: Mapping[str, int]
+
+    def missing(self, there: Sequence[str]) -> str:
+        """Say which files are not among those that are there; an empty text if none is missing.
+
+        A file may have been compressed or unpacked since. Where as many others are there, files were renamed: then
+        only the messages can show whether one is missing.
+        """
+        plain = {_unpacked(name) for name in there}
+        gone = [name for name in self.files if _unpacked(name) not in plain]
+        if len(there) - (len(self.files) - len(gone)) >= len(gone):
+            return ""
+        counts = [self.files[name] for name in gone]
+        messages = sum(count or 0 for count in counts)
+        held = f", with {counted(messages, 'message')}" if None not in counts else ""
+        names = [printable(name) for name in gone[:_NAMED]]
+        if len(gone) > _NAMED:
+            names.append(f"{len(gone) - _NAMED} more")
+        are = "is" if len(gone) == 1 else "are"
+        of_files = f"{len(gone)} of the {len(self.files)} files that {METADATA} names"
+        return f"{of_files} {are} missing{held}: {all_of(names)}"
+
+
+def parse_metadata(content: bytes) -> Metadata | None:
+    """Return what a metadata.yaml says; None for a file of this name that is not rosbag2's.
+
+    Raises BagError, without the file's name, for one that cannot be read.
+    """
+    if len(content) > LARGEST:
+        raise BagError(f"is larger than {LARGEST // 1_000_000} MB")
+    document = plain_yaml(content.decode(errors="replace"), longest=LARGEST, deepest=_DEEPEST)
+    if document is None:
+        raise BagError("is damaged")
+    about = document.get(_ROOT) if isinstance(document, dict) else None
+    if not isinstance(about, dict):
+        return None
+    # Older versions name files with the folder that they were recorded in, and count the messages of none.
+    files: dict[str, int | None] = {
+        PurePosixPath(each).name: None for each in _listed(about, "relative_file_paths") if isinstance(each, str)
+    }
+    for each in _dicts(about, "files"):
+        if isinstance(path := each.get("path"), str) and PurePosixPath(path).name in files:
+            files[PurePosixPath(path).name] = _count(each)
+    topics: dict[str, int] = {}
+    for each in _dicts(about, "topics_with_message_count"):
+        topic = each.get("topic_metadata")
+        name = topic.get("name") if isinstance(topic, dict) else None
+        if isinstance(name, str):
+            topics[printable(topic_name(name))] = _count(each) or 0
+    return Metadata(files, topics)
+
+
+def _listed(about: Mapping[str, Any], key: str) -> Sequence[Any]:
+    found = about.get(key)
+    return found if isinstance(found, list) else ()
+
+
+def _dicts(about: Mapping[str, Any], key: str) -> Iterator[Mapping[str, Any]]:
+    return (each for each in _listed(about, key) if isinstance(each, dict))
+
+
+def _count(about: Mapping[str, Any]) -> int | None:
+    count = about.get("message_count")
+    return count if type(count) is int and count >= 0 else None
+
+
+def _unpacked(name: str) -> str:
+    path = PurePath(name)
+    return path.stem if path.suffix in COMPRESSED else name

@@ -1,0 +1,116 @@
+"""What every kind of recording offers: channels, and their messages in the order in which they were received."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final, Protocol, TypeAlias
+
+from syncrelay.printable import printable
+from syncrelay.recordings.bag.qos import Profile
+
+
+class Encoding(Enum):
+    """How the payloads of a channel are serialized."""
+
+    CDR = "cdr"
+    ROS1 = "ros1"
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """A type's definition as recorded, with those of the types that it is made of.
+
+    `format` is MCAP's name of a schema encoding: ros2msg, ros2idl or ros1msg.
+    """
+
+    format: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """A topic of a recording as one publisher, or a set of alike ones, filled it. Two channels are never equal.
+
+    `type` is a full type name (`pkg/msg/Name`), also in a ROS 1 bag. `qos` is what the publishers offered,
+    empty where that was not recorded. `type_hash` is the RIHS01 hash of REP 2016, empty if it was not recorded.
+    An encoding that is not known here stands as it was recorded. Names are printable, whatever was recorded: those
+    that are not by themselves are none that a file can have.
+    """
+
+    id: int
+    topic: str
+    type: str
+    encoding: Encoding | str
+    definition: Definition | None = None
+    qos: tuple[Profile, ...] = ()
+    type_hash: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "topic", printable(self.topic))
+        object.__setattr__(self, "type", printable(self.type))
+        if not isinstance(self.encoding, Encoding):
+            object.__setattr__(self, "encoding", printable(self.encoding))
+
+
+RawMessage: TypeAlias = tuple[Channel, int, bytes]
+"""A channel, when the message was received in nanoseconds, 0 to LATEST, and its payload."""
+
+LATEST: Final = 2**62 - 1
+"""The latest time of receipt, in 2116: ROS 1 tells none that is later, and what two times differ by fits 64 bits."""
+
+
+AFTER_ALL: Final = LATEST + 1
+"""A time that is later than that of any message."""
+
+
+def is_part(begin: int, end: int) -> bool:
+    """Tell whether messages may be received before `begin`, or at `end` or later."""
+    return begin > 0 or end <= LATEST
+
+
+class Recording(Protocol):
+    """A recording that is open for reading: as a whole once, from the begin to the end, or part after part."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What was recorded."""
+        ...
+
+    @property
+    def faults(self) -> list[str]:
+        """What could not be read, a sentence each; complete when all messages are read."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Bytes that `batches` has to go through."""
+        ...
+
+    @property
+    def position(self) -> int:
+        """Bytes that `batches` has gone through."""
+        ...
+
+    @property
+    def begin(self) -> int:
+        """When the first message was received in nanoseconds; 0 if there is none."""
+        ...
+
+    @property
+    def end(self) -> int:
+        """When the last message was received in nanoseconds; 0 if there is none."""
+        ...
+
+    def batches(
+        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
+    ) -> Iterator[list[RawMessage]]:
+        """Yield the messages of some channels by their receive time; of equal times, as they were written.
+
+        Only those received from `begin` on and before `end` are read. A batch is what is read at a time, and may be
+        empty. Raises BagError where a part is asked for and the file's index lies, so that what it is cannot be told.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let go of the files."""
+        ...

@@ -1,0 +1,145 @@
+"""A recording fed to the groups of a file as the relay would have got it, with receive time as `now`."""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+from syncrelay.explain import UNREADABLE, EngineDriver
+from syncrelay.recordings.bag.bindings import GroupBinding
+from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_reader
+from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
+from syncrelay.sync import InputCounts, Message, Outcome, SyncGroup
+
+Listener: TypeAlias = Callable[[GroupBinding, Outcome, int], None]
+"""Told of each set and drop of a group when it leaves, and at what time. The payload of a message is the RawMessage."""
+
+
+@dataclass(frozen=True, slots=True)
+class InputResult:
+    """What became of the messages of one input."""
+
+    topic: str
+    counts: InputCounts
+
+
+@dataclass(frozen=True, slots=True)
+class GroupResult:
+    """What a group made of the recording."""
+
+    name: str
+    inputs: tuple[InputResult, ...]
+    sets: int
+
+
+class GroupReplay:
+    """One group at work on a recording."""
+
+    def __init__(self, binding: GroupBinding, listeners: Sequence[Listener], engine: SyncGroup | None) -> None:
+        self.binding = binding
+        self.driver: Final = EngineDriver(binding.group, self._take if listeners else None, engine)
+        self._listeners = listeners
+
+    def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
+        """Give what reads the channels of each input; raises BagError for a stamp or key that isn't there."""
+        for index, each in enumerate(self.binding.inputs):
+            yield [(channel, column_reader(self.binding.group, index, channel)) for channel in each.channels]
+
+    def result(self) -> GroupResult:
+        """Give the counts so far."""
+        engine = self.driver.engine
+        topics = (each.config.topic for each in self.binding.inputs)
+        inputs = tuple(InputResult(*each) for each in zip(topics, engine.counts(), strict=True))
+        return GroupResult(self.binding.group.name, inputs, engine.sets)
+
+    def _take(self, outcomes: Sequence[Outcome], now: int) -> None:
+        for outcome in outcomes:
+            for listener in self._listeners:
+                listener(self.binding, outcome, now)
+
+
+class Replay:
+    """Groups at work on a recording, a step for each batch that is read of it."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        bindings: Sequence[GroupBinding],
+        *,
+        listeners: Sequence[Listener] = (),
+        engines: Sequence[SyncGroup | None] | None = None,
+    ) -> None:
+        """Begin with these engines, one a group, or new ones.
+
+        Raises BagError for a stamp or key that a recorded type does not have.
+        """
+        self._recording = recording
+        pairs = zip(bindings, engines or [None] * len(bindings), strict=True)
+        self._groups = [GroupReplay(binding, listeners, engine) for binding, engine in pairs]
+        self._columns = Columns([readers for group in self._groups for readers in group.readers()])
+        # What waited in one group leaves before a later message of another arrives.
+        self._waiting = [group.driver for group in self._groups if group.driver.has_deadlines]
+        self._inputs = [(group.driver, index) for group in self._groups for index in range(len(group.binding.inputs))]
+        self._now = recording.begin
+
+    @property
+    def channels(self) -> Collection[Channel]:
+        """All whose messages are fed."""
+        return self._columns.channels
+
+    @property
+    def engines(self) -> list[SyncGroup]:
+        """Those at work, in the order of the groups."""
+        return [group.driver.engine for group in self._groups]
+
+    def steps(self) -> Iterator[None]:
+        """Feed the recording to its end, a batch a step."""
+        for rows in self._recording.batches(self.channels):
+            self.feed(rows)
+            yield
+        self.finish()
+
+    def feed(self, rows: Sequence[RawMessage]) -> None:
+        """Feed messages that were received after all before."""
+        for place, raw, stamp, key in self._columns.in_order(Batch(rows)):
+            self._now = now = raw[1]
+            for driver in self._waiting:
+                driver.expire(now)
+            driver, index = self._inputs[place]
+            if stamp == UNREADABLE:
+                driver.reject(index, raw, now=now)
+            else:
+                driver.add(Message(index, stamp, raw, key), now=now)
+
+    def expire(self, now: int) -> None:
+        """Let leave what has waited long enough, up to `now`."""
+        for driver in self._waiting:
+            driver.expire(now)
+
+    def finish(self) -> None:
+        """Let leave all that is left at the end of the recording."""
+        for group in self._groups:
+            # A damaged recording may give a false end.
+            group.driver.finish(max(self._now, self._recording.end))
+
+    def results(self) -> list[GroupResult]:
+        """Give what became of all messages so far, in the order of the groups."""
+        return [group.result() for group in self._groups]
+
+
+def replay(
+    recording: Recording, bindings: Sequence[GroupBinding], *, listeners: Sequence[Listener] = ()
+) -> list[GroupResult]:
+    """Feed a recording to its end; what became of all messages, in the order of the groups.
+
+    Raises BagError for a stamp or key that a recorded type does not have.
+    """
+    whole = Replay(recording, bindings, listeners=listeners)
+    for _ in whole.steps():
+        pass
+    return whole.results()
+
+
+def received(message: Message) -> int:
+    """When a message that was replayed had been received, in nanoseconds."""
+    raw: Any = message.payload
+    return int(raw[1])

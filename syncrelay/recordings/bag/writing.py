@@ -1,0 +1,112 @@
+"""Sets of a replay as a recording: what the relay would have published."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from syncrelay.cdr import patch_stamp
+from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
+from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter, Note
+from syncrelay.errors import BagError
+from syncrelay.recordings.bag.bindings import GroupBinding, Input
+from syncrelay.recordings.bag.definitions import as_ros2, begins_with_header, converter, jazzy_definition
+from syncrelay.recordings.bag.mcap_output import McapOutput, Output
+from syncrelay.recordings.bag.qos import Profile, output_profile
+from syncrelay.recordings.bag.recording import Channel, Encoding
+from syncrelay.sync import Match, Message, Outcome
+
+
+class Outgoing(NamedTuple):
+    """From a recorded payload and a set's common stamp to what leaves; whether it gets that stamp."""
+
+    written: Callable[[bytes, int | None], bytes]
+    is_restamped: bool
+
+
+class _Manifest(NamedTuple):
+    """What serializes the manifests of a group, and where they are written."""
+
+    writer: ManifestWriter
+    output: Output
+
+
+class SetWriter:
+    """Writes the sets of a replay as the relay would publish them, at the time at which they leave.
+
+    Payloads are those that were recorded, with the stamp of `restamp` in their place if the file has one. Those of a
+    ROS 1 bag are written as ROS 2 has them: CDR, without the header's seq. Manifests stand behind their sets.
+    """
+
+    def __init__(self, recording: McapOutput) -> None:
+        self._recording = recording
+        self._outputs: dict[str, Output] = {}
+        self._payloads: dict[tuple[str, Channel], Outgoing] = {}
+        self._manifests: dict[str, _Manifest] = {}
+        self.messages = 0
+        """How many messages of sets were written."""
+
+    def begin(self, binding: GroupBinding) -> None:
+        """Make the outputs of a group, so that those without a message are there too."""
+        for each in binding.inputs:
+            if each.channels:
+                self._add(each)
+        if binding.group.options.manifest:
+            self._manifests[binding.group.name] = self._manifest(binding)
+
+    def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
+        """Write a set that leaves at `now`; drops are none."""
+        if not isinstance(outcome, Match):
+            return
+        pairs = zip(binding.inputs, outcome.messages, strict=True)
+        stamp = outcome.stamp
+        written = [
+            (None, None, 0) if message is None else self._write(each, message, stamp, now) for each, message in pairs
+        ]
+        manifest = self._manifests.get(binding.group.name)
+        if manifest is not None:
+            left_as, received, sent = zip(*written, strict=True)
+            latency = now - max(each for each in received if each is not None)
+            note = Note(manifest.output.count + 1, latency, stamp, outcome.stamps, left_as, received, sent, {})
+            self._recording.write(manifest.output, manifest.writer.write(note), now)
+
+    def _write(self, each: Input, message: Message, stamp: int | None, now: int) -> tuple[int, int, int]:
+        """Write a message; return its stamp as it leaves, when it was received, and its number among its topic's."""
+        channel, received, payload = message.payload
+        output, payload_of = self._outputs[each.output], self._payloads[each.output, channel]
+        self._recording.write(output, payload_of.written(payload, stamp), now)
+        self.messages += 1
+        leaves_as = stamp if stamp is not None and payload_of.is_restamped else message.stamp
+        return leaves_as, received, output.count
+
+    def _manifest(self, binding: GroupBinding) -> "_Manifest":
+        node = binding.group.inputs.node
+        topics = [(each.topic, each.output) for each in binding.inputs]
+        writer = ManifestWriter(binding.group, node=node.absolute("~"), topics=topics)
+        topic, profile = node.absolute(manifest_topic(binding.group.name)), Profile(depth=MANIFEST_DEPTH)
+        return _Manifest(writer, self._recording.add(topic, MANIFEST_TYPE, *jazzy_definition(MANIFEST_TYPE), profile))
+
+    def _add(self, each: Input) -> None:
+        first = each.channels[0]
+        offered = [profile for channel in each.channels for profile in channel.qos]
+        profile = output_profile(each.config.qos, offered)
+        self._outputs[each.output] = self._recording.add(each.output, first.type, *as_ros2(first), profile)
+        for channel in each.channels:
+            self._payloads[each.output, channel] = outgoing(each, channel)
+
+
+def outgoing(each: Input, channel: Channel) -> Outgoing:
+    """Return what makes the messages of an input that a channel holds those that leave.
+
+    It raises BagError for a message that does not fit its definition.
+    """
+    convert = converter(channel) if channel.encoding is Encoding.ROS1 else None
+    has_header = begins_with_header(channel)
+    # Of a type that nothing is known of, the file says where the stamp is.
+    restamped = each.config.stamp == "header" if has_header is None else has_header
+
+    def payload_of(recorded: bytes, stamp: int | None) -> bytes:
+        payload = recorded if convert is None else convert(recorded)
+        if payload is None:
+            raise BagError(f"{channel.topic}: a message does not fit the definition of {channel.type} in the bag")
+        return payload if stamp is None or not restamped else patch_stamp(payload, stamp)
+
+    return Outgoing(payload_of, restamped)

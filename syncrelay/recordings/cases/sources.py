@@ -1,0 +1,155 @@
+"""The messages of a case that is drawn or simulated, in the order in which they are received."""
+
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from itertools import takewhile
+from typing import Final, NamedTuple
+
+from syncrelay.cdr import LATEST_STAMP
+from syncrelay.config import GroupConfig
+from syncrelay.explain import UNREADABLE
+from syncrelay.recordings.analysis.streams import Stream
+from syncrelay.recordings.cases.drawing import Drawing
+from syncrelay.recordings.cases.models import Case, InputSource
+from syncrelay.rig.schedule import Sensor, schedule
+from syncrelay.rig.what_if import Fault, disturbances
+
+SECOND: Final = 1_000_000_000
+START: Final = 1_700_000_000 * SECOND
+"""When a case begins; any time would do that is far from 0, which is no stamp."""
+
+_AS_DRAWN: Final = InputSource()
+_ALL: Final = 1_000_000
+
+
+class Arrival(NamedTuple):
+    """A message: when it is received and its stamp in nanoseconds, its input, its key, its letter if it is drawn."""
+
+    received: int
+    input: int
+    stamp: int
+    key: Hashable
+    letter: str
+
+
+def arrivals(
+    case: Case, drawing: Drawing | None, group: GroupConfig, places: Mapping[str, int], what_if: Sequence[Fault]
+) -> tuple[list[Arrival], list[str]]:
+    """Return what is received, and a sentence for each fault that has changed nothing.
+
+    `places` has the input of each name that the case calls one by.
+    """
+    sources = {places[name]: source for name, source in case.inputs.items()}
+    found: list[Arrival] = [] if drawing is None else list(_drawn(drawing, case.period, sources, places, group))
+    for index, source in sources.items():
+        if source.rate is not None:
+            found += _simulated(source, index, case, group)
+    return _disturbed(
+        found, group, what_if, seed=case.seed, is_ordered=drawing is not None and drawing.order is not None
+    )
+
+
+def streams(received: Sequence[Arrival], group: GroupConfig) -> tuple[Stream, ...]:
+    """Return the messages as recordings are analyzed: a stream for each input."""
+    made = tuple(
+        Stream(topic.topic, topic.type or "", keys=None if topic.key is None else []) for topic in group.topics
+    )
+    for place, each in enumerate(received):
+        stream = made[each.input]
+        stream.stamps.append(each.stamp)
+        stream.received.append(each.received)
+        stream.places.append(place)
+        if stream.keys is not None:
+            stream.keys.append(each.key)
+    return made
+
+
+def _drawn(
+    drawing: Drawing,
+    period: int,
+    sources: Mapping[int, InputSource],
+    places: Mapping[str, int],
+    group: GroupConfig,
+) -> Iterator[Arrival]:
+    def arrival(letter: str) -> Arrival:
+        label, column = drawing.marks[letter]
+        index = places[label]
+        source = sources.get(index, _AS_DRAWN)
+        measured = START + column * period
+        stamp = _clamped(measured + source.offset)
+        return Arrival(measured + source.latency, index, stamp, drawing.keys.get(letter, letter), letter)
+
+    found = [arrival(letter) for letter in drawing.marks]
+    by_letter = {each.letter: each for each in found}
+    received = [by_letter[letter] for letter in drawing.order or ()] or sorted(found, key=lambda each: each[:2])
+    now = 0
+    for each in received:
+        now = max(now, each.received)
+        yield _readable(each._replace(received=now), sources, group)
+
+
+def _simulated(source: InputSource, index: int, case: Case, group: GroupConfig) -> Iterator[Arrival]:
+    assert source.rate is not None and case.lasts is not None  # noqa: S101, PT018  checked as the file was read
+    if source.drop == _ALL:
+        # Whose schedule would never give one.
+        return
+    sensor = Sensor(
+        topic=group.inputs.names[index],
+        rate_hz=Fraction(SECOND, source.rate),
+        phase=source.phase,
+        clock_error=source.offset,
+        jitter=source.jitter,
+        latency=source.latency,
+        latency_jitter=source.latency_jitter,
+        loss=source.drop / _ALL,
+        reliable=True,
+    )
+    # 30 Hz for 2 s are 60, though their period is a third of a nanosecond less than it should be.
+    time = case.lasts - source.phase
+    slack = min(time // source.rate // 2 + 1, (source.rate - 1) // 2)
+    messages = -(-(time - slack) // source.rate)
+    for shot in takewhile(lambda shot: shot.number < messages, schedule(sensor, seed=case.seed, start=START)):
+        # Their numbers are the keys of messages that are not drawn.
+        arrival = Arrival(shot.sent, index, _clamped(shot.stamp), shot.number, "")
+        yield _readable(arrival, {index: source}, group)
+
+
+def _readable(arrival: Arrival, sources: Mapping[int, InputSource], group: GroupConfig) -> Arrival:
+    """Return a message as the file reads it: without a key in the field that it goes by, nothing can be read."""
+    topic = group.topics[arrival.input]
+    there = sources.get(arrival.input, _AS_DRAWN).field
+    if topic.key is not None and there is not None and topic.key != there:
+        return arrival._replace(stamp=UNREADABLE, key=None)
+    return arrival
+
+
+def _disturbed(
+    received: Sequence[Arrival], group: GroupConfig, what_if: Sequence[Fault], *, seed: int, is_ordered: bool
+) -> tuple[list[Arrival], list[str]]:
+    names = group.inputs.names
+    at_work = disturbances(what_if, names, seed=seed, began=START)
+    found: list[Arrival] = []
+    for each in received if is_ordered else sorted(received, key=lambda each: each.received):
+        disturbance = at_work.get(names[each.input])
+        if disturbance is not None:
+            later = disturbance.received(each.received)
+            if later is None:
+                continue
+            stamp = each.stamp if each.stamp == UNREADABLE else _clamped(disturbance.stamp(each.stamp, each.received))
+            found.append(each._replace(received=later, stamp=stamp))
+        else:
+            found.append(each)
+    by_receipt = sorted(found, key=lambda each: each.received)
+    idle = [sentence for each in at_work.values() for sentence in each.idle()]
+    return [_stamped(each, group) for each in by_receipt], idle
+
+
+def _stamped(arrival: Arrival, group: GroupConfig) -> Arrival:
+    if group.topics[arrival.input].stamp == "receive" and arrival.stamp != UNREADABLE:
+        return arrival._replace(stamp=arrival.received)
+    return arrival
+
+
+def _clamped(stamp: int) -> int:
+    """Return a stamp that a Header can hold, whatever the offset."""
+    return max(0, min(stamp, LATEST_STAMP))

@@ -1,0 +1,182 @@
+"""Message types as trees, what they are in Arrow, and which of their fields are asked for.
+
+bool, numbers and strings are Arrow's own; a message within a message is a struct, `T[n]` a fixed-size list, `T[]` a
+list, and `uint8[]` and `byte[]` are binary: images, clouds and packets stay bytes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, TypeAlias
+
+import pyarrow as pa
+from rosbags.interfaces import Nodetype
+from rosbags.typesys.store import Typestore
+
+from syncrelay.config.wording import did_you_mean
+from syncrelay.errors import BagError
+from syncrelay.recordings.datasets.units import unit_of
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number or a bool: numpy's code of it without its byte order, and Arrow's type."""
+
+    code: str
+    arrow: pa.DataType
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A string."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field of a message; one that nobody asks for is gone through and not given."""
+
+    name: str
+    node: "Node"
+    is_asked: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Struct:
+    """A message, of a type (`pkg/msg/Name`)."""
+
+    type: str
+    fields: tuple[Field, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """A fixed number of elements."""
+
+    element: "Node"
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """As many elements as the message says."""
+
+    element: "Node"
+
+    @property
+    def is_bytes(self) -> bool:
+        """Whether Arrow has it as binary."""
+        return isinstance(self.element, Number) and self.element.code == "u1"
+
+
+Node: TypeAlias = Number | Text | Struct | Array | Run
+
+_NUMBERS: Final = {
+    name: Number(code, arrow, int(code[1]))
+    for name, code, arrow in (
+        ("bool", "?1", pa.bool_()),
+        ("byte", "u1", pa.uint8()),
+        ("octet", "u1", pa.uint8()),
+        ("char", "u1", pa.uint8()),
+        ("int8", "i1", pa.int8()),
+        ("uint8", "u1", pa.uint8()),
+        ("int16", "i2", pa.int16()),
+        ("uint16", "u2", pa.uint16()),
+        ("int32", "i4", pa.int32()),
+        ("uint32", "u4", pa.uint32()),
+        ("int64", "i8", pa.int64()),
+        ("uint64", "u8", pa.uint64()),
+        ("float32", "f4", pa.float32()),
+        ("float64", "f8", pa.float64()),
+    )
+}
+
+
+def type_tree(store: Typestore, type_name: str) -> Struct:
+    """Return the tree of a type that a store knows; raises BagError for what no decoder is there for."""
+    fields = store.fielddefs[type_name][1]
+    return Struct(type_name, tuple(Field(name, _node(store, type_name, what)) for name, what in fields))
+
+
+def _node(store: Typestore, owner: str, description: Any) -> Node:
+    kind, what = description
+    if kind == Nodetype.NAME:
+        return type_tree(store, what)
+    if kind == Nodetype.BASE:
+        name, _ = what
+        if name == "string":
+            return Text()
+        if name not in _NUMBERS:
+            raise BagError(f"{owner} has a field of type {name}, which cannot be decoded: use --raw, or --fields")
+        return _NUMBERS[name]
+    element, count = what
+    node = _node(store, owner, element)
+    return Array(node, count) if kind == Nodetype.ARRAY else Run(node)
+
+
+def only(tree: Struct, paths: Sequence[str], topic: str) -> Struct:
+    """Return a tree of which these fields alone, named by dotted paths, are asked for.
+
+    Raises BagError for one that is not there. A field within the elements of an array has the path that it would have
+    without the array.
+    """
+    asked: dict[str, list[str]] = {}
+    for path in paths:
+        name, _, rest = path.partition(".")
+        asked.setdefault(name, []).append(rest)
+    names = [field.name for field in tree.fields]
+    for name in asked:
+        if name not in names:
+            raise BagError(
+                f"{topic}: {tree.type} has no field `{name}`{did_you_mean(name, names)}; it has {', '.join(names)}"
+            )
+    return replace(
+        tree,
+        fields=tuple(
+            replace(field, node=_narrowed(field, asked[field.name], topic))
+            if field.name in asked
+            else replace(field, is_asked=False)
+            for field in tree.fields
+        ),
+    )
+
+
+def _narrowed(field: Field, rests: Sequence[str], topic: str) -> Node:
+    return field.node if "" in rests else _narrowed_node(field.node, rests, field.name, topic)
+
+
+def _narrowed_node(node: Node, rests: Sequence[str], name: str, topic: str) -> Node:
+    if isinstance(node, Struct):
+        return only(node, rests, topic)
+    if isinstance(node, Array | Run):
+        return replace(node, element=_narrowed_node(node.element, rests, name, topic))
+    raise BagError(f"{topic}: `{name}` is a value and has no field `{rests[0]}`")
+
+
+def is_empty(node: Node) -> bool:
+    """Tell whether nothing that is asked for is in a tree."""
+    if isinstance(node, Array | Run):
+        return is_empty(node.element)
+    return isinstance(node, Struct) and not any(field.is_asked and not is_empty(field.node) for field in node.fields)
+
+
+def arrow_type(node: Node) -> pa.DataType:
+    """Return a tree's Arrow type; fields of known units say so in their metadata (`unit`)."""
+    match node:
+        case Number():
+            return node.arrow
+        case Text():
+            return pa.string()
+        case Array():
+            return pa.list_(arrow_type(node.element), node.count)
+        case Run():
+            return pa.binary() if node.is_bytes else pa.list_(arrow_type(node.element))
+        case Struct():
+            return pa.struct(
+                [_arrow_field(node.type, field) for field in node.fields if field.is_asked and not is_empty(field.node)]
+            )
+
+
+def _arrow_field(type_name: str, field: Field) -> pa.Field:
+    unit = unit_of(type_name, field.name)
+    metadata: Mapping[str, str] | None = {"unit": unit} if unit else None
+    return pa.field(field.name, arrow_type(field.node), metadata=metadata)

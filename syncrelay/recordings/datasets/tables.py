@@ -1,0 +1,257 @@
+"""Sets of a group as rows of a table: when they were, and each input's message.
+
+Columns: `set` (from 1), `stamp` (what restamping gave it, else the tick of the clock that triggered it, else the
+newest), `left_at`, `span_ns` (with the inputs' offsets), `latency_ns` (since its last message was received),
+`recording`, `stamps` and `received` (structs with a field for each input), and a column for each input, named as its
+topic, null where the set lacks an optional one. Times are timestamps of nanoseconds in UTC; where the recording's clock
+does not count from 1970, neither do they.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeAlias
+
+import pyarrow as pa
+
+from syncrelay import own_version
+from syncrelay.config.wording import counted
+from syncrelay.errors import BagError
+from syncrelay.recordings.bag.bindings import GroupBinding, Input
+from syncrelay.recordings.bag.definitions import typestore
+from syncrelay.recordings.bag.recording import Channel
+from syncrelay.recordings.bag.replay import received
+from syncrelay.recordings.bag.writing import Outgoing, outgoing
+from syncrelay.recordings.datasets.decoding import Decoder
+from syncrelay.recordings.datasets.images import IMAGE, NEEDED, ImageColumn, ImageFormat
+from syncrelay.recordings.datasets.message_types import only, type_tree
+from syncrelay.sync import Match, Message, Outcome
+
+_TIME: Final = pa.timestamp("ns", tz="UTC")
+METADATA: Final = b"syncrelay"
+"""The key of a schema's metadata under which a JSON document says what the table is made of."""
+
+_CLOUD: Final = "sensor_msgs/msg/PointCloud2"
+Fields: TypeAlias = Mapping[str, Sequence[str]]
+"""Dotted paths of the fields that are asked for, by an input's full name; all fields of one that isn't there."""
+
+Images: TypeAlias = Mapping[str, ImageFormat]
+"""What an input's images become, by its full name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a table holds of messages: fields, images as PNG or JPEG, or with `raw` each payload as CDR bytes."""
+
+    fields: Fields = field(default_factory=dict)
+    images: Images = field(default_factory=dict)
+    other_images: ImageFormat | None = None
+    """What images of inputs that `images` does not name become; None leaves their pixels raw."""
+    raw: bool = False
+
+
+class SetTable:
+    """Gathers the sets of one group until they are taken as a table. It is a listener of a replay."""
+
+    def __init__(self, binding: GroupBinding, content: Content, *, recording: str, before: int = 0) -> None:
+        """`recording` is what the column of that name says; sets are counted on from `before`.
+
+        Raises BagError for a type that the recording does not define and for fields that it does not have.
+        """
+        self.binding: Final = binding
+        self.bytes = 0
+        """How many bytes the messages that were gathered have."""
+        self.count = before
+        """How many sets there were so far."""
+        self._recording = recording
+        self._columns = [_InputColumn(each, content) for each in binding.inputs]
+        self._offsets = [each.config.offset_ns for each in binding.inputs]
+        self._matches: list[Match] = []
+        self._left: list[int] = []
+        self._schema: pa.Schema | None = None
+
+    def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
+        """Gather a set that leaves at `now`; drops and other groups' sets are none of it."""
+        if binding is not self.binding or not isinstance(outcome, Match):
+            return
+        self._matches.append(outcome)
+        self._left.append(now)
+        self.bytes += sum([len(each.payload[2]) for each in outcome.messages if each is not None])
+
+    @property
+    def gathered(self) -> int:
+        """How many sets a table would have now."""
+        return len(self._matches)
+
+    def table(self) -> pa.Table:
+        """Return the sets that were gathered, and begin anew."""
+        matches, left = self._matches, self._left
+        self._matches, self._left, self.bytes = [], [], 0
+        numbers = range(self.count + 1, self.count + 1 + len(matches))
+        self.count += len(matches)
+        stamps = [match.stamps for match in matches]
+        arrivals = [[None if each is None else received(each) for each in match.messages] for match in matches]
+        names = [each.topic for each in self.binding.inputs]
+        columns = {
+            "set": pa.array(numbers, pa.int64()),
+            "stamp": pa.array(map(_stamp_of, matches), _TIME),
+            "left_at": pa.array(left, _TIME),
+            "span_ns": pa.array(map(self._span, stamps), pa.int64()),
+            "latency_ns": pa.array(
+                [at - max(filter(None, some)) for at, some in zip(left, arrivals, strict=True)], pa.int64()
+            ),
+            "recording": pa.DictionaryArray.from_arrays(
+                pa.array([0] * len(matches), pa.int32()), pa.array([self._recording])
+            ),
+            "stamps": _times(names, stamps),
+            "received": _times(names, arrivals),
+        }
+        for index, column in enumerate(self._columns):
+            columns[column.topic] = column.column([(match.messages[index], match.stamp) for match in matches])
+        whole = pa.table(columns)
+        if self._schema is None:
+            self._schema = self._described(whole)
+        return pa.Table.from_arrays(whole.columns, schema=self._schema)
+
+    def undecodable(self) -> Iterator[str]:
+        """Yield a sentence for each input of which messages could not be decoded."""
+        for column in self._columns:
+            if column.undecodable:
+                lost = counted(column.undecodable, "message")
+                yield f"{column.topic}: {lost} could not be decoded as {column.type}, their cells are null"
+
+    def _span(self, stamps: Sequence[int | None]) -> int:
+        matched = [stamp + offset for stamp, offset in zip(stamps, self._offsets, strict=True) if stamp is not None]
+        return max(matched) - min(matched)
+
+    def _described(self, table: pa.Table) -> pa.Schema:
+        """Return the schema of this and all following tables, with what is known of the inputs."""
+        group = self.binding.group
+        about: dict[str, Any] = {"version": own_version(), "group": group.name, "policy": group.options.policy}
+        about["inputs"] = {column.topic: column.described(table[column.topic]) for column in self._columns}
+        schema = table.schema
+        for index, name in enumerate(schema.names):
+            if name in about["inputs"]:
+                told = {key: value for key, value in about["inputs"][name].items() if isinstance(value, str)}
+                schema = schema.set(index, schema.field(index).with_metadata(told))
+        return schema.with_metadata({METADATA: json.dumps(about)})
+
+
+class _InputColumn:
+    """One input's messages."""
+
+    def __init__(self, each: Input, content: Content) -> None:
+        self.topic: Final = each.topic
+        self.type: Final = each.config.type or ""
+        self._offset = each.config.offset_ns
+        self._outgoing: dict[Channel, Outgoing] = {channel: outgoing(each, channel) for channel in each.channels}
+        self._decoders: dict[Channel, Decoder] = {}
+        self._undecodable = 0
+        self._images: ImageColumn | None = None
+        self.arrow: pa.DataType = pa.binary() if content.raw else pa.null()
+        if content.raw:
+            return
+        if each.topic in content.images and self.type not in (IMAGE, ""):
+            raise BagError(f"{each.topic} is {self.type}, expected {IMAGE}: --images does not go with it")
+        paths = content.fields.get(each.topic)
+        if paths is not None and not paths:
+            # No field is asked for: a column of nulls, of whatever type the messages are.
+            return
+        image_format = content.images.get(each.topic, content.other_images)
+        if image_format is not None and self.type == IMAGE and (paths is None or "data" in paths):
+            self._images = ImageColumn(each.topic, image_format)
+        by_definition: dict[Any, Decoder] = {}
+        for channel in each.channels:
+            if channel.definition not in by_definition:
+                by_definition[channel.definition] = self._decoder(channel, paths)
+            self._decoders[channel] = by_definition[channel.definition]
+        decoders = [*by_definition.values()] or [*self._decoder_of_missing(paths)]
+        if any(each.arrow != decoders[0].arrow for each in decoders):
+            raise BagError(f"{self.topic} was recorded with two definitions of {self.type}: use --raw")
+        if decoders:
+            self.arrow = self._decoded = decoders[0].arrow
+            if self._images is not None:
+                asked = frozenset(paths or [field.name for field in self._decoded])
+                self.arrow = self._images.arrow(self._decoded, asked)
+
+    @property
+    def undecodable(self) -> int:
+        """How many messages are null though the set had one."""
+        images = 0 if self._images is None else self._images.undecodable
+        return self._undecodable + images + sum(each.undecodable for each in set(self._decoders.values()))
+
+    def column(self, messages: Sequence[tuple[Message | None, int | None]]) -> pa.ChunkedArray:
+        """Return the column of some messages, each with its set's common stamp."""
+        if pa.types.is_null(self.arrow):
+            return pa.chunked_array([pa.nulls(len(messages))])
+        payloads = [None if message is None else self._payload(message, stamp) for message, stamp in messages]
+        if not self._decoders:
+            return pa.chunked_array([pa.array(payloads, type=self.arrow)])
+        found = self._decode([None if message is None else message.payload[0] for message, _ in messages], payloads)
+        return found if self._images is None else self._images.encode(found, self.arrow)
+
+    def described(self, column: pa.ChunkedArray) -> dict[str, Any]:
+        """Return what is known of the input: its type, and what its first message says of itself."""
+        about: dict[str, Any] = {"type": self.type, "offset_ns": self._offset}
+        first = next((row.as_py() for row in column if row.is_valid), None)
+        if isinstance(first, dict):
+            frame = (first.get("header") or {}).get("frame_id")
+            if frame is not None:
+                about["frame_id"] = frame
+            if self.type == _CLOUD and first.get("fields") is not None:
+                about["fields"] = json.dumps(first["fields"])
+        return about
+
+    def _decode(self, channels: Sequence[Channel | None], payloads: Sequence[bytes | None]) -> pa.ChunkedArray:
+        decoders = set(self._decoders.values())
+        if len(decoders) == 1:
+            return decoders.pop().decode(payloads)
+        # Each decoder gets the rows that are its own; of the others' it gives null.
+        whole: pa.Array | None = None
+        for decoder in decoders:
+            own = [
+                payload if channel is not None and self._decoders[channel] is decoder else None
+                for channel, payload in zip(channels, payloads, strict=True)
+            ]
+            found = decoder.decode(own).combine_chunks()
+            whole = found if whole is None else pa.compute.coalesce(whole, found)
+        return pa.chunked_array([whole])
+
+    def _payload(self, message: Message, stamp: int | None) -> bytes | None:
+        channel, _, recorded = message.payload
+        try:
+            return self._outgoing[channel].written(recorded, stamp)
+        except BagError:
+            self._undecodable += 1
+            return None
+
+    def _decoder(self, channel: Channel, paths: Sequence[str] | None) -> Decoder:
+        store = typestore(channel.type, channel.definition)
+        if store is None:
+            raise BagError(
+                f"{self.topic}: the recording does not define {channel.type}, so it cannot be decoded: use --raw, which"
+                " keeps the bytes"
+            )
+        return self._decoder_of(store, channel.type, paths)
+
+    def _decoder_of_missing(self, paths: Sequence[str] | None) -> Iterator[Decoder]:
+        """Yield what gives the type of a column of nulls, where ROS 2 knows the type that the file names."""
+        store = typestore(self.type, None) if self.type else None
+        if store is not None:
+            yield self._decoder_of(store, self.type, paths)
+
+    def _decoder_of(self, store: Any, type_name: str, paths: Sequence[str] | None) -> Decoder:
+        tree = type_tree(store, type_name)
+        if paths is not None:
+            tree = only(tree, [*paths, *(NEEDED if self._images is not None else ())], self.topic)
+        return Decoder(store, tree)
+
+
+def _stamp_of(match: Match) -> int:
+    told = match.tick if match.stamp is None else match.stamp
+    return max([each for each in match.stamps if each is not None]) if told is None else told
+
+
+def _times(names: Sequence[str], rows: Sequence[Sequence[int | None]]) -> pa.StructArray:
+    by_input = zip(*rows, strict=True) if rows else [()] * len(names)
+    return pa.StructArray.from_arrays([pa.array(each, _TIME) for each in by_input], names=list(names))

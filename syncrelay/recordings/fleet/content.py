@@ -1,0 +1,151 @@
+"""What is in files: the hash of a recording's content, by which the ledger knows it, and those of results."""
+
+import os
+from collections.abc import Iterable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from hashlib import blake2b, file_digest
+from pathlib import Path
+from typing import Final
+
+from syncrelay.errors import BagError
+from syncrelay.recordings.bag.attempts import redacted
+from syncrelay.recordings.bag.listing import local_files
+from syncrelay.recordings.bag.storage import files_of, is_url, open_url
+
+_DIGEST_BYTES: Final = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a recording holds, as a hash, and how many bytes.
+
+    `marks` change when its files do: they tell whether a recording was still being written.
+    """
+
+    hash: str
+    size: int
+    marks: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ResultFile:
+    """A file of a result: its size in bytes, and the hash of its content."""
+
+    size: int
+    hash: str
+
+
+def content_of(words: Sequence[str]) -> Content:
+    """Read all bytes of a recording's files, and of URLs what their servers tell; raises BagError where it cannot."""
+    parts = [_of_url(word) if is_url(word) else _of_files(word) for word in words]
+    hashes = [part.hash for part in parts]
+    return Content(
+        hash=hashes[0] if len(hashes) == 1 else _of_several(hashes),
+        size=sum(part.size for part in parts),
+        marks=tuple(mark for part in parts for mark in part.marks),
+    )
+
+
+def marks_of(words: Sequence[str]) -> tuple[tuple[int, ...], ...]:
+    """Return the marks that content_of gives, without reading a file."""
+    return tuple(mark for word in words if not is_url(word) for mark in _marks(local_files(word)))
+
+
+def size_of(words: Sequence[str]) -> int:
+    """Return how many bytes the files of a recording have as far as that can be told without reading: of URLs, none."""
+    try:
+        return sum(mark[0] for mark in marks_of(words))
+    except BagError:
+        return 0
+
+
+def results_in(folder: Path) -> dict[str, ResultFile]:
+    """Return the files of a result by their paths in its folder, and have them outlast a loss of power."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_dir():
+            sync_folder(path)
+            continue
+        with path.open("rb") as file:
+            digest = file_digest(file, _blake).hexdigest()
+            os.fsync(file.fileno())
+            found[path.relative_to(folder).as_posix()] = ResultFile(path.stat().st_size, digest)
+    sync_folder(folder)
+    return found
+
+
+def are_intact(folder: Path, files: Iterable[tuple[str, ResultFile]]) -> bool:
+    """Tell whether the files of a result are all there, as they were written, and no others."""
+    try:
+        names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
+        expected = dict(files)
+        return names == expected.keys() and all(_is_intact(folder / name, file) for name, file in expected.items())
+    except OSError:
+        return False
+
+
+def sync_folder(folder: Path) -> None:
+    """Have the names in a folder outlast a loss of power."""
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
+def _is_intact(path: Path, file: ResultFile) -> bool:
+    if path.stat().st_size != file.size:
+        return False
+    with path.open("rb") as content:
+        return file_digest(content, _blake).hexdigest() == file.hash
+
+
+def _of_url(word: str) -> Content:
+    """Return what changes when the content behind a URL does, as its server tells it, and its size; nothing is read."""
+    parts = []
+    for url in files_of(word):
+        with closing(open_url(url)) as file:
+            if not file.identity:
+                raise BagError(
+                    f"{redacted(url)}: its server tells no ETag and no date, by which a change of it would be seen:"
+                    " download it"
+                )
+            parts.append((f"{file.identity}:{file.size}", file.size))
+    hashes = [told for told, _ in parts]
+    return Content(_of_several(hashes), sum(size for _, size in parts), ())
+
+
+def _of_files(word: str) -> Content:
+    files = local_files(word)
+    marks = _marks(files)
+    hashes = [_hash(path) for path in files]
+    # The parts of a split recording are told apart, and put in order, by their names.
+    named = [f"{path.name} {each}" for path, each in zip(files, hashes, strict=True)]
+    return Content(hashes[0] if len(hashes) == 1 else _of_several(named), sum(mark[0] for mark in marks), marks)
+
+
+def _of_several(lines: Sequence[str]) -> str:
+    return f"blake2b:{_blake(os.fsencode(chr(10).join(lines))).hexdigest()}"
+
+
+def _hash(path: Path) -> str:
+    try:
+        if not path.is_file():
+            raise BagError(f"{path}: is not a regular file, as a recording has to be")
+        with path.open("rb") as file:
+            return f"blake2b:{file_digest(file, _blake).hexdigest()}"
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _marks(files: Sequence[Path]) -> tuple[tuple[int, ...], ...]:
+    try:
+        found = [path.stat() for path in files]
+    except OSError as error:
+        raise BagError(f"{error.filename}: cannot be read: {error.strerror}") from error
+    return tuple((each.st_size, each.st_mtime_ns, each.st_ino) for each in found)
+
+
+def _blake(content: bytes = b"") -> blake2b:
+    return blake2b(content, digest_size=_DIGEST_BYTES)

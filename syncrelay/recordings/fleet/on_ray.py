@@ -1,0 +1,135 @@
+"""A Ray cluster: the one that RAY_ADDRESS names, or one that is started here and ends with the run.
+
+A recording is a Ray task. Ray places it, and begins it again where a worker or a whole node is lost.
+"""
+
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from typing import Any, Final
+
+from syncrelay.errors import SyncRelayError
+from syncrelay.recordings.fleet.engine import TICK_S, TRIES, Finished, given_up
+from syncrelay.recordings.fleet.work import Failed, Job, Outcome, end_with_parent, perform
+
+MEMORY: Final = 1_000_000_000
+"""What each task declares to take, in bytes: Ray begins no more tasks on a node than fit."""
+
+ADDRESS: Final = "RAY_ADDRESS"
+
+_PATIENCE_S: Final = 10
+
+# For each core, so that one that is done finds the next at hand.
+_AHEAD: Final = 2
+
+
+class RayEngine:
+    """Has a Ray cluster do jobs; see Engine."""
+
+    def __init__(self, *, jobs: int) -> None:
+        """Start a cluster of so many cores, where there is none to connect to.
+
+        Raises SyncRelayError where Ray is not installed.
+        """
+        try:
+            import ray  # noqa: PLC0415  of the extra `fleet`, and takes half a second
+        except ImportError as error:
+            raise SyncRelayError(
+                "--engine ray needs Ray, which is not installed: pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
+            ) from error
+        self._ray: Any = ray
+        self._jobs = jobs
+
+    def run(self, jobs: Iterable[Job | None]) -> Generator[Finished | None, None, None]:
+        """See Engine. Raises SyncRelayError where the cluster cannot be reached, or has no room for any task."""
+        ray = self._ray
+        waiting = iter(jobs)
+        with self._connected():
+            task = ray.remote(num_cpus=1, memory=MEMORY, max_retries=TRIES - 1)(_perform)
+            running: dict[Any, Job] = {}
+            try:
+                while True:
+                    room = self._room() - len(running)
+                    while room > 0 and (job := next(waiting, None)) is not None:
+                        running[task.remote(job)] = job
+                        room -= 1
+                    if not running:
+                        return
+                    ready, _ = ray.wait(list(running), timeout=TICK_S)
+                    for reference in ready:
+                        yield self._finished(reference, running.pop(reference))
+                    if not ready:
+                        yield None
+            finally:
+                for reference in running:
+                    ray.cancel(reference, force=True)
+
+    def _room(self) -> int:
+        """Return how many tasks may be handed over: nodes come and go, and what is handed over takes memory here."""
+        return max(1, _AHEAD * int(self._ray.cluster_resources().get("CPU", 0)))
+
+    def _finished(self, reference: Any, job: Job) -> Finished:
+        try:
+            return Finished(job, self._ray.get(reference))
+        except self._ray.exceptions.RayTaskError as error:
+            return Finished(job, Failed(str(error), is_bug=True))
+        except self._ray.exceptions.RayError as error:
+            job.remove_scratch()
+            # Ray does not tell what ended it.
+            why = f"its worker was lost ({type(error).__name__}), or took longer than --time-limit,"
+            return Finished(job, Failed(given_up(job, why)))
+
+    @contextmanager
+    def _connected(self) -> Iterator[None]:
+        ray = self._ray
+        # Nothing is told to anybody, and no port is opened for a page that nobody asked for.
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
+        address = os.environ.get(ADDRESS)
+        if not address:
+            options |= {"num_cpus": self._jobs, "include_dashboard": False}
+        try:
+            if address:
+                _require_listener(address)
+            with _own_signals():
+                ray.init(address=address or "local", **options)
+        except (ConnectionError, OSError, RuntimeError, ValueError) as error:
+            where = f"the Ray cluster {address} of {ADDRESS} cannot be reached" if address else "Ray cannot be started"
+            raise SyncRelayError(f"{where}: {error}") from error
+        # Ray prints what befalls a worker, and where data is expected.
+        with redirect_stdout(sys.stderr):
+            try:
+                yield
+            finally:
+                with _own_signals():
+                    ray.shutdown()
+
+
+def _perform(job: Job) -> Outcome:
+    """Do a job in a Ray worker, which ends with its node: a run that is killed leaves none at work."""
+    end_with_parent()
+    return perform(job)
+
+
+def _require_listener(address: str) -> None:
+    """Raise OSError where nobody listens: Ray itself would try for very long, and hear no signal meanwhile."""
+    host, _, port = address.rpartition("://")[2].rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE_S).close()
+
+
+@contextmanager
+def _own_signals() -> Iterator[None]:
+    """Keep what SIGTERM does: Ray has it end the process, and its exit code is then Ray's."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    ours = signal.getsignal(signal.SIGTERM)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, ours)

@@ -1,0 +1,91 @@
+"""Small recordings of every kind, and what a card that dies makes of them: a bit flipped, an end missing."""
+
+import random
+import sqlite3
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from mcap.writer import CompressionType, IndexType
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import CompressionMode
+
+from tests.recordings.bag.making import BEST_EFFORT, rig, write_mcap, write_ros1, write_rosbag2
+
+FRAMES = rig(12)
+_SMALL_CHUNKS = {"chunk_size": 500}
+_NO_INDEX = {
+    "index_types": IndexType.NONE,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+    "use_statistics": False,
+    "use_summary_offsets": False,
+}
+
+_Make = Callable[[Path], Path]
+
+
+def _mcap(**options) -> _Make:
+    return lambda folder: write_mcap(folder / "rig.mcap", FRAMES, **{**_SMALL_CHUNKS, **options})
+
+
+def _sqlite3(**options) -> _Make:
+    def make(folder: Path) -> Path:
+        (file,) = write_rosbag2(folder / "rig", FRAMES, qos=[BEST_EFFORT], **options).glob("*.db3")
+        with sqlite3.connect(file) as database:
+            # Eight times fewer bytes of nothing.
+            database.execute("PRAGMA page_size=512")
+            database.execute("VACUUM")
+        database.close()
+        return file
+
+    return make
+
+
+def _ros1(compression=None) -> _Make:
+    return lambda folder: write_ros1(folder / "rig.bag", FRAMES, compression=compression, chunk=500)
+
+
+KINDS: Mapping[str, _Make] = {
+    "sqlite3": _sqlite3(),
+    "sqlite3, messages compressed": _sqlite3(mode=CompressionMode.MESSAGE),
+    "MCAP": _mcap(),
+    "MCAP without checksums": _mcap(enable_crcs=False),
+    "MCAP, zstd": _mcap(compression=CompressionType.ZSTD),
+    "MCAP, lz4, without checksums": _mcap(compression=CompressionType.LZ4, enable_crcs=False),
+    "MCAP, zstd, without an index": _mcap(compression=CompressionType.ZSTD, **_NO_INDEX),
+    "MCAP without chunks": _mcap(use_chunking=False),
+    "MCAP without chunks or an index": _mcap(use_chunking=False, **_NO_INDEX),
+    "ROS 1": _ros1(),
+    "ROS 1, bz2": _ros1(Ros1Writer.CompressionFormat.BZ2),
+    "ROS 1, lz4": _ros1(Ros1Writer.CompressionFormat.LZ4),
+}
+
+
+def damaged(content: bytes, *, places: int, seed: int) -> Iterator[tuple[str, bytes]]:
+    """A file's content with one bit flipped at so many places, and cut off at as many, each with a word on what is so.
+
+    Where nothing is written (as in sqlite3's pages), nothing is flipped.
+    """
+    chance = random.Random(seed)
+    written = [at for at in range(len(content)) if any(content[max(0, at - 8) : at + 1])]
+    for at in _chosen(written, places, chance):
+        bit = chance.randrange(8)
+        yield f"bit {bit} of byte {at}", content[:at] + bytes([content[at] ^ 1 << bit]) + content[at + 1 :]
+    for size in _chosen(range(len(content)), places, chance):
+        yield f"cut off at byte {size}", content[:size]
+
+
+def with_lying_lengths(content: bytes, *, places: int, seed: int) -> Iterator[tuple[str, bytes]]:
+    """A file's content with a number that is far too large at so many places, of 4 and of 8 bytes, both ways round."""
+    chance = random.Random(seed)
+    lies = [(value, size) for size in (4, 8) for value in (1 << (8 * size - 2), (1 << 8 * size) - 1, 1 << 29)]
+    for at in _chosen(range(8, len(content) - 8), places, chance):
+        value, size = chance.choice(lies)
+        lie = value.to_bytes(size, chance.choice(("little", "big")))
+        yield f"{lie!r} at byte {at}", content[:at] + lie + content[at + size :]
+
+
+def _chosen(places: Sequence[int], count: int, chance: random.Random) -> list[int]:
+    """Some of the places; where there are fewer, all of them and some twice, with another bit."""
+    whole, rest = divmod(count, len(places))
+    return [*places] * whole + chance.sample(places, rest)

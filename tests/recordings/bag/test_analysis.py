@@ -1,0 +1,298 @@
+"""What the analysis measures, on streams of which all is known."""
+
+import random
+from array import array
+from itertools import product
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from syncrelay.explain import UNREADABLE
+from syncrelay.recordings.analysis.analysis import analyze_group, group_of
+from syncrelay.recordings.analysis.curves import curves_of
+from syncrelay.recordings.analysis.evaluation import completed, evaluate
+from syncrelay.recordings.analysis.nearest import pair, tightest
+from syncrelay.recordings.analysis.streams import Stream
+from syncrelay.recordings.analysis.topics import figures_of
+from syncrelay.recordings.analysis.watching import judged_seconds, watch_group
+from syncrelay.sync import DropReason
+from tests.recordings.bag.made_streams import every, streams_of
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.configs import config, inputs
+from tests.ros.streams import BEGIN, MS
+
+_SECOND = 1000 * MS
+
+
+def test_the_rhythm_of_a_topic_is_measured():
+    stamps = every(100 * MS, 100, jitter=2 * MS)
+    del stamps[50:53]
+    (stream,) = streams_of(stamps)
+    figures = figures_of(stream)
+    assert (figures.messages, figures.gaps) == (97, 1)
+    assert figures.period == pytest.approx(100 * MS, abs=MS)
+    assert figures.longest_gap == pytest.approx(400 * MS, abs=4 * MS)
+    assert figures.jitter is not None
+    assert MS < figures.jitter < 4 * MS
+    assert figures.rate_hz == pytest.approx(9.7, abs=0.1)
+    assert figures.delay is not None
+    assert (figures.delay.median, figures.delay.greatest) == (5 * MS, 5 * MS)
+
+
+def test_faults_of_stamps_are_counted():
+    values = array("q", [100, 200, 200, 150, 0, UNREADABLE, 300])
+    places = array("q", range(7))
+    figures = figures_of(Stream("/a", VECTOR, values, array("q", range(1000, 1700, 100)), places))
+    assert (figures.duplicates, figures.out_of_order, figures.unstamped, figures.unreadable) == (1, 1, 1, 1)
+
+
+def test_a_topic_without_stamps_has_its_rhythm_by_arrival_and_no_delay():
+    zeros = array("q", [0] * 50)
+    figures = figures_of(Stream("/a", VECTOR, zeros, array("q", every(20 * MS, 50)), array("q", range(50))))
+    assert (figures.period, figures.rate_hz, figures.delay, figures.unstamped) == (20 * MS, 50.0, None, 50)
+
+
+@pytest.mark.parametrize("ppm", [-40, 0, 250])
+def test_drift_is_measured_in_parts_per_million(ppm):
+    stamps = every(50 * MS, 2000)
+    chance = random.Random(1)
+    received = [stamp + 5 * MS + (stamp - BEGIN) * ppm // 1_000_000 + round(chance.uniform(0, MS)) for stamp in stamps]
+    stream = Stream("/a", VECTOR, array("q", stamps), array("q", received), array("q", range(2000)))
+    found = figures_of(stream).drift_ppm
+    assert found == pytest.approx(ppm, abs=5) if ppm else found is None or abs(found) < 5
+
+
+def test_a_pair_is_measured_from_the_slower_to_the_faster():
+    slow, fast = streams_of(every(100 * MS, 20, phase=3 * MS), every(20 * MS, 100))
+    for first, second in ((slow, fast), (fast, slow)):
+        found = pair(first, second, (0, 0))
+        assert found is not None
+        assert (found.first, found.second) == ("/a", "/b")
+        assert {found.signed.least, found.signed.greatest} == {-3 * MS}
+    shifted = pair(slow, fast, (-3 * MS, 0))
+    assert shifted is not None
+    assert shifted.signed.median == 0
+    assert pair(slow, Stream("/c", VECTOR), (0, 0)) is None
+
+
+_STAMPS = st.lists(st.integers(1, 60), min_size=1, max_size=8, unique=True).map(sorted)
+
+
+@given(st.lists(_STAMPS, min_size=2, max_size=4))
+def test_the_tightest_sets_are_those_of_all_combinations(topics):
+    streams = streams_of(*topics, latency=0)
+    found = tightest(streams, [0] * len(topics))
+    assert found is not None
+    others = [stamps for index, stamps in enumerate(topics) if index != found.pivot]
+    expected = [
+        min(max(stamp, *a_set) - min(stamp, *a_set) for a_set in product(*others)) for stamp in topics[found.pivot]
+    ]
+    assert found.spans.tolist() == expected
+
+
+def test_a_queue_must_hold_what_comes_until_the_set_can_leave():
+    # The slow input's message comes 5 messages of the fast one after its partner.
+    slow, fast = streams_of([BEGIN + 100 * MS], every(10 * MS, 40))
+    slow.places = array("q", [16])
+    fast.places = array("q", [place for place in range(41) if place != 16])
+    found = tightest([slow, fast], (0, 0))
+    assert found is not None
+    assert found.queues.tolist() == [6]
+
+
+def _pair_of(policy="approximate_time", **keys):
+    topics = inputs({"/a": VECTOR, "/b": VECTOR})
+    group = {"policy": policy, "slop": "10ms", "topics": topics, **keys}
+    return config({"front": {key: value for key, value in group.items() if value is not None}})
+
+
+def _analyzed(streams, text):
+    return analyze_group(group_of(text, "front"), tuple(streams), text)
+
+
+_POLICIES = ("approximate_time", "approximate_time_eager", "approximate_epsilon_time", "exact_time")
+
+
+@pytest.mark.parametrize("policy", _POLICIES)
+@given(
+    keys=st.fixed_dictionaries(
+        {"slop": st.integers(0, 20), "queue_size": st.integers(1, 12), "every": st.integers(1, 3)}
+    ),
+    period=st.sampled_from([20, 50, 100]),
+    late=st.integers(0, 300),
+)
+def test_a_curve_at_the_value_in_use_is_the_count_beside_it(policy, keys, period, late):
+    streams = streams_of(
+        every(100 * MS, 20, jitter=3 * MS), every(period * MS, 2000 // period, jitter=MS, seed=2), late=late * MS
+    )
+    slop = None if policy == "exact_time" else f"{keys['slop']}ms"
+    found = _analyzed(streams, _pair_of(policy, **{**keys, "slop": slop}))
+    count = completed(found.evaluation.counts, 0)
+    in_use = {point.value: point.sets for point in found.curves.by_queue_size}
+    assert in_use[keys["queue_size"]] == count
+    if slop is None:
+        assert found.curves.by_slop == ()
+    else:
+        in_use = {point.value: point.sets for point in found.curves.by_slop}
+        assert in_use[found.group.options.slop] == count
+    assert found.curves.is_of_all
+
+
+def test_each_point_of_a_curve_is_what_a_file_with_that_value_gives():
+    streams = streams_of(every(100 * MS, 200, jitter=MS), every(10 * MS, 2000, jitter=MS, seed=2), late=30 * MS)
+    curves = _analyzed(streams, _pair_of(slop="7ms", queue_size=3)).curves
+    for point in curves.by_queue_size:
+        text = _pair_of(slop="7ms", queue_size=point.value)
+        assert len(evaluate(group_of(text, "front"), streams).sets) == point.sets
+    assert [point.value for point in curves.by_queue_size] == sorted({point.value for point in curves.by_queue_size})
+    for point in curves.by_slop:
+        sets = evaluate(group_of(_pair_of(slop=f"{point.value}ns", queue_size=3), "front"), streams).sets
+        assert len(sets) == point.sets
+        assert point.median_span == (sorted(each.span for each in sets)[(len(sets) - 1) // 2] if sets else 0)
+
+
+def test_of_a_long_recording_values_are_tried_on_its_begin_and_that_is_said():
+    streams = tuple(streams_of(every(100 * MS, 100), every(100 * MS, 100)))
+    found = _analyzed(streams, _pair_of(queue_size=5))
+    curves = curves_of(found.group, found.suggested, streams, found.possible, most=50)
+    assert (curves.messages, curves.recorded, curves.is_of_all, curves.of) == (50, 200, False, 25)
+    assert curves.lasts == 24 * 100 * MS
+    first = streams_of(every(100 * MS, 25), every(100 * MS, 25))
+    count = len(evaluate(found.group, first).sets)
+    assert {point.value: point.sets for point in curves.by_queue_size}[5] == count
+
+
+def test_a_gps_beside_fast_odometry_has_no_needless_loss_to_show():
+    # 20 Hz beside 1 Hz: 19 of 20 have no partner to miss.
+    streams = streams_of(every(_SECOND, 60, phase=24 * MS), every(50 * MS, 1200, jitter=2 * MS), late=40 * MS)
+    found = _analyzed(streams, _pair_of(slop="30ms"))
+    gps, odometry = found.fates
+    assert len(found.evaluation.sets) == found.suggestion.possible == 60
+    assert found.evaluation.counts[1].dropped[DropReason.OVERFLOW] > 500
+    assert (odometry.matched, odometry.unneeded, odometry.dropped, odometry.lacking) == (60, 1140, {}, ("/a",))
+    assert (gps.matched, gps.unneeded, gps.dropped) == (60, 0, {})
+    assert {point.value: point.sets for point in found.curves.by_queue_size}[10] == 60
+    assert not [each for each in found.findings if each.finding.severity.name != "OK"]
+
+
+def test_drops_that_cost_a_set_are_told_from_those_that_do_not():
+    # The slow input's messages come 300 ms late: its partners have overflowed by then.
+    streams = streams_of(every(_SECOND, 30, jitter=MS), every(5 * MS, 6_100), late=300 * MS)
+    found = _analyzed(streams, _pair_of("approximate_time_eager", slop="3ms"))
+    slow, fast = found.fates
+    assert found.suggestion.now < 2
+    assert slow.received - slow.matched - slow.unneeded == sum(slow.dropped.values()) > 27
+    assert 27 < sum(fast.dropped.values()) < 100 < fast.unneeded
+    assert fast.lacking == ("/a",)
+
+
+def test_what_slop_alone_keeps_apart_was_needed():
+    streams = streams_of(every(100 * MS, 50), every(100 * MS, 50, phase=3 * MS))
+    for row in _analyzed(streams, _pair_of(slop="1ms")).fates:
+        assert (row.matched, row.unneeded, sum(row.dropped.values())) == (0, 0, 50)
+
+
+def test_faults_of_stamps_are_never_called_not_needed():
+    streams = streams_of(every(_SECOND, 20), every(50 * MS, 400))
+    streams[1].stamps[5], streams[1].stamps[7], streams[1].stamps[9] = 0, UNREADABLE, streams[1].stamps[8]
+    _, fast = _analyzed(streams, _pair_of(slop="10ms")).fates
+    assert fast.dropped == {DropReason.UNSTAMPED: 1, DropReason.MALFORMED: 1, DropReason.DUPLICATE: 1}
+    assert fast.received == 400 == fast.matched + fast.unneeded + 3
+
+
+_FAULTS = {DropReason.MALFORMED, DropReason.UNSTAMPED, DropReason.DUPLICATE, DropReason.THINNED}
+
+
+def _costs_nothing(drop, found):
+    """Whether a drop cost no set, by its definition, one message after another."""
+    group, sets, drops = found.group, found.evaluation.sets, found.evaluation.drops
+    offsets = [topic.offset_ns for topic in group.topics]
+    if drop.reason in {*_FAULTS, DropReason.LATE, DropReason.TIME_JUMP}:
+        return False
+    for index, topic in enumerate(group.topics):
+        if not topic.required or index == drop.input:
+            continue
+        left = [each.stamp for each in drops if each.input == index and each.reason not in _FAULTS]
+        left += [each.stamps[index] for each in sets if each.stamps[drop.input] is None and each.stamps[index]]
+        at = drop.stamp + offsets[drop.input]
+        if all(abs(stamp + offsets[index] - at) > found.possible.widest for stamp in left):
+            return True
+    return False
+
+
+@given(
+    topics=st.lists(st.lists(st.integers(1, 80), min_size=1, max_size=20, unique=True), min_size=3, max_size=3),
+    slop=st.integers(0, 15),
+    queue_size=st.integers(1, 4),
+    optional=st.booleans(),
+)
+def test_what_was_not_needed_is_as_defined(topics, slop, queue_size, optional):
+    streams = streams_of(*([BEGIN + stamp for stamp in stamps] for stamps in topics), latency=5)
+    rows = inputs({"/a": VECTOR, "/b": VECTOR, "/c": VECTOR})
+    rows[1]["offset"] = "3ns"
+    if optional:
+        rows[2]["required"] = False
+    text = _pair_of(
+        "approximate_time_eager",
+        slop=f"{slop}ns",
+        queue_size=queue_size,
+        topics=rows,
+        max_wait="9ns" if optional else None,
+    )
+    found = _analyzed(streams, text)
+    assert found.possible is not None
+    expected = [bool(found.possible.spans) and _costs_nothing(drop, found) for drop in found.evaluation.drops]
+    assert found.unneeded.flags.tolist() == expected
+    for row, counts in zip(found.fates, found.evaluation.counts, strict=True):
+        assert row.received == row.matched + row.unneeded + sum(row.dropped.values()) == counts.fed
+
+
+def test_the_findings_are_those_of_the_running_relay():
+    streams = streams_of(every(100 * MS, 300), every(100 * MS, 300, phase=30 * MS))
+    topics = inputs({"/a": VECTOR, "/b": VECTOR})
+    text = config({"front": {"policy": "approximate_time", "slop": "10ms", "topics": topics}})
+    first = watch_group(group_of(text, "front"), streams)[0]
+    assert (first.finding.code.value, first.finding.severity.name) == ("over_slop", "ERROR")
+    assert 20 < first.seconds <= 30
+
+
+def _watched(streams):
+    topics = inputs({"/a": VECTOR, "/b": VECTOR})
+    text = config({"front": {"policy": "approximate_time", "slop": "10ms", "topics": topics}})
+    return {
+        (each.finding.code.value, each.finding.input): each.seconds
+        for each in watch_group(group_of(text, "front"), streams)
+    }
+
+
+@pytest.mark.parametrize("pause", [60, 300, 5_000, 86_400, 54 * 365 * 86_400])
+def test_a_pause_is_found_for_as_long_as_it_lasts(pause):
+    before, after = every(100 * MS, 300), every(100 * MS, 300, phase=(30 + pause) * _SECOND)
+    found = _watched(streams_of([*before, *after], [*before, *after]))
+    assert found.keys() == {("silent", None)}
+    assert all(pause - 6 <= seconds <= pause for seconds in found.values())
+
+
+def test_one_message_of_1970_does_not_keep_the_others_from_being_judged():
+    stamps = every(100 * MS, 300)
+    (first, second) = streams_of(stamps, [stamp + 30 * MS for stamp in stamps])
+    for values, value in ((first.stamps, stamps[0] - MS), (first.received, 5 * _SECOND), (first.places, -1)):
+        values.insert(0, value)
+    assert 20 < _watched([first, second])["over_slop", None] <= 30
+
+
+@given(st.one_of(st.integers(-(2**63), 200), st.integers(0, 2**63)))
+def test_few_seconds_of_a_pause_are_judged_seconds_and_they_stand_for_all(seconds):
+    looks = judged_seconds(seconds)
+    assert looks == sorted(set(looks))
+    assert len(looks) <= 32 + 63
+    assert looks[:16] == list(range(1, min(16, max(0, seconds)) + 1))
+    assert looks[-16:] == list(range(max(1, seconds - 15), seconds + 1))
+
+
+def test_an_evaluation_loses_no_message():
+    streams = streams_of(every(100 * MS, 50, jitter=9 * MS), every(30 * MS, 150, jitter=MS))
+    evaluation = evaluate(group_of(_pair_of(), "front"), streams)
+    assert sum(each.fed for each in evaluation.counts) == 2 * len(evaluation.sets) + len(evaluation.drops) == 200
+    assert {drop.reason for drop in evaluation.drops} <= set(DropReason)

@@ -1,0 +1,104 @@
+"""Values that are written into a file, without a change of anything else."""
+
+import pytest
+
+from syncrelay.errors import BagError
+from syncrelay.recordings.analysis.changes import Change, file_with_changes, patch, with_changes
+
+_FILE = """\
+version: 1
+groups:
+  front:  # what the robot sees
+    policy: approximate_time
+    slop: 10ms            # measured in May
+    age_penalty: 0.2
+    topics:
+      - topic: /a         # the camera
+        type: x/msg/Y
+        min_period: "9ms"
+      - {topic: /b, type: x/msg/Y}
+"""
+
+
+def test_changes_keep_comments_quotes_and_order():
+    changes = [
+        Change("front", None, "slop", "25ms", "wider"),
+        Change("front", None, "queue_size", 40, "longer"),
+        Change("front", 1, "min_period", "8ms", "sooner"),
+    ]
+    assert with_changes(_FILE, changes) == _FILE.replace("slop: 10ms ", "slop: 25ms ").replace(
+        "    topics:\n", "    queue_size: 40  # longer\n    topics:\n"
+    ).replace("type: x/msg/Y}", "type: x/msg/Y, min_period: 8ms}")
+
+
+def test_changes_keep_the_line_breaks_of_a_file():
+    changed = with_changes(_FILE.replace("\n", "\r\n"), [Change("front", None, "slop", "25ms", "")])
+    assert changed == _FILE.replace("slop: 10ms", "slop: 25ms").replace("\n", "\r\n")
+
+
+def test_a_new_policy_takes_with_it_what_it_does_not_have():
+    changed = with_changes(_FILE, [Change("front", None, "policy", "exact_time", "")])
+    for gone in ("slop", "age_penalty", "min_period"):
+        assert gone not in changed
+    assert "policy: exact_time" in changed
+    assert "# the camera" in changed
+
+
+def test_a_patch_holds_the_changes_alone():
+    changes = [Change("front", None, "slop", "25ms", ""), Change("front", 1, "stamp", "receive", "")]
+    assert patch(changes, {"front": ["/a", "/b"]}) == (
+        "groups:\n  front:\n    slop: 25ms\n    topics:\n      - topic: /b\n        stamp: receive\n"
+    )
+
+
+_SHARED = """\
+version: 1
+x-base: &base
+  policy: approximate_time
+  slop: 20ms # of all
+groups:
+  front:
+    <<: *base
+    topics:
+      - {topic: /a, type: sensor_msgs/msg/Image}
+      - {topic: /b, type: sensor_msgs/msg/Image}
+  rear: &rear
+    <<: *base
+    topics: &topics
+      - {topic: /a, type: sensor_msgs/msg/Image}
+      - {topic: /b, type: sensor_msgs/msg/Image}
+  third:
+    <<: *base
+    topics: *topics
+  fourth:
+    <<: *rear
+"""
+
+
+@pytest.mark.parametrize("group", ["front", "third", "fourth"])
+def test_a_merged_value_is_changed_in_the_group_alone(group: str):
+    changed = file_with_changes(_SHARED, [Change(group, None, "slop", "25ms", "better")])
+    assert [line for line in changed.splitlines() if line not in _SHARED.splitlines()] == ["    slop: 25ms  # better"]
+    begin = changed.index(f"  {group}:")
+    assert begin < changed.index("slop: 25ms") == changed.index("slop: 25ms", begin)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        Change("rear", None, "slop", "25ms", ""),
+        Change("third", 1, "offset", "5ms", ""),
+        Change("rear", 1, "offset", "5ms", ""),
+        Change("front", None, "policy", "exact_time", ""),
+        Change("rear", None, "policy", "exact_time", ""),
+    ],
+)
+def test_what_would_change_another_group_or_cannot_be_taken_away_is_refused(change: Change):
+    with pytest.raises(BagError, match="cannot be written for one group alone: write them by hand"):
+        file_with_changes(_SHARED, [change])
+
+
+def test_two_spaces_stand_before_a_comment_beside_one_that_stands_further_left():
+    text = "groups:\n  front:\n    policy: x\n    queue_size: 10\n    slop: 9ms  # mine\n"
+    changed = with_changes(text, [Change("front", None, "queue_size", 30, "why")])
+    assert changed == text.replace("10", "30  # why")

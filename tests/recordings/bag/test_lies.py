@@ -1,0 +1,351 @@
+"""Recordings that lie, one lie a test: what is true in them is read, what is not is said."""
+
+import os
+import sqlite3
+import struct
+from contextlib import closing
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zstandard
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+
+from syncrelay.errors import BagError
+from syncrelay.recordings.bag import Channel, Encoding, open_recording
+from syncrelay.recordings.bag.effort import Effort
+from syncrelay.recordings.bag.losses import STRAY
+from syncrelay.recordings.bag.recording import LATEST
+from syncrelay.recordings.bag.ros1_records import UNREADABLE, messages
+from syncrelay.recordings.bag.unpacking import unlz4, unzstd
+from tests.recordings.bag.making import ROS1_STORE, rig, write_mcap, write_ros1, write_rosbag2
+from tests.ros.cdr_messages import VECTOR
+from tests.ros.frames import Frame
+
+_RIG = rig(6)
+
+
+def _read(path: Path) -> tuple[list[Frame], list[str]]:
+    with closing(open_recording([str(path)])) as recording:
+        found = list(chain.from_iterable(recording.batches(recording.channels)))
+        return [Frame(each.topic, each.type, time, payload) for each, time, payload in found], [
+            fault.removeprefix(f"{path}: ") for fault in recording.faults
+        ]
+
+
+def _sqlite3(folder: Path, *lies: str) -> Path:
+    """A recording whose tables take any value, as those of a damaged file do, after some statements."""
+    (file,) = write_rosbag2(folder / "rig", _RIG).glob("*.db3")
+    with closing(sqlite3.connect(file)) as database:
+        for table in ("topics", "messages"):
+            database.execute(f"CREATE TABLE free_{table} AS SELECT * FROM {table}")  # noqa: S608  of ours
+            database.execute(f"DROP TABLE {table}")
+            database.execute(f"ALTER TABLE free_{table} RENAME TO {table}")
+        for lie in lies:
+            database.execute(lie)
+        database.commit()
+    return file
+
+
+def _first_message(column: str, value: object) -> str:
+    return f"UPDATE messages SET {column} = {value} WHERE rowid = (SELECT rowid FROM messages LIMIT 1)"  # noqa: S608
+
+
+def _topics(column: str, value: object, *, where: str = "name = '/camera'") -> str:
+    return f"UPDATE topics SET {column} = {value} WHERE {where}"  # noqa: S608  of ours
+
+
+@pytest.mark.parametrize("value", ["NULL", "'soon'", "1.5", "X'00'"])
+def test_a_row_without_a_whole_number_for_its_time_is_left_out(value, tmp_path):
+    path = _sqlite3(tmp_path, _first_message("timestamp", value))
+    assert _read(path) == (_RIG[1:], ["1 message left out: the time of receipt is not an integer"])
+
+
+@pytest.mark.parametrize("value", [-1, LATEST + 1, 2**63 - 1, -(2**63)])
+def test_a_row_of_a_time_that_no_clock_shows_is_left_out(value, tmp_path):
+    path = _sqlite3(tmp_path, _first_message("timestamp", value))
+    assert _read(path) == (_RIG[1:], [_NO_CLOCK])
+
+
+_NO_CLOCK = "1 message left out: received before 1970 or after 2116"
+_NOT_CLOSED = "was not closed, or is cut off; read to its end"
+_STRAYS = "left out: channel not described in the file"
+
+
+@pytest.mark.parametrize("value", ["NULL", "7", "'text'", "1.5", "CAST(data AS TEXT)"])
+def test_a_row_without_bytes_for_its_payload_is_left_out(value, tmp_path):
+    path = _sqlite3(tmp_path, _first_message("data", value))
+    assert _read(path) == (_RIG[1:], ["1 message left out: the payload is not a BLOB"])
+
+
+@pytest.mark.parametrize("column", ["name", "type", "serialization_format"])
+@pytest.mark.parametrize("value", ["NULL", "X'ff00'"])
+def test_a_topic_without_a_text_for_its_name_or_type_is_left_out_with_its_messages(column, value, tmp_path):
+    path = _sqlite3(tmp_path, _topics(column, value))
+    frames, (topic, strays) = _read(path)
+    assert frames == [frame for frame in _RIG if frame.topic == "/lidar"]
+    assert (topic.startswith("a topic is left out"), strays) == (True, f"6 messages {_STRAYS}")
+
+
+@pytest.mark.parametrize("value", ["NULL", "'1) OR (1=1'", "X'01'", "1.5"])
+def test_a_topic_whose_number_is_none_is_no_sql_and_left_out(value, tmp_path):
+    path = _sqlite3(tmp_path, _topics("id", value))
+    frames, (topic, strays) = _read(path)
+    assert {frame.topic for frame in frames} == {"/lidar"}
+    assert (topic.startswith("a topic is left out"), strays) == (True, f"6 messages {_STRAYS}")
+
+
+@pytest.mark.parametrize("value", ["NULL", "X'ff'", "7", "1.5", "hex(zeroblob(9))", f"'{'[' * 5000}'"])
+@pytest.mark.parametrize("column", ["offered_qos_profiles", "type_description_hash"])
+def test_what_only_describes_a_topic_does_not_matter(column, value, tmp_path):
+    assert _read(_sqlite3(tmp_path, _topics(column, value, where="1"))) == (_RIG, [])
+
+
+def test_a_view_without_an_end_ends(tmp_path):
+    endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT 1 AS topic_id, i AS timestamp"
+    path = _sqlite3(tmp_path, "DROP TABLE messages", f"CREATE VIEW messages AS {endless}, X'00' AS data FROM n")
+    with pytest.raises(BagError, match="cannot be read as a rosbag2 recording"):
+        _read(path)
+
+
+@pytest.mark.parametrize("time", [LATEST + 1, 2**63, 2**64 - 1])
+@pytest.mark.parametrize(
+    "options", [{}, {"use_chunking": False}, {"chunk_size": 300}], ids=["chunk", "loose", "chunks"]
+)
+def test_an_mcap_message_of_a_time_that_no_clock_shows_is_left_out(time, options, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", [*_RIG, _RIG[-1]._replace(time=time)], **options)
+    assert _read(path) == (_RIG, [_NO_CLOCK])
+    with closing(open_recording([str(path)])) as recording:
+        assert recording.begin == _RIG[0].time
+        assert recording.end <= LATEST
+
+
+_LOOSE: dict[str, Any] = {
+    "use_chunking": False,
+    "use_summary_offsets": False,
+    "repeat_channels": False,
+    "repeat_schemas": False,
+}
+
+
+@pytest.mark.parametrize("opcode", [Opcode.SCHEMA, Opcode.CHANNEL])
+def test_a_damaged_description_outside_of_chunks_is_said(opcode, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, **_LOOSE)
+    content = bytearray(path.read_bytes())
+    name = b"/camera" if opcode == Opcode.CHANNEL else VECTOR.encode()
+    content[content.index(name)] = 0xFF
+    path.write_bytes(content)
+    frames, faults = _read(path)
+    assert [frame.payload for frame in _RIG if frame.topic == "/lidar"] == [
+        frame.payload for frame in frames if frame.topic == "/lidar"
+    ]
+    assert f"the {opcode.name.lower()} at byte" in faults[0]
+
+
+def test_a_message_of_no_channel_is_counted(tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False)
+    content = bytearray(path.read_bytes())
+    head = struct.pack("<BQH", Opcode.MESSAGE, 22 + len(_RIG[0].payload), 1)
+    content[content.index(head) + 9] = 77
+    path.write_bytes(content)
+    assert _read(path) == (_RIG[1:], [f"1 message {_STRAYS}"])
+
+
+@pytest.mark.parametrize("length", [2**20, 2**40, 2**64 - 1])
+def test_an_mcap_record_that_is_no_message_and_ends_behind_its_chunk_is_said(length, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, enable_crcs=False, compression=CompressionType.NONE)
+    content = bytearray(path.read_bytes())
+    first = content.index(struct.pack("<BQH", Opcode.MESSAGE, 22 + len(_RIG[0].payload), 1))
+    content[first : first + 9] = struct.pack("<BQ", Opcode.ATTACHMENT, length)
+    path.write_bytes(content)
+    frames, (fault,) = _read(path)
+    assert frames == []
+    assert fault.endswith("is damaged and left out: a record in it ends behind it")
+
+
+@pytest.mark.parametrize("place", [0, 4, 11, 20, -1])
+@pytest.mark.parametrize("number", [0, 5, 11])
+def test_a_chunk_of_a_wrong_checksum_is_left_out(number, place, tmp_path):
+    """What only the checksum tells: the bit is in a payload, of which nothing says what it should be."""
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300)
+    content = bytearray(path.read_bytes())
+    payload = _RIG[number].payload
+    content[content.index(payload) + place % len(payload)] ^= 1
+    path.write_bytes(content)
+    frames, (fault,) = _read(path)
+    assert set(frames) < set(_RIG)
+    assert _RIG[number] not in frames
+    assert fault.endswith("is damaged and left out: its checksum is wrong")
+
+
+def test_of_many_damaged_places_the_first_are_named_and_the_others_counted(tmp_path):
+    frames = rig(60)
+    path = write_mcap(tmp_path / "rig.mcap", frames, chunk_size=1)
+    content = bytearray(path.read_bytes())
+    for frame in frames:
+        content[content.index(frame.payload)] ^= 1
+    path.write_bytes(content)
+    found, faults = _read(path)
+    assert found == []
+    assert len(faults) == 101
+    assert all(fault.startswith("the chunk at byte") for fault in faults[:-1])
+    assert faults[-1] == "20 more places that cannot be read"
+
+
+def test_an_mcap_file_that_ends_between_two_records_is_said(tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, use_chunking=False)
+    content = path.read_bytes()
+    last = struct.pack("<BQ", Opcode.MESSAGE, 22 + len(_RIG[-1].payload))
+    path.write_bytes(content[: content.rindex(last)])
+    assert _read(path) == (_RIG[:-1], [_NOT_CLOSED])
+
+
+def test_a_ros1_bag_that_ends_between_two_records_is_said(tmp_path):
+    path = write_ros1(tmp_path / "rig.bag", _RIG, chunk=300)
+    content = path.read_bytes()
+    with closing(open_recording([str(path)])) as recording:
+        (file,) = recording._files  # type: ignore[attr-defined]  # noqa: SLF001  of this kind alone: where its chunks are
+        second = sorted(each.offset for each in file._segments)[1]  # noqa: SLF001
+    path.write_bytes(content[:second])
+    frames, faults = _read(path)
+    assert 0 < len(frames) < len(_RIG)
+    assert faults == [_NOT_CLOSED]
+
+
+@pytest.mark.parametrize("lie", [0, 9, 2**40, 2**63, 2**64 - 1])
+def test_an_mcap_file_whose_index_lies_is_gone_through(lie, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
+    content = path.read_bytes()
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        begin = summary.chunk_indexes[1].chunk_start_offset
+    at = content.rindex(struct.pack("<Q", begin))
+    path.write_bytes(content[:at] + struct.pack("<Q", lie) + content[at + 8 :])
+    assert _read(path) == (_RIG, [])
+
+
+def test_messages_that_come_behind_later_ones_are_read_and_said(tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
+    content = path.read_bytes()
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        first = summary.chunk_indexes[0]
+    # The index says that the first chunk begins, and ends, an hour later.
+    times = struct.pack("<QQ", first.message_start_time, first.message_end_time)
+    later = struct.pack("<QQ", first.message_start_time + 3600 * 10**9, first.message_end_time + 3600 * 10**9)
+    at = content.rindex(times)
+    path.write_bytes(content[:at] + later + content[at + 16 :])
+    frames, (fault,) = _read(path)
+    assert sorted(frames, key=_RIG.index) == _RIG
+    assert fault.endswith("out of order: the index has other times")
+
+
+@pytest.mark.parametrize("size", [2**31, 2**40, 2**62, 2**63, 2**64 - 1])
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_a_chunk_that_says_it_is_larger_than_the_file_is_left_out(compression, size, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", _RIG, compression=compression)
+    content = path.read_bytes()
+    word = {CompressionType.NONE: b"", CompressionType.LZ4: b"lz4", CompressionType.ZSTD: b"zstd"}[compression]
+    # Behind both times, the unpacked size and the checksum.
+    at = content.index(struct.pack("<I", len(word)) + word, content.index(struct.pack("<Q", _RIG[-1].time)) + 20)
+    data = at + 4 + len(word)
+    path.write_bytes(content[:data] + struct.pack("<Q", size) + content[data + 8 :])
+    frames, (fault,) = _read(path)
+    assert frames == []
+    assert "the chunk at byte" in fault
+    assert "is damaged and left out" in fault
+
+
+def test_frames_that_tell_no_size_are_unpacked_and_what_is_cut_off_is_not():
+    content = os.urandom(100_000) + bytes(5_000_000)
+    stream = zstandard.ZstdCompressor().compressobj()
+    packed = stream.compress(content) + stream.flush()
+
+    def unpack(packed: bytes) -> bytes:
+        return unzstd(packed, Effort())
+
+    assert unpack(packed) == unpack(zstandard.compress(content)) == content
+    for cut in (packed[:-10], packed[: len(packed) // 2], b"", packed[:4]):
+        with pytest.raises((EOFError, zstandard.ZstdError)):
+            unpack(cut)
+    with pytest.raises((EOFError, RuntimeError)):
+        unlz4(b"\x04\x22\x4d\x18", Effort())
+
+
+def test_no_frame_unpacks_to_more_than_it_can_hold():
+    packed = bytearray(zstandard.compress(bytes(70_000)))
+    params = zstandard.get_frame_parameters(bytes(packed))
+    assert params.content_size == 70_000
+    at = bytes(packed).index(struct.pack("<I", 70_000))
+    packed[at : at + 4] = struct.pack("<I", 2**32 - 1)
+    with pytest.raises((ValueError, zstandard.ZstdError)):
+        unzstd(bytes(packed), Effort())
+
+
+def _ros1_message() -> bytes:
+    """Two message records as rosbag lays them out, of connections 0 and 1."""
+    return b"".join(_ros1_record(number) for number in range(2))
+
+
+def _ros1_record(number: int) -> bytes:
+    fields = {b"op": b"\x02", b"conn": struct.pack("<I", number), b"time": struct.pack("<II", 5, 6)}
+    header = b"".join(struct.pack("<I", len(each)) + each for each in (k + b"=" + v for k, v in fields.items()))
+    return struct.pack("<I", len(header)) + header + struct.pack("<I", 3) + b"abc"
+
+
+def test_no_change_of_one_byte_of_a_ros1_message_keeps_its_chunk_from_ending():
+    content = _ros1_message()
+    channels = {number: Channel(number, "/blip", VECTOR, Encoding.ROS1) for number in range(2)}
+    assert [(time, payload) for _, time, payload in messages(content, channels)] == [(5_000_000_006, b"abc")] * 2
+    ended = 0
+    for at in range(len(content)):
+        for value in range(256):
+            changed = content[:at] + bytes([value]) + content[at + 1 :]
+            found: list[Any] = []
+            try:
+                found.extend(messages(changed, channels))
+            except UNREADABLE:
+                ended += 1
+            assert len(found) <= 2
+            assert all(each is STRAY or each[2] in changed for each in found)
+    assert ended > len(content)
+
+
+@pytest.mark.parametrize("field", [b"topic=", b"conn=", b"type=", b"message_definition="])
+def test_a_damaged_connection_of_a_ros1_bag_is_said_and_the_others_are_read(field, tmp_path):
+    path = write_ros1(tmp_path / "rig.bag", _RIG)
+    content = path.read_bytes()
+    # Without the index, and with a field that has another name in the first connection.
+    place = content.index(b"index_pos=") + len(b"index_pos=")
+    content = content[:place] + bytes(8) + content[place + 8 :]
+    path.write_bytes(content.replace(field, b"X" + field[1:], 1) if field != b"conn=" else _other_connection(content))
+    frames, faults = _read(path)
+    assert {frame.topic for frame in frames} <= {"/lidar", "/camera"}
+    assert frames
+    assert _NOT_CLOSED in faults
+    assert all(" is damaged and left out" in fault or _STRAYS in fault for fault in faults if fault != _NOT_CLOSED)
+
+
+def _other_connection(content: bytes) -> bytes:
+    at = content.index(b"conn=", content.index(b"topic=") - 60)
+    return content[:at] + b"Xonn=" + content[at + 5 :]
+
+
+def test_a_ros1_bag_without_a_message_has_its_topics(tmp_path):
+    from rosbags.rosbag1 import Writer  # noqa: PLC0415  nothing else here writes no message
+
+    with Writer(tmp_path / "none.bag") as writer:
+        writer.add_connection("/camera", VECTOR, typestore=ROS1_STORE)
+    assert _read(tmp_path / "none.bag") == ([], [])
+
+
+def test_a_pipe_is_no_recording_and_nobody_waits_for_it(tmp_path):
+    os.mkfifo(tmp_path / "rig.mcap")
+    for named in (tmp_path, tmp_path / "rig.mcap"):
+        with pytest.raises(BagError, match="is not a regular file"):
+            open_recording([str(named)])

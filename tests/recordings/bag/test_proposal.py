@@ -1,0 +1,193 @@
+"""A file proposed for a recording is in order, and gives sets of it."""
+
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from syncrelay.config import load_text
+from syncrelay.errors import NothingToMatchError
+from syncrelay.recordings.analysis import propose
+from syncrelay.recordings.analysis.inventory import no_header
+from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.bindings import bind
+from syncrelay.recordings.bag.recording import Definition
+from syncrelay.recordings.bag.replay import replay
+from tests.recordings.bag.making import BEST_EFFORT, write_mcap, write_rosbag2
+from tests.ros import recordings
+from tests.ros.cdr_messages import STORE, STRING, VECTOR, header, serialize, vector
+from tests.ros.frames import Frame
+from tests.ros.streams import BEGIN, MS, at, jittery, merged
+
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+POINT = "geometry_msgs/msg/PointStamped"
+
+
+def _left_out(bag: Path) -> dict[str, str]:
+    """Why each topic is left out, by its name and type."""
+    with closing(open_recording([str(bag)])) as recording:
+        return dict(sentence.split(": ", 1) for sentence in propose(recording).left_out)
+
+
+def _proposed(bag: Path) -> tuple[str, dict[str, int]]:
+    """The text for a recording, and the sets of each group when it is replayed."""
+    with closing(open_recording([str(bag)])) as recording:
+        text = propose(recording).text
+    with closing(open_recording([str(bag)])) as recording:
+        results = replay(recording, bind(load_text(text), recording))
+    return text, {result.name: result.sets for result in results}
+
+
+def _stereo_and_lidar() -> list[Frame]:
+    camera = jittery("/left", period_ms=50, jitter_ms=2, count=100, seed=1)
+    other = [frame._replace(topic="/right") for frame in camera]
+    return merged(camera, other, jittery("/lidar", period_ms=100, jitter_ms=3, count=50, seed=2))
+
+
+def test_topics_of_one_epoch_become_a_group_and_one_of_each_another(tmp_path):
+    text, sets = _proposed(write_mcap(tmp_path / "rig.mcap", _stereo_and_lidar()))
+    groups = {group.name: group for group in load_text(text).groups}
+    assert {name: {topic.topic for topic in group.topics} for name, group in groups.items()} == {
+        "epoch_1": {"/left", "/right"},
+        "fused": {"/lidar", "/left"},
+    }
+    assert groups["epoch_1"].options.policy == "exact_time"
+    assert sets["epoch_1"] == 100
+    assert sets["fused"] >= 49
+
+
+def test_what_was_measured_stands_in_comments(tmp_path):
+    bag = write_rosbag2(tmp_path / "rig", _stereo_and_lidar(), qos=[BEST_EFFORT])
+    lines = _proposed(bag)[0].splitlines()
+    assert "  epoch_1:  # 100 of 100 possible sets of the recording" in lines
+    (lidar,) = (line for line in lines if "/lidar" in line)
+    assert lidar.endswith("Hz, best_effort")
+
+
+def test_a_constant_distance_is_told(tmp_path):
+    frames = merged(at("/lidar", *range(0, 5000, 100)), at("/camera", *range(12, 5000, 100)))
+    assert "if one trigger starts both, write `offset: " in _proposed(write_mcap(tmp_path / "rig.mcap", frames))[0]
+
+
+def _no_groups_topics() -> list[Frame]:
+    """Topics that no group can take, each for another reason."""
+    at_100_ms = [BEGIN + n * 100 * MS for n in range(50)]
+    return merged(
+        [Frame("/text", STRING, time, serialize(STRING, "x")) for time in at_100_ms],
+        [Frame("/unset", VECTOR, time, vector(0)) for time in at_100_ms],
+        [Frame("/unset_once", VECTOR, time, vector(0 if n == 3 else time)) for n, time in enumerate(at_100_ms[:10])],
+        [Frame("/stuck", VECTOR, time, vector(BEGIN)) for time in at_100_ms],
+        [Frame("/diagnostics", DIAGNOSTICS, time, serialize(DIAGNOSTICS, header(time), [])) for time in at_100_ms],
+        at("/rare", 1, 2, 3),
+        jittery("/a<script>", period_ms=100, jitter_ms=3, count=50, seed=3),
+    )
+
+
+def test_every_topic_that_is_left_out_is_named_with_the_reason(tmp_path):
+    bag = write_mcap(tmp_path / "rig.mcap", merged(_no_groups_topics(), _stereo_and_lidar()))
+    text, sets = _proposed(bag)
+    assert {topic.topic for group in load_text(text).groups for topic in group.topics} == {"/left", "/right", "/lidar"}
+    assert sets["fused"] >= 49
+    assert _left_out(bag) == {
+        f"/a<script> ({VECTOR})": "a topic name may have only letters, digits, `_` and `/`, found `<` in `/a<script>`",
+        f"/diagnostics ({DIAGNOSTICS})": "it carries diagnostics, not sensor data",
+        f"/rare ({VECTOR})": "3 messages, at least 10 are needed",
+        f"/stuck ({VECTOR})": "50 messages, all with the same stamp",
+        f"/text ({STRING})": "its type has no header, so no stamp to match by",
+        f"/unset ({VECTOR})": "50 messages, 50 with stamp 0",
+        f"/unset_once ({VECTOR})": "10 messages, 1 with stamp 0",
+    }
+
+
+@pytest.mark.parametrize(
+    ("type_name", "definition", "said"),
+    [
+        ("rcl_interfaces/msg/Log", None, "; to match by a field of it, write `stamp: {field: stamp}`"),
+        (
+            "robot/msg/Shot",
+            Definition("ros2msg", "builtin_interfaces/Time begin\nuint8 number\nbuiltin_interfaces/Time end"),
+            "; to match by a field of it, write `stamp: {field: begin}` or `stamp: {field: end}`",
+        ),
+        (STRING, None, ", so no stamp to match by"),
+        ("robot/msg/Unknown", None, ", so no stamp to match by"),
+    ],
+)
+def test_a_type_without_a_header_is_told_with_its_fields_of_time(type_name, definition, said):
+    assert no_header(type_name, definition) == f"its type has no header{said}"
+
+
+def test_where_all_can_be_matched_none_is_left_out(tmp_path):
+    assert _left_out(write_mcap(tmp_path / "rig.mcap", _stereo_and_lidar())) == {}
+
+
+def test_what_gives_no_set_with_the_others_is_named_too(tmp_path):
+    early = jittery("/early", period_ms=100, jitter_ms=3, count=50, seed=3)
+    late = [frame._replace(topic="/late", time=frame.time + 3_600_000 * MS) for frame in early]
+    late = [frame._replace(payload=vector(frame.time)) for frame in late]
+    with (
+        closing(open_recording([str(write_mcap(tmp_path / "rig.mcap", [*early, *late]))])) as recording,
+        pytest.raises(NothingToMatchError) as raised,
+    ):
+        propose(recording)
+    said = [f"/early ({VECTOR}): none of its 50 messages forms a set with the others"]
+    said += [f"/late ({VECTOR}): none of its 50 messages forms a set with the others"]
+    assert str(raised.value).split("\n  ") == ["no two topics of the recording form a set", *said]
+
+
+def test_of_a_topic_of_two_types_the_one_with_more_messages_is_taken(tmp_path):
+    few = [frame._replace(type_name=POINT, payload=_point(frame.time)) for frame in at("/left", *range(0, 3000, 100))]
+    first, second = tmp_path / "0.mcap", tmp_path / "1.mcap"
+    write_mcap(first, few)
+    write_mcap(second, _stereo_and_lidar())
+    text, _ = _proposed(tmp_path)
+    assert {topic.type for group in load_text(text).groups for topic in group.topics} == {VECTOR}
+    why = f"recorded as several types; most messages are {VECTOR}"
+    assert _left_out(tmp_path) == {f"/left ({POINT})": why}
+
+
+def _point(stamp: int) -> bytes:
+    return serialize(POINT, header(stamp), STORE.types["geometry_msgs/msg/Point"](0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("fast_ms", "latency_ms", "size"), [(5, 50, 60), (20, 50, 16), (50, 0, None)], ids=["readme", "less", "default"]
+)
+def test_queues_are_as_long_as_the_rule_of_the_readme_asks(fast_ms, latency_ms, size, tmp_path):
+    lidar = [each._replace(time=each.time + latency_ms * MS) for each in at("/lidar", *range(0, 9000, 100))]
+    text, sets = _proposed(write_mcap(tmp_path / "rig.mcap", merged(at("/imu", *range(0, 9000, fast_ms)), lidar)))
+    (group,) = load_text(text).groups
+    assert group.options.queue_size == (size or 10)
+    assert ("queue_size" in text) == (size is not None)
+    if size is not None:
+        (line,) = (line for line in text.splitlines() if "queue_size" in line)
+        assert f"twice the {size // 2} messages of /imu that may arrive before one of /lidar" in line
+    assert sets["fused"] == 90
+
+
+@pytest.mark.parametrize("frames", [[], at("/one", *range(0, 5000, 100))], ids=["few", "one"])
+def test_a_recording_with_nothing_to_match_is_named(frames, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", [*frames, *at("/rare", 1)])
+    with (
+        closing(open_recording([str(path)])) as recording,
+        pytest.raises(NothingToMatchError, match="there is nothing to match"),
+    ):
+        propose(recording)
+
+
+_REAL = (
+    recordings.VEHICLE,
+    recordings.HUSKY,
+    "gps_odom_uf_rosbag2/bag",
+    "multicam_tagslam/test_2.tag_detections.bag.bz2",
+    "multicam_tagslam/test_14.tag_detections.bag.bz2",
+    "multicam_tagslam/test_21.tag_detections.bag.bz2",
+)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("bag", _REAL)
+def test_real_recordings_get_a_file_that_gives_sets(bag, real_data: Path):
+    text, sets = _proposed(real_data / bag)
+    assert text.startswith("version: 1\ngroups:\n")
+    assert sets
+    assert all(count > 90 for count in sets.values())

@@ -1,0 +1,318 @@
+"""Every kind of recording gives the same messages; of a damaged one, what can be read is read and the rest said."""
+
+import bz2
+import gzip
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+import tempfile
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.writer import CompressionType, IndexType
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
+
+from syncrelay.errors import BagError
+from syncrelay.recordings.bag import Encoding, open_recording
+from tests.recordings.bag.making import BEST_EFFORT, as_ros1, rig, write_mcap, write_ros1, write_rosbag2
+from tests.ros.cdr_messages import IMAGE, header, serialize
+from tests.ros.frames import Frame
+from tests.ros.streams import BEGIN, MS
+
+_RIG = rig()
+_SMALL_CHUNKS = {"chunk_size": 1000}
+
+
+def _mcap(**options):
+    return lambda folder: write_mcap(folder / "rig.mcap", _RIG, **{**_SMALL_CHUNKS, **options})
+
+
+def _rosbag2(**options):
+    return lambda folder: write_rosbag2(folder / "rig", _RIG, **options)
+
+
+def _ros1(compression=None):
+    return lambda folder: write_ros1(folder / "rig.bag", _RIG, compression=compression)
+
+
+def _packed(make, suffix, pack):
+    def packed(folder: Path) -> Path:
+        plain = make(folder)
+        path = plain.with_name(plain.name + suffix)
+        path.write_bytes(pack(plain.read_bytes()))
+        plain.unlink()
+        return path
+
+    return packed
+
+
+def _split(make_one, count=3):
+    """A folder of files that each hold a part of the rig."""
+
+    def split(folder: Path) -> Path:
+        (folder / "split").mkdir()
+        size = -(-len(_RIG) // count)
+        for number in range(count):
+            make_one(folder / "split", number, _RIG[number * size : (number + 1) * size])
+        return folder / "split"
+
+    return split
+
+
+def _split_sqlite(folder: Path, number: int, frames: list[Frame]) -> None:
+    made = write_rosbag2(folder / f"part{number}", frames)
+    shutil.move(made / f"part{number}.db3", folder / f"rig_{number}.db3")
+    shutil.rmtree(made)
+
+
+_KINDS = {
+    "sqlite3": _rosbag2(),
+    "sqlite3, messages compressed": _rosbag2(mode=CompressionMode.MESSAGE),
+    "sqlite3, file compressed": _rosbag2(mode=CompressionMode.FILE),
+    "sqlite3, split": _split(_split_sqlite),
+    "rosbag2 MCAP": _rosbag2(plugin=StoragePlugin.MCAP),
+    "rosbag2 MCAP, chunks compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.STORAGE),
+    "rosbag2 MCAP, file compressed": _rosbag2(plugin=StoragePlugin.MCAP, mode=CompressionMode.FILE),
+    "MCAP": _mcap(),
+    "MCAP, zstd": _mcap(compression=CompressionType.ZSTD),
+    "MCAP, lz4": _mcap(compression=CompressionType.LZ4),
+    "MCAP without chunks": _mcap(use_chunking=False),
+    "MCAP without an index": _mcap(index_types=IndexType.NONE),
+    "MCAP without a summary": _mcap(
+        index_types=IndexType.NONE,
+        repeat_channels=False,
+        repeat_schemas=False,
+        use_statistics=False,
+        use_summary_offsets=False,
+    ),
+    "MCAP of another profile": _mcap(profile=""),
+    "MCAP, split": _split(lambda folder, number, frames: write_mcap(folder / f"rig_{number}.mcap", frames)),
+    "MCAP, gzip": _packed(_mcap(), ".gz", gzip.compress),
+    "MCAP, zstd as a whole": _packed(_mcap(), ".zstd", zstandard.compress),
+}
+_ROS1_KINDS = {
+    "ROS 1": _ros1(),
+    "ROS 1, bz2 chunks": _ros1(Ros1Writer.CompressionFormat.BZ2),
+    "ROS 1, lz4 chunks": _ros1(Ros1Writer.CompressionFormat.LZ4),
+    "ROS 1, .bag.bz2": _packed(_ros1(), ".bz2", bz2.compress),
+    "ROS 1, split": _split(lambda folder, number, frames: write_ros1(folder / f"rig_{number}.bag", frames)),
+}
+
+
+def _read(*paths: Path) -> tuple[list[Frame], list[str]]:
+    recording = open_recording([str(path) for path in paths])
+    try:
+        messages = list(chain.from_iterable(recording.batches(recording.channels)))
+        assert recording.position == recording.size
+        return [Frame(each.topic, each.type, time, payload) for each, time, payload in messages], recording.faults
+    finally:
+        recording.close()
+
+
+@pytest.mark.parametrize("make", _KINDS.values(), ids=_KINDS)
+def test_every_kind_of_recording_gives_the_messages_as_they_were_received(make, tmp_path):
+    assert _read(make(tmp_path)) == (_RIG, [])
+
+
+@pytest.mark.parametrize("make", _ROS1_KINDS.values(), ids=_ROS1_KINDS)
+def test_every_kind_of_ros1_bag_gives_the_bytes_that_were_recorded(make, tmp_path):
+    frames, faults = _read(make(tmp_path))
+    # In a split bag each part counts anew.
+    assert [frame[:3] for frame in frames] == [frame[:3] for frame in _RIG]
+    assert [frame.payload[4:] for frame in frames] == [as_ros1(frame, 0)[4:] for frame in _RIG]
+    assert faults == []
+
+
+@pytest.mark.parametrize("make", [_mcap(), _rosbag2(), _ros1()], ids=["mcap", "sqlite3", "ros1"])
+def test_only_the_channels_that_are_wanted_are_read(make, tmp_path):
+    recording = open_recording([str(make(tmp_path))])
+    lidar = [channel for channel in recording.channels if channel.topic == "/lidar"]
+    assert {channel.topic for channel, _, _ in chain.from_iterable(recording.batches(lidar))} == {"/lidar"}
+    assert (recording.begin, recording.end) == (_RIG[0].time, _RIG[-1].time)
+    recording.close()
+
+
+@pytest.mark.parametrize("write", [write_mcap, write_ros1], ids=["mcap", "ros1"])
+def test_messages_that_were_written_out_of_order_come_by_their_receive_time(write, tmp_path):
+    swapped = [frame for pair in zip(_RIG[1::2], _RIG[::2], strict=True) for frame in pair]
+    options = _SMALL_CHUNKS if write is write_mcap else {}
+    frames, _ = _read(write(tmp_path / "rig", swapped, **options))
+    assert [frame.time for frame in frames] == sorted(frame.time for frame in _RIG)
+
+
+def test_several_recordings_are_read_as_one(tmp_path):
+    camera = write_mcap(tmp_path / "camera.mcap", [frame for frame in _RIG if frame.topic == "/camera"])
+    lidar = write_rosbag2(tmp_path / "lidar", [frame for frame in _RIG if frame.topic == "/lidar"])
+    assert _read(camera, lidar) == (_RIG, [])
+
+
+def test_a_folder_may_be_named_by_its_metadata(tmp_path):
+    assert _read(_rosbag2()(tmp_path) / "metadata.yaml") == (_RIG, [])
+
+
+@pytest.mark.parametrize("make", [_mcap(), _mcap(use_chunking=False), _ros1()], ids=["mcap", "mcap loose", "ros1"])
+def test_of_a_file_that_is_cut_off_what_is_whole_is_read(make, tmp_path):
+    path = make(tmp_path)
+    size = path.stat().st_size
+    whole, _ = _read(path)
+    with path.open("r+b") as file:
+        file.truncate(size // 2)
+    frames, (fault,) = _read(path)
+    assert 0 < len(frames) < len(whole)
+    assert frames == whole[: len(frames)]
+    assert "cut off or damaged at byte" in fault
+
+
+def test_a_ros1_bag_that_was_never_closed_is_read(tmp_path):
+    path = _ros1()(tmp_path)
+    content = path.read_bytes()
+    whole, _ = _read(path)
+    # What the recorder writes last: where the index is.
+    at = content.index(b"index_pos=") + len(b"index_pos=")
+    path.write_bytes(content[:at] + bytes(8) + content[at + 8 :])
+    assert _read(path)[0] == whole
+
+
+def test_a_damaged_chunk_is_left_out_and_named(tmp_path):
+    path = _mcap(compression=CompressionType.ZSTD)(tmp_path)
+    content = bytearray(path.read_bytes())
+    at = content.index(b"\x28\xb5\x2f\xfd") + 40
+    content[at : at + 20] = bytes(20)
+    path.write_bytes(content)
+    frames, (fault,) = _read(path)
+    assert set(frames) < set(_RIG)
+    assert "is damaged and left out" in fault
+
+
+@pytest.mark.long
+def test_a_compressed_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
+    path = _packed(_ros1(), ".bz2", lambda content: bz2.compress(content)[:-200])(tmp_path)
+    with pytest.raises(BagError, match=r"rig\.bag\.bz2: cut off or damaged"):
+        _read(path)
+    many = write_ros1(tmp_path / "many.bag", rig(40_000), chunk=100_000)
+    packed = bz2.compress(many.read_bytes())
+    (tmp_path / "many.bag.bz2").write_bytes(packed[: len(packed) * 2 // 3])
+    frames, faults = _read(tmp_path / "many.bag.bz2")
+    assert 0 < len(frames) < 80_000
+    assert any("cut off" in fault for fault in faults)
+
+
+def test_what_a_killed_recorder_left_in_the_write_ahead_log_is_read(tmp_path):
+    made = _rosbag2()(tmp_path) / "rig.db3"
+    killed = tmp_path / "killed.db3"
+    database = sqlite3.connect(made)
+    database.execute("PRAGMA journal_mode=WAL")
+    database.execute("PRAGMA wal_autocheckpoint=0")
+    row = database.execute("SELECT topic_id, max(timestamp), data FROM messages").fetchone()
+    database.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", (row[0], row[1] + MS, row[2]))
+    database.commit()
+    shutil.copy(made, killed)
+    shutil.copy(f"{made}-wal", f"{killed}-wal")
+    database.close()
+    frames, faults = _read(killed)
+    assert (frames[:-1], len(frames), faults) == (_RIG, len(_RIG) + 1, [])
+
+
+def test_of_several_files_those_that_cannot_be_read_are_said(tmp_path):
+    folder = _split(lambda into, number, frames: write_mcap(into / f"rig_{number}.mcap", frames))(tmp_path)
+    (folder / "rig_2.mcap").write_bytes(b"")
+    frames, faults = _read(folder)
+    assert frames == _RIG[: len(frames)]
+    assert faults == [f"{folder}/rig_2.mcap: is empty"]
+
+
+def test_qos_and_definitions_are_those_that_were_recorded(tmp_path):
+    for plugin in StoragePlugin:
+        folder = write_rosbag2(tmp_path / plugin.name, _RIG, plugin=plugin, qos=[BEST_EFFORT])
+        recording = open_recording([str(folder)])
+        for channel in recording.channels:
+            assert channel.definition is not None
+            assert (channel.encoding, channel.definition.format) == (Encoding.CDR, "ros2msg")
+            assert "geometry_msgs/Vector3 vector" in channel.definition.text
+            (profile,) = channel.qos
+            assert (profile.reliability, profile.depth, profile.liveliness) == ("best_effort", 5, "automatic")
+        recording.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("notes.txt", b"hello", "is not a recording, expected MCAP, a sqlite3 file of rosbag2 or a ROS 1 bag"),
+        ("empty.mcap", b"", "is empty"),
+        ("old.bag", b"#ROSBAG V1.2\n", "is a bag of a format other than 2.0"),
+        ("torn.mcap", b"\x89MCAP0\r\n\x01", "no message can be read: .*cut off or damaged at byte 8 of 9"),
+        ("torn.bag", b"#ROSBAG V2.0\n\x45\0\0\0", "no message can be read: .*cut off or damaged at byte 13"),
+        ("other.db3", b"SQLite format 3\0" + bytes(100), "cannot be read as a rosbag2 recording"),
+    ],
+)
+def test_what_is_no_recording_is_said(name, content, said, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(BagError, match=said):
+        open_recording([str(tmp_path / name)])
+
+
+def test_a_path_that_the_system_refuses_is_said(tmp_path):
+    for path in ("x" * 300, str(tmp_path / ("x" * 300) / "metadata.yaml")):
+        with pytest.raises(BagError, match="cannot be read: File name too long"):
+            open_recording([path])
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root reads everything")
+@pytest.mark.parametrize("mode", [0o000, 0o400])
+def test_a_folder_that_cannot_be_read_is_said(mode, tmp_path):
+    folder = tmp_path / "locked"
+    folder.mkdir()
+    (folder / "rig.mcap").touch()
+    folder.chmod(mode)
+    with pytest.raises(BagError, match="cannot be read: Permission denied"):
+        open_recording([str(folder)])
+
+
+def test_no_folder_to_decompress_in_is_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    path = tmp_path / "rig.mcap.gz"
+    path.write_bytes(gzip.compress(b"\x89MCAP0\r\n"))
+    with pytest.raises(BagError, match=r"rig\.mcap\.gz: no temporary folder to decompress it in, set TMPDIR to one"):
+        open_recording([str(path)])
+
+
+def test_a_name_that_is_not_there_gets_the_nearest(tmp_path):
+    (tmp_path / "drive.mcap").touch()
+    with pytest.raises(BagError, match=r"drve\.mcap: no such file or folder, did you mean `drive\.mcap`"):
+        open_recording([str(tmp_path / "drve.mcap")])
+    with pytest.raises(BagError, match=r"drve\.mcap: no such file or folder$"):
+        open_recording([str(tmp_path / "drive.mcap"), str(tmp_path / "drve.mcap")])
+    (tmp_path / "sub").mkdir()
+    with pytest.raises(BagError, match="holds no recording"):
+        open_recording([str(tmp_path / "sub")])
+
+
+_PEAK = """
+import resource, sys
+from syncrelay.recordings.bag import open_recording
+recording = open_recording(sys.argv[1:])
+for _ in recording.batches(recording.channels):
+    pass
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
+"""
+
+
+@pytest.mark.parametrize("write", [write_mcap, write_rosbag2, write_ros1], ids=["mcap", "sqlite3", "ros1"])
+@pytest.mark.process
+def test_memory_does_not_grow_with_the_recording(write, tmp_path):
+    # Large enough to see, and of many chunks: 4 MB and 120 MB.
+    picture = np.zeros(1_000_000, dtype=np.uint8)
+    payload = serialize(IMAGE, header(BEGIN), 1000, 1000, "mono8", 0, 1000, picture)
+    peaks = []
+    for count in (4, 120):
+        frames = [Frame("/camera", IMAGE, BEGIN + n * MS, payload) for n in range(count)]
+        path = write(tmp_path / f"{count}", frames)
+        done = subprocess.run([sys.executable, "-c", _PEAK, path], capture_output=True, text=True, check=True)
+        peaks.append(int(done.stdout))
+    assert peaks[1] - peaks[0] < 20

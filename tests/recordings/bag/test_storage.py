@@ -1,0 +1,422 @@
+"""Recordings behind URLs, from a server of this machine that counts, breaks off and lies."""
+
+import bz2
+import random
+import struct
+import sys
+import zlib
+from argparse import Namespace
+from collections.abc import Sequence
+from contextlib import closing
+from itertools import chain
+from pathlib import Path
+
+import pytest
+import zstandard
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.writer import CompressionType
+
+from syncrelay.cli.completion import COMPLETERS
+from syncrelay.errors import BagError, StorageError
+from syncrelay.recordings.bag import is_recording, open_recording
+from syncrelay.recordings.bag.attempts import LastingError, PassingError, Patience, persist, redacted
+from syncrelay.recordings.bag.remote_file import RemoteFile
+from syncrelay.recordings.bag.storage import find, open_url
+from tests.recordings.bag.damage import FRAMES, KINDS, damaged
+from tests.recordings.bag.file_server import FileServer, file_server
+from tests.recordings.bag.making import rig, write_mcap, write_ros1, write_rosbag2
+from tests.ros.frames import Frame
+
+pytest.importorskip("aiohttp", reason="the extra `fleet` is not installed")
+pytest.importorskip("fsspec", reason="the extra `fleet` is not installed")
+
+_QUICK = Patience(attempts=3, first_wait=0.01, answer_within=5)
+_SMALL = {"/camera", "/lidar"}
+_SECRETS = ("hush", "AKIA", "X-Amz")
+
+
+@pytest.fixture
+def server():
+    with file_server() as served:
+        yield served
+
+
+def rig_with_images(count: int = 30, size: int = 60_000) -> list[Frame]:
+    """The rig, and with each lidar message an image that no codec makes smaller."""
+    frames, chance = rig(count), random.Random(19)
+    images = [
+        frame._replace(topic="/image", payload=frame.payload + chance.randbytes(size))
+        for frame in frames
+        if frame.topic == "/lidar"
+    ]
+    return sorted(frames + images, key=lambda frame: frame.time)
+
+
+def read(word: str, topics: set[str] | None = None) -> tuple[list[Frame], list[str], list[str]]:
+    """Messages of some topics or of all, what is wrong with the recording, and what is remarked."""
+    told: list[str] = []
+    with closing(open_recording([word], tell=told.append)) as recording:
+        wanted = [each for each in recording.channels if topics is None or each.topic in topics]
+        found = list(chain.from_iterable(recording.batches(wanted)))
+        assert recording.position == recording.size
+        frames = [Frame(each.topic, each.type, time, payload) for each, time, payload in found]
+        return frames, [fault.removeprefix(f"{redacted(word)}: ") for fault in recording.faults], told
+
+
+def served_as(server: FileServer, path: Path, at: str = "/rig.mcap") -> str:
+    server.files[at] = path.read_bytes()
+    return server.url(at)
+
+
+@pytest.mark.parametrize("chunk_size", [1_000_000, 50_000], ids=["a chunk of many images", "a chunk an image"])
+def test_of_plain_chunks_only_the_wanted_messages_are_fetched(chunk_size, server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), chunk_size=chunk_size)
+    url = served_as(server, path)
+    assert read(url, _SMALL) == read(str(path), _SMALL)
+    assert server.sent < 0.06 * path.stat().st_size
+    assert {request.split()[0] for request in server.requests} == {"GET"}
+
+
+def test_of_compressed_chunks_only_those_that_hold_a_wanted_topic_are_fetched(server, tmp_path):
+    # The camera stops early, so that most chunks hold images alone.
+    frames = [frame for frame in rig_with_images(40) if frame.topic == "/image"]
+    frames += [frame for frame in rig(3) if frame.topic == "/camera"]
+    frames.sort(key=lambda frame: frame.time)
+    path = write_mcap(tmp_path / "rig.mcap", frames, chunk_size=50_000, compression=CompressionType.ZSTD)
+    url = served_as(server, path)
+    assert read(url, {"/camera"}) == read(str(path), {"/camera"})
+    assert server.sent < 0.15 * path.stat().st_size
+
+
+def test_to_open_it_takes_the_index_alone(server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig_with_images())
+    with closing(open_recording([served_as(server, path)])) as recording:
+        assert {channel.topic for channel in recording.channels} == {*_SMALL, "/image"}
+        assert recording.end > recording.begin > 0
+    assert len(server.requests) < 5
+    assert server.sent < 0.05 * path.stat().st_size
+
+
+def test_all_of_it_is_fetched_once_and_in_few_requests(server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), chunk_size=50_000)
+    assert read(served_as(server, path)) == read(str(path))
+    assert server.sent < 1.1 * path.stat().st_size
+    assert len(server.requests) < 8
+
+
+def _with_summary(path: Path, old: bytes, new: bytes) -> None:
+    """Change the last such bytes of an MCAP file, and set the checksum of its summary right."""
+    content = bytearray(path.read_bytes())
+    at = content.rindex(old)
+    content[at : at + len(old)] = new
+    footer = len(content) - 8 - 20
+    (begin,) = struct.unpack_from("<Q", content, footer)
+    struct.pack_into("<I", content, footer + 16, zlib.crc32(content[begin : footer + 16]))
+    path.write_bytes(content)
+
+
+def test_an_index_that_hides_a_channel_is_told_by_the_statistics(server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig(30), chunk_size=600, compression=CompressionType.ZSTD)
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        chunk = summary.chunk_indexes[-1]
+    entries = b"".join(struct.pack("<HQ", *each) for each in chunk.message_index_offsets.items())
+    numbers = list(chunk.message_index_offsets)
+    assert len(numbers) == 2
+    hidden = struct.pack("<HQ", numbers[1], chunk.message_index_offsets[numbers[0]])
+    _with_summary(path, entries, hidden + entries[10:])
+    for topic in ("/camera", "/lidar"):
+        (near, near_faults, _), (far, far_faults, _) = (
+            read(each, {topic}) for each in (str(path), served_as(server, path))
+        )
+        assert (near, near_faults) == (far, far_faults)
+        assert near_faults == [] or "its statistics tell of 30 messages" in near_faults[0]
+        assert bool(near_faults) == (len(near) < 30)
+
+
+@pytest.mark.parametrize("lack", [{"enable_crcs": False}, {"use_statistics": False}], ids=["checksum", "statistics"])
+def test_without_a_checksum_or_statistics_no_chunk_is_left_out(lack, server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), chunk_size=50_000, **lack)
+    assert read(served_as(server, path), {"/camera"}) == read(str(path), {"/camera"})
+    assert server.sent > path.stat().st_size * 0.9
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if "index" not in kind])
+@pytest.mark.long
+def test_whatever_became_of_it_is_read_as_a_file_of_this_machine_is(kind, server, tmp_path):
+    path = KINDS[kind](tmp_path)
+    url = server.url("/rig")
+    for what, content in damaged(path.read_bytes(), places=6, seed=19):
+        path.write_bytes(content)
+        server.files["/rig"] = content
+        for topics in (None, {"/camera"}):
+            assert _outcome(url, topics) == _outcome(str(path), topics), what
+
+
+def _outcome(word: str, topics: set[str] | None) -> object:
+    try:
+        frames, faults, _ = read(word, topics)
+    except BagError as error:
+        return str(error).replace(word, "")
+    return frames, faults
+
+
+def test_a_file_that_was_not_closed_is_fetched_once(server, tmp_path):
+    path = KINDS["MCAP without chunks or an index"](tmp_path)
+    path.write_bytes(path.read_bytes()[:-200])
+    near, near_faults, _ = read(str(path))
+    far, far_faults, (told,) = read(served_as(server, path))
+    assert (near, near_faults) == (far, far_faults)
+    assert "copied here as a whole" in told
+    assert "it has no index that can be trusted" in told
+    assert server.sent < path.stat().st_size + 70_000
+
+
+@pytest.mark.parametrize("kind", ["db3", "bag", "zst", "bz2"])
+def test_what_cannot_be_read_by_ranges_is_copied_here_and_that_is_said(kind, server, tmp_path):
+    if kind == "db3":
+        (path,) = write_rosbag2(tmp_path / "rig", FRAMES).glob("*.db3")
+    elif kind == "bag":
+        path = write_ros1(tmp_path / "rig.bag", FRAMES)
+    else:
+        plain = write_mcap(tmp_path / "plain.mcap", FRAMES).read_bytes()
+        path = tmp_path / f"rig.mcap.{kind}"
+        path.write_bytes(bz2.compress(plain) if kind == "bz2" else zstandard.compress(plain))
+    near, near_faults, _ = read(str(path))
+    far, far_faults, (told,) = read(served_as(server, path))
+    assert (near, near_faults) == (far, far_faults)
+    assert len(far) == len(FRAMES)
+    assert "copied here as a whole" in told
+
+
+@pytest.mark.parametrize("fault", ["drop", "cut", "500", "503", "429", "shifted", "short", "whole"])
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.long
+def test_what_goes_wrong_once_is_tried_again(fault, number, server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(10))
+    server.fault = lambda request: fault if request == number else ""
+    url = served_as(server, path)
+    assert read(url) == read(str(path))
+    assert len(server.requests) > number + 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "why"),
+    [
+        ("drop", "the server closed the connection without an answer"),
+        ("cut", "the connection was lost in the middle of an answer"),
+        ("503", "the server answered 503"),
+        ("shifted", "asked for bytes 10-19, the server sent 11-19"),
+        ("short", "the connection was lost in the middle of an answer"),
+        ("whole", "the server does not say which bytes it sent"),
+    ],
+)
+def test_what_stays_wrong_is_tried_so_often_and_then_said(fault, why, server):
+    server.files["/rig.mcap"] = bytes(100)
+    remote = open_url(server.url("/rig.mcap?X-Amz-Signature=hush"), _QUICK)
+    server.fault = lambda _: fault
+    server.forget()
+    remote.seek(10)
+    with pytest.raises(StorageError) as raised:
+        remote.read(10)
+    assert str(raised.value).startswith(f"{server.url('/rig.mcap')}?...: {why}")
+    assert "(3 attempts): try again later" in str(raised.value)
+    # aiohttp itself asks once more where a connection that it kept is gone.
+    assert 3 <= len(server.requests) <= 6
+
+
+def test_a_server_that_never_answers_is_not_waited_for_without_end(server):
+    server.files["/rig.mcap"] = bytes(100)
+    server.fault = lambda _: "silent"
+    with pytest.raises(StorageError, match=r"no answer, or too slow a one, within 0\.2 s \(2 attempts\)"):
+        open_url(server.url("/rig.mcap"), Patience(attempts=2, first_wait=0.01, answer_within=0.2))
+
+
+def test_where_nobody_listens_that_is_said():
+    with file_server() as gone:
+        url = gone.url("/rig.mcap")
+    with pytest.raises(StorageError, match="cannot connect to the server"):
+        open_url(url, _QUICK)
+
+
+@pytest.mark.parametrize(("status", "why"), [(401, "access denied"), (403, "access denied"), (404, "no such file")])
+def test_what_no_second_time_can_mend_is_said_at_once(status, why, server):
+    server.fault = lambda _: str(status)
+    with pytest.raises(StorageError) as raised:
+        open_recording([server.url("/rig.mcap?X-Amz-Credential=AKIA&X-Amz-Signature=hush")])
+    assert f"/rig.mcap?...: {why}" in str(raised.value)
+    assert not any(secret in str(raised.value) for secret in _SECRETS)
+    assert raised.value.__cause__ is None
+    assert len(server.requests) == 1
+
+
+@pytest.mark.parametrize("change", ["tag", "size", "gone"])
+def test_a_file_that_is_replaced_while_it_is_read_is_no_recording(change, server, tmp_path):
+    url = served_as(server, write_mcap(tmp_path / "rig.mcap", rig_with_images(10)))
+    with closing(open_recording([url])) as recording:
+        if change == "tag":
+            server.etags["/rig.mcap"] = "two"
+        elif change == "size":
+            server.files["/rig.mcap"] += b"more"
+        else:
+            server.files["/rig.mcap"] = b""
+        with pytest.raises(StorageError, match="was replaced or removed while it was being read"):
+            list(recording.batches(recording.channels))
+
+
+@pytest.mark.parametrize("fault", ["", "drop", "cut"])
+def test_a_server_without_ranges_sends_the_whole_and_that_is_said(fault, server, tmp_path):
+    path = write_mcap(tmp_path / "rig.mcap", FRAMES)
+    server.has_ranges = False
+    server.fault = lambda request: fault if request == 1 else ""
+    far, faults, (told,) = read(served_as(server, path))
+    assert (far, faults) == read(str(path))[:2]
+    assert "its server cannot send parts of it" in told
+
+
+def test_an_answer_whose_end_cannot_be_told_is_no_recording(server, tmp_path):
+    server.has_ranges = False
+    server.fault = lambda _: "endless"
+    url = served_as(server, write_mcap(tmp_path / "rig.mcap", FRAMES))
+    with pytest.raises(StorageError, match="the server does not tell its size"):
+        open_recording([url])
+
+
+def test_an_empty_file_is_said_to_be_empty(server):
+    server.files["/rig.mcap"] = b""
+    with pytest.raises(BagError, match=r"rig\.mcap: is empty"):
+        open_recording([server.url("/rig.mcap")])
+
+
+def test_of_splits_behind_urls_one_recording_is_made(server, tmp_path):
+    for number in range(2):
+        path = write_mcap(tmp_path / f"rig_{number}.mcap", FRAMES[number::2])
+        server.files[f"/rig_{number}.mcap"] = path.read_bytes()
+    with closing(open_recording([server.url(f"/rig_{number}.mcap") for number in range(2)])) as recording:
+        assert len(list(chain.from_iterable(recording.batches(recording.channels)))) == len(FRAMES)
+
+
+def test_one_of_several_that_cannot_be_reached_is_no_fault_to_pass_over(server, tmp_path):
+    url = served_as(server, write_mcap(tmp_path / "rig.mcap", FRAMES))
+    with pytest.raises(StorageError, match=r"none\.mcap: no such file"):
+        open_recording([url, server.url("/none.mcap")])
+
+
+def test_to_tell_and_to_complete_a_word_nothing_is_fetched(server):
+    url = server.url("/rig.mcap")
+    assert is_recording(url)
+    assert is_recording("s3://bucket/day/")
+    assert not is_recording("/camera/image")
+    assert list(COMPLETERS["BAG|TOPIC"](f"{url}/x", Namespace(bag=url, more=[]))) == []
+    assert find(url) == [url]
+    assert server.requests == []
+
+
+@pytest.mark.parametrize(
+    ("word", "shown"),
+    [
+        ("https://host/a.mcap", "https://host/a.mcap"),
+        ("https://me:hush@host/a.mcap", "https://host/a.mcap"),
+        ("https://me:hu/sh@host/a.mcap", "https://host/a.mcap"),
+        ("https://host:8443/a@2.mcap", "https://host:8443/a@2.mcap"),
+        ("http://[::1]:80/a.mcap?X-Amz-Signature=hush", "http://[::1]:80/a.mcap?..."),
+        ("HTTPS://hush@host/a.mcap?AKIA#hush", "https://host/a.mcap?..."),
+        ("https://host/a.mcap?user=me@x:y", "https://host/a.mcap?..."),
+        ("s3://AKIA:hush@bucket/a/run?.mcap", "s3://bucket/a/run?.mcap"),
+        ("/data/a?b@c.mcap", "/data/a?b@c.mcap"),
+    ],
+)
+def test_what_is_secret_in_a_url_is_never_shown(word, shown):
+    assert redacted(word) == shown
+
+
+@pytest.mark.parametrize("word", ["ftp://host/rig.mcap", "file:///rig.mcap"])
+def test_a_url_of_another_kind_is_refused_with_those_that_are_read(word):
+    with pytest.raises(BagError, match=r"cannot be read, expected s3://, gs://, https:// or http://"):
+        open_recording([word])
+
+
+def test_where_the_library_is_missing_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "aiohttp", None)
+    monkeypatch.delitem(sys.modules, "syncrelay.recordings.bag.http_file", raising=False)
+    with pytest.raises(StorageError, match=r"aiohttp is not installed, .*: pip install 'FOLDER-OF-SYNCRELAY\[fleet\]'"):
+        open_recording(["https://host/rig.mcap"])
+
+
+def test_where_there_is_no_space_for_a_copy_that_is_said(tmp_path):
+    vast = _Content(b"")
+    vast.size = 2**60
+    with pytest.raises(BagError, match=r"cannot be copied to .* bytes, and .* are free, set TMPDIR"):
+        RemoteFile(vast, "rig.bag", _QUICK).download(tmp_path / "rig.bag")
+    assert vast.given == []
+
+
+def test_attempts_end_with_what_was_wrong_last():
+    faults = iter([PassingError("busy"), PassingError("busy"), LastingError("gone")])
+
+    def work():
+        raise next(faults)
+
+    with pytest.raises(StorageError, match=r"^rig\.mcap: gone$"):
+        persist("rig.mcap", work, _QUICK)
+
+
+class _Content:
+    """Ranges of bytes in memory, which counts what it gives."""
+
+    has_ranges, identity = True, "one"
+
+    def __init__(self, content: bytes) -> None:
+        self.content = content
+        self.size = len(content)
+        self.given: list[tuple[int, int]] = []
+
+    def fetch(self, begin: int, end: int) -> bytes:
+        assert 0 <= begin < end <= self.size
+        self.given.append((begin, end))
+        return self.content[begin:end]
+
+    def fetch_all(self, file) -> None:
+        file.write(self.content)
+
+
+_CONTENT = random.Random(19).randbytes(300_000)
+_SPANS = st.lists(st.tuples(st.integers(0, 300_000), st.integers(0, 90_000)), max_size=12)
+
+
+@given(planned=_SPANS, others=_SPANS)
+def test_whatever_is_planned_what_is_read_is_what_is_there(planned: Sequence, others: Sequence):
+    content = _Content(_CONTENT)
+    remote = RemoteFile(content, "rig.mcap", _QUICK)
+    remote.expect(planned)
+    for begin, size in chain.from_iterable(zip(planned, others, strict=False)):
+        remote.seek(begin)
+        assert remote.read(size) == _CONTENT[begin : begin + size]
+    allowed = [*planned, *others]
+    for begin, end in content.given:
+        # At most what lies between two parts that stand close together.
+        assert sum(1 for place in range(begin, end, 1000) if not _is_near(place, allowed)) == 0
+
+
+def _is_near(place: int, spans: Sequence[tuple[int, int]]) -> bool:
+    return any(begin - 32_000 <= place <= begin + size + 32_000 for begin, size in spans)
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize(
+    "bag",
+    [
+        "event_camera_mcap/test_events_2/test_events_2_0.mcap",
+        "gps_odom_uf_rosbag2/bag/bag_0.db3",
+        "husky_jackal_robot_localization/test1.bag",
+        "multicam_tagslam/test_2.tag_detections.bag.bz2",
+    ],
+)
+def test_real_recordings_are_the_same_behind_a_url(bag, server, real_data: Path):
+    path = real_data / bag
+    far, faults, _ = read(served_as(server, path))
+    assert (far, faults) == read(str(path))[:2]
+    assert server.sent < 1.02 * path.stat().st_size

@@ -1,0 +1,267 @@
+"""What a replay writes is what the relay would publish, and others can read it."""
+
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+import yaml
+from mcap.reader import make_reader
+from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
+from rosbags.rosbag2 import Reader
+
+from syncrelay.config import AUTO, QosOverrides, QosPreset, load_text
+from syncrelay.errors import OutputError
+from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.bindings import bind
+from syncrelay.recordings.bag.mcap_output import McapOutput
+from syncrelay.recordings.bag.qos import PRESETS, Profile, output_profile, read_profiles, write_profile
+from syncrelay.recordings.bag.replay import replay
+from syncrelay.recordings.bag.writing import SetWriter
+from tests.recordings.bag.making import (
+    BEST_EFFORT,
+    CUSTOM,
+    CUSTOM_STORE,
+    CUSTOM_TEXT,
+    blip,
+    rig,
+    write_mcap,
+    write_ros1,
+)
+from tests.recordings.bag.making import write_rosbag2 as write_folder
+from tests.ros.cdr_messages import STORE, VECTOR, stamp_of, with_stamp
+from tests.ros.configs import config, inputs
+from tests.ros.frames import Frame
+from tests.ros.manifests import read
+from tests.ros.streams import BEGIN, MS, at, merged
+
+_PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
+_RIG = rig(10)
+
+
+def _written(bag: Path, output: Path, **keys) -> list[Frame]:
+    """What a replay with a group of a camera and a lidar writes, as rosbags reads it."""
+    group = {"policy": "approximate_time", "slop": "5ms", "manifest": False, "topics": inputs(_PAIR), **keys}
+    with closing(open_recording([str(bag)])) as recording, McapOutput(output) as written:
+        writer = SetWriter(written)
+        bindings = bind(load_text(config({"front": group})), recording)
+        for binding in bindings:
+            writer.begin(binding)
+        replay(recording, bindings, listeners=[writer.take])
+    return _read(output)
+
+
+def _read(output: Path) -> list[Frame]:
+    with Reader(output) as reader:
+        return [Frame(each.topic, each.msgtype, time, payload) for each, time, payload in reader.messages()]
+
+
+def _payloads(frames, topic):
+    return [frame.payload for frame in frames if frame.topic == topic]
+
+
+@pytest.mark.parametrize("output", ["out.mcap", "out"])
+def test_payloads_are_written_unchanged_on_the_outputs(output, tmp_path):
+    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / output)
+    for topic in _PAIR:
+        assert _payloads(written, f"/front{topic}") == _payloads(_RIG, topic)[:-1]
+    # A set leaves with the message that shows that no closer one can come.
+    assert {frame.time for frame in written} <= {frame.time for frame in _RIG}
+
+
+@pytest.mark.parametrize("output", ["out.mcap", "out"])
+def test_types_and_qos_are_recorded(output, tmp_path):
+    bag = write_folder(tmp_path / "rig", _RIG, qos=[BEST_EFFORT])
+    _written(bag, tmp_path / output)
+    with Reader(tmp_path / output) as reader:
+        assert reader.message_count == 18
+        for connection in reader.connections:
+            assert connection.msgtype == VECTOR
+            assert "Vector3 vector" in connection.msgdef.data
+            assert isinstance(connection.ext, ConnectionExtRosbag2)
+            (qos,) = connection.ext.offered_qos_profiles
+            assert (qos.reliability, qos.durability) == (QosReliability.BEST_EFFORT, QosDurability.VOLATILE)
+
+
+def test_a_folder_has_the_metadata_of_rosbag2(tmp_path):
+    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out")
+    with Reader(tmp_path / "out") as reader:
+        assert (reader.start_time, reader.end_time) == (written[0].time, written[-1].time + 1)
+        assert {each.topic: each.msgcount for each in reader.connections} == {"/front/camera": 9, "/front/lidar": 9}
+        assert all(each.digest == STORE.hash_rihs01(VECTOR) for each in reader.connections)
+
+
+def test_restamp_patches_the_stamp_and_no_other_byte(tmp_path):
+    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out.mcap", restamp="earliest")
+    lidar = _payloads(_RIG, "/lidar")[:-1]
+    camera = _payloads(_RIG, "/camera")[:-1]
+    assert _payloads(written, "/front/lidar") == lidar
+    assert _payloads(written, "/front/camera") == [
+        with_stamp(mine, stamp_of(other)) for mine, other in zip(camera, lidar, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("restamp", ["none", "earliest"])
+def test_messages_of_a_ros1_bag_are_written_as_ros2_has_them(restamp, tmp_path):
+    from_ros1 = _written(write_ros1(tmp_path / "rig.bag", _RIG), tmp_path / "one", restamp=restamp)
+    from_ros2 = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "two", restamp=restamp)
+    assert from_ros1 == from_ros2
+    with Reader(tmp_path / "one") as reader:
+        assert {each.msgdef.data for each in reader.connections} == {STORE.generate_msgdef(VECTOR, ros_version=2)[0]}
+        assert {each.digest for each in reader.connections} == {STORE.hash_rihs01(VECTOR)}
+
+
+def test_a_type_that_nothing_here_knows_keeps_its_recorded_definition(tmp_path):
+    times = [BEGIN + 100 * n * MS for n in range(5)]
+    blips = [Frame("/camera", CUSTOM, time, blip(time, seen=0)) for time in times]
+    frames = merged(blips, at("/lidar", *(100 * n for n in range(5))))
+    written = _written(
+        write_mcap(tmp_path / "rig.mcap", frames, store=CUSTOM_STORE),
+        tmp_path / "out.mcap",
+        topics=inputs({"/camera": CUSTOM, "/lidar": VECTOR}),
+        max_wait="0ms",
+    )
+    assert _payloads(written, "/front/camera") == _payloads(frames, "/camera")
+    with (tmp_path / "out.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        schemas = summary.schemas.values()
+    (schema,) = (schema for schema in schemas if schema.name == CUSTOM)
+    assert schema.data.decode().startswith(CUSTOM_TEXT)
+
+
+def test_outputs_without_a_set_are_there_too(tmp_path):
+    assert _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", slop="1ms") == []
+    with Reader(tmp_path / "out") as reader:
+        assert {each.topic for each in reader.connections} == {"/front/camera", "/front/lidar"}
+
+
+def test_a_manifest_is_written_behind_the_messages_of_its_set(tmp_path):
+    written = _written(write_mcap(tmp_path / "rig.mcap", _RIG), tmp_path / "out", manifest=True, restamp="earliest")
+    sets = [written[at : at + 3] for at in range(0, len(written), 3)]
+    assert len(sets) == 9
+    for number, (camera, lidar, manifest) in enumerate(sets, 1):
+        assert (manifest.topic, manifest.time) == ("/syncrelay/front/sets", camera.time)
+        told = read(manifest.payload)
+        assert (told.number, told.common_stamp) == (number, stamp_of(camera.payload))
+        assert told.stamp == stamp_of(camera.payload) == stamp_of(lidar.payload)
+        assert [(each.output, each.sequence, each.stamp) for each in told.inputs] == [
+            ("/front/camera", number, told.stamp),
+            ("/front/lidar", number, told.stamp),
+        ]
+        newest = max(each.received for each in told.inputs if each.received is not None)
+        assert told.latency == manifest.time - newest
+    with Reader(tmp_path / "out") as reader:
+        (connection,) = (each for each in reader.connections if each.topic == "/syncrelay/front/sets")
+        assert connection.digest == STORE.hash_rihs01(connection.msgtype)
+
+
+def test_nothing_is_overwritten(tmp_path):
+    bag = write_mcap(tmp_path / "rig.mcap", _RIG)
+    with pytest.raises(OutputError, match=r"rig\.mcap: already exists and is not overwritten"):
+        _written(bag, bag)
+    with pytest.raises(OutputError, match=r"cannot be written: .*none is not a folder"):
+        _written(bag, tmp_path / "none" / "out.mcap")
+
+
+@pytest.mark.parametrize(
+    ("asked", "offered", "profile"),
+    [
+        (AUTO, [], Profile(depth=100)),
+        (AUTO, [PRESETS["sensor_data"], Profile()], Profile(depth=100, reliability="best_effort")),
+        (AUTO, [PRESETS["action_status_default"]], Profile(depth=100, durability="transient_local")),
+        (QosPreset("sensor_data"), [Profile()], PRESETS["sensor_data"]),
+        (QosOverrides(depth=3), [PRESETS["sensor_data"]], Profile(depth=3, reliability="best_effort")),
+        (QosOverrides.model_validate({"deadline": "1s"}), [], Profile(depth=100, deadline=1_000_000_000)),
+    ],
+)
+def test_outputs_offer_what_the_relay_would(asked, offered, profile):
+    assert output_profile(asked, offered) == profile
+
+
+def test_profiles_are_read_from_every_version_of_the_metadata():
+    numbers = "- {history: 3, depth: 0, reliability: 2, durability: 1, liveliness: 1, deadline: {sec: 1, nsec: 5}}"
+    (profile,) = read_profiles(numbers)
+    assert (profile.history, profile.reliability, profile.durability) == ("unknown", "best_effort", "transient_local")
+    assert profile.deadline == 1_000_000_005
+    assert read_profiles(yaml.safe_dump([write_profile(profile)])) == (profile,)
+    assert [read_profiles(text) for text in ("", "x: [", "5")] == [(), (), ()]
+
+
+_LAUGHS = "".join(f"- &l{n} [{', '.join([f'*l{n - 1}'] * 9) if n else 'lol'}]\n" for n in range(12))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 5000,
+        "- {a: " * 5000,
+        "- {reliability: " + "[" * 5000 + "]" * 5000 + "}",
+        f"- {{reliability: reliable}}\n{_LAUGHS}",
+        "- 2001-99-99",
+        f"- {'9' * 5000}",
+        "- {? [] : x}",
+        "- !!python/name:os.system",
+        "- depth: !!bool foo",
+        "- depth: !!int ''",
+        "- depth: !!float ''",
+        "- depth: !!timestamp foo",
+        "- !!map {depth: 5}",
+        "- depth: " + "1:" * 2000 + "1.5",
+        "- 0001-01-01 00:00:00 +23:59",
+        "- {depth: 5}\n" * 10_000,
+        "\0",
+    ],
+    ids=[
+        "nested",
+        "nested maps",
+        "nested in a profile",
+        "aliases",
+        "no date",
+        "no number",
+        "no key",
+        "a tag",
+        "no bool",
+        "no int",
+        "no float",
+        "no timestamp",
+        "a tag of a map",
+        "an endless float",
+        "a time before all",
+        "more than any text",
+        "no text",
+    ],
+)
+def test_profiles_that_nobody_offers_are_none(text):
+    assert read_profiles(text) == ()
+
+
+def test_values_that_no_profile_has_are_unknown_or_unset():
+    (profile,) = read_profiles(
+        '- {reliability: [a, b], durability: "\\e[31m", history: 99, deadline: {sec: .inf, nsec: 0}}'
+    )
+    assert (profile.reliability, profile.durability, profile.history) == ("unknown",) * 3
+    assert profile.deadline == 0
+
+
+@pytest.mark.ros
+def test_the_presets_are_those_of_rclpy():
+    from rclpy.qos import QoSPresetProfiles  # noqa: PLC0415  where it is installed
+
+    for name, ours in PRESETS.items():
+        theirs = QoSPresetProfiles.get_from_short_key(name)
+        for key in ("history", "reliability", "durability", "liveliness"):
+            assert getattr(theirs, key).name.lower() == getattr(ours, key)
+        for key in ("deadline", "lifespan", "liveliness_lease_duration"):
+            assert getattr(theirs, key).nanoseconds == getattr(ours, key)
+        assert theirs.depth == ours.depth
+
+
+def test_where_sets_are_restamped_a_payload_without_a_place_for_a_stamp_is_malformed(tmp_path):
+    cut = Frame("/camera", VECTOR, _RIG[3].time + 1, _RIG[3].payload[:8])
+    frames = sorted([*_RIG, cut], key=lambda frame: frame.time)
+    topics = inputs(_PAIR, stamp="receive")
+    written = _written(
+        write_mcap(tmp_path / "rig.mcap", frames), tmp_path / "out.mcap", topics=topics, restamp="earliest"
+    )
+    assert len(_payloads(written, "/front/lidar")) > 5
+    assert all(len(frame.payload) == len(_RIG[0].payload) for frame in written)

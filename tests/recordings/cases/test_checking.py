@@ -1,0 +1,263 @@
+"""What comes of drawn, simulated and recorded messages is what the engine and the judge make of them."""
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from syncrelay.config import load
+from syncrelay.sync import Match, Message
+from tests.recordings.bag.making import rig, write_mcap
+from tests.recordings.cases.suites import found, left, run
+from tests.ros.cdr_messages import VECTOR
+
+PAIR = "camera |a...\nlidar  |.A..\n"
+RATES = {"inputs": {"camera": {"rate": "10 Hz"}, "lidar": {"rate": "10 Hz", "phase": "5ms"}}, "lasts": "20s"}
+RECORDED = {"topics": [{"topic": "/camera", "type": VECTOR}, {"topic": "/lidar", "type": VECTOR}]}
+
+
+@pytest.mark.parametrize(
+    ("numbers", "lines"),
+    [
+        ({}, ("A: aA",)),
+        ({"period": "25ms"}, ("A: a too_far",)),
+        ({"inputs": {"lidar": {"offset": "15ms"}}}, ("A: a too_far",)),
+        ({"inputs": {"camera": {"latency": "30ms"}}}, ("a: aA",)),
+        ({"what_if": ["late: /camera 30ms"]}, ("a: aA",)),
+        ({"what_if": ["dead: /camera from 0s"]}, ()),
+        ({"what_if": ["offset: lidar -1s"]}, ("A: A too_far",)),
+    ],
+)
+def test_numbers_say_what_a_drawing_is_too_small_for(tmp_path, numbers, lines):
+    assert left(tmp_path, PAIR, case=numbers) == lines
+
+
+def test_a_deadline_is_told_by_its_column_and_what_waits_at_the_end_is_not(tmp_path):
+    topics = [{"topic": "/camera"}, {"topic": "/lidar"}, {"topic": "/radar", "required": False}]
+    drawing = "camera |a.....b\nlidar  |.A....B\nradar  |.......\n"
+    assert left(tmp_path, drawing, topics=topics, max_wait="25ms") == ("@3.5: aA-",)
+
+
+def test_a_set_is_told_with_the_stamp_that_it_is_given(tmp_path):
+    assert left(tmp_path, PAIR, restamp="latest") == ("A: aA stamped A",)
+
+
+def test_letters_of_one_key_belong_together(tmp_path):
+    drawing = "camera |ab..\nlidar  |..BA\nkeys: aA bB\n"
+    group = {"policy": "equal_key", "slop": None, "key": "header.frame_id"}
+    fields = {"camera": {"field": "header.frame_id"}, "lidar": {"field": "header.frame_id"}}
+    assert left(tmp_path, drawing, case={"inputs": fields}, **group) == ("B: a superseded, bB",)
+    fields["lidar"]["field"] = "header.stamp"
+    assert left(tmp_path, drawing, case={"inputs": fields}, **group) == ("B: B malformed", "A: A malformed")
+
+
+def test_figures_are_those_of_the_engine(tmp_path):
+    expect = {
+        "sets": 1,
+        "received": 1,
+        "in_sets": 1,
+        "match_rate": 0.5,
+        "dropped": 1,
+        "span_p95": "1ms",
+        "span_max": "< 2ms",
+        "latency_max": "> 1ms",
+        "drops": {"late": 1},
+        "inputs": {"lidar": {"received": 1}},
+    }
+    assert found(tmp_path, expect, RATES) == {
+        "sets": "200",
+        "received": "200",
+        "in_sets": "400",
+        "match_rate": "1",
+        "dropped": "0",
+        "span_p95": "5ms",
+        "span_max": "5ms",
+        "latency_max": "0ms",
+        "late": "0",
+    }
+
+
+def test_figures_that_hold_are_not_told(tmp_path):
+    expect = {
+        "sets": ">= 200",
+        "match_rate": "100%",
+        "span_p95": "< 6ms",
+        "drops": {"overflow": 0},
+        "findings": ["healthy"],
+    }
+    assert found(tmp_path, expect, RATES) == {}
+
+
+@pytest.mark.parametrize(
+    ("what_if", "code"),
+    [([], "healthy"), (["dead: /lidar from 8s"], "silent"), (["offset: /camera 2s"], "other_clock")],
+)
+def test_findings_are_those_of_the_judge(tmp_path, what_if, code):
+    assert found(tmp_path, {"findings": ["alone"]}, {**RATES, "what_if": what_if}) == {"findings": code}
+
+
+@pytest.mark.parametrize(
+    ("expected", "told"),
+    [
+        ({"match_rate": "< 98.765%"}, ("< 98.765%", "100%", "== 100%")),
+        ({"match_rate": "< 0.9"}, ("< 0.9", "1", "== 1")),
+        ({"match_rate": "50%"}, ("50%", "100%", "100%")),
+        ({"span_max": "> 1s"}, ("> 1s", "5ms", ">= 5ms")),
+        ({"span_max": "< 4500us"}, ("< 4500us", "5000us", "<= 5000us")),
+        ({"span_max": "> 0.02s"}, ("> 0.02s", "5ms", ">= 5ms")),
+        ({"span_max": "== 0.02s"}, ("== 0.02s", "5ms", "== 5ms")),
+        ({"span_max": "< 0.004 s"}, ("< 0.004s", "5ms", "<= 5ms")),
+        ({"span_max": "6ms"}, ("6ms", "5ms", "5ms")),
+        ({"span_max": 0.006}, ("6ms", "5ms", "5ms")),
+        ({"latency_max": "> 1min"}, ("> 1min", "0min", "== 0min")),
+    ],
+)
+def test_figures_are_told_in_the_unit_that_the_file_has(tmp_path, expected, told):
+    (mismatch,) = run(tmp_path, {**RATES, "expect": expected}).mismatches
+    assert (*mismatch.expected, *mismatch.found, mismatch.renewed) == told
+
+
+def test_of_a_share_in_percent_as_many_digits_are_told_as_of_one(tmp_path):
+    case = {"drawing": "camera |abc\nlidar  |A..\n"}
+    assert found(tmp_path, {"match_rate": "> 98%"}, {**case, "inputs": {"lidar": {"latency": "1ms"}}}) == {}
+    thirds = {"drawing": "camera |abc\nlidar  |A.........BC\n"}
+    assert found(tmp_path, {"match_rate": "> 98%"}, thirds) == {"match_rate": "33.33%"}
+
+
+@pytest.mark.parametrize(
+    ("case", "error"),
+    [
+        (
+            {"what_if": ["dead: /camera", "dead: /lidar"], "expect": {"drops": {"late": 0}}},
+            "no message came to the group",
+        ),
+        ({"lasts": "2s", "expect": {"findings": ["healthy"]}}, "last 2 s, so they cannot test `findings`"),
+    ],
+)
+def test_what_could_not_fail_is_an_error(tmp_path, case, error):
+    result = run(tmp_path, {**RATES, **case})
+    assert error in result.error
+    assert not result.passed
+
+
+def test_that_nothing_comes_can_be_expected(tmp_path):
+    dead = {**RATES, "what_if": ["dead: /camera", "dead: /lidar"]}
+    assert found(tmp_path, {"received": 0}, dead) == {}
+
+
+def test_that_all_inputs_fall_silent_is_found(tmp_path):
+    dead = {**RATES, "what_if": ["dead: /camera from 8s", "dead: /lidar from 8s"]}
+    assert found(tmp_path, {"findings": ["healthy"]}, dead) == {"findings": "silent"}
+
+
+def test_all_but_one_are_not_all(tmp_path):
+    case = {**RATES, "lasts": "2500s", "what_if": ["dead: /camera from 9.95s until 10.05s"]}
+    expect = {"inputs": {"lidar": {"match_rate": 1}}}
+    assert found(tmp_path, expect, case) == {"match_rate": "0.9999"}
+
+
+@pytest.mark.parametrize(("rate", "lasts", "count"), [("30 Hz", "2s", 60), ("100 kHz", "0.3s", 30_000)])
+def test_as_many_messages_come_as_a_rate_says(tmp_path, rate, lasts, count):
+    case = {"inputs": {"camera": {"rate": rate}}, "lasts": lasts}
+    assert found(tmp_path, {"received": 1}, case) == {"received": str(count)}
+
+
+def test_losses_are_those_of_the_fault_however_it_is_written(tmp_path):
+    def lost(*faults):
+        expect = {"inputs": {"camera": {"received": 1}}}
+        return int(found(tmp_path, expect, {**RATES, "what_if": list(faults)})["received"])
+
+    once = lost("drop: /camera 50%")
+    assert lost("drop: camera 50.0 % from 0s") == once
+    assert 20 < lost("drop: /camera 50%", "drop: camera 50.0%") < 80 < once
+
+
+def test_a_fault_that_changes_nothing_is_remarked_on(tmp_path):
+    result = run(tmp_path, {**RATES, "what_if": ["dead: lidar from 30s"], "expect": {"sets": 200}})
+    assert result.passed
+    why = "the first message of /lidar came after 0.005 s, the last after 19.905 s"
+    assert result.remarks == (f"`dead: lidar from 30s` changed nothing: {why}",)
+
+
+def test_without_a_set_there_is_no_span_to_expect(tmp_path):
+    result = run(tmp_path, {**RATES, "what_if": ["dead: /lidar"], "expect": {"span_p95": "< 1ms"}})
+    assert [(each.found, each.renewed) for each in result.mismatches] == [(("no set left",), None)]
+
+
+def test_losses_are_the_same_for_a_seed_and_others_for_another(tmp_path):
+    case = {**RATES, "what_if": ["drop: /camera 30%"]}
+    first, again, other = (found(tmp_path, {"sets": 1}, {**case, "seed": seed})["sets"] for seed in (1, 1, 2))
+    assert first == again != other
+    assert 100 < int(first) < 180
+
+
+def test_an_input_that_loses_everything_sends_nothing(tmp_path):
+    case = {"inputs": {"camera": {"rate": "10 Hz", "drop": "100%"}, "lidar": {"rate": "30 Hz"}}, "lasts": "2s"}
+    assert found(tmp_path, {"received": 1}, case) == {"received": "60"}
+
+
+def test_a_recording_is_run_as_replay_runs_it(tmp_path):
+    write_mcap(tmp_path / "rig.mcap", rig())
+    expect = {"sets": 1, "match_rate": 0, "findings": ["silent"], "inputs": {"camera": {"received": 1}}}
+    assert found(tmp_path, expect, {"recording": "rig.mcap"}, **RECORDED) == {
+        "sets": "40",
+        "match_rate": "1",
+        "received": "40",
+        "findings": "healthy",
+    }
+    for name in ("/lidar", "lidar"):
+        dead = {"recording": "rig.mcap", "what_if": [f"dead: {name} from 2s"]}
+        assert found(tmp_path, {"sets": 1}, dead, **RECORDED) == {"sets": "20"}
+
+
+@pytest.mark.parametrize(
+    ("case", "error"),
+    [
+        ({"recording": "rg.mcap"}, "did you mean `rig.mcap`?"),
+        ({"recording": "rig.mcap", "what_if": ["drop: /lidr 3%"]}, "there is no topic `/lidr`, did you mean `/lidar`?"),
+    ],
+)
+def test_what_cannot_be_run_fails_and_says_why(tmp_path, case, error):
+    write_mcap(tmp_path / "rig.mcap", rig(3))
+    result = run(tmp_path, {**case, "expect": {"sets": 1}}, **RECORDED)
+    assert error in result.error
+    assert not result.passed
+
+
+def test_a_recording_without_a_required_topic_fails(tmp_path):
+    write_mcap(tmp_path / "rig.mcap", [frame for frame in rig(3) if frame.topic == "/camera"])
+    result = run(tmp_path, {"recording": "rig.mcap", "expect": {"sets": 0}}, **RECORDED)
+    assert result.error == "front: /lidar is not in the recording, it has /camera"
+
+
+@st.composite
+def lanes(draw):
+    """Draw two lanes of letters, in the order of the alphabet by column."""
+    columns = draw(st.lists(st.sampled_from(("..", "x.", ".x", "xx")), min_size=1, max_size=9))
+    letters = iter("abcdefghijklmnopqr")
+    marked = ["".join(next(letters) if mark == "x" else "." for mark in column) for column in columns]
+    return tuple("".join(column[lane] for column in marked) for lane in (0, 1))
+
+
+@given(drawn=lanes(), policy=st.sampled_from(("approximate_time", "approximate_time_eager", "exact_time")))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_drawing_gives_what_the_engine_gives_by_hand(tmp_path, drawn, policy):
+    camera, lidar = drawn
+    group = {"policy": policy, "slop": None if policy == "exact_time" else "20ms", "queue_size": 3}
+    assume(set(camera + lidar) != {"."})
+    told = left(tmp_path, f"camera |{camera}\nlidar  |{lidar}\n", **group)
+    engine = load(str(tmp_path / "fusion.yaml")).groups[0].engine()
+    expected = []
+    for column, marks in enumerate(zip(camera, lidar, strict=True)):
+        for index, letter in enumerate(marks):
+            if letter != ".":
+                stamp = 10**18 + column * 10_000_000
+                outcomes = engine.add(Message(index, stamp, letter), now=stamp)
+                expected += [(letter, each) for each in outcomes]
+    by_letter = [(line[0], each) for line in told for each in line[3:].split(", ")]
+    assert by_letter == [(letter, in_words(outcome)) for letter, outcome in expected]
+
+
+def in_words(outcome):
+    if isinstance(outcome, Match):
+        return "".join(message.payload for message in outcome.messages if message is not None)
+    return f"{outcome.message.payload} {outcome.reason.value}"

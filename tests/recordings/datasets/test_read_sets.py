@@ -1,0 +1,330 @@
+"""Sets as record batches: the sets of `replay`, with the messages that were recorded."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from syncrelay.config import load_text
+from syncrelay.errors import BagError, UsageError
+from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.bindings import bind
+from syncrelay.recordings.bag.replay import received, replay
+from syncrelay.recordings.datasets import read_sets
+from syncrelay.sync import Match
+from tests.recordings.bag.making import CUSTOM, CUSTOM_STORE, rig, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.datasets import times
+from tests.ros.cdr_messages import STORE, VECTOR
+from tests.ros.frames import Frame
+from tests.ros.streams import MS
+
+GROUP = """
+version: 1
+groups:
+  front:
+    policy: approximate_time
+    slop: 20ms
+    {more}
+    topics:
+      - {{topic: /camera}}
+      - {{topic: /lidar}}
+"""
+
+
+def config(more=""):
+    return load_text(GROUP.format(more=more))
+
+
+def rows_of(*args, **options):
+    return [row for batch in read_sets(*args, **options) for row in times.rows_of(batch)]
+
+
+def replayed(path, loaded):
+    """What a replay tells of each set: stamps, when it left, and its latency."""
+    told = []
+
+    def note(_binding, outcome, now):
+        if isinstance(outcome, Match):
+            last = max(received(each) for each in outcome.messages if each is not None)
+            told.append((outcome.stamps, now, now - last))
+
+    recording = open_recording([str(path)])
+    replay(recording, bind(loaded, recording), listeners=[note])
+    recording.close()
+    return told
+
+
+def test_a_row_is_a_set_of_replay(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    rows = rows_of(bag, config())
+    assert [
+        ((row["stamps"]["/camera"], row["stamps"]["/lidar"]), row["left_at"], row["latency_ns"]) for row in rows
+    ] == replayed(bag, config())
+    assert len(rows) > 30
+    assert [row["set"] for row in rows] == list(range(1, len(rows) + 1))
+    assert {row["recording"] for row in rows} == {str(bag)}
+
+
+def test_a_row_tells_spans_with_offsets_and_its_newest_stamp(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    loaded = load_text(GROUP.format(more="").replace("/camera}", "/camera, offset: -3ms}"))
+    rows = rows_of(bag, loaded)
+    assert {row["span_ns"] for row in rows} == {0}
+    assert all(row["stamp"] == max(row["stamps"].values()) for row in rows)
+    assert {row["received"]["/lidar"] - row["stamps"]["/lidar"] for row in rows} == {5 * MS}
+
+
+def test_messages_leave_with_the_stamp_of_their_set(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    rows = rows_of(bag, config("restamp: earliest"))
+    for row in rows:
+        stamp = row["/camera"]["header"]["stamp"]
+        assert stamp["sec"] * 10**9 + stamp["nanosec"] == row["stamp"] == min(row["stamps"].values())
+
+
+def test_missing_optional_messages_are_null(tmp_path):
+    frames = [frame for frame in rig() if frame.topic == "/camera" or frame.time % (200 * MS) < 100 * MS]
+    bag = write_mcap(tmp_path / "bag.mcap", frames)
+    loaded = load_text(GROUP.format(more="max_wait: 50ms").replace("/lidar}", "/lidar, required: false}"))
+    rows = rows_of(bag, loaded)
+    missing = [row["stamps"]["/lidar"] is None for row in rows]
+    assert [row["/lidar"] is None for row in rows] == missing
+    assert [row["received"]["/lidar"] is None for row in rows] == missing
+    assert 10 < sum(missing) < len(rows) - 10
+
+
+def test_an_optional_input_that_was_not_recorded_has_the_type_of_the_file(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    loaded = load_text(
+        GROUP.format(more="max_wait: 50ms") + "      - {topic: /imu, type: sensor_msgs/msg/Imu, required: false}\n"
+    )
+    (batch,) = read_sets(bag, loaded)
+    assert batch["/imu"].null_count == len(batch) > 0
+    assert batch.schema.field("/imu").type.field("angular_velocity").type.num_fields == 3
+
+
+def test_all_sets_come_whatever_the_size_of_a_batch(tmp_path):
+    # What is read at a time is some thousands of messages.
+    bag = write_mcap(tmp_path / "bag.mcap", rig(5_000), chunk_size=50_000)
+    whole = rows_of(bag, config())
+    batches = list(read_sets(bag, config(), most_bytes=1))
+    assert len(batches) > 3
+    assert [row for batch in batches for row in times.rows_of(batch)] == whole
+    assert len({batch.schema.serialize().to_pybytes() for batch in batches}) == 1
+
+
+def test_what_is_known_of_the_inputs_stands_in_the_schema(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    (batch,) = read_sets(bag, config())
+    told = json.loads(batch.schema.metadata[b"syncrelay"])
+    assert (told["group"], told["policy"]) == ("front", "approximate_time")
+    first = batch["/camera"][0].as_py()["header"]["frame_id"]
+    assert told["inputs"]["/camera"] == {"type": VECTOR, "offset_ns": 0, "frame_id": first}
+    assert batch.schema.field("/camera").metadata == {b"type": VECTOR.encode(), b"frame_id": first.encode()}
+
+
+def test_raw_messages_are_the_bytes_that_were_recorded(tmp_path):
+    frames = rig()
+    bag = write_mcap(tmp_path / "bag.mcap", frames)
+    recorded = {frame.payload for frame in frames}
+    rows = rows_of(bag, config(), raw=True)
+    assert all(row["/camera"] in recorded and row["/lidar"] in recorded for row in rows)
+
+
+def test_types_of_the_recording_alone_are_decoded(tmp_path):
+    time = CUSTOM_STORE.types["builtin_interfaces/msg/Time"]
+    header = CUSTOM_STORE.types["std_msgs/msg/Header"]
+    frames = [
+        Frame(
+            topic,
+            CUSTOM,
+            n * 100 * MS + 1,
+            bytes(
+                CUSTOM_STORE.serialize_cdr(
+                    CUSTOM_STORE.types[CUSTOM](header(time(1, n * 1000), "blip"), time(2, n), n, f"label {'x' * n} é"),
+                    CUSTOM,
+                )
+            ),
+        )
+        for n in range(9)
+        for topic in ("/camera", "/lidar")
+    ]
+    rows = rows_of(write_mcap(tmp_path / "bag.mcap", frames, store=CUSTOM_STORE), config())
+    assert [row["/lidar"]["label"] for row in rows] == [f"label {'x' * n} é" for n in range(len(rows))]
+    assert len(rows) > 5
+
+
+def test_a_type_that_the_recording_does_not_define_is_named_and_raw_takes_it(tmp_path):
+    frames = [frame._replace(type_name="secret_msgs/msg/Thing") for frame in rig()]
+    bag = _undefined(tmp_path / "bag.mcap", frames)
+    with pytest.raises(BagError, match=r"does not define secret_msgs/msg/Thing.* use --raw"):
+        next(read_sets(bag, config()))
+    assert len(rows_of(bag, config(), raw=True)) > 30
+
+
+def test_ros_1_messages_are_those_of_ros_2(tmp_path):
+    bag = write_ros1(tmp_path / "bag.bag", rig())
+    rows = rows_of(bag, config())
+    assert rows[0]["/camera"]["header"].keys() == {"stamp", "frame_id"}
+    stamps = [row["/camera"]["header"]["stamp"] for row in rows]
+    assert [each["sec"] * 10**9 + each["nanosec"] for each in stamps] == [row["stamps"]["/camera"] for row in rows]
+
+
+@pytest.mark.parametrize("image_format", ["png", "jpeg"])
+@pytest.mark.parametrize(
+    ("encoding", "shape", "kind"),
+    [("rgb8", (3, 4, 3), "u1"), ("bgr8", (3, 4, 3), "u1"), ("mono8", (3, 4), "u1"), ("rgba8", (3, 4, 4), "u1")],
+)
+def test_images_are_pictures(tmp_path, image_format, encoding, shape, kind):
+    pixels = np.full(shape, 40, kind)
+    if len(shape) == 3:
+        pixels[..., 0] = 200
+        pixels[..., 3:] = 255
+    bag = write_mcap(tmp_path / "bag.mcap", images(encoding, pixels))
+    rows = rows_of(bag, config(), images=image_format)
+    picture = rows[0]["/camera"]
+    assert picture.keys() == {"header", "height", "width", "encoding", "format", "data"}
+    assert (picture["format"], picture["encoding"], picture["height"]) == (image_format, encoding, 3)
+    (tmp_path / "picture").write_bytes(picture["data"])
+    found = np.asarray(Image.open(tmp_path / "picture").convert("RGB")).astype(int)
+    expected = (200, 40, 40) if encoding in ("rgb8", "rgba8") else (40, 40, 200) if encoding == "bgr8" else (40,) * 3
+    assert np.abs(found - expected).max() <= 3
+
+
+@pytest.mark.parametrize("big_endian", [0, 1])
+def test_depth_images_of_16_bits_are_whole_in_png(tmp_path, big_endian):
+    pixels = (np.arange(12).reshape(3, 4) * 5000).astype(">u2" if big_endian else "<u2")
+    bag = write_mcap(tmp_path / "bag.mcap", images("16UC1", pixels, big_endian=big_endian))
+    (tmp_path / "picture").write_bytes(rows_of(bag, config(), images="png")[0]["/camera"]["data"])
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "picture")), pixels)
+    with pytest.raises(BagError, match="JPEG cannot hold 16 bit images: use --images /camera=png"):
+        rows_of(bag, config(), images="jpeg")
+
+
+@pytest.mark.parametrize(
+    ("chosen", "camera", "lidar"),
+    [
+        ("jpeg", "jpeg", "jpeg"),
+        ({"/camera": "jpeg", "/lidar": "png"}, "jpeg", "png"),
+        ({"/lidar": "png"}, None, "png"),
+        ({}, None, None),
+    ],
+)
+def test_each_input_may_have_a_format_of_its_own(tmp_path, chosen, camera, lidar):
+    frames = images("rgb8", np.zeros((3, 4, 3), "u1"), topics=("/camera", "/lidar"))
+    (row, *_) = rows_of(write_mcap(tmp_path / "bag.mcap", frames), config(), images=chosen)
+    assert (row["/camera"].get("format"), row["/lidar"].get("format")) == (camera, lidar)
+
+
+def test_a_format_for_what_has_no_images_is_refused(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", images("rgb8", np.zeros((3, 4, 3), "u1")))
+    with pytest.raises(BagError, match=f"/lidar is {VECTOR}, expected sensor_msgs/msg/Image: --images does not go"):
+        rows_of(bag, config(), images={"/lidar": "png"})
+    with pytest.raises(UsageError, match="/lidr is no input of the file, did you mean `/lidar`"):
+        rows_of(bag, config(), images={"/lidr": "png"})
+
+
+def test_an_encoding_that_no_picture_holds_is_named(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", images("32FC1", np.zeros((3, 4), "f4")))
+    with pytest.raises(BagError, match="encoding '32FC1' cannot become PNG"):
+        rows_of(bag, config(), images="png")
+
+
+def test_an_image_that_is_smaller_than_it_says_is_null_and_told(tmp_path):
+    frames = images("rgb8", np.zeros((3, 4, 3), "u1"), height=400)
+    bag = write_mcap(tmp_path / "bag.mcap", frames)
+    assert all(row["/camera"] is None and row["/lidar"] is not None for row in rows_of(bag, config(), images="png"))
+
+
+def test_only_the_fields_that_are_wanted_are_there(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    row = rows_of(bag, config(), fields={"/camera": ["vector.x", "header.frame_id"]})[0]
+    assert (row["/camera"].keys(), row["/camera"]["vector"].keys()) == ({"header", "vector"}, {"x"})
+    assert row["/lidar"]["vector"].keys() == {"x", "y", "z"}
+    row = rows_of(
+        write_mcap(tmp_path / "2.mcap", images("rgb8", np.zeros((3, 4, 3), "u1"))),
+        config(),
+        fields={"/camera": ["data"]},
+        images="png",
+    )[0]
+    assert row["/camera"].keys() == {"format", "data"}
+
+
+def test_several_recordings_are_read_one_after_the_other_each_by_itself(tmp_path):
+    first = write_mcap(tmp_path / "1.mcap", rig())
+    second = write_rosbag2(tmp_path / "2", rig(20))
+    rows = rows_of([first, second], config())
+    assert rows[: len(rows_of(first, config()))] == rows_of(first, config())
+    assert [row["set"] for row in rows if row["recording"] == str(second)] == list(
+        range(1, len(rows_of(second, config())) + 1)
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"group": "frnt"}, "no group frnt, did you mean `front`?; it has front"),
+        ({"fields": {"/camra": ["vector.x"]}}, "/camra is no input of the file, did you mean `/camera`?"),
+    ],
+)
+def test_words_that_mean_nothing_are_told(tmp_path, options, told):
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    with pytest.raises(UsageError) as raised:
+        next(read_sets(bag, config(), **options))
+    assert told in str(raised.value)
+
+
+def test_a_file_with_several_groups_wants_one_to_be_named(tmp_path):
+    text = GROUP.format(more="")
+    both = text + text.split("groups:\n")[1].replace("front", "rear")
+    bag = write_mcap(tmp_path / "bag.mcap", rig())
+    with pytest.raises(UsageError, match="the groups front and rear: say which one, as group='front'"):
+        next(read_sets(bag, load_text(both)))
+    assert rows_of(bag, load_text(both), group="rear") == rows_of(bag, config())
+
+
+def test_a_recording_without_a_required_topic_is_refused(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", [frame for frame in rig() if frame.topic == "/camera"])
+    with pytest.raises(BagError, match="front: /lidar is not in the recording"):
+        next(read_sets(bag, config()))
+
+
+def images(encoding, pixels, *, big_endian=0, height=None, topics=("/camera",)):
+    """Images of some topics, of a camera alone unless said otherwise, with a lidar beside it."""
+    types = STORE.types
+    frames = []
+    for frame in rig(10):
+        if frame.topic in topics:
+            found: Any = STORE.deserialize_cdr(frame.payload, frame.type_name)
+            image = types["sensor_msgs/msg/Image"](
+                header=found.header,
+                height=height or pixels.shape[0],
+                width=pixels.shape[1],
+                encoding=encoding,
+                is_bigendian=big_endian,
+                step=pixels.strides[0],
+                data=np.frombuffer(pixels.tobytes(), np.uint8),
+            )
+            payload = bytes(STORE.serialize_cdr(image, "sensor_msgs/msg/Image"))
+            frames.append(frame._replace(type_name="sensor_msgs/msg/Image", payload=payload))
+        else:
+            frames.append(frame)
+    return frames
+
+
+def _undefined(path: Path, frames):
+    """An MCAP file whose schemas are empty."""
+    from mcap.writer import Writer  # noqa: PLC0415
+
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        schema = writer.register_schema("secret_msgs/msg/Thing", "", b"")
+        channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in ("/camera", "/lidar")}
+        for frame in frames:
+            writer.add_message(channels[frame.topic], frame.time, frame.payload, frame.time)
+        writer.finish()
+    return path

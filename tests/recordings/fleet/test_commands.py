@@ -1,0 +1,200 @@
+"""`syncrelay replay --into` and `syncrelay analyze --into`."""
+
+import json
+import sys
+
+import pytest
+
+from tests.cli.command import run, run_python
+from tests.cli.terminals import on_terminal
+from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
+from tests.recordings.fleet.fleets import FILE, TOPICS, entries, file_text, make_fleet, replay_into, result
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A folder with three recordings, and what one undisturbed replay of them left in `out`."""
+    folder = make_fleet(tmp_path_factory.mktemp("fleet"))
+    ended = replay_into(folder)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "out: 3 recordings: 3 done\n", "")
+    return folder
+
+
+def test_the_sets_are_those_of_replay_alone(done, tmp_path):
+    for name in ("r0", "r1", "r2"):
+        output = tmp_path / f"{name}.mcap"
+        run("replay", f"bags/{name}.mcap", "--config", FILE, "-o", str(output), folder=done)
+        assert (result(done / "out", name) / "sets.mcap").read_bytes() == output.read_bytes()
+
+
+def test_recordings_that_take_longer_than_they_may_have_failed(tmp_path):
+    ended = replay_into(make_fleet(tmp_path, (20, 20)), "--time-limit", "1ms")
+    assert (ended.returncode, ended.stdout) == (1, "out: 2 recordings: 2 failed\n")
+    assert "r0.mcap: not done within 0.001 s: check it, or give it longer by --time-limit" in ended.stderr
+    assert {entry["state"] for entry in entries(tmp_path / "out").values()} == {"failed"}
+
+
+def test_the_ledger_tells_what_became_of_each_input(done):
+    inputs = [{"topic": topic, "received": 30, "matched": 29, "dropped": {"shutdown": 1}} for topic in TOPICS]
+    assert entries(done / "out")["r1"]["facts"]["groups"] == [{"name": "front", "sets": 29, "inputs": inputs}]
+
+
+def test_the_analyses_are_those_of_analyze_alone(done):
+    ended = run("analyze", "bags", "--config", FILE, "--into", "analyses", "--jobs", "1", folder=done)
+    assert (ended.returncode, ended.stderr) == (0, "analyses: 3 recordings: 3 done\n")
+    bag = done / "bags" / "r1.mcap"
+    alone = run("analyze", str(bag), "--config", FILE, "--json", folder=done)
+    assert (result(done / "analyses", "r1") / "analysis.json").read_text() == alone.stdout
+    assert entries(done / "analyses")["r1"]["facts"]["groups"][0]["sets"] == 29
+
+
+@pytest.mark.parametrize("words", [TOPICS, ()])
+def test_analyses_need_no_file(words, done, tmp_path):
+    ended = run("analyze", "bags/*", *words, "--into", str(tmp_path / "out"), folder=done)
+    assert (ended.returncode, "3 recordings: 3 done" in (ended.stderr if words else ended.stdout)) == (0, True)
+    alone = run("analyze", str(done / "bags" / "r0.mcap"), *words, "--json", folder=done)
+    assert (result(tmp_path / "out", "r0") / "analysis.json").read_text() == alone.stdout
+
+
+def test_a_run_of_analyses_ends_with_a_report_of_all_of_them(tmp_path):
+    for robot in ("r1", "r2"):
+        (tmp_path / robot).mkdir()
+        write_mcap(tmp_path / robot / "x.mcap", rig(30))
+    (tmp_path / "r2" / "bad.mcap").write_bytes(b"no recording")
+    (tmp_path / FILE).write_text(file_text())
+    words = ["analyze", "r1", "r2", "--config", FILE, "--into", "out"]
+    ended = run(*words, "--html", "fleet.html", folder=tmp_path)
+    assert (ended.returncode, ended.stdout.splitlines()[0][:23]) == (1, "2 recordings, 2 robots,")
+    assert "not analyzed: 1 recording" in ended.stdout
+    page = (tmp_path / "fleet.html").read_text()
+    assert "r2/bad.mcap" in page
+    told = run(*words, "--json", "--robot", "{robot}/*.mcap", folder=tmp_path)
+    report = json.loads(told.stdout)
+    assert (report["recordings"], report["failed"], {each["robot"] for each in report["by_robot"]}) == (
+        2,
+        1,
+        {"r1", "r2"},
+    )
+    wrong = run(*words, "--robot", "{day}/*.mcap", folder=tmp_path)
+    assert (wrong.returncode, "{robot}" in wrong.stderr) == (2, True)
+
+
+def test_faults_are_laid_over_each_recording(done, tmp_path):
+    ended = replay_into(done, "--what-if", "dead: /lidar from 1s", into=str(tmp_path / "out"))
+    assert ended.returncode == 0
+    assert {
+        name: entry["facts"]["groups"][0]["sets"] for name, entry in entries(tmp_path / "out").items()
+    } == dict.fromkeys(("r0", "r1", "r2"), 9)
+
+
+def test_a_change_of_the_file_needs_leave_to_replace(tmp_path):
+    make_fleet(tmp_path)
+    replay_into(tmp_path)
+    (tmp_path / FILE).write_text(file_text(slop="1ms"))
+    refused = replay_into(tmp_path)
+    assert refused.returncode == 1
+    assert (
+        "out: holds results of a file with other values: name another folder, or replace them with --overwrite"
+        in refused.stderr
+    )
+    replaced = replay_into(tmp_path, "--overwrite")
+    assert (replaced.returncode, replaced.stdout) == (0, "out: 3 recordings: 3 done\n")
+    assert "only 0 of 20 possible sets are complete, because of slop 1 ms: without it, 19 would be" in replaced.stderr
+    assert {entry["facts"]["groups"][0]["sets"] for entry in entries(tmp_path / "out").values()} == {0}
+    assert replay_into(tmp_path, "--overwrite").stdout == "out: 3 recordings: 3 done before\n"
+
+
+def test_a_variable_of_the_file_counts_as_its_text(done, tmp_path):
+    (tmp_path / FILE).write_text(file_text(slop="${SLOP}"))
+    words = ("replay", str(done / "bags"), "--config", FILE, "--into", "out")
+    run(*words, folder=tmp_path, environ={"SLOP": "5ms"})
+    refused = run(*words, folder=tmp_path, environ={"SLOP": "1ms"})
+    assert "holds results of a file with other values" in refused.stderr
+    assert run(*words, folder=tmp_path, environ={"SLOP": "5ms"}).stdout == "out: 3 recordings: 3 done before\n"
+
+
+def test_a_corrupt_recording_is_told_and_the_others_are_done(tmp_path):
+    make_fleet(tmp_path)
+    (tmp_path / "bags" / "r1.mcap").write_bytes(b"")
+    (tmp_path / "bags" / "\udcff.mcap").write_text("no recording")
+    ended = replay_into(tmp_path)
+    assert (ended.returncode, ended.stdout) == (1, "out: 4 recordings: 2 done, 2 failed\n")
+    assert "r1.mcap: is empty\n" in ended.stderr
+    assert "\\udcff.mcap: is not a recording" in ended.stderr
+    assert [name for name, entry in entries(tmp_path / "out").items() if entry["state"] == "failed"]
+    again = replay_into(tmp_path)
+    assert (again.returncode, again.stdout) == (1, "out: 4 recordings: 2 done before, 2 failed\n")
+
+
+def test_strict_ends_at_the_first_fault(tmp_path):
+    make_fleet(tmp_path, counts=(20, 30))
+    # The largest is begun first.
+    (tmp_path / "bags" / "bad.mcap").write_bytes(bytes(10**6))
+    ended = replay_into(tmp_path, "--strict", "--jobs", "1")
+    assert (ended.returncode, ended.stdout) == (1, "")
+    told = "ended at the first recording that is at fault: 3 recordings: 1 failed, 2 not done"
+    assert ended.stderr.endswith(f"syncrelay: {told}\n")
+
+
+def test_a_recording_without_a_required_topic_is_told_each_time(tmp_path):
+    make_fleet(tmp_path, counts=(20,))
+    write_mcap(tmp_path / "bags" / "half.mcap", [frame for frame in rig(20) if frame.topic == "/camera"])
+    for _ in range(2):
+        ended = replay_into(tmp_path)
+        assert ended.returncode == 1
+        assert "half.mcap: front: /lidar is not in the recording" in ended.stderr
+
+
+def test_a_split_recording_is_one(tmp_path):
+    make_fleet(tmp_path, counts=())
+    write_rosbag2(tmp_path / "bags" / "drive", rig(20))
+    assert replay_into(tmp_path).stdout == "out: 1 recording: 1 done\n"
+    assert entries(tmp_path / "out")["drive"]["facts"]["groups"][0]["sets"] == 19
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("replay", "bags", "--config", FILE, "--strict"), "--strict goes with --into"),
+        (("replay", "bags", "--config", FILE, "--overwrite"), "--overwrite goes with --into"),
+        (("replay", "bags", "--config", FILE, "--time-limit", "2min"), "--time-limit goes with --into"),
+        (
+            ("replay", "bags", "--config", FILE, "--into", "out", "--time-limit", "2"),
+            "has no unit, expected one such as",
+        ),
+        (("analyze", "bags", "--into", "out", "--time-limit", "0s"), "expected a duration above 0, found 0s"),
+        (("analyze", "bags", "--engine", "ray"), "--engine goes with --into"),
+        (("replay", "bags", "--config", FILE, "--jobs", "2"), "--jobs goes with --into"),
+        (
+            ("replay", "bags", "--config", FILE, "--into", "o", "-o", "x.mcap"),
+            "--into writes the sets of each recording",
+        ),
+        (("analyze", "bags", "--config", FILE, "--into", "o", "--write", "x.yaml"), "--write is for one recording"),
+        (("analyze", "bags", "--into", "o", "--json"), "--html, --json and --robot tell of groups"),
+        (("analyze", "bags", "--config", FILE, "--robot", "{robot}/*"), "--robot goes with --into"),
+    ],
+)
+def test_options_that_make_no_sense_together_are_told(words, told, done):
+    ended = run(*words, folder=done)
+    assert ended.returncode == 2
+    assert told in ended.stderr
+    assert not (done / "o").exists()
+
+
+def test_ray_that_is_missing_is_told(done, tmp_path):
+    script = "import sys; sys.modules['ray'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
+    words = ("replay", "bags", "--config", FILE, "--engine", "ray", "--into", str(tmp_path / "out"))
+    ended = run_python("-c", script, *words, folder=done)
+    assert ended.returncode == 1
+    install = "pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
+    assert ended.stderr == f"syncrelay: --engine ray needs Ray, which is not installed: {install}\n"
+
+
+def test_on_a_terminal_progress_is_one_line_that_is_gone_at_the_end(done, tmp_path):
+    words = ("replay", str(done / "bags"), "--config", str(done / FILE), "--into", "out")
+    with on_terminal([sys.executable, "-m", "syncrelay", *words], folder=tmp_path, environ={}) as terminal:
+        assert terminal.wait_for_end() == 0
+    shown = terminal.written.partition("out:")[0]
+    assert "\r\x1b[K3 of 3 recordings" in shown
+    assert "\n" not in shown
+    assert shown.endswith("\r\x1b[K")

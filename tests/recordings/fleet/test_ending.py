@@ -1,0 +1,136 @@
+"""A run that is ended: in order by a signal, or by kill -9 at any moment; no worker is left, and the next goes on."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.cli.command import ROOT
+from tests.faults.extent import IS_LONG
+from tests.recordings.fleet.fleets import FILE, LEDGER, entries, make_fleet, replay_into, tree
+from tests.recordings.fleet.tasks import attempts_of
+
+_DEADLINE_S = 60
+_KILLS = 50 if IS_LONG else 6
+ENVIRON = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONSAFEPATH": "1"}
+_OBEDIENT = """
+import sys
+from argparse import Namespace
+from syncrelay.cli.boundary import guarded
+from syncrelay.cli.fleet import do_on_many
+from tests.recordings.fleet.tasks import Obedient
+options = Namespace(into="out", engine="local", jobs=2, strict=False, overwrite=False, time_limit=None)
+sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[1:], options)))
+"""
+
+
+def wait_until(condition):
+    """Return what a condition gives once it is something."""
+    end = time.monotonic() + _DEADLINE_S
+    while not (found := condition()):
+        assert time.monotonic() < end
+        time.sleep(0.005)
+    return found
+
+
+def is_alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False
+
+
+def children(pid):
+    try:
+        return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    except OSError:
+        return []
+
+
+def lines(out):
+    return (out / LEDGER).read_text().count("\n") if (out / LEDGER).exists() else 0
+
+
+@contextmanager
+def at_work(folder):
+    """A command with two recordings done and two that take for ever; its workers on them."""
+    for name in ("a", "b"):
+        (folder / f"{name}.mcap").write_text(f"longer than the others: {name}")
+    for name in ("x", "y"):
+        (folder / f"{name}.mcap").write_text("hang")
+    words = [sys.executable, "-c", _OBEDIENT, "."]
+    with subprocess.Popen(words, cwd=folder, env=ENVIRON, stdout=-1, stderr=-1, text=True) as command:
+        try:
+            wait_until(lambda: all(map(attempts_of, (folder / "x.mcap", folder / "y.mcap"))))
+            yield command, wait_until(lambda: children(command.pid) if len(children(command.pid)) == 2 else None)
+        finally:
+            command.kill()
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_it_in_order(number, code, tmp_path):
+    with at_work(tmp_path) as (command, workers):
+        command.send_signal(number)
+        output, told = command.communicate(timeout=_DEADLINE_S)
+    assert (command.returncode, output) == (code, "")
+    assert f"ended by {number.name}: 4 recordings: 2 done, 2 not done; the same command does the rest" in told
+    assert not any(map(is_alive, workers))
+    assert not (tmp_path / "out" / ".partial").exists()
+    assert set(entries(tmp_path / "out")) == {"a", "b"}
+
+
+def test_ctrl_c_of_a_terminal_which_reaches_the_workers_too_is_one_request(tmp_path):
+    with at_work(tmp_path) as (command, workers):
+        for pid in (*workers, command.pid):
+            os.kill(pid, signal.SIGINT)
+        _, told = command.communicate(timeout=_DEADLINE_S)
+    assert command.returncode == 130
+    assert "2 done, 2 not done" in told
+
+
+def test_no_worker_outlives_a_command_that_is_killed(tmp_path):
+    with at_work(tmp_path) as (command, workers):
+        command.kill()
+        wait_until(lambda: not any(map(is_alive, workers)))
+
+
+@pytest.mark.faults
+def test_a_run_that_is_killed_at_any_moment_ends_as_an_undisturbed_one(tmp_path, figures):
+    count = 8
+    make_fleet(tmp_path, counts=range(20, 20 + count))
+    assert replay_into(tmp_path, into="undisturbed").returncode == 0
+    chance = random.Random(19)
+    words = [sys.executable, "-m", "syncrelay", "replay", "bags", "--config", FILE, "--into", "out", "--jobs", "2"]
+    killed = {"command": 0, "worker": 0}
+    while sum(killed.values()) < _KILLS:
+        if lines(tmp_path / "out") > count:
+            # About all were done before as many were killed as there shall be: whose folder was not yet in place when
+            # its line was, has two lines.
+            assert replay_into(tmp_path).returncode == 0
+            assert tree(tmp_path / "out") == tree(tmp_path / "undisturbed")
+            shutil.rmtree(tmp_path / "out")
+        with subprocess.Popen(words, cwd=tmp_path, env=ENVIRON, stderr=subprocess.DEVNULL, stdout=-1) as command:
+            awaited = max(1, lines(tmp_path / "out") + chance.randint(0, 2))
+            wait_until(lambda: lines(tmp_path / "out") >= awaited or command.poll() is not None)  # noqa: B023
+            for pid in children(command.pid)[: chance.randint(0, 1)]:
+                os.kill(pid, signal.SIGKILL)
+                killed["worker"] += 1
+            time.sleep(chance.random() * 0.03)
+            workers = children(command.pid)
+            command.kill()
+            killed["command"] += command.wait() < 0
+            wait_until(lambda: not any(map(is_alive, workers)))  # noqa: B023
+    ended = replay_into(tmp_path)
+    assert ended.returncode == 0
+    assert tree(tmp_path / "out") == tree(tmp_path / "undisturbed")
+    figures(
+        f"replay of {count} recordings, kill -9 of the command {killed['command']} times and of a worker"
+        f" {killed['worker']} times: in the end what an undisturbed run leaves, byte for byte"
+    )
