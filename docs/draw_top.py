@@ -1,16 +1,15 @@
 """Draws docs/top.svg from a simulated rig: `PYTHONPATH=. python docs/draw_top.py`."""  # noqa: INP001  no package
 
 import asyncio
-import json
 from pathlib import Path
 
 from picture import COLUMNS, LINES, draw
 from rich.segment import SegmentLines
 
-from syncrelay.status import RelayState, document
+from syncrelay.status import RelayState, status_of
+from syncrelay.status.document import read_status
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import Answer
-from syncrelay.top.state import read_state
 from tests.top.rigs import Sensor, simulated
 from tests.top.states import CAMERA, CLOUD, IMAGE, IMU, IMU_200, file, group
 
@@ -37,8 +36,8 @@ def rig() -> RelayState:
 
 async def main() -> None:
     """Draw what a terminal shows of it."""
-    told = json.dumps(document(rig())).encode()
-    app = TopApp([Answer("http://robot:9464", told, read_state(told))], period_s=_NEVER)
+    told = status_of(rig()).as_json()
+    app = TopApp([Answer("http://robot:9464", told, read_status(told))], period_s=_NEVER)
     async with app.run_test(size=(COLUMNS, LINES)) as pilot:
         await pilot.pause()
         # Textual's own picture has a frame that fetches a font.

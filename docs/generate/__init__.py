@@ -15,6 +15,7 @@ from docs.generate.commands import exit_codes, relay, the_commands
 from docs.generate.findings import findings, matching
 from docs.generate.keys import of_file, of_group, of_model, of_topic, policies
 from docs.generate.metrics import metrics, scalars
+from docs.generate.status import objects
 from syncrelay.status.server import PATHS_TOLD
 from syncrelay.sync import DropReason
 
@@ -35,6 +36,7 @@ def pages() -> Mapping[str, str]:
         "findings.md": {"findings": findings(), "matching": matching()},
         "drop_reasons.md": {"reasons": tuple(DropReason)},
         "command_line.md": {"relay": relay(), "commands": the_commands(), "exit_codes": exit_codes()},
+        "status.md": {"objects": objects()},
         "metrics.md": {"paths": PATHS_TOLD, "metrics": metrics(), "scalars": scalars()},
     }
     templates = Environment(

@@ -20,8 +20,8 @@ from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.config import load_text
 from syncrelay.logs import configure, held_back
-from syncrelay.status import document
-from syncrelay.top.state import State, state_of
+from syncrelay.status import status_of
+from syncrelay.status.document import Status
 
 if TYPE_CHECKING:
     from syncrelay.rig.processes import Rig
@@ -107,20 +107,20 @@ def _relay(relay: "Relay", rig: "Rig", show: Show, *, total_s: float | None, sto
     began = time.monotonic()
     end = math.inf if total_s is None else began + total_s
 
-    def moment(state: State) -> Moment:
+    def moment(state: Status) -> Moment:
         return Moment(state, time.monotonic() - began, total_s, time.time_ns())
 
     stop.wake_with(relay.wake)
     reports = relay.evaluate()
-    state = state_of(document(relay.state()))
+    state = status_of(relay.state())
     while not stop.requested and (left_s := end - time.monotonic()) > 0:
         relay.step(min(_FRAME_S, left_s))
         rig.check()
         if (told := relay.state()).groups != reports:
-            reports, state = told.groups, state_of(document(told))
+            reports, state = told.groups, status_of(told)
         show(moment(state))
     relay.drain()
-    return moment(state_of(document(relay.state())))
+    return moment(status_of(relay.state()))
 
 
 def isolation(environ: Mapping[str, str]) -> dict[str, str]:

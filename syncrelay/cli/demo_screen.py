@@ -9,10 +9,10 @@ from rich.console import Group as Lines
 from rich.text import Text
 
 from syncrelay.explain import RecentDrop
+from syncrelay.status.document import Group, Status
 from syncrelay.top import group_blocks, phrases
 from syncrelay.top.pieces import line
 from syncrelay.top.plain import group_lines
-from syncrelay.top.state import Group, State
 from syncrelay.top.strip import COLUMN_NS, UNNEEDED, Sweep, letter_style, mark_of, newest_stamp
 
 _TITLE: Final = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
@@ -29,7 +29,7 @@ class Moment:
     `now` is the time, in nanoseconds of the clock that the rig stamps by.
     """
 
-    state: State
+    state: Status
     elapsed_s: float
     total_s: float | None
     now: int

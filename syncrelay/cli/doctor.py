@@ -101,7 +101,7 @@ def _as_json(examination: Examination) -> dict[str, Any]:
 def _observed_as_json(observed: Observed | None) -> dict[str, Any]:
     if observed is None:
         return {"graph": None, "groups": []}
-    from syncrelay.status import group_document
+    from syncrelay.status import group_of
 
     graph = {"seconds": observed.seconds, **asdict(observed.graph)}
-    return {"graph": graph, "groups": [group_document(report) for report in observed.reports]}
+    return {"graph": graph, "groups": [group_of(report).as_dict() for report in observed.reports]}

@@ -166,20 +166,19 @@ def _show(relay: "Relay", stop: StopRequest) -> None:
 
 
 def _answer(relay: "Relay") -> "Answer":
-    from syncrelay.status import document
+    from syncrelay.status import status_of
     from syncrelay.top.client import Answer
-    from syncrelay.top.state import state_of
 
-    return Answer("", b"", state_of(document(relay.state())))
+    return Answer("", b"", status_of(relay.state()))
 
 
 def _as_json(observed: Observed) -> object:
     """Return the state as /status has it, for how long was observed, and what is suggested for each group."""
     from syncrelay.cli.analysis_json import suggestion_as_json
-    from syncrelay.status import document
+    from syncrelay.status import status_of
 
     suggestions = [{"group": each.group.name, **suggestion_as_json(each.suggestion)} for each in observed.analyses]
-    return {**document(observed.state), "seconds": round(observed.seconds, 1), "suggestions": suggestions}
+    return {**status_of(observed.state).as_dict(), "seconds": round(observed.seconds, 1), "suggestions": suggestions}
 
 
 def _columns() -> float:
@@ -197,15 +196,14 @@ def _fitted(text: str, columns: float) -> list[str]:
 def _lines(observed: Observed, columns: float) -> Iterator[str]:
     from syncrelay.cli.analysis_text import suggestion_lines
     from syncrelay.explain import words
-    from syncrelay.status import document
+    from syncrelay.status import status_of
     from syncrelay.top.plain import WIDTH, group_lines
-    from syncrelay.top.state import state_of
 
     state = observed.state
     seconds = words.seconds(round(observed.seconds * 1e9))
     yield from _fitted(f"observed for {seconds} with {state.config}; nothing was published", columns)
     analyses = {each.group.name: each for each in observed.analyses}
-    shown = state_of(document(state)).groups
+    shown = status_of(state).groups
     for report, group in zip(state.groups, shown, strict=True):
         yield ""
         yield from group_lines(group, width=int(min(WIDTH, columns)))

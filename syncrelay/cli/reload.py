@@ -13,8 +13,8 @@ from syncrelay.cli.relays import find_one
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
 from syncrelay.printable import one_entry, printable
+from syncrelay.status.document import Relay
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask
-from syncrelay.top.state import Relay
 
 # Reading a file takes milliseconds; a relay that is busy turns to it within a second or two.
 _PATIENCE_S: Final = 10.0

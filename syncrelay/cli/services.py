@@ -5,7 +5,7 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.config_files import ConfigFiles
-from syncrelay.status import RelayState, document
+from syncrelay.status import RelayState, status_of
 
 if TYPE_CHECKING:
     from syncrelay.ros.relay import Relay
@@ -25,8 +25,7 @@ def services(relay: "Relay", files: ConfigFiles) -> "Offered":
 def _status(state: Callable[[], RelayState]) -> "Future[str]":
     # What says it is imported when it is first asked for, which it may never be.
     from syncrelay.top.plain import summary
-    from syncrelay.top.state import state_of
 
     told: Future[str] = Future()
-    told.set_result(summary(state_of(document(state()))))
+    told.set_result(summary(status_of(state())))
     return told

@@ -1,151 +1,329 @@
-"""The state of a relay as JSON: what /status gives and `syncrelay top` reads."""
+"""The document that /status gives: what the relay writes, and what everything that watches a relay reads.
 
-import os
+Durations are in milliseconds, stamps in nanoseconds. What is not known yet is None, null in JSON. A newer relay may
+send more than is here, which readers ignore; a field with a default may be missing from an older one.
+"""
+
 from collections.abc import Mapping
-from typing import Any, Final
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+from typing import Annotated, Any, TypeAlias
 
-from syncrelay import own_version
-from syncrelay.config import Tolerance
-from syncrelay.explain import (
-    Distribution,
-    DropFates,
-    Endpoint,
-    Finding,
-    GroupFacts,
-    GroupReport,
-    RecentDrop,
-    RecentSet,
-    explanation,
-)
-from syncrelay.status.state import RelayState, is_ready, level
-from syncrelay.sync import DropReason
+from pydantic import AfterValidator, BeforeValidator, PlainSerializer, TypeAdapter, ValidationError
 
-_NS_PER_MS: Final = 1_000_000
+from syncrelay.errors import SyncRelayError
+from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.printable import printable
+
+Text: TypeAlias = Annotated[str, AfterValidator(printable)]
+"""A text that is safe to show: what answers at a port may be anything."""
 
 
-def document(state: RelayState) -> dict[str, Any]:
-    """Return the state as what json.dumps takes. Durations in milliseconds, stamps in nanoseconds.
+class Phase(Enum):
+    """Where a relay is in its life. Only managed nodes are unconfigured, inactive or finalized.
 
-    What is not known is null, as the type of an input for which the file has none and nobody publishes.
+    `observing` is a process that publishes nothing, for as long as it runs.
     """
-    return {
-        "relay": {
-            "node": state.node,
-            "version": own_version(),
-            "config": state.config,
-            "phase": state.phase.value,
-            "ready": is_ready(state),
-            "uptime_s": round(state.uptime_s, 1),
-            "receives_by": state.receives_by,
-            "reloads": state.reloads,
-            "refused_reloads": state.refused_reloads,
-            "reload_error": state.reload_error,
-            "pid": os.getpid(),
-        },
-        "groups": [group_document(report) for report in state.groups],
-    }
+
+    UNCONFIGURED = "unconfigured"
+    INACTIVE = "inactive"
+    STARTING = "starting"
+    OBSERVING = "observing"
+    RUNNING = "running"
+    PAUSED = "paused"
+    DRAINING = "draining"
+    FINALIZED = "finalized"
 
 
-def group_document(report: GroupReport) -> dict[str, Any]:
-    """Return what there is to say of a group as what json.dumps takes."""
-    facts, figures = report.facts, report.facts.figures
-    fates, lately = facts.fates, facts.fates_lately
-    return {
-        "name": facts.name,
-        "policy": facts.policy,
-        "level": level(report).value,
-        "queue_size": facts.queue_size,
-        "tolerance": _tolerance(facts.tolerance),
-        "max_wait_ms": _ms(facts.max_wait),
-        "sets": figures.sets,
-        "rate_hz": round(figures.rate_hz, 3),
-        "possible_hz": round(facts.possible_hz, 3),
-        "since_last_set_ms": _ms(None if figures.last_set is None else figures.now - figures.last_set),
-        "span_ms": _percentiles(figures.spans),
-        "span_without_offsets_ms": _ms(report.span_without_offsets),
-        "latency_ms": _percentiles(figures.latencies),
-        "nearest_ms": _percentiles(figures.nearest),
-        "last_sets": [{"span_ms": _ms(span), "latency_ms": _ms(late)} for span, late in reversed(figures.last_sets)],
-        "inputs": [_input(facts, index, *each) for index, each in enumerate(zip(fates, lately, strict=True))],
-        "findings": [_finding(facts, finding) for finding in _explanation_first(report.findings)],
-        "recent": [_recent(outcome) for outcome in report.recent],
-    }
+class Level(Enum):
+    """The state of a group in DiagnosticStatus's words: STALE where nothing comes in at all."""
+
+    OK = "ok"
+    WARN = "warn"
+    ERROR = "error"
+    STALE = "stale"
 
 
-def _tolerance(tolerance: Tolerance | None) -> dict[str, Any] | None:
-    if tolerance is None or not tolerance.is_key:
-        return None
-    return {"key": tolerance.key, "ms": _ms(tolerance.ns)}
+class NotAStatusError(SyncRelayError):
+    """The bytes are not the status of a relay, or that of a version whose status has another shape."""
 
 
-def _input(facts: GroupFacts, index: int, fates: DropFates, lately: DropFates) -> dict[str, Any]:
-    each = facts.inputs[index]
-    figures, counts = each.figures, each.counts
-    return {
-        "topic": each.name,
-        "type": each.type,
-        "output": each.output,
-        "required": each.required,
-        "offset_ms": _ms(each.offset),
-        "rate_hz": round(figures.rate_hz, 3),
-        "age_ms": _ms(None if figures.last_received is None else facts.figures.now - figures.last_received),
-        "lag_ms": _ms(facts.lag(index)),
-        "jitter_ms": _ms(figures.jitter),
-        "drift_ppm": figures.drift and round(figures.drift.slope * 1e6, 1),
-        "received": counts.fed,
-        "matched": counts.matched,
-        "buffered": counts.buffered,
-        "dropped": _by_reason(counts.dropped),
-        "unneeded": fates.unneeded,
-        "other_drops": _by_reason(fates.others),
-        "dropped_lately": _by_reason(figures.dropped),
-        "unneeded_lately": lately.unneeded,
-        "other_drops_lately": _by_reason(lately.others),
-        "lost": each.graph.lost,
-        "missing": round(facts.figures.missing[index], 3),
-        "publishers": [_endpoint(publisher) for publisher in each.graph.publishers],
-        "subscribers": [_endpoint(subscriber) for subscriber in each.graph.subscribers],
-    }
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relay:
+    """The relay as a whole."""
+
+    node: Text
+    """Its name on the ROS graph, with its namespace."""
+    version: Text
+    """The version of syncrelay that runs."""
+    config: Text
+    """The files that it runs."""
+    phase: Phase
+    """Where it is in its life."""
+    ready: bool
+    """The same as `/readyz`."""
+    uptime_s: float
+    """Seconds since its start."""
+    receives_by: Text = ""
+    """How messages are taken and published."""
+    reloads: int = 0
+    """How often the file was read again and taken over."""
+    refused_reloads: int = 0
+    """How often a reload failed, so that the running configuration was kept."""
+    reload_error: str | None = None
+    """Why the last reload failed."""
+    pid: int = 0
+    """Its process id, in the container or on the machine where it runs."""
 
 
-def _by_reason(drops: Mapping[DropReason, int]) -> dict[str, int]:
-    return {reason.value: count for reason, count in drops.items()}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Percentiles:
+    """Percentiles of durations, in milliseconds."""
+
+    p50: float
+    """The median."""
+    p95: float
+    """Larger than 95 % of them."""
+    max: float
+    """The largest."""
 
 
-def _endpoint(endpoint: Endpoint) -> dict[str, Any]:
-    why = endpoint.mismatch
-    mismatch = why and {"policy": why.policy, "offered": why.offered, "requested": why.requested}
-    return {"node": endpoint.node, "type": endpoint.type, "mismatch": mismatch}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetFigures:
+    """One set that left."""
+
+    span_ms: float
+    """Its latest stamp minus its earliest, offsets added."""
+    latency_ms: float
+    """From the receipt of its last message until it was published."""
 
 
-def _explanation_first(findings: tuple[Finding, ...]) -> list[Finding]:
-    first = explanation(findings)
-    return [first, *(finding for finding in findings if finding is not first)]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerance:
+    """How far apart the stamps of a set may be."""
+
+    key: Text
+    """The key of the file that says so, such as `slop`."""
+    ms: float
+    """Its value."""
 
 
-def _finding(facts: GroupFacts, finding: Finding) -> dict[str, Any]:
-    return {
-        "code": finding.code.value,
-        "severity": finding.severity.name.lower(),
-        "text": finding.text,
-        "suggestion": finding.suggestion,
-        "topic": None if finding.input is None else facts.inputs[finding.input].name,
-        "topics": [facts.inputs[index].name for index in finding.about],
-    }
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mismatch:
+    """A QoS policy that keeps a publisher and a subscriber from connecting."""
+
+    policy: Text
+    """The policy."""
+    offered: Text
+    """What the publisher offers."""
+    requested: Text
+    """What the subscriber requests."""
 
 
-def _recent(outcome: RecentSet | RecentDrop) -> dict[str, Any]:
-    if isinstance(outcome, RecentSet):
-        return {"set": list(outcome.stamps)}
-    told = {"input": outcome.input, "stamp": outcome.stamp, "reason": outcome.reason.value}
-    return {"drop": {**told, "unneeded": outcome.unneeded}}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Endpoint:
+    """A publisher of an input, or a subscriber of an output."""
+
+    node: Text
+    """The node that it belongs to."""
+    type: Text
+    """Its message type."""
+    mismatch: Mismatch | None
+    """Why it does not connect to the relay; null if it does."""
 
 
-def _percentiles(sample: Distribution) -> dict[str, float | None] | None:
-    if not sample:
-        return None
-    return {"p50": _ms(sample.quantile(0.5)), "p95": _ms(sample.quantile(0.95)), "max": _ms(sample.quantile(1))}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Input:
+    """An input of a group and its output. Counts are since the start; what ends in `_lately` is of the last 10 s."""
+
+    topic: Text
+    """The input topic."""
+    type: Text | None
+    """Its type; null until the graph shows it, where the file does not say it."""
+    output: Text
+    """The topic that its messages are republished on."""
+    required: bool
+    """Whether every set needs a message of it."""
+    offset_ms: float = 0.0
+    """What the file adds to its stamps for matching."""
+    rate_hz: float
+    """Messages a second by receipt, 0 while it is silent."""
+    age_ms: float | None = None
+    """How long ago its last message arrived."""
+    lag_ms: float | None
+    """Time of receipt minus stamp, median."""
+    jitter_ms: float | None
+    """How far the time between its stamps is from the median, 95th percentile."""
+    drift_ppm: float | None = None
+    """How much its clock is slower than the clock of this machine, in parts per million."""
+    received: int
+    """Messages received: those in sets, those dropped and those still waiting."""
+    matched: int
+    """Messages that left in sets."""
+    buffered: int
+    """Messages that wait in the queue."""
+    dropped: Mapping[Text, int]
+    """Dropped messages by reason."""
+    unneeded: int = 0
+    """Dropped messages that cost no set."""
+    other_drops: Mapping[Text, int] | None = None
+    """The other dropped messages by reason."""
+    dropped_lately: Mapping[Text, int]
+    """As `dropped`."""
+    unneeded_lately: int = 0
+    """As `unneeded`."""
+    other_drops_lately: Mapping[Text, int] | None = None
+    """As `other_drops`."""
+    lost: int
+    """Messages that DDS lost on their way to the relay, lately."""
+    missing: float
+    """The share of the last sets that left without it, 0 to 1."""
+    publishers: tuple[Endpoint, ...]
+    """Who publishes the topic."""
+    subscribers: tuple[Endpoint, ...]
+    """Who subscribes to the output."""
 
 
-def _ms(nanoseconds: int | None) -> float | None:
-    return None if nanoseconds is None else round(nanoseconds / _NS_PER_MS, 3)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Something that was found out about a group."""
+
+    code: Text
+    """One of the findings, the same in every version."""
+    severity: Level
+    """How bad it is; never `stale`."""
+    text: Text
+    """A sentence for people; its words may change with a version."""
+    suggestion: Text | None
+    """What to do about it."""
+    topic: Text | None = None
+    """The input that it is about; null if it is about several or about the group."""
+    topics: tuple[Text, ...] = ()
+    """All inputs that it is about."""
+
+    @property
+    def label(self) -> str:
+        """Its code in words."""
+        return self.code.replace("_", " ")
+
+
+def _read_recent(recent: Any) -> Any:
+    match recent:
+        case {"set": stamps}:
+            return {"stamps": stamps}
+        case {"drop": drop}:
+            return drop
+        case _:
+            return recent
+
+
+def _write_recent(recent: RecentSet | RecentDrop) -> dict[str, Any]:
+    if isinstance(recent, RecentSet):
+        return {"set": recent.stamps}
+    drop = {"input": recent.input, "stamp": recent.stamp, "reason": recent.reason.value, "unneeded": recent.unneeded}
+    return {"drop": drop}
+
+
+Recent: TypeAlias = Annotated[
+    RecentSet | RecentDrop, BeforeValidator(_read_recent), PlainSerializer(_write_recent, return_type=dict[str, Any])
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group:
+    """A group."""
+
+    name: Text
+    """Its name in the file."""
+    policy: Text
+    """The policy that matches its messages."""
+    level: Level
+    """The severity of its worst finding, or `stale` where nothing comes in at all."""
+    queue_size: int
+    """Messages kept for each input."""
+    tolerance: Tolerance | None
+    """How far apart the stamps of a set may be; null where no key of the file says so."""
+    max_wait_ms: float | None
+    """How long a set may wait."""
+    sets: int
+    """Sets published since the start."""
+    rate_hz: float
+    """Sets a second."""
+    possible_hz: float
+    """Sets a second that the slowest required input allows."""
+    since_last_set_ms: float | None
+    """How long ago the last set left."""
+    span_ms: Percentiles | None
+    """Spans of the last sets."""
+    span_without_offsets_ms: float | None = None
+    """The median span without the offsets of the file; null without offsets."""
+    latency_ms: Percentiles | None
+    """Latencies of the last sets."""
+    nearest_ms: Percentiles | None = None
+    """Spans of the nearest messages, whether they made a set or not."""
+    last_sets: tuple[SetFigures, ...]
+    """The last sets, the oldest first."""
+    inputs: tuple[Input, ...]
+    """The inputs, as in the file."""
+    findings: tuple[Finding, ...]
+    """At least one finding, the one that explains most first."""
+    recent: tuple[Recent, ...]
+    """The last sets (`set`: the stamp of each input's message) and drops (`drop`: the input's number, the stamp, the reason, whether it was `unneeded`), the oldest first."""  # noqa: E501  a row of a table
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the document has of it as what json.dumps takes."""
+        return dict(_of_group().dump_python(self, mode="json"))
+
+    @property
+    def explanation(self) -> Finding | None:
+        """The finding that explains most, None if a relay sent none."""
+        return self.findings[0] if self.findings else None
+
+    @property
+    def problems(self) -> list[Finding]:
+        """The findings that something is wrong."""
+        return [finding for finding in self.findings if finding.severity is not Level.OK]
+
+    def problem_of(self, an_input: Input) -> Finding | None:
+        """The finding about what is wrong with an input that explains most; None if nothing is wrong with it."""
+        return next((finding for finding in self.problems if an_input.topic in (finding.topic, *finding.topics)), None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Status:
+    """A relay at one moment."""
+
+    relay: Relay
+    """The relay as a whole."""
+    groups: tuple[Group, ...]
+    """The groups, as in the file."""
+
+    def as_json(self) -> bytes:
+        """Return the document."""
+        return _of_status().dump_json(self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the document as what json.dumps takes."""
+        return dict(_of_status().dump_python(self, mode="json"))
+
+
+def read_status(document: bytes) -> Status:
+    """Return the status that a document holds. Raises NotAStatusError."""
+    try:
+        return _of_status().validate_json(document)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "the document"
+        raise NotAStatusError(printable(f"{where}: {first['msg']}")) from error
+
+
+# Made when first needed, as a relay may never be asked.
+@cache
+def _of_status() -> TypeAdapter[Status]:
+    return TypeAdapter(Status)
+
+
+@cache
+def _of_group() -> TypeAdapter[Group]:
+    return TypeAdapter(Group)

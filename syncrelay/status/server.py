@@ -5,7 +5,6 @@ the connections for a while, and nothing else.
 """
 
 import errno
-import json
 import logging
 import socket
 from collections.abc import Callable, Iterable, Mapping
@@ -23,10 +22,9 @@ from syncrelay.config.wording import all_of
 from syncrelay.errors import ListenError
 from syncrelay.explain import GroupReport
 from syncrelay.status.announcement import Place, announce
-from syncrelay.status.document import document
 from syncrelay.status.hosts import Hosts
 from syncrelay.status.page import HEADERS, PATHS, page_file
-from syncrelay.status.state import RelayState, is_ready
+from syncrelay.status.state import RelayState, is_ready, status_of
 from syncrelay.status.taps import TapRefusedError, Taps
 
 # An idle loop turns once a second; what has not turned for this long hangs.
@@ -169,7 +167,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
     answers: dict[str, _Answer] = {
         **{path: _of_page(path) for path in PATHS},
         "/metrics": answer_metrics,
-        "/status": lambda _, start: _json(start, document(state())),
+        "/status": lambda _, start: _answer(start, "200 OK", status_of(state()).as_json(), _JSON),
         "/tap": lambda environ, start: _tapped(start, taps, environ["QUERY_STRING"], state),
         "/livez": lambda _, start: _liveness(start, state()),
         "/readyz": lambda _, start: _readiness(start, state()),
@@ -223,10 +221,6 @@ def _tapped(start: _Start, taps: Taps, query: str, state: Callable[[], RelayStat
         return _answer(start, "200 OK", taps.answer(query, reports=reports), _JSON)
     except TapRefusedError as error:
         return _text(start, error.status, str(error))
-
-
-def _json(start: _Start, value: object) -> list[bytes]:
-    return _answer(start, "200 OK", json.dumps(value).encode(), _JSON)
 
 
 def _text(start: _Start, status: str, text: str) -> list[bytes]:

@@ -1,60 +1,51 @@
-"""What a running relay tells of itself."""
+"""What a running relay knows of itself, and the status that it gives."""
 
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
+from typing import Final
 
-from syncrelay.explain import Endpoint, GroupReport, InputFacts
+from syncrelay import own_version
+from syncrelay.config import Tolerance
+from syncrelay.explain import (
+    Distribution,
+    DropFates,
+    Endpoint,
+    Finding,
+    GroupFacts,
+    GroupReport,
+    InputFacts,
+    Mismatch,
+    explanation,
+)
+from syncrelay.status import document
+from syncrelay.status.document import Level, Phase
+from syncrelay.sync import DropReason
 
-
-class Phase(Enum):
-    """Where a relay is in its life. Unconfigured, inactive and finalized are only managed nodes.
-
-    Observing is one that only looks, for as long as it lives.
-    """
-
-    UNCONFIGURED = "unconfigured"
-    INACTIVE = "inactive"
-    STARTING = "starting"
-    OBSERVING = "observing"
-    RUNNING = "running"
-    PAUSED = "paused"
-    DRAINING = "draining"
-    FINALIZED = "finalized"
+_NS_PER_MS: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class RelayState:
-    """A relay at one moment. `turned_s` is how long ago its receive loop last turned, `uptime_s` since its start.
-
-    `receives_by` names the way by which messages are taken and published, `reloads` counts how often the file was
-    reloaded, `refused_reloads` how often a reload failed, `reload_error` says why it last did.
-    `unjudged` are groups that have no report, as before the first one.
-    """
+    """A relay at one moment; fields that the status has too are documented there."""
 
     node: str
     config: str
     phase: Phase
     uptime_s: float
     turned_s: float
+    """How long ago the receive loop last turned."""
     receives_by: str
     groups: tuple[GroupReport, ...]
     reloads: int = 0
     refused_reloads: int = 0
     reload_error: str | None = None
     unjudged: tuple[str, ...] = ()
-
-
-class Level(Enum):
-    """How a group fares, in DiagnosticStatus's words: STALE where nothing comes in at all."""
-
-    OK = "ok"
-    WARN = "warn"
-    ERROR = "error"
-    STALE = "stale"
+    """Groups without a report, as all are before the first one."""
 
 
 def level(report: GroupReport) -> Level:
-    """Return how a group fares."""
+    """Return the state of a group."""
     facts = report.facts
     if facts.is_silent and not any(each.figures.rate_hz for each in facts.inputs):
         return Level.STALE
@@ -62,7 +53,7 @@ def level(report: GroupReport) -> Level:
 
 
 def advice(phase: Phase, node: str) -> str | None:
-    """Say why a managed node gives nothing, and what to do; None where its state is no reason."""
+    """Say why a managed node publishes nothing and what to do; None in phases in which it should."""
     match phase:
         case Phase.UNCONFIGURED:
             return f"the node is unconfigured: configure it with `ros2 lifecycle set {node} configure`"
@@ -92,3 +83,128 @@ def _is_served(an_input: InputFacts) -> bool:
 
 def _serves(publisher: Endpoint, type_name: str | None) -> bool:
     return publisher.type == type_name and publisher.mismatch is None
+
+
+def status_of(state: RelayState) -> document.Status:
+    """Return the status of a relay."""
+    relay = document.Relay(
+        node=state.node,
+        version=own_version(),
+        config=state.config,
+        phase=state.phase,
+        ready=is_ready(state),
+        uptime_s=round(state.uptime_s, 1),
+        receives_by=state.receives_by,
+        reloads=state.reloads,
+        refused_reloads=state.refused_reloads,
+        reload_error=state.reload_error,
+        pid=os.getpid(),
+    )
+    return document.Status(relay=relay, groups=tuple(map(group_of, state.groups)))
+
+
+def group_of(report: GroupReport) -> document.Group:
+    """Return what the status of a relay says of a group."""
+    facts, figures = report.facts, report.facts.figures
+    fates = zip(facts.fates, facts.fates_lately, strict=True)
+    first = explanation(report.findings)
+    findings = (first, *(finding for finding in report.findings if finding is not first))
+    return document.Group(
+        name=facts.name,
+        policy=facts.policy,
+        level=level(report),
+        queue_size=facts.queue_size,
+        tolerance=_tolerance(facts.tolerance),
+        max_wait_ms=_ms(facts.max_wait),
+        sets=figures.sets,
+        rate_hz=round(figures.rate_hz, 3),
+        possible_hz=round(facts.possible_hz, 3),
+        since_last_set_ms=None if figures.last_set is None else _in_ms(figures.now - figures.last_set),
+        span_ms=_percentiles(figures.spans),
+        span_without_offsets_ms=_ms(report.span_without_offsets),
+        latency_ms=_percentiles(figures.latencies),
+        nearest_ms=_percentiles(figures.nearest),
+        last_sets=tuple(
+            document.SetFigures(span_ms=_in_ms(span), latency_ms=_in_ms(latency))
+            for span, latency in reversed(figures.last_sets)
+        ),
+        inputs=tuple(_input(facts, index, *each) for index, each in enumerate(fates)),
+        findings=tuple(_finding(facts, finding) for finding in findings),
+        recent=report.recent,
+    )
+
+
+def _tolerance(tolerance: Tolerance | None) -> document.Tolerance | None:
+    if tolerance is None or not tolerance.is_key:
+        return None
+    return document.Tolerance(key=tolerance.key, ms=_in_ms(tolerance.ns))
+
+
+def _input(facts: GroupFacts, index: int, fates: DropFates, lately: DropFates) -> document.Input:
+    each = facts.inputs[index]
+    figures, counts = each.figures, each.counts
+    return document.Input(
+        topic=each.name,
+        type=each.type,
+        output=each.output,
+        required=each.required,
+        offset_ms=_in_ms(each.offset),
+        rate_hz=round(figures.rate_hz, 3),
+        age_ms=None if figures.last_received is None else _in_ms(facts.figures.now - figures.last_received),
+        lag_ms=_ms(facts.lag(index)),
+        jitter_ms=_ms(figures.jitter),
+        drift_ppm=figures.drift and round(figures.drift.slope * 1e6, 1),
+        received=counts.fed,
+        matched=counts.matched,
+        buffered=counts.buffered,
+        dropped=_by_reason(counts.dropped),
+        unneeded=fates.unneeded,
+        other_drops=_by_reason(fates.others),
+        dropped_lately=_by_reason(figures.dropped),
+        unneeded_lately=lately.unneeded,
+        other_drops_lately=_by_reason(lately.others),
+        lost=each.graph.lost,
+        missing=round(facts.figures.missing[index], 3),
+        publishers=tuple(map(_endpoint, each.graph.publishers)),
+        subscribers=tuple(map(_endpoint, each.graph.subscribers)),
+    )
+
+
+def _by_reason(drops: Mapping[DropReason, int]) -> dict[str, int]:
+    return {reason.value: count for reason, count in drops.items()}
+
+
+def _endpoint(endpoint: Endpoint) -> document.Endpoint:
+    return document.Endpoint(node=endpoint.node, type=endpoint.type, mismatch=_mismatch(endpoint.mismatch))
+
+
+def _mismatch(why: Mismatch | None) -> document.Mismatch | None:
+    if why is None:
+        return None
+    return document.Mismatch(policy=why.policy, offered=why.offered, requested=why.requested)
+
+
+def _finding(facts: GroupFacts, finding: Finding) -> document.Finding:
+    return document.Finding(
+        code=finding.code.value,
+        severity=document.Level(finding.severity.name.lower()),
+        text=finding.text,
+        suggestion=finding.suggestion,
+        topic=None if finding.input is None else facts.inputs[finding.input].name,
+        topics=tuple(facts.inputs[index].name for index in finding.about),
+    )
+
+
+def _percentiles(sample: Distribution) -> document.Percentiles | None:
+    if not sample:
+        return None
+    p50, p95, most = (_in_ms(sample.quantile(share)) for share in (0.5, 0.95, 1))
+    return document.Percentiles(p50=p50, p95=p95, max=most)
+
+
+def _ms(nanoseconds: int | None) -> float | None:
+    return None if nanoseconds is None else _in_ms(nanoseconds)
+
+
+def _in_ms(nanoseconds: int) -> float:
+    return round(nanoseconds / _NS_PER_MS, 3)

@@ -15,8 +15,8 @@ from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS
 from syncrelay.errors import SyncRelayError, UsageError
 from syncrelay.printable import printable
 from syncrelay.status.announcement import Place, announced
+from syncrelay.status.document import NotAStatusError, Status, read_status
 from syncrelay.status.hosts import REFUSAL
-from syncrelay.top.state import NotAStateError, State, read_state
 
 _TIMEOUT_S: Final = 2.0
 # A relay that is just starting, or a machine under load, takes longer to be found than to be asked again.
@@ -46,7 +46,7 @@ class Answer:
 
     url: str
     document: bytes
-    state: State
+    state: Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +66,8 @@ def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -
     with closing(connection_to(url, timeout_s)) as connection:
         body = get(connection, f"{urlsplit(url).path}/status", whole_s=whole_s)
     try:
-        return Answer(url, body, read_state(body))
-    except NotAStateError as error:
+        return Answer(url, body, read_status(body))
+    except NotAStatusError as error:
         raise OtherServerError(
             f"what listens there is not a relay, or runs another version ({printable(str(error))})"
         ) from error

@@ -6,10 +6,10 @@ from typing import Final
 from rich.text import Text
 
 from syncrelay.explain import RecentDrop, RecentSet
+from syncrelay.status.document import Endpoint, Finding, Group, Input, Percentiles
 from syncrelay.top import phrases
 from syncrelay.top.names import fitted, fitted_names, short_names
 from syncrelay.top.pieces import STYLES, bar, line, sparkline, wrapped
-from syncrelay.top.state import Endpoint, Finding, Group, Input, Percentiles
 from syncrelay.top.strip import (
     MARKS,
     UNNEEDED,

@@ -7,10 +7,10 @@ from typing import Final
 from rich.text import Text
 
 from syncrelay.status import Level
+from syncrelay.status.document import Group
 from syncrelay.top import phrases
 from syncrelay.top.names import fitted
 from syncrelay.top.pieces import STYLES, line, sparkline
-from syncrelay.top.state import Group
 from syncrelay.top.view import Order
 
 _LEVEL: Final = 7

@@ -5,7 +5,7 @@ from typing import Final
 
 from syncrelay.explain import words
 from syncrelay.status import Level, Phase
-from syncrelay.top.state import Group, Input, Relay
+from syncrelay.status.document import Group, Input, Relay
 
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000

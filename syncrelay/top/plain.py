@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from textwrap import wrap
 
 from syncrelay.status import Level, advice
+from syncrelay.status.document import Finding, Group, Input, Relay, Status
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
-from syncrelay.top.state import Finding, Group, Input, Relay, State
 
 WIDTH = 80
 
@@ -16,7 +16,7 @@ def plain_text(answer: Answer) -> str:
     return "\n".join(_lines(answer))
 
 
-def summary(state: State) -> str:
+def summary(state: Status) -> str:
     """Say most of it: a line for the relay, and one for each group with what explains most."""
     return "\n".join([f"{state.relay.node}: {_of_relay(state.relay)}", *map(_summary_of, state.groups)])
 

@@ -13,11 +13,11 @@ from textual.events import Resize
 from textual.screen import Screen
 from textual.widgets import Footer, OptionList, Static
 
+from syncrelay.status.document import Group
 from syncrelay.top import group_blocks
 from syncrelay.top.group_rows import columns_of, heading, row
 from syncrelay.top.pieces import line, screenful
 from syncrelay.top.rows import MARK_WIDTH, Rows
-from syncrelay.top.state import Group
 from syncrelay.top.view import Order, View, title
 
 LEAST_WIDTH, LEAST_HEIGHT = 60, 15

@@ -9,8 +9,8 @@ from urllib.parse import urlencode, urlsplit
 
 from pydantic import Field, TypeAdapter, ValidationError
 
+from syncrelay.status.document import Text
 from syncrelay.top.client import NoAnswerError, OtherServerError, connection_to, get
-from syncrelay.top.state import Text
 
 _NAME_BYTES: Final = 8
 

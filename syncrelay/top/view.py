@@ -7,10 +7,10 @@ from typing import Final
 from rich.text import Text
 
 from syncrelay.status import Level, advice
+from syncrelay.status.document import Group
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
 from syncrelay.top.pieces import STYLES, line, wrapped
-from syncrelay.top.state import Group
 
 _WORST_FIRST: Final = (Level.ERROR, Level.STALE, Level.WARN, Level.OK)
 

@@ -9,8 +9,7 @@ from rich.console import Console
 
 from syncrelay.cli.demo import shipped_config
 from syncrelay.cli.demo_screen import Moment, frame, plain_line, summary
-from syncrelay.status import document
-from syncrelay.top.state import state_of
+from syncrelay.status import status_of
 from tests.top.rigs import Sensor, simulated
 
 CAMERA, LIDAR, IMU = "/demo/camera/image_raw", "/demo/lidar/points", "/demo/imu/data"
@@ -28,7 +27,7 @@ def moment(*without, seconds=12, total_s=20.0):
         shipped_config(), {topic: each for topic, each in RIG.items() if topic not in without}, seconds=seconds
     )
     now = state.groups[0].facts.figures.now + 300_000_000
-    return Moment(state_of(document(state)), seconds + 0.04, total_s, now)
+    return Moment(status_of(state), seconds + 0.04, total_s, now)
 
 
 def shown(drawn, *, width=80, height=24, environ=None, **options):

@@ -17,8 +17,8 @@ from syncrelay.cli.graph.layout import Placed, layout_of
 from syncrelay.cli.graph.mermaid import as_mermaid
 from syncrelay.cli.graph.svg import as_svg
 from syncrelay.config import load, load_text
-from syncrelay.status import document
-from syncrelay.top.state import read_state
+from syncrelay.status import status_of
+from syncrelay.status.document import read_status
 from tests.cli.command import ROOT, run, run_here
 from tests.top import states
 from tests.top.relay_server import serving
@@ -53,13 +53,13 @@ def drawn(text: str = _FILE, **options) -> Drawing:
 
 def hostile() -> Drawing:
     """The rig's file, and a relay that says what no relay says."""
-    told = document(states.rig())
+    told = status_of(states.rig()).as_dict()
     for group in told["groups"]:
         for each in group["findings"]:
             each["text"] = _HOSTILE
         for each in group["inputs"]:
             each["type"] = _HOSTILE
-    return drawing_of(load_text(_RIG), title=_HOSTILE, state=read_state(json.dumps(told).encode()))
+    return drawing_of(load_text(_RIG), title=_HOSTILE, state=read_status(json.dumps(told).encode()))
 
 
 _RIG = states.file(
@@ -89,7 +89,7 @@ def test_a_drawing_has_what_the_file_says():
 
 
 def test_a_running_relay_adds_rates_and_the_finding_that_explains_most():
-    drawing = drawing_of(load_text(_RIG), title="", state=read_state(json.dumps(document(states.rig())).encode()))
+    drawing = drawing_of(load_text(_RIG), title="", state=status_of(states.rig()))
     boxes = {group.box.name: group.box for group in drawing.groups}
     assert boxes["front"].lines[-1] == "OK, 10 of 10 sets/s"
     assert (boxes["front"].mark, boxes["front"].finding) == (Mark.OK, None)

@@ -21,7 +21,7 @@ from mcap.writer import Writer
 from syncrelay.cli.boundary import guarded
 from syncrelay.cli.dispatch import dispatch
 from syncrelay.cli.stop import StopRequest
-from syncrelay.status import document
+from syncrelay.status import status_of
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
 from tests.cli.command import BAD, GOOD, ROOT
@@ -184,7 +184,7 @@ def _made_hostile(value, chance):
 
 
 def _hostile_status(chance, **relay) -> bytes:
-    told = _made_hostile(document(states.rig()), chance)
+    told = _made_hostile(status_of(states.rig()).as_dict(), chance)
     told["relay"] |= relay
     # As it is, where JSON allows that: what a terminal must not see needs no escape there.
     return json.dumps(told, ensure_ascii=False).encode(errors="surrogatepass")

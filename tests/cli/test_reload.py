@@ -7,7 +7,7 @@ import pytest
 
 from syncrelay.config import Listen
 from syncrelay.explain import Tape
-from syncrelay.status import Taps, document
+from syncrelay.status import Taps, status_of
 from syncrelay.status.server import Server
 from tests.cli.command import run
 from tests.top import states
@@ -44,7 +44,7 @@ def test_of_several_relays_none_is_taken_for_the_one_that_is_meant(tmp_path, wor
 
 
 def test_a_relay_that_ends_once_it_is_found_is_gone(tmp_path):
-    whole = b"HTTP/1.1 200 OK\r\n\r\n" + json.dumps(document(states.healthy())).encode()
+    whole = b"HTTP/1.1 200 OK\r\n\r\n" + status_of(states.healthy()).as_json()
     speeches = iter([[whole]])
     with speaking(lambda: iter(next(speeches, []))) as url:
         asked = run("reload", "--url", url, folder=tmp_path)
@@ -56,7 +56,7 @@ def test_a_relay_that_ends_once_it_is_found_is_gone(tmp_path):
 
 @pytest.mark.parametrize("told", [{}, {"pid": 0}, {"pid": -1}, {"pid": 1}, {"pid": 2**70}])
 def test_what_is_no_relay_here_gets_no_signal(tmp_path, told):
-    state = document(states.healthy())
+    state = status_of(states.healthy()).as_dict()
     del state["relay"]["pid"]
     state["relay"] |= told
     with serving(states.healthy()) as server:

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from syncrelay.status import document
+from syncrelay.status import status_of
 from tests.cli.command import run
 from tests.cli.terminals import on_terminal
 from tests.top import states
@@ -35,7 +35,7 @@ def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
 def test_the_document_is_printed_as_it_came(tmp_path):
     with serving(states.rig()) as server:
         shown = run("top", "--once", "--json", "--url", server.url, folder=tmp_path)
-    assert json.loads(shown.stdout) == json.loads(json.dumps(document(states.rig())))
+    assert json.loads(shown.stdout) == json.loads(json.dumps(status_of(states.rig()).as_dict()))
 
 
 def test_where_no_relay_answers_it_says_what_to_do(tmp_path):

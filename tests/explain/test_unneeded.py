@@ -8,11 +8,10 @@ import pytest
 from syncrelay.cli.summary import summarize
 from syncrelay.explain import FOR_WANT_OF_A_PARTNER, RecentDrop, Standing, drop_fates
 from syncrelay.explain.unneeded import may_set_pace
-from syncrelay.status import RelayState, document
+from syncrelay.status import RelayState, status_of
 from syncrelay.sync import DropReason
 from syncrelay.top.group_blocks import recent_sets
 from syncrelay.top.plain import group_lines
-from syncrelay.top.state import state_of
 from tests.faults.extent import chosen
 from tests.top.rigs import Sensor, simulated
 from tests.top.states import CLOUD, IMAGE, file, group
@@ -101,7 +100,7 @@ def rig(seed: int, *, alone: int) -> Rig:
 def test_surplus_of_a_faster_camera_is_not_needed_in_any_view(seed):
     drawn = rig(seed, alone=0)
     (report,) = drawn.state.groups
-    told = document(drawn.state)
+    told = status_of(drawn.state).as_dict()
     camera, lidar = told["groups"][0]["inputs"]
     surplus = camera["received"] - camera["matched"] - camera["buffered"]
     assert lidar["matched"] + lidar["buffered"] == lidar["received"], drawn.how
@@ -112,7 +111,7 @@ def test_surplus_of_a_faster_camera_is_not_needed_in_any_view(seed):
     assert all(each["unneeded"] for each in drops), drawn.how
     assert report.told(RecentDrop(0, 1, DropReason(drops[0]["reason"]))).unneeded
     assert report.facts.standing is Standing.ENOUGH, drawn.how
-    (shown,) = state_of(told).groups
+    (shown,) = status_of(drawn.state).groups
     text = "\n".join(group_lines(shown, width=1000))
     assert f"waiting, {surplus} not needed, 0 dropped" in text, drawn.how
     strip = list(recent_sets(shown, 160))
@@ -127,7 +126,7 @@ def test_surplus_of_a_faster_camera_is_not_needed_in_any_view(seed):
 @pytest.mark.parametrize("seed", range(_RIGS))
 def test_each_message_of_a_lidar_without_a_partner_is_costly_and_no_more(seed):
     drawn = rig(seed, alone=random.Random(seed).randrange(1, 6))
-    told = document(drawn.state)
+    told = status_of(drawn.state).as_dict()
     camera, lidar = told["groups"][0]["inputs"]
     assert lidar["unneeded"] == 0, drawn.how
     assert sum(lidar["other_drops"].values()) == drawn.alone, drawn.how
@@ -148,7 +147,7 @@ def test_no_drop_is_shown_as_not_needed_where_each_may_be_why_no_set_leaves(seed
     config = file(front=group({"/camera": IMAGE, "/lidar": CLOUD}, queue_size=chance.choice([5, 20])))
     camera = Sensor(camera_hz, behind_ms=chance.choice([-1, 1]) * chance.uniform(6000, 50_000))
     state = simulated(config, {"/camera": camera, "/lidar": Sensor(lidar_hz)}, seconds=20, seed=seed)
-    told = document(state)["groups"][0]
+    told = status_of(state).as_dict()["groups"][0]
     how = f"seed {seed}, camera {camera_hz} Hz {camera.behind_ms:.0f} ms behind, lidar {lidar_hz} Hz"
     assert not any(each["drop"]["unneeded"] for each in told["recent"]), how
     assert all(each["other_drops_lately"] for each in told["inputs"]), how

@@ -8,7 +8,7 @@ import pytest
 
 from syncrelay import own_version
 from syncrelay.explain import Endpoint, Mismatch
-from syncrelay.status import Level, Phase, document, level
+from syncrelay.status import Level, Phase, group_of, level, status_of
 from tests.status.support.states import BEGAN, MS, relay, started, working
 
 STATES = {
@@ -23,11 +23,11 @@ STATES = {
 
 @pytest.mark.parametrize("state", STATES.values(), ids=STATES)
 def test_every_state_is_json_and_no_number_is_nan(state):
-    assert json.loads(json.dumps(document(state), allow_nan=False)) == document(state)
+    assert json.loads(json.dumps(status_of(state).as_dict(), allow_nan=False)) == status_of(state).as_dict()
 
 
 def test_what_is_said_of_the_relay():
-    said = document(relay(working(), reloads=3))["relay"]
+    said = status_of(relay(working(), reloads=3)).as_dict()["relay"]
     assert said.pop("version")
     assert said == {
         "node": "/syncrelay",
@@ -44,7 +44,7 @@ def test_what_is_said_of_the_relay():
 
 
 def test_what_is_said_of_a_group():
-    group = document(relay(working()))["groups"][0]
+    group = group_of(working()).as_dict()
     assert group.pop("inputs")
     assert group == {
         "name": "front",
@@ -77,7 +77,7 @@ def test_what_is_said_of_a_group():
 
 
 def test_what_is_said_of_an_input():
-    assert document(relay(working()))["groups"][0]["inputs"][0] == {
+    assert group_of(working()).as_dict()["inputs"][0] == {
         "topic": "/camera",
         "type": "sensor_msgs/msg/Image",
         "output": "/front/camera",
@@ -105,7 +105,7 @@ def test_what_is_said_of_an_input():
 
 
 def test_what_did_not_happen_yet_is_null_or_empty():
-    group = document(relay(started()))["groups"][0]
+    group = group_of(started()).as_dict()
     assert [group[key] for key in ("since_last_set_ms", "span_ms", "latency_ms", "nearest_ms")] == [None] * 4
     assert [group["inputs"][0][key] for key in ("age_ms", "lag_ms", "jitter_ms", "drift_ppm")] == [None] * 4
     assert group["last_sets"] == []
@@ -115,13 +115,15 @@ def test_a_type_is_null_until_the_graph_tells_it():
     unknown = started()
     facts = replace(unknown.facts, inputs=tuple(replace(each, type=None) for each in unknown.facts.inputs))
     said = relay(replace(unknown, facts=facts))
-    assert [each["type"] for each in document(said)["groups"][0]["inputs"]] == [None, None]
-    assert not document(said)["relay"]["ready"]
+    assert [each["type"] for each in status_of(said).as_dict()["groups"][0]["inputs"]] == [None, None]
+    assert not status_of(said).as_dict()["relay"]["ready"]
 
 
 def test_a_mismatch_says_what_is_offered_and_requested_and_a_finding_its_topic():
     mismatch = Mismatch("durability", "volatile", "transient_local")
-    group = document(relay(started(camera=(Endpoint("/usb_cam", "sensor_msgs/msg/Image", mismatch),))))["groups"][0]
+    group = status_of(relay(started(camera=(Endpoint("/usb_cam", "sensor_msgs/msg/Image", mismatch),)))).as_dict()[
+        "groups"
+    ][0]
     assert group["inputs"][0]["publishers"][0]["mismatch"] == {
         "policy": "durability",
         "offered": "volatile",
@@ -140,7 +142,7 @@ def test_a_level_is_the_worst_finding(report, expected):
 
 
 def test_durations_are_milliseconds():
-    assert document(relay(working()))["groups"][0]["tolerance"]["ms"] * MS == 20_000_000
+    assert group_of(working()).as_dict()["tolerance"]["ms"] * MS == 20_000_000
 
 
 def test_what_is_left_of_an_installation_has_no_version(tmp_path, monkeypatch):

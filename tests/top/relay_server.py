@@ -1,12 +1,11 @@
 """A relay's HTTP side without a relay: serves whatever state it is given, on a real socket."""
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
-from syncrelay.status import RelayState, document
+from syncrelay.status import RelayState, status_of
 
 
 class RelayServer:
@@ -16,13 +15,13 @@ class RelayServer:
     """
 
     def __init__(self, state: RelayState) -> None:
-        self.body = json.dumps(document(state)).encode()
+        self.body = status_of(state).as_json()
         self.port = 0
         self.asked = 0
         self.start()
 
     def show(self, state: RelayState) -> None:
-        self.body = json.dumps(document(state)).encode()
+        self.body = status_of(state).as_json()
 
     @property
     def url(self) -> str:

@@ -1,6 +1,5 @@
 """Relays of this machine are found wherever they listen, and whatever else listens beside them."""
 
-import json
 import os
 import random
 import subprocess
@@ -13,7 +12,7 @@ from hypothesis import strategies as st
 
 from syncrelay.config import Listen
 from syncrelay.explain import Tape
-from syncrelay.status import Taps, document
+from syncrelay.status import Taps, status_of
 from syncrelay.status.announcement import Place, announce, announced, places_in
 from syncrelay.status.server import Server
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask, base_urls, search
@@ -156,7 +155,7 @@ def test_who_answers_something_else_is_no_relay_and_writes_nothing_to_the_termin
 def test_any_noise_is_an_error_of_ours():
     """A document that is damaged at a few places, and lines that are no HTTP."""
     chance = random.Random(15)
-    whole = HEAD + json.dumps(document(states.rig())).encode()
+    whole = HEAD + status_of(states.rig()).as_json()
     damaged = b""
     with speaking(lambda: iter([damaged])) as url:
         for _ in range(150):

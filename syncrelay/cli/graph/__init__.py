@@ -16,7 +16,7 @@ from syncrelay.config.source import shown_name
 from syncrelay.config.wording import all_of
 
 if TYPE_CHECKING:
-    from syncrelay.top.state import State
+    from syncrelay.status.document import Status
 
 _FORMATS: Final = {"mermaid": as_mermaid, "dot": as_dot, "svg": as_svg}
 _OTHERWISE: Final = "  Without --url, the files alone are drawn."
@@ -49,7 +49,7 @@ def _drawing(config: Config, files: Sequence[str], url: str | None) -> Drawing:
     return drawing_of(config, title=f"{title}, as {state.relay.node} runs it", state=state)
 
 
-def _remark_on_others(config: Config, state: "State") -> None:
+def _remark_on_others(config: Config, state: "Status") -> None:
     """Say where the relay runs other groups than the files have."""
     drawn, running = ({group.name for group in of.groups} for of in (config, state))
     if missing := sorted(drawn - running):

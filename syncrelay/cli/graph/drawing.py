@@ -11,7 +11,7 @@ from syncrelay.explain.words import figure
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:
-    from syncrelay.top.state import Group, Input, State
+    from syncrelay.status.document import Group, Input, Status
 
 _ANY_TYPE: Final = "type from the graph"
 _MOST_WORDS: Final = 200
@@ -66,7 +66,7 @@ class Drawing:
     groups: tuple[GroupBox, ...]
 
 
-def drawing_of(config: Config, *, title: str, state: "State | None" = None) -> Drawing:
+def drawing_of(config: Config, *, title: str, state: "Status | None" = None) -> Drawing:
     """Return the drawing of a file's groups, with what a running relay says of those that it runs."""
     running = {group.name: group for group in state.groups} if state is not None else {}
     topics: dict[str, tuple[TopicConfig, Input | None]] = {}
