@@ -34,7 +34,7 @@ Tell: TypeAlias = Callable[[str], object]
 _OPENERS: Final[Mapping[bytes, Callable[[Path, str], Recording]]] = {
     mcap_file.MAGIC: lambda path, name: mcap_file.open_mcap(LocalFile(path), name),
     sqlite_file.MAGIC: sqlite_file.SqliteFile,
-    ros1_file.MAGIC: ros1_file.open_ros1,
+    ros1_file.MAGIC: ros1_file.Ros1File,
 }
 
 

@@ -1,67 +1,54 @@
-"""ROS 1 bags (format 2.0): by their index, or by one made in a first pass where there is none that can be trusted.
+"""ROS 1 bags (format 2.0), read by rosbags through the index that a closed bag ends with."""
 
-Messages are in chunks.
-"""
-
-import os
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterator
 from functools import partial
 from pathlib import Path
-from struct import Struct
 from typing import Final
 
+from rosbags.interfaces import Connection, ConnectionExtRosbag1
+from rosbags.rosbag1 import Reader, ReaderError
+from rosbags.rosbag1.reader import IndexData, decompressors
+
 from syncrelay.errors import BagError
+from syncrelay.recordings.bag.batching import batched
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import Losses
 from syncrelay.recordings.bag.names import full_type_name, topic_name
 from syncrelay.recordings.bag.qos import Profile
-from syncrelay.recordings.bag.recording import AFTER_ALL, Channel, Definition, Encoding, RawMessage, is_part
-from syncrelay.recordings.bag.ros1_records import (
-    CHUNK,
-    CHUNK_INFO,
-    CONNECTION,
-    LENGTH,
-    MESSAGE,
-    UNREADABLE,
-    Record,
-    field_of,
-    fields_of,
-    messages,
-    record_of,
-    records,
-    time_of,
-    unpacked,
-)
-from syncrelay.recordings.bag.segments import Segment, extent, read_in_order
+from syncrelay.recordings.bag.recording import AFTER_ALL, Channel, Definition, Encoding, RawMessage
+from syncrelay.recordings.bag.unpacking import unbz2, unlz4
 
 MAGIC: Final = b"#ROSBAG V2.0\n"
 """What a bag of this format begins with."""
 
-_PLACE: Final = Struct("<Q")
 _LATCHED: Final = (Profile(durability="transient_local"),)
+# rosbags keeps one unpacked chunk, and unpacks anew for each message where chunks overlap in time.
+_HELD_CHUNKS: Final = 4
+_UNPACKERS: Final = {decompressors["bz2"]: unbz2, decompressors["lz4"]: unlz4}
 
 
 class Ros1File:
     """One ROS 1 bag, opened for reading; see Recording."""
 
     def __init__(self, path: Path, name: str) -> None:
-        """Open a file that messages call `name`; raises BagError where it is encrypted."""
-        self._file = path.open("rb")
+        """Open a file that messages call `name`; raises BagError where it is encrypted or its index cannot be read."""
         self._losses = Losses(name)
-        self.size = os.fstat(self._file.fileno()).st_size
+        self.size = path.stat().st_size
         self.position = 0
-        self._effort = Effort()
-        self._by_id: dict[int, Channel] = {}
-        self._segments: list[Segment] = []
-        if self._is_encrypted():
-            self._file.close()
-            raise BagError(f"{name}: is encrypted, which is not supported")
-        if not self._read_index():
-            self._scan()
+        self._reader = _BoundedReader(path)
+        try:
+            self._reader.open()
+        except Exception as error:
+            raise BagError(f"{name}: {_why_not_opened(error, name)}") from error
+        unpacking = _Unpacking()
+        for place, chunk in self._reader.chunks.items():
+            if (unpack := _UNPACKERS.get(chunk.decompressor)) is not None:
+                bounded = partial(unpacking.unpacked, place, unpack)
+                self._reader.chunks[place] = chunk._replace(decompressor=bounded)
+        self._by_id = {each.id: _channel(each) for each in self._reader.connections}
         self.channels = tuple(self._by_id.values())
-        self.begin, self.end = extent(self._segments)
+        times = [index[end].time for index in self._reader.indexes.values() if index for end in (0, -1)]
+        self.begin, self.end = min(times, default=0), max(times, default=0)
 
     @property
     def faults(self) -> list[str]:
@@ -72,156 +59,85 @@ class Ros1File:
         self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
     ) -> Iterator[list[RawMessage]]:
         """See Recording."""
-        among = frozenset(wanted)
-        chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
-        read = partial(self._read, channels=chosen)
-        for segment, found in read_in_order(self._segments, read, self._losses, begin=begin, end=end):
-            self.position += segment.size
-            yield found
-        if not is_part(begin, end):
-            self.position = self.size
+        return batched(self._messages(frozenset(wanted), begin, end))
 
     def close(self) -> None:
         """See Recording."""
-        self._file.close()
+        if self._reader.bio is not None:
+            self._reader.close()
 
-    def _is_encrypted(self) -> bool:
-        with suppress(*UNREADABLE):
-            return bool(self._record_at(len(MAGIC)).fields.get(b"encryptor"))
-        return False
-
-    def _read_index(self) -> bool:
-        """Take channels and chunks from the end of the file; False where there is no such end, or it tells a lie."""
-        infos = []
+    def _messages(self, wanted: Collection[Channel], begin: int, end: int) -> Iterator[RawMessage]:
+        chosen = [each for each in self._reader.connections if self._by_id[each.id] in wanted]
         try:
-            header = self._record_at(len(MAGIC)).fields
-            (place,) = _PLACE.unpack(field_of(header, b"index_pos"))
-            (chunks,) = LENGTH.unpack(field_of(header, b"chunk_count"))
-            if not place or place > self.size:
-                return False
-            while place < self.size:
-                record = self._record_at(place)
-                if record.fields.get(b"op") == CONNECTION:
-                    self._connect(record.fields, self._content(record))
-                elif record.fields.get(b"op") == CHUNK_INFO and LENGTH.unpack(field_of(record.fields, b"count"))[0]:
-                    infos.append(_segment(record.fields))
-                place = record.end
-        except UNREADABLE:
-            return False
-        offsets = sorted(each.offset for each in infos)
-        ends = dict(zip(offsets, [*offsets, self.size][1:], strict=True))
-        self._segments = [replace(each, size=ends[each.offset] - each.offset) for each in infos]
-        return len(ends) == chunks and all(each.size > 0 and each.begin <= each.end for each in self._segments)
-
-    def _scan(self) -> None:
-        """Find channels and chunks by going through the file to its end, or as far as it can be read."""
-        self._by_id.clear()
-        self._segments.clear()
-        place = len(MAGIC)
-        while place < self.size:
-            try:
-                record = self._record_at(place)
-            except UNREADABLE:
-                self._losses.cut_off(place, self.size)
-                return
-            self._note(place, record)
-            place = record.end
-        if not self._has_index_place():
-            self._losses.not_closed()
-
-    def _has_index_place(self) -> bool:
-        """Tell whether the file goes as far as its header says that the index is; that is 0 until it is closed."""
-        with suppress(*UNREADABLE):
-            (place,) = _PLACE.unpack(field_of(self._record_at(len(MAGIC)).fields, b"index_pos"))
-            return bool(0 < place <= self.size)
-        return False
-
-    def _note(self, place: int, record: Record) -> None:
-        """Take in what a record of the file says."""
-        op = record.fields.get(b"op")
-        try:
-            if op == CHUNK:
-                self._note_chunk(place, record)
-            elif op == CONNECTION:
-                self._connect(record.fields, self._content(record))
-        except UNREADABLE as fault:
-            self._losses.damaged(f"the {'chunk' if op == CHUNK else 'connection'} at byte {place}", fault)
-
-    def _note_chunk(self, place: int, record: Record) -> None:
-        content = unpacked(record.fields, self._content(record), self._effort)
-        times = []
-        # Where its records end too soon is said when its messages are read.
-        with suppress(*UNREADABLE):
-            for each in records(content):
-                if each.fields.get(b"op") == CONNECTION:
-                    self._connect_in(place, each.fields, content[each.content : each.end])
-                elif each.fields.get(b"op") == MESSAGE:
-                    times.append(time_of(field_of(each.fields, b"time")))
-        if times:
-            self._effort.found_message()
-            self._segments.append(Segment(place, record.end - place, min(times), max(times)))
-
-    def _read(self, segment: Segment, channels: dict[int, Channel | None]) -> list[RawMessage]:
-        found: list[RawMessage] = []
-        try:
-            record = self._record_at(segment.offset)
-            found.extend(messages(unpacked(record.fields, self._content(record), self._effort), channels))
-            self._effort.found_message()
-        except UNREADABLE as fault:
-            self._losses.damaged(f"the chunk at byte {segment.offset}", fault, read=len(found))
-        return found
-
-    def _record_at(self, place: int) -> Record:
-        """Read the header of a record that the file has all of; raises one of UNREADABLE where it has not."""
-        header = place + LENGTH.size
-        begin = header + self._length_at(place) + LENGTH.size
-        end = begin + self._length_at(begin - LENGTH.size)
-        if end > self.size:
-            raise EOFError("it ends past the end of the file")
-        return record_of(self._bytes(header, begin - LENGTH.size - header), begin, end)
-
-    def _length_at(self, place: int) -> int:
-        (length,) = LENGTH.unpack(self._bytes(place, LENGTH.size))
-        return int(length)
-
-    def _content(self, record: Record) -> bytes:
-        return self._bytes(record.content, record.end - record.content)
-
-    def _bytes(self, place: int, size: int) -> bytes:
-        """Read bytes that the file has, or a length where it may have ended."""
-        self._file.seek(place)
-        return self._file.read(size)
-
-    def _connect_in(self, chunk: int, fields: Mapping[bytes, bytes], content: bytes) -> None:
-        try:
-            self._connect(fields, content)
-        except UNREADABLE as fault:
-            self._losses.damaged(f"a connection in the chunk at byte {chunk}", fault)
-
-    def _connect(self, fields: Mapping[bytes, bytes], content: bytes) -> None:
-        (number,) = LENGTH.unpack(field_of(fields, b"conn"))
-        if number in self._by_id:
-            return
-        about = fields_of(content)
-        self._by_id[number] = Channel(
-            number,
-            topic_name(field_of(fields, b"topic").decode()),
-            full_type_name(field_of(about, b"type").decode()),
-            Encoding.ROS1,
-            Definition("ros1msg", field_of(about, b"message_definition").decode(errors="replace")),
-            _LATCHED if about.get(b"latching") == b"1" else (),
-        )
+            # rosbags takes no connections for all of them.
+            for connection, time, payload in self._reader.messages(chosen, begin, end) if chosen else ():
+                self.position = max(self.position, self._reader.current_chunk[0])
+                yield self._by_id[connection.id], time, payload
+        except Exception as error:  # noqa: BLE001  as in open()
+            self._losses.say(f"damaged; read as far as possible: {_reason(error)}")
+        self.position = self.size
 
 
-def open_ros1(path: Path, name: str) -> Ros1File:
-    """Open a ROS 1 bag; raises BagError where nothing of it can be read."""
-    file = Ros1File(path, name)
-    if not file.channels:
-        file.close()
-        raise BagError(f"{name}: no message can be read{': ' + file.faults[0] if file.faults else ', it is empty'}")
-    return file
+class _BoundedReader(Reader):
+    """rosbags' reader, which has no bound for an index that many chunks share."""
+
+    _indexed = 0
+
+    def read_index_data(self, pos: int, indexes: dict[int, list[IndexData]]) -> None:
+        """See Reader; raises ReaderError once more was read of the index than the file holds."""
+        assert self.bio is not None  # noqa: S101  for mypy: it is called by open() alone
+        begin = self.bio.tell()
+        super().read_index_data(pos, indexes)
+        self._indexed += self.bio.tell() - begin
+        if self._indexed > self.path.stat().st_size:
+            raise ReaderError("it is larger than the file")
 
 
-def _segment(info: Mapping[bytes, bytes]) -> Segment:
-    (place,) = _PLACE.unpack(field_of(info, b"chunk_pos"))
-    return Segment(place, 0, time_of(field_of(info, b"start_time")), time_of(field_of(info, b"end_time")))
+class _Unpacking:
+    """Unpacks chunks within bounds, and keeps the last few of them."""
+
+    def __init__(self) -> None:
+        self._effort = Effort()
+        self._held: dict[int, bytes] = {}
+        self._seen: set[int] = set()
+
+    def unpacked(self, place: int, unpack: Callable[[bytes, Effort], bytes], packed: bytes) -> bytes:
+        """Return the content of the chunk at a place; raises whatever `unpack` does."""
+        content = self._held.get(place)
+        if content is None:
+            # A chunk is unpacked because the index leads to a message in it. A second time it is no new one.
+            if place not in self._seen:
+                self._effort.found_message()
+            self._seen.add(place)
+            self._held[place] = content = unpack(packed, self._effort)
+            if len(self._held) > _HELD_CHUNKS:
+                del self._held[next(iter(self._held))]
+        return content
+
+
+def _channel(connection: Connection) -> Channel:
+    about = connection.ext
+    is_latched = isinstance(about, ConnectionExtRosbag1) and about.latching == 1
+    return Channel(
+        connection.id,
+        topic_name(connection.topic),
+        full_type_name(connection.msgtype),
+        Encoding.ROS1,
+        Definition("ros1msg", connection.msgdef.data),
+        _LATCHED if is_latched else (),
+    )
+
+
+def _why_not_opened(error: Exception, name: str) -> str:
+    if "encryption" in str(error):
+        return "is encrypted, which is not supported"
+    return (
+        f"its index cannot be read: {_reason(error)}. A bag that was not closed, is cut off or damaged needs a new one:"
+        f" run `rosbag reindex {name}` of ROS 1, then read it again"
+    )
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return "there is not enough memory"
+    return (str(error) or type(error).__name__).rstrip(".")

@@ -113,19 +113,25 @@ def _mcap_bomb(folder: Path, chance: random.Random, most: int) -> Drawn:
 
 
 def _ros1_bomb(folder: Path, chance: random.Random, most: int) -> Drawn:
-    """A ROS 1 bag without an index, with a chunk in it that unpacks to much and holds one record, or zeros."""
-    whole = _ros1(folder, chance)
+    """A ROS 1 bag whose last chunk goes on with much that is no message."""
     size = _size(chance, most)
-    record = _ros1_header(op=b"\x55") + struct.pack("<I", size) + bytes(size)
-    what, content = chance.choice(((f"{size} zeros", bytes(size)), (f"a record of {size} bytes", record)))
     kind = chance.choice([*_ROS1_PACKERS])
     word, pack = _ROS1_PACKERS[kind]
+    whole = write_ros1(folder / "whole", FRAMES, chunk=500).read_bytes()
+    *_, at = _ros1_chunks(whole)
+    (header,) = struct.unpack_from("<I", whole, at)
+    begin = at + 8 + header
+    end = begin + struct.unpack_from("<I", whole, begin - 4)[0]
+    content = whole[begin:end] + bytes(size)
     data = pack(content)
-    header = _ros1_header(op=b"\x05", compression=word.encode(), size=struct.pack("<I", len(content)))
-    at = chance.choice([*_ros1_chunks(whole)])
+    chunk = _ros1_header(op=b"\x05", compression=word.encode(), size=struct.pack("<I", len(content)))
+    chunk += struct.pack("<I", len(data)) + data
+    place = whole.index(b"index_pos=") + len(b"index_pos=")
+    (index,) = struct.unpack_from("<Q", whole, place)
+    moved = struct.pack("<Q", index + len(chunk) - (end - at))
     path = folder / "rig.bag"
-    path.write_bytes(whole[:at] + header + struct.pack("<I", len(data)) + data + whole[at:])
-    return Drawn(f"a chunk at byte {at} of a ROS 1 bag, {kind}: {what}", path, FRAMES)
+    path.write_bytes(whole[:place] + moved + whole[place + 8 : at] + chunk + whole[end:])
+    return Drawn(f"a chunk of a ROS 1 bag, {kind}, with {size} zeros behind its messages", path, [])
 
 
 def _packed_file(folder: Path, chance: random.Random, most: int) -> Drawn:
@@ -219,11 +225,8 @@ def _loose_mcap(folder: Path) -> bytes:
 
 
 def _ros1(folder: Path, chance: random.Random) -> bytes:
-    """A ROS 1 bag whose header knows of no index."""
     compression = chance.choice((None, *Ros1Writer.CompressionFormat))
-    content = write_ros1(folder / "whole", FRAMES, compression=compression, chunk=500).read_bytes()
-    at = content.index(b"index_pos=") + len(b"index_pos=")
-    return content[:at] + bytes(8) + content[at + 8 :]
+    return write_ros1(folder / "whole", FRAMES, compression=compression, chunk=500).read_bytes()
 
 
 def _sqlite(folder: Path, _chance: random.Random) -> bytes:

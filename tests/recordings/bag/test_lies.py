@@ -15,13 +15,11 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType
 
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag import Channel, Encoding, open_recording
+from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.effort import Effort
-from syncrelay.recordings.bag.losses import STRAY
 from syncrelay.recordings.bag.recording import LATEST
-from syncrelay.recordings.bag.ros1_records import UNREADABLE, messages
 from syncrelay.recordings.bag.unpacking import unlz4, unzstd
-from tests.recordings.bag.making import ROS1_STORE, rig, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.bag.making import ROS1_STORE, rig, write_mcap, write_rosbag2
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.frames import Frame
 
@@ -203,18 +201,6 @@ def test_an_mcap_file_that_ends_between_two_records_is_said(tmp_path):
     assert _read(path) == (_RIG[:-1], [_NOT_CLOSED])
 
 
-def test_a_ros1_bag_that_ends_between_two_records_is_said(tmp_path):
-    path = write_ros1(tmp_path / "rig.bag", _RIG, chunk=300)
-    content = path.read_bytes()
-    with closing(open_recording([str(path)])) as recording:
-        (file,) = recording._files  # type: ignore[attr-defined]  # noqa: SLF001  of this kind alone: where its chunks are
-        second = sorted(each.offset for each in file._segments)[1]  # noqa: SLF001
-    path.write_bytes(content[:second])
-    frames, faults = _read(path)
-    assert 0 < len(frames) < len(_RIG)
-    assert faults == [_NOT_CLOSED]
-
-
 @pytest.mark.parametrize("lie", [0, 9, 2**40, 2**63, 2**64 - 1])
 def test_an_mcap_file_whose_index_lies_is_gone_through(lie, tmp_path):
     path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300, enable_crcs=False)
@@ -285,55 +271,6 @@ def test_no_frame_unpacks_to_more_than_it_can_hold():
     packed[at : at + 4] = struct.pack("<I", 2**32 - 1)
     with pytest.raises((ValueError, zstandard.ZstdError)):
         unzstd(bytes(packed), Effort())
-
-
-def _ros1_message() -> bytes:
-    """Two message records as rosbag lays them out, of connections 0 and 1."""
-    return b"".join(_ros1_record(number) for number in range(2))
-
-
-def _ros1_record(number: int) -> bytes:
-    fields = {b"op": b"\x02", b"conn": struct.pack("<I", number), b"time": struct.pack("<II", 5, 6)}
-    header = b"".join(struct.pack("<I", len(each)) + each for each in (k + b"=" + v for k, v in fields.items()))
-    return struct.pack("<I", len(header)) + header + struct.pack("<I", 3) + b"abc"
-
-
-def test_no_change_of_one_byte_of_a_ros1_message_keeps_its_chunk_from_ending():
-    content = _ros1_message()
-    channels = {number: Channel(number, "/blip", VECTOR, Encoding.ROS1) for number in range(2)}
-    assert [(time, payload) for _, time, payload in messages(content, channels)] == [(5_000_000_006, b"abc")] * 2
-    ended = 0
-    for at in range(len(content)):
-        for value in range(256):
-            changed = content[:at] + bytes([value]) + content[at + 1 :]
-            found: list[Any] = []
-            try:
-                found.extend(messages(changed, channels))
-            except UNREADABLE:
-                ended += 1
-            assert len(found) <= 2
-            assert all(each is STRAY or each[2] in changed for each in found)
-    assert ended > len(content)
-
-
-@pytest.mark.parametrize("field", [b"topic=", b"conn=", b"type=", b"message_definition="])
-def test_a_damaged_connection_of_a_ros1_bag_is_said_and_the_others_are_read(field, tmp_path):
-    path = write_ros1(tmp_path / "rig.bag", _RIG)
-    content = path.read_bytes()
-    # Without the index, and with a field that has another name in the first connection.
-    place = content.index(b"index_pos=") + len(b"index_pos=")
-    content = content[:place] + bytes(8) + content[place + 8 :]
-    path.write_bytes(content.replace(field, b"X" + field[1:], 1) if field != b"conn=" else _other_connection(content))
-    frames, faults = _read(path)
-    assert {frame.topic for frame in frames} <= {"/lidar", "/camera"}
-    assert frames
-    assert _NOT_CLOSED in faults
-    assert all(" is damaged and left out" in fault or _STRAYS in fault for fault in faults if fault != _NOT_CLOSED)
-
-
-def _other_connection(content: bytes) -> bytes:
-    at = content.index(b"conn=", content.index(b"topic=") - 60)
-    return content[:at] + b"Xonn=" + content[at + 5 :]
 
 
 def test_a_ros1_bag_without_a_message_has_its_topics(tmp_path):

@@ -156,7 +156,7 @@ def test_a_folder_may_be_named_by_its_metadata(tmp_path):
     assert _read(_rosbag2()(tmp_path) / "metadata.yaml") == (_RIG, [])
 
 
-@pytest.mark.parametrize("make", [_mcap(), _mcap(use_chunking=False), _ros1()], ids=["mcap", "mcap loose", "ros1"])
+@pytest.mark.parametrize("make", [_mcap(), _mcap(use_chunking=False)], ids=["mcap", "mcap loose"])
 def test_of_a_file_that_is_cut_off_what_is_whole_is_read(make, tmp_path):
     path = make(tmp_path)
     size = path.stat().st_size
@@ -169,14 +169,27 @@ def test_of_a_file_that_is_cut_off_what_is_whole_is_read(make, tmp_path):
     assert "cut off or damaged at byte" in fault
 
 
-def test_a_ros1_bag_that_was_never_closed_is_read(tmp_path):
+@pytest.mark.parametrize("change", ["never closed", "cut off"])
+def test_a_ros1_bag_without_an_index_is_refused_with_the_command_that_makes_one(change, tmp_path):
     path = _ros1()(tmp_path)
     content = path.read_bytes()
-    whole, _ = _read(path)
     # What the recorder writes last: where the index is.
     at = content.index(b"index_pos=") + len(b"index_pos=")
-    path.write_bytes(content[:at] + bytes(8) + content[at + 8 :])
-    assert _read(path)[0] == whole
+    path.write_bytes(content[:-200] if change == "cut off" else content[:at] + bytes(8) + content[at + 8 :])
+    with pytest.raises(BagError, match=r"rig\.bag: its index cannot be read: .* run `rosbag reindex .*rig\.bag`"):
+        _read(path)
+
+
+def test_a_ros1_bag_is_read_up_to_a_chunk_that_is_damaged(tmp_path):
+    path = _ros1(Ros1Writer.CompressionFormat.BZ2)(tmp_path)
+    content = bytearray(path.read_bytes())
+    at = content.index(b"BZh", len(content) // 2)
+    content[at : at + 20] = bytes(20)
+    path.write_bytes(content)
+    frames, (fault,) = _read(path)
+    assert [frame[:3] for frame in frames] == [frame[:3] for frame in _RIG[: len(frames)]]
+    assert 0 < len(frames) < len(_RIG)
+    assert "damaged; read as far as possible" in fault
 
 
 def test_a_damaged_chunk_is_left_out_and_named(tmp_path):
@@ -195,10 +208,10 @@ def test_a_compressed_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
     path = _packed(_ros1(), ".bz2", lambda content: bz2.compress(content)[:-200])(tmp_path)
     with pytest.raises(BagError, match=r"rig\.bag\.bz2: cut off or damaged"):
         _read(path)
-    many = write_ros1(tmp_path / "many.bag", rig(40_000), chunk=100_000)
+    many = write_mcap(tmp_path / "many.mcap", rig(40_000), chunk_size=100_000)
     packed = bz2.compress(many.read_bytes())
-    (tmp_path / "many.bag.bz2").write_bytes(packed[: len(packed) * 2 // 3])
-    frames, faults = _read(tmp_path / "many.bag.bz2")
+    (tmp_path / "many.mcap.bz2").write_bytes(packed[: len(packed) * 2 // 3])
+    frames, faults = _read(tmp_path / "many.mcap.bz2")
     assert 0 < len(frames) < 80_000
     assert any("cut off" in fault for fault in faults)
 
@@ -247,7 +260,7 @@ def test_qos_and_definitions_are_those_that_were_recorded(tmp_path):
         ("empty.mcap", b"", "is empty"),
         ("old.bag", b"#ROSBAG V1.2\n", "is a bag of a format other than 2.0"),
         ("torn.mcap", b"\x89MCAP0\r\n\x01", "no message can be read: .*cut off or damaged at byte 8 of 9"),
-        ("torn.bag", b"#ROSBAG V2.0\n\x45\0\0\0", "no message can be read: .*cut off or damaged at byte 13"),
+        ("torn.bag", b"#ROSBAG V2.0\n\x45\0\0\0", "its index cannot be read: .*rosbag reindex"),
         ("other.db3", b"SQLite format 3\0" + bytes(100), "cannot be read as a rosbag2 recording"),
     ],
 )
