@@ -12,6 +12,7 @@ from typing import Final
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from docs.generate.commands import exit_codes, relay, the_commands
+from docs.generate.facts import facts
 from docs.generate.findings import findings, matching
 from docs.generate.keys import of_file, of_group, of_model, of_topic, policies
 from docs.generate.metrics import metrics, scalars
@@ -37,6 +38,7 @@ def pages() -> Mapping[str, str]:
         "drop_reasons.md": {"reasons": tuple(DropReason)},
         "command_line.md": {"relay": relay(), "commands": the_commands(), "exit_codes": exit_codes()},
         "status.md": {"objects": objects()},
+        "facts.md": {"facts": facts()},
         "metrics.md": {"paths": PATHS_TOLD, "metrics": metrics(), "scalars": scalars()},
     }
     templates = Environment(

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from syncrelay.cli.analysis_json import as_json
 from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
-from syncrelay.cli.fleet import do_on_many, require_into
+from syncrelay.cli.fleet import do_on_many, put_facts, require_into
 from syncrelay.cli.inventory import put_inventory
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
@@ -83,22 +84,23 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 
 
 def _analyze_many(parser: Parser, arguments: Namespace, bags: Sequence[str], asked: Asked) -> int:
-    """Leave an analysis of each recording in a folder, and tell of all of them where there are groups to tell of."""
-    from syncrelay.cli.fleet_report import Views, tell_report
+    """Leave an analysis of each recording in a folder, and a table of all of them where there are groups."""
     from syncrelay.cli.fleet_tasks import AnalyzeTask
 
-    if asked.write:
-        parser.error("--write is for one recording, and --into is for many")
+    if asked.write or asked.html:
+        parser.error("--write and --html are for one recording, and --into is for many")
     if asked.text is None and not asked.topics:
-        if asked.html or asked.json or arguments.robot:
-            parser.error("--html, --json and --robot tell of groups: name a file with --config FILE, or topics")
+        if asked.json or arguments.robot:
+            parser.error("--json and --robot are about groups: name a file with --config FILE, or topics")
         return do_on_many(AnalyzeTask.of(asked), bags, arguments)
-    if arguments.robot is not None:
-        RobotPattern.parse(arguments.robot)
-    views = Views(asked.html, asked.json, arguments.robot)
-    return do_on_many(
-        AnalyzeTask.of(asked), bags, arguments, finish=lambda *_: tell_report(Path(arguments.into), views)
-    )
+    pattern = None if arguments.robot is None else RobotPattern.parse(arguments.robot)
+    # Without it hours of work would end in no table.
+    import_module("pyarrow")
+
+    def finish(*_: object) -> int:
+        return put_facts(Path(arguments.into), pattern, is_json=asked.json)
+
+    return do_on_many(AnalyzeTask.of(asked), bags, arguments, finish=finish)
 
 
 def analyze_bag(bag: str, asked: Asked) -> int:

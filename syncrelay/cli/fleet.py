@@ -19,9 +19,11 @@ from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
 from syncrelay.printable import printable
 from syncrelay.recordings.fleet.engine import Engine, Finished
+from syncrelay.recordings.fleet.facts import FleetRow
 from syncrelay.recordings.fleet.local import LocalEngine
 from syncrelay.recordings.fleet.progress import Progress
 from syncrelay.recordings.fleet.recordings import find_sources
+from syncrelay.recordings.fleet.robots import RobotPattern
 from syncrelay.recordings.fleet.run import Others, Run
 from syncrelay.recordings.fleet.task import NOTES, PROBLEMS, Source, Task
 from syncrelay.recordings.fleet.work import Failed, Job
@@ -90,6 +92,27 @@ def do_on_many(
     if finish is None:
         put(summary)
     return code
+
+
+def put_facts(folder: Path, pattern: RobotPattern | None, *, is_json: bool) -> int:
+    """Write the table of facts of a folder's results, and print a summary of it, or its rows as lines of JSON; 0."""
+    from syncrelay.recordings.fleet.summary import Summary
+    from syncrelay.recordings.fleet.table import TABLE, fleet_rows, write_rows
+
+    summary = Summary()
+
+    def rows() -> Iterator[FleetRow]:
+        for row in fleet_rows(folder, pattern):
+            summary.take(row)
+            if is_json:
+                put(row.model_dump_json())
+            yield row
+
+    write_rows(folder / TABLE, rows(), FleetRow)
+    for line in () if is_json else summary.lines():
+        put(line)
+    remark(f"wrote {folder / TABLE}: {counted(summary.rows, 'row')}; docs/howto/fleet_report.md has ten queries")
+    return DONE
 
 
 def engine_of(arguments: Namespace) -> Engine:

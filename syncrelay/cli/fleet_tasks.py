@@ -21,13 +21,15 @@ from syncrelay.recordings.bag.replay import GroupResult
 from syncrelay.recordings.bag.replay import replay as replay_groups
 from syncrelay.recordings.bag.what_if import Disturbed
 from syncrelay.recordings.bag.writing import SetWriter
-from syncrelay.recordings.fleet.documents import ANALYSIS
+from syncrelay.recordings.fleet.facts import rows_of
+from syncrelay.recordings.fleet.table import FACTS
 from syncrelay.recordings.fleet.task import (
     JSON,
     NOTES,
     PROBLEMS,
     Source,
     fingerprint_of,
+    short_hash,
     what_decides_outputs,
     what_decides_sets,
 )
@@ -35,6 +37,8 @@ from syncrelay.rig.what_if import Fault
 
 SETS: Final = "sets.mcap"
 """The file of a recording's sets in the folder of its result, as `replay -o` writes it."""
+ANALYSIS: Final = "analysis.json"
+"""The file of a recording's analysis in the folder of its result, as `analyze --json` prints it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +85,7 @@ class AnalyzeTask:
     """Writes the analysis of a recording; see Task. Facts are the sets and the findings of each group."""
 
     asked: Asked
+    file_hash: str | None
     decided_by: str
 
     @classmethod
@@ -88,7 +93,8 @@ class AnalyzeTask:
         """Return the task of what is asked of each recording."""
         file = None if asked.text is None else load_text(asked.text, name=asked.config or "<text>")
         config = "" if file is None else what_decides_sets(file.groups)
-        return cls(asked, fingerprint_of("analyze", config=config, options={"topics": list(asked.topics)}))
+        fingerprint = fingerprint_of("analyze", config=config, options={"topics": list(asked.topics)})
+        return cls(asked, short_hash(config) if config else None, fingerprint)
 
     def fingerprint(self) -> str:
         """See Task."""
@@ -113,16 +119,29 @@ class AnalyzeTask:
                     for each in analysis.groups
                 ]
                 facts = {**about(recording, bindings), "groups": groups}
+                rows = rows_of(
+                    analysis,
+                    recording=source.shown[0],
+                    problems=problems_of(recording, bindings),
+                    file=self.asked.config,
+                    file_hash=self.file_hash,
+                )
+                (folder / FACTS).write_text("".join(f"{row.model_dump_json()}\n" for row in rows), encoding="utf-8")
         (folder / ANALYSIS).write_text(f"{json.dumps(document, indent=2)}\n")
         return facts
 
 
 def about(recording: Recording, bindings: Sequence[GroupBinding], *, more: Sequence[str] = ()) -> dict[str, JSON]:
     """Return when a recording was made, and what is wrong with it: what it lacks, `more`, what could not be read."""
-    lacking = (problem for binding in bindings if not binding.is_complete for problem in binding.problems)
-    problems: list[JSON] = [*lacking, *more, *recording.faults]
+    problems: list[JSON] = [*problems_of(recording, bindings), *more]
     facts: dict[str, JSON] = {"begin": recording.begin, "end": recording.end}
     return {**facts, PROBLEMS: problems} if problems else facts
+
+
+def problems_of(recording: Recording, bindings: Sequence[GroupBinding]) -> list[str]:
+    """Return what a recording lacks, and what of it is damaged, a sentence each."""
+    lacking = (problem for binding in bindings if not binding.is_complete for problem in binding.problems)
+    return [*lacking, *recording.faults]
 
 
 def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Sequence[GroupResult]) -> dict[str, JSON]:

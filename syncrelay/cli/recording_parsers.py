@@ -28,7 +28,9 @@ def analyze() -> Parser:
         "--html", metavar="REPORT", type=output, help="write a report with charts: one HTML file, opens offline"
     )
     parser.add_argument(
-        "--json", action="store_true", help="print all figures as JSON; of several recordings, each in one line"
+        "--json",
+        action="store_true",
+        help="print all figures as JSON; of several recordings, each in one line; with --into the rows of its table",
     )
     parser.add_argument(
         "--robot",

@@ -97,8 +97,9 @@ def fingerprint_of(command: str, *, config: str, options: Mapping[str, JSON]) ->
     how fast. Two lines are equal if all of these are; the words of a line tell which one differs.
     """
     written = json.dumps(options, sort_keys=True)
-    return f"{command} version:{own_version()} config:{_short(config)} options:{_short(written)}"
+    return f"{command} version:{own_version()} config:{short_hash(config)} options:{short_hash(written)}"
 
 
-def _short(text: str) -> str:
+def short_hash(text: str) -> str:
+    """Return a hash of a text that people can compare by eye."""
     return blake2b(text.encode(errors="surrogateescape"), digest_size=8).hexdigest()

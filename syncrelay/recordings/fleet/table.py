@@ -1,0 +1,88 @@
+"""FOLDER/facts.parquet: the facts of all recordings in a folder of results, as one table."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from types import NoneType
+from typing import Annotated, Any, Final, get_args, get_origin
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pydantic import BaseModel, ValidationError
+
+from syncrelay.errors import SyncRelayError
+from syncrelay.output_files import written_whole
+from syncrelay.printable import printable
+from syncrelay.recordings.fleet.facts import FleetRow
+from syncrelay.recordings.fleet.ledger import Entry, State, read_ledger
+from syncrelay.recordings.fleet.robots import RobotPattern, common_folders, folder_below, folders_of
+
+FACTS: Final = "facts.jsonl"
+"""The file with a recording's rows in the folder of its result."""
+TABLE: Final = "facts.parquet"
+"""The file with the rows of all recordings in the folder of all results."""
+
+_AT_ONCE: Final = 1000
+_ARROW: Final[dict[object, pa.DataType]] = {
+    str: pa.string(),
+    int: pa.int64(),
+    float: pa.float64(),
+    bool: pa.bool_(),
+}
+
+
+def schema_of(model: type[BaseModel]) -> pa.Schema:
+    """Return the columns of a table whose rows are instances of a model."""
+    return pa.schema([(name, _arrow(field.annotation)) for name, field in model.model_fields.items()])
+
+
+def _arrow(kind: Any) -> pa.DataType:
+    if kind in _ARROW:
+        return _ARROW[kind]
+    arguments = get_args(kind)
+    if get_origin(kind) is tuple:
+        return pa.list_(_arrow(arguments[0]))
+    if get_origin(kind) is Annotated:
+        return _arrow(arguments[0])
+    if arguments:
+        return _arrow(next(each for each in arguments if each is not NoneType))
+    return pa.struct(list(schema_of(kind)))
+
+
+def write_rows(path: Path, rows: Iterable[BaseModel], model: type[BaseModel]) -> None:
+    """Write rows as a Parquet file, some at a time. Raises OutputError where it cannot be written."""
+    schema = schema_of(model)
+    with written_whole(path) as scratch, pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
+        batch: list[dict[str, Any]] = []
+        for row in rows:
+            batch.append(row.model_dump())
+            if len(batch) == _AT_ONCE:
+                writer.write_table(pa.Table.from_pylist(batch, schema))
+                batch = []
+        writer.write_table(pa.Table.from_pylist(batch, schema))
+
+
+def fleet_rows(folder: Path, pattern: RobotPattern | None) -> Iterator[FleetRow]:
+    """Yield the rows of all recordings that a folder has results of, and of those that failed, by the results' names.
+
+    Without a pattern, a robot is the first folder below the one that all recordings lie in.
+    """
+    entries = [entry for entry in read_ledger(folder) if entry.state is not State.REMOVED]
+    common: tuple[str, ...] | None = None
+    for entry in entries:
+        folders = folders_of(entry.recording[0])
+        common = folders if common is None else common_folders(common, folders)
+    for entry in entries:
+        place = entry.recording[0]
+        robot = pattern.robot_of(place) if pattern else folder_below(common or (), folders_of(place))
+        for row in _rows_of(folder, entry):
+            yield row.model_copy(update={"robot": robot and printable(robot), "size_bytes": entry.size or None})
+
+
+def _rows_of(folder: Path, entry: Entry) -> list[FleetRow]:
+    if entry.state is State.FAILED:
+        return [FleetRow(recording=entry.recording[0], error=entry.error)]
+    result = folder / entry.name
+    try:
+        return [FleetRow.model_validate_json(line) for line in (result / FACTS).read_bytes().splitlines()]
+    except (OSError, ValidationError) as error:
+        raise SyncRelayError(f"{result / FACTS}: cannot be read: remove {result}, and run the command again") from error

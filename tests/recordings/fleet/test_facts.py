@@ -1,0 +1,258 @@
+"""A fleet drawn at random, analyzed from the command line; the ten queries of the docs find what was drawn."""
+
+import json
+import random
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import pyarrow.parquet as pq
+import pytest
+
+from syncrelay.errors import UsageError
+from syncrelay.recordings.fleet.facts import FindingFacts, FleetRow, SuggestedValue
+from syncrelay.recordings.fleet.ledger import Entry, Ledger, State
+from syncrelay.recordings.fleet.recordings import result_name
+from syncrelay.recordings.fleet.robots import RobotPattern
+from syncrelay.recordings.fleet.summary import Summary
+from syncrelay.recordings.fleet.table import fleet_rows
+from tests.cli.command import ROOT, run
+from tests.hostile_names import assert_shown_safely, hostile_name
+from tests.recordings.bag.making import write_mcap
+from tests.recordings.fleet.fleets import FILE, file_text
+from tests.ros.streams import at, merged
+
+_SEED = 29
+_DRAWN = 30
+_LASTS_S = 8
+_DAYS = ("2023-11-14", "2023-11-15", "2023-11-16")
+_QUERIES = re.findall(r"```sql\n(.*?)```", (ROOT / "docs" / "howto" / "fleet_report.md").read_text(), re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A recording whose truth is known: what befell it, where it lies, its day, and the camera's rate."""
+
+    kind: str
+    name: str
+    robot: str
+    day: int
+    rate_hz: int
+
+    @property
+    def share(self) -> float | None:
+        """Of its possible sets, with slop 5 ms; the last one may lack the message that would prove it the best."""
+        return {"torn": None, "missing": 0, "wide": 0}.get(self.kind, 1)
+
+    def write(self, folder: Path) -> None:
+        path = folder / self.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if self.kind == "torn":
+            path.write_bytes(b"no recording")
+            return
+        period, begin = 1000 // self.rate_hz, self.day * 86_400_000
+        times = range(0, _LASTS_S * 1000, period)
+        apart = 15 if self.kind == "wide" else 3
+        last = {"half": _LASTS_S * 500, "missing": 0}.get(self.kind, _LASTS_S * 1000)
+        lidar = at("/lidar", *(begin + time + apart for time in times if time < last))
+        write_mcap(path, merged(at("/camera", *(begin + time for time in times)), lidar))
+
+
+def _draw() -> list[Drawn]:
+    chance = random.Random(_SEED)
+    kinds = ("good", "good", "wide", "half", "missing", "torn")
+    recordings = []
+    for number in range(_DRAWN):
+        robot, day = f"robot_{chance.randrange(4)}", chance.randrange(3)
+        kind, rate_hz = chance.choice(kinds), chance.choice((5, 10, 20))
+        recordings.append(Drawn(kind, f"bags/{robot}/{day}/{kind}_{number}.mcap", robot, day, rate_hz))
+    return recordings
+
+
+class Fleet:
+    """The drawn recordings, what the command printed of them, and the answers to the queries, by recordings' names."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.drawn = _draw()
+        for each in self.drawn:
+            each.write(folder)
+        for slop, into in (("5ms", "old"), ("20ms", "new")):
+            (folder / FILE).write_text(file_text(slop=slop))
+            words = ("analyze", "bags", "--config", FILE, "--into", into, "--jobs", "2", "--robot", "{robot}/{day}/*")
+            self.ended = run(*words, folder=folder)
+            assert self.ended.returncode == 1, self.ended.stderr
+        self.as_json = run(*words, "--json", folder=folder).stdout
+        (folder / "out").symlink_to("old")
+
+    def of(self, *kinds: str) -> set[str]:
+        return {each.name for each in self.drawn if each.kind in kinds}
+
+    def ask(self, number: int) -> list[dict[str, Any]]:
+        """The rows that a query of the page gives."""
+        with duckdb.connect() as connection:
+            connection.execute(f"SET file_search_path='{self.folder}'")
+            found = connection.sql(_QUERIES[number])
+            rows = [dict(zip(found.columns, values, strict=True)) for values in found.fetchall()]
+        for row in rows:
+            if "recording" in row:
+                row["recording"] = row["recording"].removeprefix(f"{self.folder}/")
+        return rows
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    drawn = Fleet(tmp_path_factory.mktemp("facts"))
+    assert min(Counter(each.kind for each in drawn.drawn).values()) > 1
+    return drawn
+
+
+def test_the_worst_recordings_come_first(fleet):
+    rows = fleet.ask(0)
+    worst = fleet.of("wide", "missing")
+    assert {row["recording"] for row in rows[: len(worst)]} == worst
+    assert [row["share"] for row in rows] == sorted(row["share"] for row in rows)
+
+
+def test_groups_below_80_percent_are_counted(fleet):
+    (row,) = fleet.ask(1)
+    assert (row["group_name"], row["below"]) == ("front", len(fleet.of("wide", "missing")))
+    assert row["recordings"] == _DRAWN - len(fleet.of("torn"))
+
+
+def test_a_robots_days_have_the_mean_of_their_shares(fleet):
+    shares: dict[tuple[str, str], list[float]] = {}
+    for each in fleet.drawn:
+        if each.share is not None:
+            shares.setdefault((each.robot, _DAYS[each.day]), []).append(each.share)
+    rows = fleet.ask(2)
+    assert [(row["robot"], row["day"]) for row in rows] == sorted(shares)
+    for row in rows:
+        drawn = shares[row["robot"], row["day"]]
+        assert row["recordings"] == len(drawn)
+        assert row["mean_share"] == pytest.approx(sum(drawn) / len(drawn), abs=0.05)
+
+
+def test_findings_are_counted_by_recordings(fleet):
+    rows = fleet.ask(3)
+    counts = {row["code"]: row["recordings"] for row in rows}
+    assert counts["over_slop"] == len(fleet.of("wide"))
+    assert counts["no_publisher"] == len(fleet.of("missing"))
+    assert [*counts.values()] == sorted(counts.values(), reverse=True)
+
+
+def test_a_topic_that_is_missing_is_counted(fleet):
+    (row,) = fleet.ask(4)
+    assert (row["topic"], row["missing"]) == ("/lidar", len(fleet.of("missing")))
+    assert row["recordings"] == _DRAWN - len(fleet.of("torn"))
+
+
+def test_another_slop_is_tried_on_the_whole_fleet(fleet):
+    both = [each for each in fleet.drawn if each.kind in ("good", "wide", "half")]
+    # A set holds a message of the lidar, which is there half the time or always.
+    sets = {each: each.rate_hz * _LASTS_S / (2 if each.kind == "half" else 1) for each in both}
+    for row in fleet.ask(5):
+        given = sum(sets[each] for each in both if row["slop_ms"] >= (15 if each.kind == "wide" else 3))
+        assert row["share"] == pytest.approx(given / sum(sets.values()), abs=0.05), row
+
+
+def test_two_releases_of_a_file_differ_where_slop_decides(fleet):
+    rows = fleet.ask(6)
+    assert {row["recording"] for row in rows} == fleet.of("wide")
+    assert all(row["old_share"] == 0 and row["change"] > 0.9 for row in rows)
+
+
+def test_what_could_not_be_read_is_listed_with_the_reason(fleet):
+    rows = fleet.ask(7)
+    assert {row["recording"] for row in rows if row["error"]} == fleet.of("torn")
+    assert {row["recording"] for row in rows if row["problems"]} == fleet.of("missing")
+
+
+def test_sensors_that_were_silent_are_listed(fleet):
+    rows = fleet.ask(8)
+    assert {row["recording"] for row in rows} == fleet.of("half", "missing")
+    assert {row["topic"] for row in rows} == {"/lidar"}
+
+
+def test_rates_are_spread_as_they_were_drawn(fleet):
+    for row in fleet.ask(9):
+        assert (row["least"], row["greatest"]) == pytest.approx((5, 20), rel=0.01), row
+    assert len(_QUERIES) == 10
+
+
+def test_the_lines_of_json_are_the_rows_of_the_table(fleet):
+    rows = [json.loads(line) for line in fleet.as_json.splitlines()]
+    assert rows == pq.read_table(fleet.folder / "new" / "facts.parquet").to_pylist()
+    torn = next(row for row in rows if row["error"])
+    assert (torn["group_name"], torn["share"], torn["inputs"]) == (None, None, [])
+
+
+def test_the_summary_is_one_screen_about_the_same(fleet):
+    lines = fleet.ended.stdout.splitlines()
+    torn, missing = len(fleet.of("torn")), len(fleet.of("missing"))
+    assert lines[0].startswith(f"{_DRAWN - torn} recordings of 4 robots, ")
+    assert lines[0].endswith(", 2023-11-14 to 2023-11-16")
+    assert lines[1].startswith(f"not analyzed: {torn} recordings, such as ")
+    assert lines[2].endswith(f"below 80 % in {missing} of {_DRAWN - torn} rows")
+    assert len(lines) <= 22
+    assert max(map(len, lines)) <= 80
+    assert f"facts.parquet: {_DRAWN} rows" in fleet.ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("pattern", "places", "robots"),
+    [
+        ("{robot}/{day}/*.mcap", ["/data/r1/mon/a_1.mcap", "/data/r2/mon/c.mcap"], ["r1", "r2"]),
+        ("/data/*/{robot}/*", ["/data/r1/mon/a_1.mcap", "/data/r1/tue/b_1.mcap"], ["mon", "tue"]),
+        ("{robot}_*.mcap", ["/data/r1/a_1.mcap", "/data/c.mcap"], ["a", None]),
+        ("/data/**/{robot}.mcap", ["/data/r1/mon/a_1.mcap", "/data/r2/c.mcap"], ["a_1", "c"]),
+        ("/elsewhere/{robot}/**", ["/data/r1/a.mcap"], [None]),
+        ("r?/{day}/{robot}.mcap", ["/data/r1/mon/a_1.mcap"], ["a_1"]),
+        (None, ["/data/r1/a.mcap", "/data/r1/b.mcap"], [None, None]),
+        (None, ["/data/r1/a.mcap", "/data/b.mcap"], ["r1", None]),
+        (None, ["/data/r1/x/a.mcap", "/data/r1/y/c.mcap", "/data/r2/z.mcap"], ["r1", "r1", "r2"]),
+        (None, ["s3://days/r1/a.mcap", "s3://days/r2/a.mcap"], ["r1", "r2"]),
+        (None, ["/a.mcap", "s3://x/b.mcap"], ["", "s3:"]),
+    ],
+)
+def test_a_robot_is_what_its_path_says(pattern, places, robots, tmp_path):
+    with Ledger(tmp_path) as ledger:
+        for place in places:
+            ledger.append(Entry(result_name(place), State.FAILED, (place,), "analyze version:1", error="torn"))
+    rows = fleet_rows(tmp_path, None if pattern is None else RobotPattern.parse(pattern))
+    assert {row.recording: row.robot for row in rows} == dict(zip(places, robots, strict=True))
+
+
+@pytest.mark.parametrize("pattern", ["*/*.mcap", "{robot}/{robot}", "", "{Robot}/*"])
+def test_a_pattern_without_one_robot_is_refused(pattern):
+    with pytest.raises(UsageError, match=r"expected \{robot\} once"):
+        RobotPattern.parse(pattern)
+
+
+def test_no_name_moves_a_cursor_begins_a_line_or_runs_off_the_screen():
+    chance = random.Random(_SEED)
+
+    def name() -> str:
+        return hostile_name(chance)
+
+    summary = Summary()
+    for share in (None, 0.0, 0.3, 0.9):
+        found = FindingFacts(code=name(), severity="warn", topic=name(), seconds=9, text=name(), suggestion=name())
+        value = SuggestedValue(key=name(), topic=name(), value=name())
+        row = FleetRow(
+            recording=f"/{name()}/{name()}",
+            robot=name(),
+            error=name() if share is None else None,
+            group_name=None if share is None else name(),
+            share=share,
+            findings=(found,),
+            suggestions=(value,),
+        )
+        assert row.model_dump_json().isprintable()
+        summary.take(row)
+    lines = list(summary.lines())
+    assert_shown_safely("\n".join(lines))
+    assert max(map(len, lines)) <= 80
