@@ -93,12 +93,13 @@ class Noise(TypedDict):
 
 @dataclass(frozen=True)
 class Line:
-    """A line of the log: at which second, and whether it warns."""
+    """A line of the log: at which second, whether it warns, and of which finding about which topics."""
 
     second: float
     warns: bool
     text: str
     code: str | None
+    topics: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,10 @@ class Told:
     def ever_found(self) -> set[str]:
         """The codes of all that was ever found to be wrong, whether it lasted or not."""
         return {each.code.value for _, found in self.found for each in found if each.severity is not Severity.OK}
+
+    def says_only(self, code: str, *topics: str) -> bool:
+        """Whether the log warns of one cause alone, at first about these topics; of the group where there are none."""
+        return self.codes == {code} and self.first.topics == set(topics)
 
     def findings(self, code: str) -> list[tuple[float, Finding]]:
         """All findings of one code, with their seconds."""
@@ -340,4 +345,6 @@ class _Relay:
             self._hears(second, self.facts, found, remarks)
         for remark in remarks:
             code = remark.code and remark.code.value
-            self.lines.append(Line(second, remark.severity is not Severity.OK, remark.text, code))
+            about = [index for finding in remark.findings[:1] for index in finding.about]
+            topics = frozenset(self.facts.inputs[index].name for index in about)
+            self.lines.append(Line(second, remark.severity is not Severity.OK, remark.text, code, topics))

@@ -1,27 +1,19 @@
 """What is found of a group that a clock triggers: its rate, inputs that stop, stamps off the clock or too old."""
 
+import re
+
 import pytest
 
-from syncrelay.config import Distance, load_text
-from syncrelay.explain import Code, GroupWatch, InputGraph, Judge, Severity, Tolerance, judge, with_ok
+from syncrelay.config import load_text
+from syncrelay.explain import Code, GroupWatch, InputGraph, Judge, Severity, judge, with_ok
 from syncrelay.explain.dry_run import EngineDriver
-from syncrelay.explain.facts import ClockState, Endpoint
+from syncrelay.explain.facts import Endpoint
 from syncrelay.sync import Match, Message
 from tests.explain.support.cases import LIDAR, camera
+from tests.explain.support.cases_stamps import AT_TICKS
 from tests.explain.support.groups import BEGAN, MS, S, a_group, a_silent_group, an_input
 
 IMAGE = "sensor_msgs/msg/Image"
-CLOCKED = {
-    "policy": "latest_time",
-    "ticks_hz": 30.0,
-    "tolerance": Tolerance("max_age", 200 * MS),
-    "distance": Distance.AGE,
-    "repeats": True,
-}
-
-
-def figures_of(delay, pace_hz=10.0):
-    return {"delay": None, "delays": (delay,) * 20, "pace_hz": pace_hz}
 
 
 def watched(keys, streams, *, until_s, own=""):
@@ -64,7 +56,7 @@ def watched(keys, streams, *, until_s, own=""):
 def test_a_group_that_is_well_runs_at_the_rate_of_its_clock():
     (finding,) = watched("trigger: 30 Hz", {"camera": (33, 5, 30_000), "lidar": (100, 20, 30_000)}, until_s=20)[-1]
     assert finding.code is Code.HEALTHY
-    assert finding.text.startswith("30 of 30 possible sets a second")
+    assert finding.text.startswith("30 of 30 ")
 
 
 def test_an_input_that_stopped_is_why_no_set_leaves():
@@ -80,20 +72,19 @@ def test_messages_that_are_too_old_at_ticks_are_found_and_the_value_that_is_told
     streams = {"camera": (33, 5, 40_000), "lidar": (100, 30, 40_000)}
     (finding,) = watched(f"trigger: 30 Hz\n    max_age: {max_age}", streams, until_s=30)[-1]
     assert (finding.code, finding.severity) == (Code.OVER_SLOP, code)
-    assert finding.text.startswith("at a tick, the latest message of /lidar is 30 ms to 130 ms old, max_age is")
-    assert finding.suggestion == "write `max_age: 180ms`"
+    assert "/lidar is 30 ms to 130 ms" in finding.text
+    assert "`max_age: 180ms`" in (finding.suggestion or "")
     assert watched("trigger: 30 Hz\n    max_age: 180ms", streams, until_s=30)[-1][0].code is Code.HEALTHY
 
 
-@pytest.mark.parametrize(("trigger", "when"), [("30 Hz", "a tick"), ("/camera", "a message of /camera")])
-def test_an_input_that_is_too_old_for_its_own_age_is_found_and_the_value_that_is_told_cures(trigger, when):
+@pytest.mark.parametrize("trigger", ["30 Hz", "/camera"])
+def test_an_input_that_is_too_old_for_its_own_age_is_found_and_the_value_that_is_told_cures(trigger):
     streams = {"camera": (33, 5, 40_000), "lidar": (33, 5, 40_000), "map": (1000, 5, 40_000)}
     keys = f"trigger: {trigger}\n    max_age: 100ms"
     (finding,) = watched(keys, streams, until_s=30, own=", max_age: 300ms")[-1]
     assert (finding.code, finding.severity) == (Code.OVER_SLOP, Severity.WARN)
-    assert finding.text.startswith(f"at {when}, the latest message of /map is ")
-    assert finding.text.endswith("old, max_age is 300 ms")
-    assert finding.suggestion == "write `max_age: 1.3s` at /map"
+    assert "/map" in finding.text
+    assert "`max_age: 1.3s` at /map" in (finding.suggestion or "")
     assert watched(keys, streams, until_s=30, own=", max_age: 1.3s")[-1][0].code is Code.HEALTHY
 
 
@@ -108,39 +99,17 @@ def test_what_is_sent_once_and_may_be_old_leaves_a_group_healthy(trigger):
 def test_a_longer_wait_is_offered_where_messages_are_only_late():
     streams = {"camera": (33, 5, 40_000), "lidar": (100, 150, 40_000)}
     (finding,) = watched("trigger: 30 Hz\n    max_age: 120ms", streams, until_s=30)[-1]
-    assert finding.suggestion == "write `max_age: 350ms`, or `max_wait: 200ms`, which delays every set by that"
+    assert re.findall("`.*?`", finding.suggestion or "") == ["`max_age: 350ms`", "`max_wait: 200ms`"]
     cured = watched("trigger: 30 Hz\n    max_age: 120ms\n    max_wait: 200ms", streams, until_s=30)[-1]
     assert cured[0].code is Code.HEALTHY
 
 
-@pytest.mark.parametrize(
-    ("delay", "facts", "text"),
-    [
-        (3 * 86_400 * S, {}, "stamps of all inputs are 3 days behind this machine's clock, which triggers the sets"),
-        (-40 * S, {}, "stamps of all inputs are 40 s ahead of this machine's clock, which triggers the sets"),
-        (40 * S, {"is_recorded": True}, "stamps of all inputs are 40 s behind the recorder's clock, which triggers"),
-        (40 * S, {"clock": ClockState(received=True)}, "stamps of all inputs are 40 s behind /clock, which triggers"),
-    ],
-)
-def test_stamps_that_are_off_the_clock_are_found(delay, facts, text):
-    inputs = [an_input(name, figures=figures_of(delay)) for name in ("/camera", "/lidar")]
-    (finding,) = judge(a_silent_group(*inputs, **CLOCKED, **facts))
-    assert (finding.code, finding.severity, finding.input) == (Code.OTHER_CLOCK, Severity.ERROR, None)
-    assert finding.text.startswith(text)
-
-
-def test_of_one_input_off_the_clock_its_name_is_told():
-    (finding,) = judge(a_silent_group(camera(figures=figures_of(40 * S)), LIDAR, **CLOCKED))
-    assert (finding.code, finding.input) == (Code.OTHER_CLOCK, 0)
-    assert "/camera are 40 s behind" in finding.text
-
-
 def test_old_stamps_do_not_matter_where_any_age_will_do():
-    inputs = [an_input(name, figures=figures_of(40 * S)) for name in ("/camera", "/lidar")]
-    found = judge(a_silent_group(*inputs, **{**CLOCKED, "tolerance": None}))
+    inputs = [an_input(name, figures={"delay": None, "delays": (40 * S,) * 20}) for name in ("/camera", "/lidar")]
+    found = judge(a_silent_group(*inputs, **{**AT_TICKS, "tolerance": None}))
     assert Code.OTHER_CLOCK not in [each.code for each in found]
 
 
 def test_every_input_is_held_so_one_that_repeats_its_stamp_is_no_fault():
     repeating = camera(figures={"duplicates": 50})
-    assert judge(a_group(repeating, LIDAR, **{**CLOCKED, "tolerance": None})) == ()
+    assert judge(a_group(repeating, LIDAR, **{**AT_TICKS, "tolerance": None})) == ()

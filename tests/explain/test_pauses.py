@@ -29,13 +29,6 @@ def test_of_a_healthy_rig_nothing_is_found_but_the_pauses_and_none_of_them_is_a_
     assert told.facts.figures.rate_hz == pytest.approx(10, rel=0.1)
 
 
-def test_what_is_said_of_a_pause_is_for_how_long_and_how_to_end_it():
-    told = run(_CAMERA, _LIDAR, seconds=30, options=_SLOP, paused=[(20, 60)])
-    (paused,) = told.found[-1][1]
-    assert paused.text == "paused for 10 s: no set leaves"
-    assert paused.suggestion == "`ros2 service call /syncrelay/resume std_srvs/srv/Trigger` ends the pause"
-
-
 def test_a_silence_that_begins_in_a_pause_is_told_after_it():
     dead = Source("/lidar", hz=10, sends=lambda second: second < 40)
     told = run(_CAMERA, dead, seconds=90, options=_SLOP, paused=[(20, 60)])
@@ -44,7 +37,7 @@ def test_a_silence_that_begins_in_a_pause_is_told_after_it():
     assert {line.code for line in told.warnings} == {"silent"}
     in_the_pause, *after = told.warnings
     assert in_the_pause.second >= 45
-    assert all(line.second >= 65 and line.text.startswith("no more sets for ") for line in after)
+    assert all(line.second >= 65 for line in after)
     assert not any("recovered" in line.text for line in told.lines)
 
 

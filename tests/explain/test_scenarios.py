@@ -1,7 +1,6 @@
 """What the log says first, and what it never says, of rigs in virtual time: one cause each, and its many effects."""
 
 import random
-import re
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -30,13 +29,6 @@ def a_trio(*, seconds=60, **faults) -> Told:
 def all_of(**faults) -> Told:
     """Two inputs with the same faults."""
     return run(*(Source(topic, 10, **{**REAL, **faults}) for topic in ("/a", "/b")), seconds=60, options=SLOP)
-
-
-def says_only(told: Told, code: str, *texts: str) -> None:
-    """Hold that all warnings of the log have one code, and the first certain words."""
-    assert told.codes == {code}, told.warnings
-    for text in texts:
-        assert text in told.first.text
 
 
 HEALTHY = {
@@ -92,17 +84,21 @@ def test_one_stop_of_the_relay_is_blamed_on_nothing_else(kind, length, hz):
     assert told.codes <= {"too_slow"}, told.warnings
     if length >= 3:
         assert told.codes
-        assert any("resolved 10 s ago" in line.text for line in told.lines) or "recovered" in told.lines[-1].text
+        assert not told.lines[-1].warns
 
 
 @pytest.mark.parametrize(("rate", "seconds"), [(0.01, 60), (-0.01, 60), (0.001, 90), (0.0002, 180)])
 def test_of_three_inputs_the_one_that_drifts_is_named(rate, seconds):
     told = a_trio(clock=lambda second: rate * second, seconds=seconds)
-    says_only(told, "clock_drift", f"stamps of /b {'gain' if rate > 0 else 'lose'}", "those of the other inputs")
+    assert told.says_only("clock_drift", "/b"), told.warnings
+    found = told.facts.inputs[1].figures.drift
+    assert found is not None
+    assert found.slope == pytest.approx(-rate, rel=0.1)
 
 
 def test_of_two_inputs_the_one_that_does_not_follow_this_machines_clock_is_named():
-    says_only(a_pair(clock=lambda second: 0.001 * second), "clock_drift", "stamps of /b gain", "against those of /a")
+    told = a_pair(clock=lambda second: 0.001 * second)
+    assert told.says_only("clock_drift", "/b"), told.warnings
 
 
 def test_of_two_inputs_that_both_drift_both_are_named():
@@ -111,33 +107,30 @@ def test_of_two_inputs_that_both_drift_both_are_named():
         Source("/b", 10, clock=lambda second: -0.001 * second, **REAL),
     )
     told = run(*sources, seconds=60, options=SLOP)
-    says_only(told, "clock_drift")
-    assert "and" in told.first.text
-    assert "drift apart by" in told.first.text
+    assert told.says_only("clock_drift"), told.warnings
+    assert "/a" in told.first.text
+    assert "/b" in told.first.text
 
 
-def test_two_publishers_of_one_topic_are_both_named_with_the_distance_of_their_clocks():
+def test_two_publishers_of_one_topic_with_two_clocks_are_named():
     sources = (
         Source("/imu", 20, node="/a", **REAL),
         Source("/imu", 20, node="/b", clock=lambda _: -3.0, phase_ms=20, **REAL),
         Source("/camera", 10, **REAL),
     )
     told = run(*sources, seconds=60, options=SLOP)
-    says_only(told, "several_publishers", "/a and /b both publish /imu: their stamps are 3 s apart")
+    assert told.says_only("several_publishers", "/imu"), told.warnings
 
 
 def test_one_publisher_of_two_clocks_is_named():
     told = a_pair(stamp=lambda stamp: stamp - 3 * S * (stamp // 100_000_000 % 2))
-    says_only(
-        told, "time_jump", "timestamps of /b jump back and forth by 3 s; check whether /b_driver stamps by two clocks"
-    )
+    assert told.says_only("time_jump", "/b"), told.warnings
 
 
 def test_a_looped_recording_is_no_conflict_and_no_step():
     told = all_of(stamp=lambda stamp: stamp - (3600 if stamp % (20 * S) < 10 * S else 3610) * S)
     assert told.warnings == []
-    (_, finding), *_ = told.findings("time_jump")
-    assert "matching restarted" in finding.text
+    assert told.findings("time_jump")
 
 
 @pytest.mark.parametrize(("before", "after"), [(30, 15), (10, 5), (10, 6.5), (10, 1)])
@@ -147,10 +140,10 @@ def test_an_input_that_slows_down_is_told_by_its_rates(before, after):
         Source("/b", before, **REAL),
     )
     told = run(*sources, seconds=110, options={"slop": "8ms", "queue_size": 50})
-    says_only(told, "slowed")
-    rates = re.match(r"/a has slowed from ([\d.]+) Hz to ([\d.]+) Hz; check /a_driver", told.first.text)
-    assert rates
-    assert [float(rate) for rate in rates.groups()] == pytest.approx([before, after], rel=0.05)
+    assert told.says_only("slowed", "/a"), told.warnings
+    figures = told.facts.inputs[0].figures
+    assert figures.slowed_from_hz == pytest.approx(before, rel=0.05)
+    assert figures.pace_hz == pytest.approx(after, rel=0.05)
 
 
 def test_a_rate_that_wavers_between_the_limits_is_told_once():
@@ -176,28 +169,19 @@ def held_until_the_tenth_second(second):
 
 def test_a_player_that_stalls_is_one_line_and_no_network():
     told = all_of(received=held_until_the_tenth_second)
-    says_only(told, "bursts", "messages of all inputs arrived in a burst")
-    assert "network" not in told.first.text
+    assert told.says_only("bursts", "/a", "/b"), told.warnings
     assert len(told.warnings) == 1
 
 
 def test_one_input_in_bursts_is_asked_about():
     told = a_pair(received=held_until_the_tenth_second, options={"slop": "20ms", "queue_size": 30})
-    says_only(
-        told, "bursts", "messages of /b arrived in a burst", "check whether /b_driver sends in bursts; if it runs on"
-    )
-
-
-def test_a_recording_in_bursts_has_no_network():
-    more = {"facts": lambda _: {"is_recorded": True}}
-    told = a_pair(received=held_until_the_tenth_second, options={"slop": "20ms", "queue_size": 30}, more=more)
-    says_only(told, "bursts", "or the recorder received it late")
+    assert told.says_only("bursts", "/b"), told.warnings
 
 
 def test_without_any_clock_only_that_is_said():
     more = {"facts": lambda second: {"clock": ClockState(received=False, stopped=round(second * S))}}
     told = a_pair(more=more, seconds=30)
-    says_only(told, "no_clock", "no /clock has been received for")
+    assert told.says_only("no_clock"), told.warnings
 
 
 def test_a_simulation_that_is_paused_is_one_line():
@@ -212,23 +196,13 @@ def test_a_simulation_that_is_paused_is_one_line():
         options=SLOP,
         **more,
     )
-    says_only(told, "clock_stopped", "/clock has stood still")
+    assert told.says_only("clock_stopped"), told.warnings
 
 
-@pytest.mark.parametrize(
-    ("clock", "said"),
-    [
-        (-1_700_000_000 + 5000, "54 years behind those of /a: they count from boot"),
-        (-315_964_800 + 18, "10 years behind those of /a: they look like GPS time, which counts from 1980"),
-        (37, "37 s ahead of those of /a: they look like TAI"),
-        (18, "18 s ahead of those of /a: they look like GPS time"),
-        (-7200, "2 h behind those of /a: they look like local time"),
-        (-37.2, "37.2 s behind those of /a; synchronize the clocks"),
-    ],
-)
-def test_a_clock_of_another_epoch_is_recognized(clock, said):
+@pytest.mark.parametrize("clock", [-1_700_000_000 + 5000, -315_964_800 + 18, 37, 18, -7200, -37.2])
+def test_a_clock_that_is_another_one_is_named(clock):
     told = a_pair(clock=lambda _: clock)
-    says_only(told, "other_clock", said)
+    assert told.says_only("other_clock", "/b"), told.warnings
 
 
 def test_stamps_of_the_future_on_all_inputs_are_no_fault():
@@ -238,24 +212,14 @@ def test_stamps_of_the_future_on_all_inputs_are_no_fault():
 @pytest.mark.parametrize("by", [2.0, -2.0])
 def test_a_clock_of_all_inputs_that_steps_is_told_once_while_matching_goes_on(by):
     told = all_of(clock=lambda second: 0.0 if second < 20 else by)
-    direction = "forward" if by > 0 else "back"
-    says_only(told, "clock_step", f"stamps of all inputs jumped {direction} by ", "against this machine's clock")
+    assert told.says_only("clock_step"), told.warnings
     assert len(told.warnings) == 1
 
 
 @pytest.mark.parametrize("by", [2.0, -2.0])
 def test_the_one_input_whose_clock_steps_is_named(by):
     told = a_trio(clock=lambda second: 0.0 if second < 20 else by, seconds=45)
-    direction = "forward" if by > 0 else "back"
-    says_only(told, "clock_step", f"stamps of /b jumped {direction} by ", "those of the other inputs did not")
-
-
-def test_nothing_is_said_of_inputs_that_sent_nothing_when_another_ones_clock_stepped():
-    camera = Source("/camera", 15, clock=lambda second: 0.0 if second < 20 else 2.0)
-    told = run(camera, Source("/lidar", 10, sends=lambda second: second < 15), seconds=30, options={"slop": "40ms"})
-    steps = [finding.text for _, finding in told.findings("clock_step")]
-    assert steps
-    assert not any("other inputs" in text for text in steps)
+    assert told.says_only("clock_step", "/b"), told.warnings
 
 
 def test_a_step_that_stays_is_another_clock_in_the_end():
@@ -267,35 +231,36 @@ def test_a_step_that_stays_is_another_clock_in_the_end():
 def test_this_machines_clock_that_is_set_is_told():
     step = Step(1_700_000_020 * S, 2 * S)
     more = {"facts": lambda second: {"clock_set": step if 20 <= second < 50 else None}}
-    says_only(a_pair(more=more), "clock_step", "this machine's clock was set forward by 2 s")
+    told = a_pair(more=more)
+    assert told.says_only("clock_step"), told.warnings
 
 
 def test_a_sensor_that_dies_and_returns_is_silent_and_then_nothing():
     told = a_pair(sends=lambda second: not 20 < second < 35, seconds=90)
-    says_only(told, "silent", "/b has been silent for")
-    assert told.lines[-1].text == "recovered after 24 s"
+    assert told.says_only("silent", "/b"), told.warnings
+    assert not told.lines[-1].warns
 
 
 def test_a_recorder_that_pauses_is_one_line():
     sources = (Source(topic, 10, sends=lambda second: not 20 < second < 35, **REAL) for topic in ("/a", "/b"))
     told = run(*sources, seconds=80, options=SLOP, facts=lambda _: {"is_recorded": True})
-    says_only(told, "silent", "all inputs have been silent for 5", "check whether recording was paused")
+    assert told.says_only("silent", "/a", "/b"), told.warnings
 
 
 def test_one_message_only_is_silence():
-    says_only(a_pair(sends=lambda second: second < 0.05, seconds=40), "silent", "/b has been silent for")
+    told = a_pair(sends=lambda second: second < 0.05, seconds=40)
+    assert told.says_only("silent", "/b"), told.warnings
 
 
 def test_stamps_of_zero_explain_the_gaps_that_they_leave():
-    says_only(
-        a_pair(stamp=lambda stamp: stamp if stamp // 100_000_000 % 5 else 0), "unstamped", "messages of /b have stamp 0"
-    )
+    told = a_pair(stamp=lambda stamp: stamp if stamp // 100_000_000 % 5 else 0)
+    assert told.says_only("unstamped", "/b"), told.warnings
 
 
 def test_two_messages_of_each_stamp_are_told():
     sources = Source("/a", 10), Source("/b", 10), Source("/b", 10, phase_ms=1, stamp=lambda stamp: stamp - 1_000_000)
     told = run(*sources, seconds=40, options=SLOP, publishers=lambda topic, _: (Endpoint(f"{topic}_driver", IMU),))
-    says_only(told, "duplicates", "messages of /b repeat the stamp before them")
+    assert told.says_only("duplicates", "/b"), told.warnings
 
 
 @pytest.mark.parametrize(
@@ -310,7 +275,7 @@ def test_a_publisher_that_goes_and_returns_as_another_is_told_by_that(returns_as
         return returns_as if topic == "/b" and second > 20 else (Endpoint(f"{topic}_driver", IMU),)
 
     told = a_pair(sends=lambda second: second < 20, more={"publishers": publishers})
-    says_only(told, code, "/b")
+    assert told.says_only(code, "/b"), told.warnings
 
 
 UNTYPED = {"topic_options": {"type": None}}
@@ -322,19 +287,19 @@ def test_two_types_of_a_topic_without_one_are_told_until_one_goes():
         return (Endpoint("/a_driver", IMU),) if topic == "/a" else both[: 2 if second < 30 else 1]
 
     told = a_pair(sends=lambda second: second > 30, **UNTYPED, more={"publishers": publishers})
-    says_only(told, "several_types", "/b is published with 2 types", f"{IMU} by /b_driver", "by /stranger")
+    assert told.says_only("several_types", "/b"), told.warnings
     assert told.ever_found == {"several_types"}
     assert told.facts.inputs[1].type == IMU
     assert not told.facts.is_silent
 
 
-def test_a_publisher_that_returns_as_another_is_told_with_whose_type_was_taken():
+def test_a_publisher_that_returns_with_another_type_than_was_taken_is_told():
     def publishers(topic, second):
         is_other = topic == "/b" and second > 20
         return (Endpoint("/new", "sensor_msgs/msg/Image") if is_other else Endpoint(f"{topic}_driver", IMU),)
 
     told = a_pair(sends=lambda second: second < 20, **UNTYPED, more={"publishers": publishers})
-    says_only(told, "other_type", f"the relay took {IMU} from /b_driver")
+    assert told.says_only("other_type", "/b"), told.warnings
 
 
 def test_a_standstill_in_which_nothing_was_due_is_nobodys_fault():
@@ -402,7 +367,7 @@ def test_when_one_of_two_publishers_leaves_nothing_has_slowed_or_stepped(lag):
 
     told = run(*sources, seconds=90, options=SLOP, publishers=publishers)
     assert told.ever_found <= {"several_publishers", *(("slowed",) if lag > 2 else ())}
-    says_only(told, "several_publishers")
+    assert told.says_only("several_publishers", "/camera"), told.warnings
 
 
 def test_a_driver_that_is_started_again_at_a_lower_rate_has_slowed_down():
@@ -424,7 +389,7 @@ def test_a_recording_that_begins_again_is_no_step():
 
 def test_the_offset_of_a_time_scale_is_offered_exactly():
     told = a_pair(clock=lambda _: 18.0)
-    says_only(told, "other_clock", "stamp with the host's time, or write `offset: -18s` at /b")
+    assert "`offset: -18s`" in told.first.text
 
 
 @pytest.mark.parametrize("busy", BUSY)
@@ -439,9 +404,10 @@ def test_what_comes_in_batches_has_the_pace_of_its_stamps(slower):
     told = all_of(
         hz_at=lambda second: 10 if second < 30 else 10 * slower, received=lambda second: second - second % 1.2 + 1.2
     )
-    texts = [each.text for _, each in told.findings("slowed")]
-    assert bool(texts) == (slower < 1)
-    assert all(re.match(r"/[ab] has slowed from (9\.\d+|10(\.\d+)?) Hz to [4-6]", text) for text in texts), texts
+    assert bool(told.findings("slowed")) == (slower < 1)
+    for each in told.facts.inputs if slower < 1 else ():
+        assert each.figures.slowed_from_hz == pytest.approx(10, rel=0.1)
+        assert each.figures.pace_hz == pytest.approx(5, rel=0.2)
 
 
 @pytest.mark.parametrize("rest_s", [0.0, 0.8])

@@ -76,6 +76,16 @@ FOUND = {
         ),
         "check what delays /camera",
     ),
+    "an optional input that comes late, and seldom": (
+        Code.WAITING_FOR_OPTIONAL,
+        Severity.WARN,
+        without_camera(delay=305 * MS, nearest=Distribution([3 * MS] * 100), rate_hz=2.0, usual_hz=2.0, pace_hz=2.0),
+        (
+            "100 % of the sets leave without /camera after waiting 100 ms for it, 80 % because it comes at 2 Hz only:"
+            " it arrives 300 ms after the others, too late"
+        ),
+        "check what delays /camera",
+    ),
     "an optional input that went away": (
         Code.WAITING_FOR_OPTIONAL,
         Severity.WARN,

@@ -1,6 +1,7 @@
 """What stamps tell: facts that come to a finding, and the nearest that do not."""
 
-from syncrelay.explain import Code, Distribution, Endpoint, Severity, Step, Tolerance
+from syncrelay.config import Distance
+from syncrelay.explain import ClockState, Code, Distribution, Endpoint, Severity, Step, Tolerance
 from syncrelay.explain.clocks import Drift
 from syncrelay.sync.messages import DropReason
 from tests.explain.support.cases import (
@@ -17,6 +18,14 @@ from tests.explain.support.cases import (
     wide,
 )
 from tests.explain.support.groups import IMAGE, MS, NOW, S, a_group, a_silent_group, an_input
+
+AT_TICKS = {
+    "policy": "latest_time",
+    "ticks_hz": 30.0,
+    "tolerance": Tolerance("max_age", 200 * MS),
+    "distance": Distance.AGE,
+    "repeats": True,
+}
 
 TWO = Endpoint("/a", IMAGE), Endpoint("/b", IMAGE)
 
@@ -64,6 +73,83 @@ FOUND = {
         "stamps of /camera are 37.2 s behind those of /lidar",
         "synchronize the clocks of their machines, or write `offset: 37.2s` at /camera",
     ),
+    "stamps that count from boot": (
+        Code.OTHER_CLOCK,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"delay": NOW - 5000 * S, "stamps": (5000 * S,)}), LIDAR),
+        (
+            "stamps of /camera are 54 years behind those of /lidar: they count from boot or the start of a simulation,"
+            " not from 1970"
+        ),
+        "have /usb_cam stamp with the host's time, or write `stamp: receive` at /camera",
+    ),
+    "stamps of GPS time since 1980": (
+        Code.OTHER_CLOCK,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"delay": 315_964_782 * S}), LIDAR),
+        "stamps of /camera are 10 years behind those of /lidar: they look like GPS time, which counts from 1980",
+        "have /usb_cam stamp with the host's time, or write `stamp: receive` at /camera",
+    ),
+    "stamps of TAI": (
+        Code.OTHER_CLOCK,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"delay": -37 * S}), LIDAR),
+        (
+            "stamps of /camera are 37 s ahead of those of /lidar: they look like TAI, the time of PTP clocks, which is"
+            " 37 s ahead of UTC"
+        ),
+        "have /usb_cam stamp with the host's time, or write `offset: -37s` at /camera",
+    ),
+    "stamps of GPS time since 1970": (
+        Code.OTHER_CLOCK,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"delay": -18 * S}), LIDAR),
+        ("stamps of /camera are 18 s ahead of those of /lidar: they look like GPS time, which is 18 s ahead of UTC"),
+        "have /usb_cam stamp with the host's time, or write `offset: -18s` at /camera",
+    ),
+    "stamps of local time": (
+        Code.OTHER_CLOCK,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"delay": 7200 * S}), LIDAR),
+        "stamps of /camera are 2 h behind those of /lidar: they look like local time, not UTC",
+        "have /usb_cam stamp with the host's time, or write `offset: 7200s` at /camera",
+    ),
+    **{
+        f"stamps that are off the clock that triggers: {name}": (
+            Code.OTHER_CLOCK,
+            Severity.ERROR,
+            a_silent_group(
+                *(an_input(each, figures={"delay": None, "delays": (40 * S,) * 20}) for each in ("/camera", "/lidar")),
+                **AT_TICKS,
+                **facts,
+            ),
+            f"stamps of all inputs are 40 s behind {name}, which triggers the sets",
+            remedy,
+        )
+        for name, facts, remedy in (
+            (
+                "this machine's clock",
+                {},
+                (
+                    "with a simulation or a recording, write `node: {use_sim_time: true}` and play it with --clock;"
+                    " else synchronize the clocks of the machines"
+                ),
+            ),
+            (
+                "the recorder's clock",
+                {"is_recorded": True},
+                (
+                    "record what a simulation publishes with `ros2 bag record --use-sim-time`, or let an input be the"
+                    " `trigger`"
+                ),
+            ),
+            (
+                "/clock",
+                {"clock": ClockState(received=True)},
+                "check whether what publishes these topics uses simulated time as well",
+            ),
+        )
+    },
     "stamps of a clock that is ahead": (
         Code.OTHER_CLOCK,
         Severity.ERROR,
@@ -96,6 +182,13 @@ FOUND = {
         ),
         "no key arrived on all inputs while it was buffered; the newest are 'c7' of /camera, 'l7' of /lidar",
         "correct `key`, or write a larger `queue_size` if one input's keys arrive much later",
+    ),
+    "messages that are too old at ticks": (
+        Code.OVER_SLOP,
+        Severity.ERROR,
+        a_silent_group(camera(figures={"delay": None, "delays": (305 * MS,) * 20, "pace_hz": 10.0}), LIDAR, **AT_TICKS),
+        "at a tick, the latest message of /camera is 305 ms to 405 ms old, max_age is 200 ms",
+        "write `max_age: 550ms`, or `max_wait: 400ms`, which delays every set by that",
     ),
     "sets wider than slop": (
         Code.OVER_SLOP,
@@ -230,6 +323,16 @@ FOUND = {
         Severity.ERROR,
         a_silent_group(camera(figures={"stepped": Step(NOW - 12 * S, 2 * S)}), LIDAR),
         "stamps of /camera jumped forward by 2 s, 12 s ago; those of the other inputs did not",
+        "check what set the clock of /usb_cam; NTP and chrony can be told to slew it instead",
+    ),
+    "one clock that stepped while the others sent nothing": (
+        Code.CLOCK_STEP,
+        Severity.ERROR,
+        a_silent_group(
+            camera(figures={"stepped": Step(NOW - 12 * S, 2 * S)}),
+            an_input("/lidar", figures={"last_received": NOW - 20 * S}),
+        ),
+        "stamps of /camera jumped forward by 2 s, 12 s ago",
         "check what set the clock of /usb_cam; NTP and chrony can be told to slew it instead",
     ),
     "the clock of all inputs that stepped": (
