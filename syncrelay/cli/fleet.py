@@ -50,12 +50,11 @@ def do_on_many(
     words: Sequence[str],
     arguments: Namespace,
     *,
-    engine: Engine | None = None,
     finish: Finish | None = None,
 ) -> int:
     """Do a task on all recordings that words name, into a folder, as the options of add_fleet_options say.
 
-    `engine` is another than engine_of gives. `finish` is called once nothing is left to do, while the folder is still
+    `finish` is called once nothing is left to do, while the folder is still
     held; what it prints is the outcome, else a line is.
     Returns the exit code: 1 where a recording is at fault. Raises SyncRelayError where a word names no recording, or
     the folder cannot be used; with --strict also for the first recording that is at fault.
@@ -63,7 +62,6 @@ def do_on_many(
     into = Path(os.path.abspath(arguments.into))  # noqa: PTH100  what a user named as a link stays one
     with _Stop() as stop:
         sources = find_sources(words, into=into)
-        engine = engine or engine_of(arguments)
         others = Others.REPLACED if arguments.overwrite else Others.REFUSED
         with Run(task, sources, into=into, others=others, time_limit=arguments.time_limit) as run:
             if run.unreadable:
@@ -71,7 +69,7 @@ def do_on_many(
                 remark(f"{into}: {lines} of its ledger cannot be read; what was told there is done again")
             shown = _Shown(Progress(run.jobs, time.monotonic()))
             code = DONE
-            with closing(run.go(engine)) as finished, shown.clearing():
+            with closing(run.go(_engine(arguments))) as finished, shown.clearing():
                 for each in finished:
                     if each is not None:
                         code = max(code, _tell(each, run, shown))
@@ -115,7 +113,7 @@ def put_facts(folder: Path, pattern: RobotPattern | None, *, is_json: bool) -> i
     return DONE
 
 
-def engine_of(arguments: Namespace) -> Engine:
+def _engine(arguments: Namespace) -> Engine:
     """Return what options say that works on recordings. Raises SyncRelayError where it is not installed."""
     jobs = arguments.jobs or len(os.sched_getaffinity(0))
     if arguments.engine == "local":

@@ -135,11 +135,5 @@ def export() -> Parser:
         " may be repeated, as in --images jpeg --images /depth=png",
     )
     parser.add_argument("--raw", action="store_true", help="write each message as the CDR bytes that were recorded")
-    parser.add_argument(
-        "--stretch",
-        metavar="TIME",
-        help="have several workers do a long recording, in stretches of at most so long, such as 10min:"
-        " GROUP-0001.parquet, GROUP-0002.parquet, ...; the sets are the same",
-    )
     add_fleet_options(parser, "-o", "--output")
     return parser

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeAlias
 
 from syncrelay.config import GroupConfig
-from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome, SyncGroup
+from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome
 
 Take: TypeAlias = Callable[[Sequence[Outcome], int], None]
 """Told of what leaves together, and at what time, in nanoseconds of receipt."""
@@ -23,9 +23,9 @@ class _Add(Protocol):
 class EngineDriver:
     """Drives an engine of its own through one group's messages; times of receipt are the only clock."""
 
-    def __init__(self, group: GroupConfig, take: Take | None, engine: SyncGroup | None = None) -> None:
-        """Take None where nobody is to be told; an `engine` of this group goes on where it was."""
-        self.engine: Final = engine or group.engine()
+    def __init__(self, group: GroupConfig, take: Take | None) -> None:
+        """Take None where nobody is to be told."""
+        self.engine: Final = group.engine()
         # Else nothing is ever due, and asking for each message costs a tenth of a replay.
         self.has_deadlines: Final = group.has_deadlines
         # Ticks go on for a while after the last message: those of the time after it are nobody's.

@@ -57,10 +57,6 @@ class ApproximateTime(Policy):
         "waits_started",
     )
 
-    aside = frozenset(
-        {"_candidate_end", "_candidate_start", "_pivot_stamp", "_proof_end", "waits_ended", "waits_started"}
-    )
-
     def __init__(
         self,
         *,
@@ -141,13 +137,6 @@ class ApproximateTime(Policy):
 
     def needed_queue(self, place: int) -> int | None:
         return self._losses.needed[place]
-
-    def in_effect(self) -> Sequence[int]:
-        """Tell how many waits there are, and of the candidate what is not of one before it."""
-        waits = self.waits_started - self.waits_ended
-        if self._pivot == _NO_PIVOT:
-            return (waits,)
-        return (waits, self._pivot_stamp, self._candidate_start, self._candidate_end, self._proof_end)
 
     def _reset(self) -> None:
         self.waits_ended = self.waits_started

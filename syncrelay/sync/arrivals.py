@@ -23,8 +23,6 @@ class Arrivals:
 
     __slots__ = ("_before", "_given", "_jumped", "_offsets", "newest")
 
-    aside = frozenset({"_given", "_jumped"})
-
     def __init__(self, offsets_ns: Sequence[int]) -> None:
         self._offsets = offsets_ns
         self.newest = [_UNSEEN] * len(offsets_ns)
@@ -44,15 +42,6 @@ class Arrivals:
         for message in messages:
             if message is not None and message.stamp > given[message.input]:
                 given[message.input] = message.stamp
-
-    def in_effect(self) -> Sequence[int | None]:
-        """Tell the stamps given that may still make a message late, and what jumped if anything is left over of it.
-
-        A stamp that is behind `newest` by more than a jump makes nothing late: what is older begins a new time.
-        """
-        pairs = zip(self._given, self.newest, strict=True)
-        given = [_NEVER if newest != _UNSEEN and last < newest - JUMP_NS else last for last, newest in pairs]
-        return [*given, None if all(before is None for before in self._before) else self._jumped]
 
     def is_late(self, index: int, stamp: int, *, or_equal: bool) -> bool:
         """Whether a set of this input's messages would go back; of equal stamps only if they mean the same."""

@@ -28,8 +28,6 @@ class Ledger:
 
     __slots__ = ("_absent", "_dropped", "_last", "_repeats", "fed", "sets")
 
-    aside = frozenset({"_absent", "_dropped", "fed", "sets"})
-
     def __init__(self, n_inputs: int, *, repeats: bool) -> None:
         self.fed = [0] * n_inputs
         self.sets = 0

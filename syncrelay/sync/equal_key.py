@@ -28,8 +28,6 @@ class EqualKey(Policy):
 
     __slots__ = ("_fed", "_keys", "_losses", "_lost", "_messages", "_queue_size", "_stamps", "n_inputs")
 
-    aside = frozenset({"_fed", "_lost"})
-
     by_stamp = False
 
     def __init__(self, *, n_inputs: int, queue_size: int) -> None:

@@ -1,6 +1,6 @@
 """A group: what all policies share."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from typing import Generic
 
 from syncrelay.sync.arrivals import Arrivals
@@ -9,7 +9,6 @@ from syncrelay.sync.matching import ByClock, Limited, Matching, Unlimited
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, T
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.restamp import Restamp, common_stamp
-from syncrelay.sync.state import Name, state_of
 from syncrelay.sync.thinning import Thinning
 
 
@@ -153,14 +152,6 @@ class SyncGroup(Generic[T]):
         drops = self._matching.let_go(reason)
         self._ledger.note(drops)
         return drops
-
-    def state(self, name: Name) -> Hashable:
-        """Tell what decides what leaves from now on; see `state_of`.
-
-        Two groups of one configuration and equal state give the same, at the same times, for the same messages, and
-        count them alike, but for `needed_queue`: what overflowed earlier is no part of the state.
-        """
-        return state_of(self, name)
 
     def counts(self) -> tuple[InputCounts, ...]:
         """Where the messages of each input went since the group was made."""

@@ -60,8 +60,6 @@ class LatestAtTicks(Policy):
         "ticks",
     )
 
-    aside = frozenset({"_needed"})
-
     by_clock = True
     repeats = True
 

@@ -59,8 +59,6 @@ class LatestTime(Policy):
         "waits_started",
     )
 
-    aside = frozenset({"waits_ended", "waits_started"})
-
     repeats = True
 
     def __init__(
@@ -142,10 +140,6 @@ class LatestTime(Policy):
 
     def needed_queue(self, place: int) -> int | None:
         return self._losses.needed[place]
-
-    def in_effect(self) -> Sequence[int]:
-        """Tell how many waits there are."""
-        return (self.waits_started - self.waits_ended,)
 
     def _serve(self, outcomes: list[Outcome]) -> None:
         triggers = self._queues[self._trigger]

@@ -139,8 +139,6 @@ class Limited(Matching):
         "_waits_started",
     )
 
-    aside = frozenset({"_waits_ended", "_waits_started"})
-
     def __init__(
         self,
         policy: Policy,
@@ -208,11 +206,6 @@ class Limited(Matching):
     def needed_queue(self, index: int) -> int | None:
         place = self._places.get(index)
         return None if place is None else self._policy.needed_queue(place)
-
-    def in_effect(self) -> Sequence[int]:
-        """Tell how many waits have begun and ended in the policy that are not noted here."""
-        policy = self._policy
-        return (policy.waits_started - self._waits_started, policy.waits_ended - self._waits_ended)
 
     def _join(self, outcomes: Sequence[Outcome], now: int) -> list[Outcome]:
         """Let the optional inputs join the sets of the policy."""

@@ -30,8 +30,6 @@ class OptionalInputs(OptionalStage):
 
     __slots__ = ("_least_steps", "_newest", "_queue_size", "_queues", "_slop", "_waiting", "inputs")
 
-    aside = frozenset({"_newest"})
-
     def __init__(
         self,
         *,
@@ -102,10 +100,6 @@ class OptionalInputs(OptionalStage):
     def buffered(self, index: int) -> int:
         held = sum(waiting.messages[index] is not None for waiting in self._waiting)
         return held + (len(self._queues[index].stamps) if index in self._queues else 0)
-
-    def in_effect(self) -> Sequence[tuple[int, int]]:
-        """Tell the newest stamps in the order of the inputs, whichever showed one first."""
-        return sorted(self._newest.items())
 
     def _leave_decided(self) -> list[Outcome]:
         outcomes: list[Outcome] = []

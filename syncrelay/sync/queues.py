@@ -55,8 +55,6 @@ class Losses:
 
     __slots__ = ("_lost", "needed")
 
-    aside = frozenset(__slots__)
-
     def __init__(self, n_inputs: int) -> None:
         self._lost: list[list[int]] = [[] for _ in range(n_inputs)]
         self.needed: list[int | None] = [None] * n_inputs

@@ -18,8 +18,6 @@ class Thinning:
 
     __slots__ = ("_every", "_first", "_period", "_seen", "_slot", "_withheld")
 
-    aside = frozenset({"_seen"})
-
     def __init__(self, *, n_inputs: int, repeats: bool, every: int, min_set_period_ns: int | None) -> None:
         if every < 1 or (min_set_period_ns is not None and min_set_period_ns < 1):
             raise ValueError(f"every {every} and min_set_period_ns {min_set_period_ns} must be 1 or more")
@@ -44,10 +42,6 @@ class Thinning:
     def buffered(self, index: int) -> int:
         """How many messages of this input are withheld."""
         return 0 if self._withheld is None else self._withheld.buffered(index)
-
-    def in_effect(self) -> Sequence[int]:
-        """Tell the place among every `every` sets."""
-        return (self._seen % self._every,)
 
     def _reset(self) -> None:
         self._seen = 0

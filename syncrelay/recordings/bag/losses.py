@@ -4,7 +4,6 @@ from collections import Counter
 from typing import Final
 
 from syncrelay.config.wording import counted
-from syncrelay.errors import BagError
 from syncrelay.recordings.bag.recording import LATEST, Channel, RawMessage
 
 STRAY: Final[RawMessage] = (Channel(-1, "", "", ""), -1, b"")
@@ -67,13 +66,6 @@ class Losses:
     def too_late(self, count: int) -> None:
         """Count messages that are read, but behind later ones."""
         self._too_late += count
-
-    def not_in_parts(self, place: int) -> BagError:
-        """Return the error for messages at a byte that are of other times than the index says."""
-        return BagError(
-            f"{self._name}: the messages at byte {place} are of other times than the index says, so that no part of the"
-            " recording can be told by time: read it as a whole"
-        )
 
     def kept(self, messages: list[RawMessage]) -> list[RawMessage]:
         """Return those of messages, sorted by their times, that are of a channel and of a time; count the others."""

@@ -28,7 +28,7 @@ from syncrelay.recordings.bag.mcap_records import (
 )
 from syncrelay.recordings.bag.names import full_type_name, topic_name
 from syncrelay.recordings.bag.qos import read_profiles
-from syncrelay.recordings.bag.recording import AFTER_ALL, Channel, Definition, Encoding, RawMessage, is_part
+from syncrelay.recordings.bag.recording import Channel, Definition, Encoding, RawMessage
 from syncrelay.recordings.bag.segments import PIECE, Pieces, Segment, extent, read_in_order
 from syncrelay.recordings.bag.sources import NoIndexError, Source
 
@@ -76,9 +76,7 @@ class McapFile:
         """See Recording."""
         return self._losses.sentences
 
-    def batches(
-        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
-    ) -> Iterator[list[RawMessage]]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
         among = frozenset(wanted)
         chosen = {number: channel if channel in among else None for number, channel in self._by_id.items()}
@@ -94,12 +92,10 @@ class McapFile:
         self._effort = Effort()
         said, count = self.faults, 0
         read = partial(self._read, channels=chosen, parts=parts)
-        for segment, found in read_in_order(needed, read, self._losses, begin=begin, end=end):
+        for segment, found in read_in_order(needed, read, self._losses):
             self.position += segment.size
             count += len(found)
             yield found
-        if is_part(begin, end):
-            return
         self.position = self.size
         told = sum(self._counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
         is_chosen = parts is not None or len(needed) < len(self._segments)

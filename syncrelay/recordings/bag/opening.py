@@ -24,7 +24,7 @@ from syncrelay.recordings.bag.attempts import redacted
 from syncrelay.recordings.bag.batching import batched, filled
 from syncrelay.recordings.bag.effort import TOO_MUCH, room_for
 from syncrelay.recordings.bag.listing import files_meant, told_of
-from syncrelay.recordings.bag.recording import AFTER_ALL, Channel, RawMessage, Recording, is_part
+from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
 from syncrelay.recordings.bag.sources import LocalFile, NoIndexError
 from syncrelay.recordings.bag.storage import open_url
 
@@ -119,16 +119,14 @@ class Files:
         """See Recording."""
         return sum(file.position for file in self._files)
 
-    def batches(
-        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
-    ) -> Iterator[list[RawMessage]]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
-        parts = [file.batches(wanted, begin=begin, end=end) for file in self._files]
+        parts = [file.batches(wanted) for file in self._files]
         if any(earlier.end > later.begin for earlier, later in pairwise(self._files)):
             found = batched(heapq.merge(*map(chain.from_iterable, parts), key=itemgetter(1)))
         else:
             found = filled(chain.from_iterable(parts))
-        return self._counted(found, wanted) if self._counts and not is_part(begin, end) else found
+        return self._counted(found, wanted) if self._counts else found
 
     def _counted(self, found: Iterator[list[RawMessage]], wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """Pass on what is read; if it is less than there should be, and no fault explains that, it is one."""

@@ -59,17 +59,8 @@ LATEST: Final = 2**62 - 1
 """The latest time of receipt, in 2116: ROS 1 tells none that is later, and what two times differ by fits 64 bits."""
 
 
-AFTER_ALL: Final = LATEST + 1
-"""A time that is later than that of any message."""
-
-
-def is_part(begin: int, end: int) -> bool:
-    """Tell whether messages may be received before `begin`, or at `end` or later."""
-    return begin > 0 or end <= LATEST
-
-
 class Recording(Protocol):
-    """A recording that is open for reading: as a whole once, from the begin to the end, or part after part."""
+    """A recording that is open for reading, once from the begin to the end."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -101,13 +92,10 @@ class Recording(Protocol):
         """When the last message was received in nanoseconds; 0 if there is none."""
         ...
 
-    def batches(
-        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
-    ) -> Iterator[list[RawMessage]]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """Yield the messages of some channels by their receive time; of equal times, as they were written.
 
-        Only those received from `begin` on and before `end` are read. A batch is what is read at a time, and may be
-        empty. Raises BagError where a part is asked for and the file's index lies, so that what it is cannot be told.
+        A batch is what is read at a time, and may be empty.
         """
         ...
 

@@ -1,6 +1,6 @@
 """A recording fed to the groups of a file as the relay would have got it, with receive time as `now`."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
@@ -8,7 +8,7 @@ from syncrelay.explain import UNREADABLE, EngineDriver
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.columns import Batch, Columns, ReadColumn, column_reader
 from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
-from syncrelay.sync import InputCounts, Message, Outcome, SyncGroup
+from syncrelay.sync import InputCounts, Message, Outcome
 
 Listener: TypeAlias = Callable[[GroupBinding, Outcome, int], None]
 """Told of each set and drop of a group when it leaves, and at what time. The payload of a message is the RawMessage."""
@@ -34,9 +34,9 @@ class GroupResult:
 class GroupReplay:
     """One group at work on a recording."""
 
-    def __init__(self, binding: GroupBinding, listeners: Sequence[Listener], engine: SyncGroup | None) -> None:
+    def __init__(self, binding: GroupBinding, listeners: Sequence[Listener]) -> None:
         self.binding = binding
-        self.driver: Final = EngineDriver(binding.group, self._take if listeners else None, engine)
+        self.driver: Final = EngineDriver(binding.group, self._take if listeners else None)
         self._listeners = listeners
 
     def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
@@ -61,45 +61,27 @@ class Replay:
     """Groups at work on a recording, a step for each batch that is read of it."""
 
     def __init__(
-        self,
-        recording: Recording,
-        bindings: Sequence[GroupBinding],
-        *,
-        listeners: Sequence[Listener] = (),
-        engines: Sequence[SyncGroup | None] | None = None,
+        self, recording: Recording, bindings: Sequence[GroupBinding], *, listeners: Sequence[Listener] = ()
     ) -> None:
-        """Begin with these engines, one a group, or new ones.
-
-        Raises BagError for a stamp or key that a recorded type does not have.
-        """
+        """Raises BagError for a stamp or key that a recorded type does not have."""
         self._recording = recording
-        pairs = zip(bindings, engines or [None] * len(bindings), strict=True)
-        self._groups = [GroupReplay(binding, listeners, engine) for binding, engine in pairs]
+        self._groups = [GroupReplay(binding, listeners) for binding in bindings]
         self._columns = Columns([readers for group in self._groups for readers in group.readers()])
         # What waited in one group leaves before a later message of another arrives.
         self._waiting = [group.driver for group in self._groups if group.driver.has_deadlines]
         self._inputs = [(group.driver, index) for group in self._groups for index in range(len(group.binding.inputs))]
         self._now = recording.begin
 
-    @property
-    def channels(self) -> Collection[Channel]:
-        """All whose messages are fed."""
-        return self._columns.channels
-
-    @property
-    def engines(self) -> list[SyncGroup]:
-        """Those at work, in the order of the groups."""
-        return [group.driver.engine for group in self._groups]
-
     def steps(self) -> Iterator[None]:
         """Feed the recording to its end, a batch a step."""
-        for rows in self._recording.batches(self.channels):
-            self.feed(rows)
+        for rows in self._recording.batches(self._columns.channels):
+            self._feed(rows)
             yield
-        self.finish()
+        for group in self._groups:
+            # A damaged recording may give a false end.
+            group.driver.finish(max(self._now, self._recording.end))
 
-    def feed(self, rows: Sequence[RawMessage]) -> None:
-        """Feed messages that were received after all before."""
+    def _feed(self, rows: Sequence[RawMessage]) -> None:
         for place, raw, stamp, key in self._columns.in_order(Batch(rows)):
             self._now = now = raw[1]
             for driver in self._waiting:
@@ -109,17 +91,6 @@ class Replay:
                 driver.reject(index, raw, now=now)
             else:
                 driver.add(Message(index, stamp, raw, key), now=now)
-
-    def expire(self, now: int) -> None:
-        """Let leave what has waited long enough, up to `now`."""
-        for driver in self._waiting:
-            driver.expire(now)
-
-    def finish(self) -> None:
-        """Let leave all that is left at the end of the recording."""
-        for group in self._groups:
-            # A damaged recording may give a false end.
-            group.driver.finish(max(self._now, self._recording.end))
 
     def results(self) -> list[GroupResult]:
         """Give what became of all messages so far, in the order of the groups."""

@@ -15,7 +15,7 @@ from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import Losses
 from syncrelay.recordings.bag.names import full_type_name, topic_name
 from syncrelay.recordings.bag.qos import Profile
-from syncrelay.recordings.bag.recording import AFTER_ALL, Channel, Definition, Encoding, RawMessage
+from syncrelay.recordings.bag.recording import Channel, Definition, Encoding, RawMessage
 from syncrelay.recordings.bag.unpacking import unbz2, unlz4
 
 MAGIC: Final = b"#ROSBAG V2.0\n"
@@ -55,22 +55,20 @@ class Ros1File:
         """See Recording."""
         return self._losses.sentences
 
-    def batches(
-        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
-    ) -> Iterator[list[RawMessage]]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
-        return batched(self._messages(frozenset(wanted), begin, end))
+        return batched(self._messages(frozenset(wanted)))
 
     def close(self) -> None:
         """See Recording."""
         if self._reader.bio is not None:
             self._reader.close()
 
-    def _messages(self, wanted: Collection[Channel], begin: int, end: int) -> Iterator[RawMessage]:
+    def _messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
         chosen = [each for each in self._reader.connections if self._by_id[each.id] in wanted]
         try:
             # rosbags takes no connections for all of them.
-            for connection, time, payload in self._reader.messages(chosen, begin, end) if chosen else ():
+            for connection, time, payload in self._reader.messages(chosen) if chosen else ():
                 self.position = max(self.position, self._reader.current_chunk[0])
                 yield self._by_id[connection.id], time, payload
         except Exception as error:  # noqa: BLE001  as in open()

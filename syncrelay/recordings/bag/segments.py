@@ -10,7 +10,7 @@ from operator import itemgetter
 from typing import Final
 
 from syncrelay.recordings.bag.losses import Losses
-from syncrelay.recordings.bag.recording import AFTER_ALL, LATEST, RawMessage, is_part
+from syncrelay.recordings.bag.recording import LATEST, RawMessage
 
 PIECE: Final = 4_000_000
 """How much is read at a time of what stands in no chunk."""
@@ -38,19 +38,12 @@ def read_in_order(
     segments: Sequence[Segment],
     read: Callable[[Segment], list[RawMessage]],
     losses: Losses,
-    *,
-    begin: int = 0,
-    end: int = AFTER_ALL,
 ) -> Iterator[tuple[Segment, list[RawMessage]]]:
     """Yield, for each segment in turn, the messages that nothing later can precede.
 
     What comes too late for that, as its segment tells other times than it has, is counted by `losses`, as is what
-    belongs to no channel or no time, and is left out. Only segments that may have messages from `begin` to before
-    `end` are read; raises BagError where one of them tells other times than it has, as others may, too.
+    belongs to no channel or no time, and is left out.
     """
-    if is_part(begin, end):
-        segments = [each for each in segments if _may_have(each, begin, end)]
-        read = _truthful(read, losses)
     by_time = sorted(segments, key=lambda segment: segment.begin)
     held: list[RawMessage] = []
     until = 0
@@ -58,7 +51,7 @@ def read_in_order(
         held += read(segment)
         # Sorted runs, one behind another, are merged in one go.
         held.sort(key=_RECEIVED)
-        held = _between(losses.kept(held), begin, end)
+        held = losses.kept(held)
         too_late = bisect_left(held, until, key=_RECEIVED)
         if too_late:
             losses.too_late(too_late)
@@ -95,29 +88,3 @@ class Pieces:
 
     def _open(self) -> list[Segment]:
         return [] if self._last is None else [self._last]
-
-
-def _may_have(segment: Segment, begin: int, end: int) -> bool:
-    """Whether a segment is of this time or tells a lie: no time is after the last."""
-    first, last = sorted((segment.begin, segment.end))
-    return last >= begin and (first < end or end > LATEST)
-
-
-def _between(messages: list[RawMessage], begin: int, end: int) -> list[RawMessage]:
-    """Return those of sorted messages that were received from `begin` on and before `end`."""
-    if not messages or (messages[0][1] >= begin and messages[-1][1] < end):
-        return messages
-    return messages[bisect_left(messages, begin, key=_RECEIVED) : bisect_left(messages, end, key=_RECEIVED)]
-
-
-def _truthful(read: Callable[[Segment], list[RawMessage]], losses: Losses) -> Callable[[Segment], list[RawMessage]]:
-    """Return a reader that raises BagError for a segment that tells other times than it has."""
-
-    def read_truthful(segment: Segment) -> list[RawMessage]:
-        found = read(segment)
-        times = [time for _, time, _ in found if 0 <= time <= LATEST]
-        if times and not segment.begin <= min(times) <= max(times) <= segment.end:
-            raise losses.not_in_parts(segment.offset)
-        return found
-
-    return read_truthful

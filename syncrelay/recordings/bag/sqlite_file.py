@@ -19,7 +19,7 @@ from syncrelay.recordings.bag.batching import batched
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.recordings.bag.qos import read_profiles
-from syncrelay.recordings.bag.recording import AFTER_ALL, LATEST, Channel, Definition, Encoding, RawMessage, is_part
+from syncrelay.recordings.bag.recording import LATEST, Channel, Definition, Encoding, RawMessage
 from syncrelay.recordings.bag.unpacking import unzstd
 
 MAGIC: Final = b"SQLite format 3\0"
@@ -28,7 +28,7 @@ MAGIC: Final = b"SQLite format 3\0"
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 # Those of no known topic too, so that they are missed.
 _BY_TIME: Final = """
-SELECT topic_id, timestamp, data FROM messages WHERE (topic_id IS NULL OR topic_id NOT IN ({})){} ORDER BY timestamp"""
+SELECT topic_id, timestamp, data FROM messages WHERE (topic_id IS NULL OR topic_id NOT IN ({})) ORDER BY timestamp"""
 # By the index of the times: no scan.
 _END_OF: Final = """
 SELECT timestamp FROM messages WHERE timestamp BETWEEN 0 AND ? AND typeof(timestamp) = 'integer'
@@ -71,26 +71,22 @@ class SqliteFile:
         """See Recording."""
         return self._losses.sentences
 
-    def batches(
-        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
-    ) -> Iterator[list[RawMessage]]:
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """See Recording."""
-        return batched(self._messages(wanted, begin, end))
+        return batched(self._messages(wanted))
 
     def close(self) -> None:
         """See Recording."""
         self._database.close()
 
-    def _messages(self, wanted: Collection[Channel], begin: int, end: int) -> Iterator[RawMessage]:
+    def _messages(self, wanted: Collection[Channel]) -> Iterator[RawMessage]:
         among = frozenset(wanted)
         chosen = {channel.id: channel for channel in self.channels if channel in among}
         others = [channel.id for channel in self.channels if channel.id not in chosen]
         effort, stored, leave_out = Effort(), 0, self._losses.leave_out
-        # What is of no time is left out where all is read.
-        part = " AND timestamp >= ? AND timestamp < ?" if is_part(begin, end) else ""
-        query = _BY_TIME.format(_marks(len(others)), part)
+        query = _BY_TIME.format(_marks(len(others)))
         try:
-            for number, time, payload in self._database.execute(query, [*others, begin, end] if part else others):
+            for number, time, payload in self._database.execute(query, others):
                 channel = chosen.get(number)
                 if channel is None or type(time) is not int or type(payload) is not bytes or not 0 <= time <= LATEST:
                     leave_out(_why(channel, time, payload))

@@ -10,7 +10,7 @@ from syncrelay.errors import UsageError
 from syncrelay.recordings.bag.batching import filled
 from syncrelay.recordings.bag.definitions import begins_with_header
 from syncrelay.recordings.bag.payloads import read_ros1_stamp, with_ros1_stamp
-from syncrelay.recordings.bag.recording import AFTER_ALL, LATEST, Channel, Encoding, RawMessage, Recording, is_part
+from syncrelay.recordings.bag.recording import LATEST, Channel, Encoding, RawMessage, Recording
 from syncrelay.rig.what_if import MOST_LATE, Disturbance, Fault, disturbances
 
 
@@ -61,14 +61,9 @@ class Disturbed:
         """See Recording."""
         return self._recording.position
 
-    def batches(
-        self, wanted: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
-    ) -> Iterator[list[RawMessage]]:
-        """See Recording. The recording is read from its begin for every part: faults go by what came before."""
-        in_order = self._in_order(wanted)
-        if is_part(begin, end):
-            in_order = ([raw for raw in batch if begin <= raw[1] < end] for batch in in_order)
-        return filled(in_order)
+    def batches(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
+        """See Recording."""
+        return filled(self._in_order(wanted))
 
     def _in_order(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """Yield messages when none that is received sooner can still come: late ones wait for the others."""

@@ -36,18 +36,12 @@ class Part(NamedTuple):
 class SetsOf:
     """The sets that leave in a replay, group by group as tables."""
 
-    def __init__(
-        self, bindings: Sequence[GroupBinding], content: Content, *, name: str, before: Sequence[int] = ()
-    ) -> None:
-        """`name` is what the sets' column `recording` says; `before` is how many sets each group gave before, if any.
+    def __init__(self, bindings: Sequence[GroupBinding], content: Content, *, name: str) -> None:
+        """`name` is what the sets' column `recording` says.
 
         Raises BagError for a field that a recorded type does not have.
         """
-        counts = before or [0] * len(bindings)
-        self.groups: Final = tuple(
-            SetTable(binding, content, recording=name, before=count)
-            for binding, count in zip(bindings, counts, strict=True)
-        )
+        self.groups: Final = tuple(SetTable(binding, content, recording=name) for binding in bindings)
         self.listeners: Final[tuple[Listener, ...]] = tuple(group.take for group in self.groups)
         """What the replay has to tell."""
 

@@ -53,15 +53,15 @@ class Content:
 class SetTable:
     """Gathers the sets of one group until they are taken as a table. It is a listener of a replay."""
 
-    def __init__(self, binding: GroupBinding, content: Content, *, recording: str, before: int = 0) -> None:
-        """`recording` is what the column of that name says; sets are counted on from `before`.
+    def __init__(self, binding: GroupBinding, content: Content, *, recording: str) -> None:
+        """`recording` is what the column of that name says.
 
         Raises BagError for a type that the recording does not define and for fields that it does not have.
         """
         self.binding: Final = binding
         self.bytes = 0
         """How many bytes the messages that were gathered have."""
-        self.count = before
+        self.count = 0
         """How many sets there were so far."""
         self._recording = recording
         self._columns = [_InputColumn(each, content) for each in binding.inputs]

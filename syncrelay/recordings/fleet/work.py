@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from errno import EROFS
 from pathlib import Path
-from typing import Any, Final, Protocol, TypeAlias
+from typing import Final, TypeAlias
 from uuid import uuid4
 
 from syncrelay import own_version
@@ -28,27 +28,11 @@ _LIMIT_PER_BYTE: Final = _NS_PER_SECOND // 100_000
 _PR_SET_PDEATHSIG: Final = 1
 
 
-class Work(Protocol):
-    """What is done to a recording once its content is known: to all of it, or to a stretch. It can be pickled."""
-
-    def __call__(self, job: "Job", content: Content, folder: Path, /) -> "Outcome":
-        """Do it, with results in a folder that is made here and of its own; raises what Task.run does."""
-        ...
-
-
-def whole(job: "Job", content: Content, folder: Path) -> "Outcome":
-    """Do the task of a job to all of its recording."""
-    folder.mkdir(parents=True)
-    facts = job.task.run(job.source, folder)
-    return finished(job, content, facts, folder)
-
-
 @dataclass(frozen=True, slots=True)
 class Job:
     """One recording of a run: its source, where results go, and what the ledger tells of a result that should be there.
 
-    `version` is the driver's: a worker of another would give other results. `size` is in bytes, 0 where not known. Of
-    several jobs on a recording at a time, each has a `part` of its own. `content` is given where it has been read.
+    `version` is the driver's: a worker of another would give other results. `size` is in bytes, 0 where not known.
     """
 
     source: Source
@@ -57,9 +41,6 @@ class Job:
     done: Entry | None
     size: int
     version: str
-    work: Work = whole
-    part: str = ""
-    content: Content | None = None
     time_limit: int | None = None
     """How many nanoseconds it may take; None for what its size makes plausible."""
 
@@ -70,17 +51,13 @@ class Job:
 
     def scratch_folder(self) -> Path:
         """Return a new name for a result: a worker that was given up for lost may still be writing."""
-        return self.scratch / f"{self._prefix}{uuid4().hex}"
+        return self.scratch / f"{self.source.name}.{uuid4().hex}"
 
     def remove_scratch(self) -> None:
         """Remove what lost workers left of it."""
         for folder in self.scratch.iterdir():
-            if folder.name.startswith(self._prefix):
+            if folder.name.startswith(f"{self.source.name}."):
                 shutil.rmtree(folder, ignore_errors=True)
-
-    @property
-    def _prefix(self) -> str:
-        return f"{self.source.name}.{self.part}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,14 +88,7 @@ class Failed:
     ends_all: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Midway:
-    """What work on a part of a recording has found, for whoever gave it; the recording is not done by it."""
-
-    told: Any
-
-
-Outcome: TypeAlias = Done | Kept | Failed | Midway
+Outcome: TypeAlias = Done | Kept | Failed
 
 
 def limit_of(job: Job, size: int) -> int:
@@ -147,15 +117,15 @@ def _performed(job: Job) -> Outcome:
     folder = job.scratch_folder()
     if (why := _unfit(job)) is not None:
         return Failed(why, ends_all=True)
-    content = "" if job.content is None else job.content.hash
+    content = ""
     try:
-        found = content_of(job.source.words) if job.content is None else job.content
+        found = content_of(job.source.words)
         content = found.hash
         # The size of what is behind a URL is known only now.
         _end_after(limit_of(job, found.size))
-        if job.content is None and job.done is not None and job.done.content == content and _is_there(job, job.done):
+        if job.done is not None and job.done.content == content and _is_there(job, job.done):
             return Kept()
-        return job.work(job, found, folder)
+        return _done(job, found, folder)
     except SyncRelayError as error:
         failed = Failed(str(error), content, ends_all=isinstance(error, OutputError))
     except MemoryError:
@@ -169,6 +139,14 @@ def _performed(job: Job) -> Outcome:
         failed = Failed(traceback.format_exc(), content, is_bug=True)
     shutil.rmtree(folder, ignore_errors=True)
     return failed
+
+
+def _done(job: Job, content: Content, folder: Path) -> Done:
+    folder.mkdir(parents=True)
+    facts = job.task.run(job.source, folder)
+    if marks_of(job.source.words) != content.marks:
+        raise BagError(f"{job.source.shown[0]}: was changed while it was read: is it still being recorded?")
+    return Done(content, facts, results_in(folder), folder)
 
 
 def end_with_parent() -> None:
@@ -187,10 +165,3 @@ def _unfit(job: Job) -> str | None:
 
 def _is_there(job: Job, done: Entry) -> bool:
     return are_intact(job.into / job.source.name, done.files.items())
-
-
-def finished(job: Job, content: Content, facts: Mapping[str, JSON], folder: Path) -> Done:
-    """Have a result outlast a loss of power; raises BagError where the recording has changed meanwhile."""
-    if marks_of(job.source.words) != content.marks:
-        raise BagError(f"{job.source.shown[0]}: was changed while it was read: is it still being recorded?")
-    return Done(content, facts, results_in(folder), folder)

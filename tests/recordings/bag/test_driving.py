@@ -17,7 +17,7 @@ from syncrelay.recordings.analysis.watching import watch_group
 from syncrelay.recordings.bag import Channel, Encoding
 from syncrelay.recordings.bag.bindings import bind
 from syncrelay.recordings.bag.payloads import message_reader
-from syncrelay.recordings.bag.recording import AFTER_ALL, Definition, RawMessage
+from syncrelay.recordings.bag.recording import Definition, RawMessage
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import DropReason, Match, Message, Outcome
 from tests.ros.cdr_messages import STORE, VECTOR, vector
@@ -46,13 +46,10 @@ class Made:
         self.faults: list[str] = []
         self.size = self.position = 0
 
-    def batches(
-        self, channels: Collection[Channel], *, begin: int = 0, end: int = AFTER_ALL
-    ) -> Iterator[list[RawMessage]]:
+    def batches(self, channels: Collection[Channel]) -> Iterator[list[RawMessage]]:
         """Give the rows of some channels in the order of receipt, and a batch of none."""
-        rows = [row for row in self.rows if begin <= row[2] < end]
-        for first in range(0, len(rows) + _BATCH, _BATCH):
-            yield list(self._messages(channels, rows[first : first + _BATCH]))
+        for first in range(0, len(self.rows) + _BATCH, _BATCH):
+            yield list(self._messages(channels, self.rows[first : first + _BATCH]))
 
     def _messages(self, channels: Collection[Channel], rows) -> Iterator[RawMessage]:
         for row in rows:

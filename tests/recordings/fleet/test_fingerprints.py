@@ -173,7 +173,7 @@ def tasks_of(text: str) -> dict[str, Task]:
     asked = Asked("file.yaml", text, (), None, None, json=False, indent=None)
     front = [group for group in config.groups if group.name == "front"]
     return {
-        "parquet": ParquetTask.of(only(config, front), Content(), None),
+        "parquet": ParquetTask.of(only(config, front), Content()),
         "lerobot": LerobotTask.of(config),
         "analyze": AnalyzeTask.of(asked),
         "mcap": ReplayTask.of(config, (), 0),
