@@ -20,7 +20,11 @@ class TypeImportError(SyncRelayError):
     """A message type that exists by name could not be imported."""
 
 
-class RosUnavailableError(SyncRelayError):
+class UnavailableError(SyncRelayError):
+    """What a command needs is not installed, or cannot be used here."""
+
+
+class RosUnavailableError(UnavailableError):
     """ROS cannot be used here: rclpy, its middleware or its environment is missing."""
 
 

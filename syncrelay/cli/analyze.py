@@ -27,10 +27,10 @@ from syncrelay.errors import BagError, UsageError
 from syncrelay.printable import printable
 from syncrelay.recordings.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
 from syncrelay.recordings.bag import Channel, Recording, is_recording, open_recording
-from syncrelay.recordings.bag.attempts import redacted
 from syncrelay.recordings.bag.bindings import GroupBinding, bind
 from syncrelay.recordings.fleet.recordings import names_recordings
 from syncrelay.recordings.fleet.robots import RobotPattern
+from syncrelay.urls import redacted
 
 _GROUP = "matched"
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Final, TextIO
 
 from syncrelay.cli.stop import TERMINATED, Terminated
-from syncrelay.errors import NO_SPACE, RosUnavailableError, SyncRelayError, UsageError
+from syncrelay.errors import NO_SPACE, SyncRelayError, UnavailableError, UsageError
 from syncrelay.printable import one_entry, printable_lines
 
 DONE: Final = 0
@@ -169,7 +169,7 @@ def _code(error: SyncRelayError) -> int:
     match error:
         case UsageError():
             return USAGE
-        case RosUnavailableError():
+        case UnavailableError():
             return UNAVAILABLE
         case _:
             return AT_FAULT

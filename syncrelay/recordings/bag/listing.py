@@ -8,10 +8,11 @@ from typing import NamedTuple
 from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, StorageError
 from syncrelay.recording_files import METADATA, SUFFIXES, is_recording_name
-from syncrelay.recordings.bag.attempts import redacted
 from syncrelay.recordings.bag.metadata import LARGEST, Metadata, parse_metadata
 from syncrelay.recordings.bag.names import natural
-from syncrelay.recordings.bag.storage import files_of, is_url, metadata_of, open_url
+from syncrelay.recordings.bag.remote_file import RemoteFile
+from syncrelay.recordings.bag.storage import files_of, is_url, metadata_of
+from syncrelay.urls import redacted
 
 
 def files_meant(named: Sequence[str]) -> Iterator[Path | str]:
@@ -63,7 +64,7 @@ def _metadata(word: str) -> _Found | None:
         url = metadata_of(word)
         if url is None:
             return None
-        with closing(open_url(url)) as remote:
+        with closing(RemoteFile(url)) as remote:
             content = remote.read(min(LARGEST + 1, remote.size))
         return _Found(content, [PurePosixPath(each).name for each in files_of(word)])
     folder = Path(word).parent if Path(word).name == METADATA else Path(word)

@@ -18,15 +18,15 @@ import zstandard
 
 from syncrelay.config.wording import counted
 from syncrelay.errors import BagError, StorageError
-from syncrelay.recording_files import METADATA
+from syncrelay.recording_files import METADATA, scheme_of
 from syncrelay.recordings.bag import mcap_file, ros1_file, sqlite_file
-from syncrelay.recordings.bag.attempts import redacted
 from syncrelay.recordings.bag.batching import batched, filled
 from syncrelay.recordings.bag.effort import TOO_MUCH, room_for
 from syncrelay.recordings.bag.listing import files_meant, told_of
 from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
+from syncrelay.recordings.bag.remote_file import RemoteFile
 from syncrelay.recordings.bag.sources import LocalFile, NoIndexError
-from syncrelay.recordings.bag.storage import open_url
+from syncrelay.urls import file_system, redacted
 
 Tell: TypeAlias = Callable[[str], object]
 """Takes a sentence that is worth a remark and is no fault."""
@@ -49,6 +49,7 @@ _DECOMPRESSORS: Final[Mapping[bytes, Callable[[Path], Any]]] = {
 }
 _LONGEST_MAGIC: Final = 16
 _PIECE: Final = 1_000_000
+_LOCAL: Final = ("file", "local")
 
 
 def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Recording:
@@ -156,7 +157,9 @@ def _counts(told: Sequence[Mapping[str, int]]) -> Mapping[str, int]:
 
 def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> Recording:
     """Open a file behind a URL by ranges if that is possible, and else copy it here, once."""
-    remote = open_url(url)
+    if scheme_of(url) in _LOCAL:
+        return _open(Path(file_system(url)[1]), url, opened, faults)
+    remote = RemoteFile(url)
     opened.callback(remote.close)
     why = "its format is read from a file of this machine"
     if not remote.has_ranges:

@@ -3,43 +3,33 @@
 import shutil
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from errno import ENOSPC
+from functools import partial
 from pathlib import Path
 from threading import Thread
-from typing import BinaryIO, Final, Protocol
+from typing import Any, Final, TypeAlias
 
-from syncrelay.errors import BagError
-from syncrelay.recordings.bag.attempts import Patience, persist
+from syncrelay.errors import NO_SPACE, BagError, StorageError
+from syncrelay.recording_files import scheme_of
 from syncrelay.recordings.bag.sources import Span
+from syncrelay.urls import REPLACED, SERVERS, IncompleteError, file_system, redacted, tried
 
-# What is asked for at once, and what may lie between two parts of it: less than one more request costs.
+Fetch: TypeAlias = Callable[[int, int], bytes]
+"""Returns the bytes from one place up to another; called from several threads."""
+
+# Why not one of fsspec's caches: they fetch whole blocks, one after another. Of a recording of 10 MB with two small
+# topics they fetch all of it instead of 55 kB.
 _AT_ONCE: Final = 4_000_000
+# Less than one more request costs.
 _GAP: Final = 32_000
 # Parts that are on their way, so that a store far away is not waited for at each: 32 MB at most.
 _AHEAD: Final = 8
 # Chunks that overlap in time are read in turns.
 _HELD: Final = 3
-
-
-class Ranges(Protocol):
-    """A file that is read by ranges, as it was when it was opened. All raise PassingError or LastingError.
-
-    `identity` tells it from another that is behind the URL later: an ETag, a generation, or when it was changed.
-    """
-
-    size: int
-    identity: str
-    has_ranges: bool
-
-    def fetch(self, begin: int, end: int) -> bytes:
-        """Return the bytes from one place up to another, all of them; called from several threads."""
-        ...
-
-    def fetch_all(self, file: BinaryIO) -> None:
-        """Write the whole into a file from its begin on, where there are no ranges."""
-        ...
+# At its begin a file could be read without ranges too.
+_PROBED: Final = (1, 2)
+_IDENTITIES: Final = ("ETag", "generation", "etag", "Last-Modified", "LastModified", "mtime")
 
 
 class RemoteFile:
@@ -50,14 +40,20 @@ class RemoteFile:
 
     is_near = False
 
-    def __init__(self, ranges: Ranges, name: str, patience: Patience) -> None:
-        """Read a file that messages call `name`, which holds no secret."""
-        self.name = name
-        self.size = ranges.size
-        self.identity = ranges.identity
-        self.has_ranges = ranges.has_ranges
-        self._ranges = ranges
-        self._patience = patience
+    def __init__(self, url: str) -> None:
+        """Find out what there is; raises StorageError where it cannot be reached, and UnavailableError."""
+        self._files, self._path = file_system(url)
+        self._url = url
+        self.name = redacted(url)
+        """What messages call it, without a secret."""
+        self._about = self._look()
+        self.identity = _identity(self._about)
+        """What changes when the file is replaced; nothing where its server tells none."""
+        if self._about.get("size") is None:
+            raise StorageError(f"{self.name}: the server does not tell its size, so its end is unknown: copy it here")
+        self.size = int(self._about["size"])
+        self._fetch_range = _fetcher(self._files, self._path, self._about, url)
+        self.has_ranges = scheme_of(url) not in SERVERS or self._sends_ranges()
         self._place = 0
         self._held: deque[tuple[int, bytes]] = deque(maxlen=_HELD)
         self._windows: list[Span] = []
@@ -95,7 +91,7 @@ class RemoteFile:
                 return
             why = f"it has {self.size:,} bytes, and {free:,} are free"
         except OSError as error:
-            why = "no space is left" if error.errno == ENOSPC else f"{error.strerror}"
+            why = "no space is left" if error.errno in NO_SPACE else f"{error.strerror}"
         raise BagError(f"{self.name}: cannot be copied to {path.parent}: {why}, set TMPDIR to another folder")
 
     def close(self) -> None:
@@ -103,11 +99,33 @@ class RemoteFile:
         self._held.clear()
         self.expect(())
 
+    def _look(self) -> Mapping[str, Any]:
+        """Return what the store says of the file now."""
+        about: Mapping[str, Any] = tried(self._url, lambda: self._files.info(self._path))
+        if about["type"] != "file":
+            raise StorageError(f"{self.name}: is a folder, expected a file")
+        return about
+
+    def _sends_ranges(self) -> bool:
+        if self._about.get("partial") is False:
+            return False
+
+        def probe() -> bool:
+            try:
+                return self.size < len(_PROBED) or bool(self._fetch_once(*_PROBED))
+            except ValueError:
+                # fsspec's, for an answer that is the whole file.
+                return False
+
+        return tried(self._url, probe)
+
     def _copy_to(self, path: Path) -> None:
+        if not self.has_ranges:
+            tried(self._url, lambda: self._files.get_file(self._path, str(path)))
+            if path.stat().st_size != self.size:
+                raise StorageError(f"{self.name}: {path.stat().st_size:,} of {self.size:,} bytes came")
+            return
         with path.open("wb") as file:
-            if not self.has_ranges:
-                persist(self.name, lambda: self._ranges.fetch_all(file), self._patience)
-                return
             self.seek(0)
             self.expect([(0, self.size)])
             while piece := self.read(_AT_ONCE):
@@ -145,14 +163,46 @@ class RemoteFile:
         def fetch() -> None:
             try:
                 coming.set_result(self._fetch(begin, end))
-            except BaseException as error:  # noqa: BLE001  told where it is read
+            except BaseException as error:  # noqa: BLE001  raised where it is read
                 coming.set_exception(error)
 
         Thread(target=fetch, daemon=True).start()
         return coming
 
     def _fetch(self, begin: int, end: int) -> bytes:
-        return persist(self.name, lambda: self._ranges.fetch(begin, end), self._patience)
+        return tried(self._url, lambda: self._fetch_once(begin, end))
+
+    def _fetch_once(self, begin: int, end: int) -> bytes:
+        content = self._fetch_range(begin, end)
+        if len(content) != end - begin:
+            about = self._look()
+            if (_identity(about), about.get("size")) != (self.identity, self.size):
+                raise StorageError(f"{self.name}: {REPLACED}")
+            raise IncompleteError(f"asked for {end - begin} bytes, {len(content)} came")
+        return content
+
+
+def _fetcher(files: Any, path: str, about: Mapping[str, Any], url: str) -> Fetch:
+    """Return what fetches parts of a file, of the version that was opened where its store can tell versions apart."""
+    if "generation" in about:
+        return partial(files.cat_file, path, generation=about["generation"])
+    pinned: dict[str, Any] = {}
+    if scheme_of(url) in SERVERS:
+        # Ranges are those of the file and not of a compressed form of it.
+        headers = {"Accept-Encoding": "identity"}
+        if about.get("ETag", "W/").startswith("W/"):
+            headers |= {"If-Unmodified-Since": about["Last-Modified"]} if "Last-Modified" in about else {}
+        else:
+            headers["If-Match"] = about["ETag"]
+        pinned = {"headers": headers, "size": about["size"]}
+    file = tried(url, lambda: files.open(path, "rb", cache_type="none", **pinned))
+    # Files of S3 and of servers; what is in memory has no cache, and needs none.
+    cache = getattr(file, "cache", None)
+    return partial(files.cat_file, path) if cache is None else cache.fetcher
+
+
+def _identity(about: Mapping[str, Any]) -> str:
+    return next((str(about[name]) for name in _IDENTITIES if about.get(name)), "")
 
 
 def _windows(spans: Sequence[Span], size: int) -> Iterator[Span]:

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Final
 
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag.attempts import redacted
 from syncrelay.recordings.bag.listing import local_files
-from syncrelay.recordings.bag.storage import files_of, is_url, open_url
+from syncrelay.recordings.bag.remote_file import RemoteFile
+from syncrelay.recordings.bag.storage import files_of, is_url
+from syncrelay.urls import redacted
 
 _DIGEST_BYTES: Final = 20
 
@@ -105,7 +106,7 @@ def _of_url(word: str) -> Content:
     """Return what changes when the content behind a URL does, as its server tells it, and its size; nothing is read."""
     parts = []
     for url in files_of(word):
-        with closing(open_url(url)) as file:
+        with closing(RemoteFile(url)) as file:
             if not file.identity:
                 raise BagError(
                     f"{redacted(url)}: its server tells no ETag and no date, by which a change of it would be seen:"

@@ -10,9 +10,9 @@ from typing import Final
 
 from syncrelay.errors import BagError
 from syncrelay.recording_files import METADATA, is_recording_name
-from syncrelay.recordings.bag.attempts import redacted
 from syncrelay.recordings.bag.storage import find, is_url
 from syncrelay.recordings.fleet.task import Source
+from syncrelay.urls import redacted
 
 _EXPECTED: Final = "expected files that end in .mcap, .db3 or .bag, compressed or not"
 _LIST: Final = "@"

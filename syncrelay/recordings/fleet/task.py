@@ -9,7 +9,7 @@ from typing import Final, Protocol, TypeAlias
 
 from syncrelay import own_version
 from syncrelay.config import GroupConfig
-from syncrelay.recordings.bag.attempts import redacted
+from syncrelay.urls import redacted
 
 JSON: TypeAlias = "dict[str, JSON] | list[JSON] | str | int | float | bool | None"
 """What json.dumps takes."""

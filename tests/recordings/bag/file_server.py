@@ -105,7 +105,7 @@ def _send(request: BaseHTTPRequestHandler, served: FileServer, content: bytes, f
             return
         body, status = content[begin:end], 206
         headers["Content-Range"] = f"bytes {begin}-{end - 1}/{len(content)}"
-    if fault == "short":
+    if fault == "short" and request.command == "GET":
         body = body[: len(body) // 2]
     headers |= {"Connection": "close"} if fault == "endless" else {"Content-Length": str(len(body))}
     request.send_response(status)

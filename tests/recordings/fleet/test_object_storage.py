@@ -133,8 +133,8 @@ def test_analyze_and_init_take_urls(folder, relay):  # noqa: ARG001  the bucket
 @pytest.mark.parametrize(
     ("word", "why"),
     [
-        ("s3://fleet/day/none.mcap", "no such object, or bucket: check the URL"),
-        ("s3://no-such-bucket/rig.mcap", "no such object, or bucket: check the URL"),
+        ("s3://fleet/day/none.mcap", "no such file, folder or bucket: check the URL"),
+        ("s3://no-such-bucket/rig.mcap", "no such file, folder or bucket: check the URL"),
         ("s3://fleet/day/none*.mcap", "holds no recording"),
     ],
 )

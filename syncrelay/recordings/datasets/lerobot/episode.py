@@ -15,7 +15,6 @@ from syncrelay.config.wording import counted
 from syncrelay.errors import BagError, UsageError
 from syncrelay.recordings.analysis.few_sets import why_few_sets
 from syncrelay.recordings.bag import Recording, open_recording
-from syncrelay.recordings.bag.attempts import redacted
 from syncrelay.recordings.bag.bindings import GroupBinding, bind
 from syncrelay.recordings.bag.replay import Replay
 from syncrelay.recordings.datasets.lerobot.grid import Grid
@@ -23,6 +22,7 @@ from syncrelay.recordings.datasets.lerobot.sets import INCOMPLETE, FrameSet, Fra
 from syncrelay.recordings.datasets.lerobot.stats import PictureStats, Stats, stats_of
 from syncrelay.recordings.datasets.lerobot.videos import VideoWriter
 from syncrelay.recordings.datasets.reading import SetsOf, require_complete
+from syncrelay.urls import redacted
 
 TABLE: Final = "frames.parquet"
 ABOUT: Final = "episode.json"
