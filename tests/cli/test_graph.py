@@ -94,7 +94,7 @@ def test_a_running_relay_adds_rates_and_the_finding_that_explains_most():
     assert boxes["front"].lines[-1] == "OK, 10 of 10 sets/s"
     assert (boxes["front"].mark, boxes["front"].finding) == (Mark.OK, None)
     assert boxes["rear"].mark is Mark.ERROR
-    assert (boxes["rear"].finding or "").startswith("other clock: stamps of /rear/image_raw are 37.2 s behind")
+    assert (boxes["rear"].finding or "").startswith("other clock: ")
     assert (boxes["new"].mark, boxes["new"].finding) == (Mark.NONE, None)
     inputs = {each.name: each for each in drawing.inputs}
     assert inputs["/imu/data"].lines == ("sensor_msgs/msg/Imu", "200 Hz")

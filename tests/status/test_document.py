@@ -66,7 +66,7 @@ def test_what_is_said_of_a_group():
             {
                 "code": "healthy",
                 "severity": "ok",
-                "text": "10 of 10 possible sets a second, span 5 ms and latency 2 ms at the 95th percentile",
+                "text": working().findings[0].text,
                 "suggestion": None,
                 "topic": None,
                 "topics": [],
