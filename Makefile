@@ -108,7 +108,7 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { apt-get update && apt-get install -y python3-venv && $(PYTHON) -m venv $(VENV); }
 
 $(VENV)/demo: $(BIN)/python $(BUILT_OF)
-	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS)]'
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),top]'
 	touch $@
 
 $(VENV)/test: $(BIN)/python $(BUILT_OF)

@@ -1,8 +1,7 @@
 """Takes out of the image's Python environment what a running relay never opens. Run by that environment's Python.
 
-Left out: pip and setuptools, headers, static libraries, CMake files, type stubs, numpy's tests, and what reads
-recordings, which is done elsewhere (syncrelay.cli.boundary says so to who tries). Libraries that the wheels hold
-several times over (links flattened into files, one OpenSSL in each of eight packages) are kept once.
+Left out: pip and setuptools, headers, static libraries, CMake files, type stubs and numpy's tests. Libraries that the
+wheels hold several times over (links flattened into files, one OpenSSL in each of eight packages) are kept once.
 """
 
 import hashlib
@@ -13,10 +12,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 _FOLDERS = ("include", "lib/cmake", "share/*/cmake", "lib/python3*/site-packages/numpy/**/tests")
-_FILES = ("**/*.a", "**/*.pyi", "bin/[Aa]ctivate*", "bin/apsw", "bin/pip*")
+_FILES = ("**/*.a", "**/*.pyi", "bin/[Aa]ctivate*", "bin/pip*")
 _INSTALLERS = ("pip", "setuptools", "pkg_resources", "_distutils_hack", "distutils-precedence.pth")
-# With apsw rosbags opens SQLite files; what it knows of message types needs none of these.
-_OF_RECORDINGS = ("apsw", "lz4", "mcap", "zstandard")
 
 
 def main() -> None:
@@ -28,7 +25,7 @@ def main() -> None:
         for file in root.glob(pattern):
             file.unlink()
     for packages in root.glob("lib/python3*/site-packages"):
-        for path in _distributions(packages, (*_INSTALLERS, *_OF_RECORDINGS)):
+        for path in _distributions(packages, _INSTALLERS):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
     _keep_once(root.glob("lib/**/*.so*"))
 

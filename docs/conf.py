@@ -11,7 +11,7 @@ author = "the authors of syncrelay"
 copyright = "the authors of syncrelay, Apache-2.0"  # noqa: A001  Sphinx's word
 
 # `repository` and what follows it are ours, in _ext.
-extensions = ["myst_parser", "sphinx_copybutton", "repository", "doors", "drawings", "lexers"]
+extensions = ["myst_parser", "sphinx_copybutton", "repository", "doors", "lexers"]
 exclude_patterns = ["_*", "generate"]
 
 nitpicky = True

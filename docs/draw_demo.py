@@ -6,9 +6,10 @@ from pathlib import Path
 from picture import COLUMNS, LINES, draw
 
 from syncrelay.cli.demo import prepare_ros, relay_rig
-from syncrelay.cli.demo_screen import WIDEST_STRIP, Moment, frame
 from syncrelay.cli.stop import StopRequest
 from syncrelay.explain import RecentDrop
+from syncrelay.top.demo_screen import WIDEST_STRIP, frame, head_of
+from syncrelay.top.demo_text import Moment
 from syncrelay.top.group_blocks import as_matched
 from syncrelay.top.strip import Sweep
 
@@ -30,7 +31,7 @@ def main() -> None:
 
 def _fullness(moment: Moment) -> tuple[bool, int]:
     """Prefer a moment that shows a lost set, and then one at which the strip is about to begin again."""
-    sweep = Sweep(head=moment.head, width=WIDEST_STRIP)
+    sweep = Sweep(head=head_of(moment), width=WIDEST_STRIP)
     outcomes = as_matched(moment.state.groups[0])
     lost = [each for each in outcomes if isinstance(each, RecentDrop) and each.input == _LIDAR]
     return any(sweep.column(each.stamp) for each in lost), sweep.column(sweep.head) or 0

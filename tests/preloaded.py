@@ -64,7 +64,7 @@ _OF_NODES: Final = (
     "rclpy.executors",
     "syncrelay.cli.run",
     "syncrelay.cli.services",
-    "syncrelay.cli.summary",
+    "syncrelay.explain.summary",
     "syncrelay.config",
     "syncrelay.logs",
     "syncrelay.ros.compiled.path",

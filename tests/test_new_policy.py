@@ -10,13 +10,13 @@ import pytest
 from jsonschema import Draft7Validator
 from pydantic import Field, create_model
 
-from syncrelay.cli.analysis_html import as_html
 from syncrelay.config import ConfigError, Tolerance, load_text, policies
 from syncrelay.config.keys import Duration, TopicName
 from syncrelay.config.models import Group, Inputs, Topic, Topics
 from syncrelay.config.schema import json_schema
 from syncrelay.explain import Code
 from syncrelay.recordings.analysis import GroupAnalysis, analyze
+from syncrelay.recordings.analysis.html import as_html
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
 from syncrelay.sync import ApproximateEpsilonTime

@@ -9,13 +9,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from syncrelay.cli.diff import difference_lines
-from syncrelay.cli.graph.drawing import drawing_of
-from syncrelay.cli.graph.mermaid import as_mermaid
 from syncrelay.config import load_text
 from syncrelay.config.difference import difference
+from syncrelay.config.difference_report import difference_lines
 from syncrelay.config.file import file_format
 from syncrelay.recordings.cases import check, load_suite_text
+from syncrelay.top.graph import as_mermaid, as_text, drawing_of
 from tests.sync.support.timeline import play_group
 from tests.test_launch_files import declared
 
@@ -90,7 +89,10 @@ def _is_make_target(words):
 def _is_known_install(words):
     return " ".join(words) in {
         "install .",
-        "install '.[ros]'",
+        "install '.[ros,top]'",
+        "install '.[ros,top,recordings]'",
+        "install '.[top]'",
+        "install '.[recordings]'",
         "install '.[kilted]'",
         "install '.[ros,test,lint]'",
         "install '.[datasets,fleet]'",
@@ -131,7 +133,9 @@ def test_the_error_that_a_page_shows_is_the_one_that_comes(tmp_path):
 def test_the_drawing_and_the_difference_that_a_page_shows_are_those_that_come():
     old = load_text(_FILES[0])
     (shown,) = [text for kind, text in _BLOCKS if kind == "mermaid"]
-    assert as_mermaid(drawing_of(old, title="fusion.yaml")) == shown.rstrip()
+    drawing = drawing_of(old, title="fusion.yaml")
+    assert "\n".join(as_mermaid(drawing)) == shown.rstrip()
+    assert "\n".join(as_text(drawing)) in [text.rstrip() for kind, text in _BLOCKS if kind == "text"]
     (shown,) = [text for kind, text in _BLOCKS if kind == "text" and text.startswith("a reload ")]
     found = difference(old, load_text(_FILES[0].replace("20ms", "30ms")))
     assert "\n".join(difference_lines(found)) == shown.rstrip()

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from docs.generate.markdown import plain
-from syncrelay.cli import parsers
+from syncrelay.cli import run
 from syncrelay.cli.boundary import EXIT_CODES
-from syncrelay.cli.dispatch import COMMANDS
+from syncrelay.cli.commands import COMMANDS, Need
 from syncrelay.cli.parser import Parser
 
 _WIDTH = 100
@@ -25,17 +25,18 @@ class _Command:
     meaning: str
     usage: str
     options: Sequence[_Option]
+    needs: Sequence[Need] = ()
 
 
 def relay() -> _Command:
     """Return the relay, which is no command."""
-    return _command(parsers.relay())
+    return _command(run.parser())
 
 
 def the_commands() -> Iterator[_Command]:
     """Yield all commands, in the order of the help."""
     for command in COMMANDS.values():
-        yield _command(command.parser())
+        yield _command(command.parser(), command.needs)
 
 
 def exit_codes() -> Mapping[int, str]:
@@ -43,12 +44,13 @@ def exit_codes() -> Mapping[int, str]:
     return EXIT_CODES
 
 
-def _command(parser: Parser) -> _Command:
+def _command(parser: Parser, needs: Sequence[Need] = ()) -> _Command:
     return _Command(
         parser.prog,
         plain(" ".join((parser.description or "").split())),
         _usage(parser),
         tuple(_Option(_name(action), plain((action.help or "").replace("%%", "%"))) for action in parser.actions),
+        needs,
     )
 
 

@@ -3,175 +3,175 @@
 import json
 import os
 from argparse import Namespace
-from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from syncrelay.cli.analysis_json import as_json
-from syncrelay.cli.analysis_text import report
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
-from syncrelay.cli.fleet import do_on_many, put_facts, require_into
-from syncrelay.cli.inventory import put_inventory
+from syncrelay.cli.fleet_options import add_fleet_options, require_into
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
-from syncrelay.cli.parser import Parser
-from syncrelay.cli.reading import reading, tell_faults
-from syncrelay.cli.side_by_side import Work, side_by_side
+from syncrelay.cli.parser import Parser, output
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config import load_text
-from syncrelay.config.source import read_source
-from syncrelay.config.wording import did_you_mean
-from syncrelay.errors import BagError, UsageError
 from syncrelay.printable import printable
-from syncrelay.recordings.analysis import Analysis, analyze, file_with_changes, proposed_text, settled
-from syncrelay.recordings.bag import Channel, Recording, is_recording, open_recording
-from syncrelay.recordings.bag.bindings import GroupBinding, bind
-from syncrelay.recordings.fleet.recordings import names_recordings
-from syncrelay.recordings.fleet.robots import RobotPattern
-from syncrelay.urls import redacted
 
-_GROUP = "matched"
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from syncrelay.recordings.analysis import Analysis
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What is analyzed: a file's groups, or topics as one group; and what comes of it beside the text.
-
-    `text` is what the file of this name holds. `indent` is that of JSON.
-    """
-
-    config: str | None
-    text: str | None
-    topics: tuple[str, ...]
-    write: str | None
-    html: str | None
-    json: bool
-    indent: int | None
+def parser() -> Parser:
+    """Return the parser of `syncrelay analyze`."""
+    parser = Parser(
+        "syncrelay analyze",
+        example="syncrelay analyze drive.mcap --config fusion.yaml",
+        description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
+        "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
+        "Each of several recordings is measured by itself, on all cores. "
+        "Exit code 1 if a required topic, or part of a recording, is missing.",
+    )
+    parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
+    parser.add_argument(
+        "more", metavar="BAG|TOPIC", nargs="*", help="more recordings; topics to match, if there is no file yet"
+    )
+    parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
+    parser.add_argument(
+        "--write", metavar="NEW", type=output, help="write the file with the suggested values; keeps its comments"
+    )
+    parser.add_argument(
+        "--html", metavar="REPORT", type=output, help="write a report with charts: one HTML file, opens offline"
+    )
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print all figures as JSON; of several recordings, each in one line; with --into the rows of its table",
+    )
+    parser.add_argument(
+        "--robot",
+        metavar="PATTERN",
+        help="with --into: where in a path the robot's name is, as in '{robot}/{day}/*.mcap'; default: the first folder"
+        " in which paths differ",
+    )
+    add_fleet_options(parser)
+    return parser
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay analyze`."""
+    from syncrelay.cli.side_by_side import Work, side_by_side
+    from syncrelay.config import load_text
+    from syncrelay.config.source import read_source
+    from syncrelay.recordings.bag import is_recording
+    from syncrelay.urls import redacted
+    from syncrelay.recordings.fleet.recordings import names_recordings
+
     config, *others = arguments.config or [None]
     if others:
         parser.error("--config was given more than once: analyze takes one file")
     require_into(parser, arguments)
     is_bag = is_recording if arguments.into is None else names_recordings
     bags = [arguments.bag, *filter(is_bag, arguments.more)]
-    asked = Asked(
-        config=config,
-        text=None,
-        topics=tuple(word for word in arguments.more if not is_bag(word)),
-        write=arguments.write,
-        html=arguments.html,
-        json=arguments.json,
-        indent=2 if len(bags) == 1 else None,
-    )
-    _require_sense(asked, bags if arguments.into is None else bags[:1])
-    if config is not None:
-        asked = replace(asked, text=read_source(config).text)
+    topics = tuple(word for word in arguments.more if not is_bag(word))
+    if config is not None and topics:
+        parser.error("name a file with --config FILE, or the topics to match, not both")
+    if config is None and not topics and (arguments.write or arguments.html):
+        parser.error("name a file with --config FILE, or the topics to match: there is nothing to write yet")
+    text = None if config is None else read_source(config).text
     if arguments.into is not None:
-        return _analyze_many(parser, arguments, bags, asked)
+        return _analyze_many(parser, arguments, bags, text, topics)
+    if len(bags) > 1 and (arguments.write or arguments.html):
+        parser.error(f"--write and --html are for one recording, found {len(bags)}")
     if arguments.robot:
         parser.error("--robot goes with --into")
     if len(bags) == 1:
-        return analyze_bag(bags[0], asked)
-    if asked.text is not None:
-        load_text(asked.text, name=config)
-    works = [Work(redacted(bag), partial(analyze_bag, bag, asked)) for bag in bags]
+        return _analyze(bags[0], arguments, text, topics, indent=2)
+    if text is not None:
+        load_text(text, name=config)
+    works = [Work(redacted(bag), partial(_analyze, bag, arguments, text, topics, indent=None)) for bag in bags]
     return side_by_side(works, jobs=arguments.jobs or len(os.sched_getaffinity(0)))
 
 
-def _analyze_many(parser: Parser, arguments: Namespace, bags: Sequence[str], asked: Asked) -> int:
+def _analyze_many(
+    parser: Parser, arguments: Namespace, bags: "Sequence[str]", text: str | None, topics: tuple[str, ...]
+) -> int:
     """Leave an analysis of each recording in a folder, and a table of all of them where there are groups."""
-    from syncrelay.cli.fleet_tasks import AnalyzeTask
+    from syncrelay.cli.fleet import do_on_many, put_facts
+    from syncrelay.recordings.fleet.robots import RobotPattern
+    from syncrelay.recordings.fleet.tasks import AnalyzeTask
 
-    if asked.write or asked.html:
+    if arguments.write or arguments.html:
         parser.error("--write and --html are for one recording, and --into is for many")
-    if asked.text is None and not asked.topics:
-        if asked.json or arguments.robot:
-            parser.error("--json and --robot are about groups: name a file with --config FILE, or topics")
-        return do_on_many(AnalyzeTask.of(asked), bags, arguments)
+    has_groups = text is not None or bool(topics)
+    if not has_groups and (arguments.json or arguments.robot):
+        parser.error("--json and --robot are about groups: name a file with --config FILE, or topics")
+    file = arguments.config[0] if arguments.config else None
+    task = AnalyzeTask.of(file=file, text=text, topics=topics)
+    if not has_groups:
+        return do_on_many(task, bags, arguments)
     pattern = None if arguments.robot is None else RobotPattern.parse(arguments.robot)
-    # Without it hours of work would end in no table.
-    import_module("pyarrow")
 
     def finish(*_: object) -> int:
-        return put_facts(Path(arguments.into), pattern, is_json=asked.json)
+        return put_facts(Path(arguments.into), pattern, is_json=arguments.json)
 
-    return do_on_many(AnalyzeTask.of(asked), bags, arguments, finish=finish)
+    return do_on_many(task, bags, arguments, finish=finish)
 
 
-def analyze_bag(bag: str, asked: Asked) -> int:
-    """Print what a recording tells, with neither file nor topics what is in it.
+def _analyze(bag: str, arguments: Namespace, text: str | None, topics: tuple[str, ...], *, indent: int | None) -> int:
+    """Print what a recording tells, with neither file nor topics what is in it; `indent` is that of JSON.
 
     Returns 1 if a required topic is not there, or part of the recording is missing or cannot be read.
     Raises ConfigError for a faulty file, BagError for a recording that cannot be read.
     """
+    from syncrelay.cli.reading import reading, tell_faults
+    from syncrelay.recordings.analysis import analyze, inventory, settled
+    from syncrelay.recordings.analysis.binding import bind_file_or_topics
+    from syncrelay.recordings.analysis.report_json import inventory_as_json
+    from syncrelay.recordings.analysis.report_text import inventory_lines
+    from syncrelay.recordings.bag import open_recording
+    from syncrelay.urls import redacted
+
     name = redacted(bag)
     with closing(open_recording([bag], tell=remark)) as recording:
-        if asked.config is None and not asked.topics:
-            put_inventory(name, recording, is_json=asked.json, indent=asked.indent)
+        if text is None and not topics:
+            with reading(recording):
+                found = inventory(recording)
+            if arguments.json:
+                put(json.dumps(inventory_as_json(name, recording, found), indent=indent))
+            else:
+                put("\n".join(inventory_lines(name, recording, found)))
             return tell_faults(recording)
-        text, bindings = bound(recording, asked)
+        file = arguments.config[0] if arguments.config else None
+        text, bindings = bind_file_or_topics(recording, file=file, text=text, topics=topics)
         for problem in (problem for binding in bindings for problem in binding.problems):
             remark(printable(problem))
         with reading(recording):
-            analysis = measured(recording, text, bindings, asked)
-    _print(name, analysis, asked)
+            analysis = analyze(recording, text, bindings)
+            if file is None:
+                analysis = settled(analysis)
+    _give(name, analysis, arguments, indent=indent)
     if tell_faults(recording) or not all(binding.is_complete for binding in bindings):
         return AT_FAULT
     return DONE
 
 
-def bound(recording: Recording, asked: Asked) -> tuple[str, tuple[GroupBinding, ...]]:
-    """Return the text of the file that is meant, and its groups as the recording fills them; raises as analyze_bag."""
-    text = _proposed(recording, asked.topics) if asked.text is None else asked.text
-    return text, bind(load_text(text, name=asked.config or "<topics>"), recording)
+def _give(name: str, analysis: "Analysis", arguments: Namespace, *, indent: int | None) -> None:
+    """Print an analysis, and write the files that the options name."""
+    from syncrelay.recordings.analysis import file_with_changes
+    from syncrelay.recordings.analysis.report_json import as_json
+    from syncrelay.recordings.analysis.report_text import report
 
-
-def measured(recording: Recording, text: str, bindings: Sequence[GroupBinding], asked: Asked) -> Analysis:
-    """Read a recording to its end; where only topics are named, with the values that fit them."""
-    analysis = analyze(recording, text, bindings)
-    return settled(analysis) if asked.config is None else analysis
-
-
-def _require_sense(asked: Asked, bags: Sequence[str]) -> None:
-    more = "\n  see syncrelay analyze --help"
-    if asked.config is not None and asked.topics:
-        raise UsageError(f"name a file with --config FILE, or the topics to match, not both{more}")
-    if asked.config is None and not asked.topics and (asked.write or asked.html):
-        raise UsageError(f"name a file with --config FILE, or the topics to match: there is nothing to write yet{more}")
-    if len(bags) > 1 and (asked.write or asked.html):
-        raise UsageError(f"--write and --html are for one recording, found {len(bags)}{more}")
-
-
-def _proposed(recording: Recording, topics: Sequence[str]) -> str:
-    by_name: dict[str, Channel] = {channel.topic: channel for channel in recording.channels}
-    for topic in topics:
-        if topic not in by_name:
-            raise BagError(
-                f"{topic} is not in the recording{did_you_mean(topic, by_name)}; it has {', '.join(by_name)}"
-            )
-    if len(set(topics)) < 2:  # noqa: PLR2004  one alone has nothing to be matched with
-        raise UsageError("name 2 topics or more")
-    return proposed_text(_GROUP, [by_name[topic] for topic in dict.fromkeys(topics)])
-
-
-def _print(bag: str, analysis: Analysis, asked: Asked) -> None:
-    if asked.json:
-        put(json.dumps(as_json(bag, analysis), indent=asked.indent))
+    if arguments.json:
+        put(json.dumps(as_json(name, analysis), indent=indent))
     else:
-        for line in report(bag, analysis):
-            put(line)
-        if asked.config is None:
+        put("\n".join(report(name, analysis)))
+        if arguments.config is None:
             put(f"\nA file that gives these sets:\n\n{analysis.text.rstrip()}")
-    if asked.write is not None and asked.config is None:
-        write_new(asked.write, file_with_changes(analysis.text, analysis.changes))
-    elif asked.write is not None:
-        write_suggested(asked.write, analysis.text, analysis.changes)
-    if asked.html is not None:
-        from syncrelay.cli.analysis_html import MARK, as_html
+    if arguments.write is not None and arguments.config is None:
+        write_new(arguments.write, file_with_changes(analysis.text, analysis.changes))
+    elif arguments.write is not None:
+        write_suggested(arguments.write, analysis.text, analysis.changes)
+    if arguments.html is not None:
+        from syncrelay.recordings.analysis.html import MARK, as_html
 
-        write_again(asked.html, as_html(bag, analysis), mark=MARK)
+        write_again(arguments.html, as_html(name, analysis), mark=MARK)

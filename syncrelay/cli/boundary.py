@@ -32,13 +32,6 @@ EXIT_CODES: Final[Mapping[int, str]] = {
 }
 """What help and docs/reference/command_line.md say of them."""
 
-# What brings the packages that only some commands need.
-_EXTRAS: Final = {
-    **dict.fromkeys(("PIL", "av", "pyarrow"), "[datasets]"),
-    **dict.fromkeys(("fsspec", "pandas", "ray"), "[fleet]"),
-}
-# What the container image goes without, see docker/trim.py.
-_OF_RECORDINGS: Final = ("apsw", "lz4", "mcap", "zstandard")
 # All that our own texts are coloured with (syncrelay.config.render, syncrelay.doctor.text), and nothing else.
 _COLOURS: Final = re.compile("(\033\\[(?:[0-2]|3[134])m)")
 
@@ -153,7 +146,7 @@ def _abandon(stream: TextIO) -> None:
 
 
 def _tell(error: SyncRelayError) -> None:
-    if isinstance(error, UsageError):
+    if isinstance(error, UsageError | UnavailableError):
         # At once: the import below takes far longer than to read the words.
         remark(str(error))
         return
@@ -176,10 +169,11 @@ def _code(error: SyncRelayError) -> int:
 
 
 def _lacking(error: ImportError, package: str) -> str:
-    extra = _EXTRAS.get(package, "")
-    needs = "this command" if extra or package in _OF_RECORDINGS else "syncrelay"
-    image = " (the container image leaves out what reads recordings)" if package in _OF_RECORDINGS else ""
+    from syncrelay.cli.commands import EXTRAS
+
+    extra = next((f"[{name}]" for name, packages in EXTRAS.items() if package in packages), "")
     return (
-        f"{sys.executable} lacks a Python package that {needs} needs, or has too old a version: {error}{image}; run"
-        f" `python3 -m pip install 'FOLDER-OF-SYNCRELAY{extra}'`, or see docs/howto/workspace.md for a ROS workspace"
+        f"{sys.executable} lacks a Python package that syncrelay needs, or has too old a version: {error}; run"
+        f" `pip install 'syncrelay{extra}'`, in a clone `pip install '.{extra}'`, or see docs/howto/workspace.md for a"
+        " ROS workspace"
     )

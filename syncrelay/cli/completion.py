@@ -18,11 +18,10 @@ from argcomplete.finders import ExclusiveCompletionFinder
 from argcomplete.lexers import split_line
 from argcomplete.shell_integration import shellcode
 
-from syncrelay.cli import parsers
+from syncrelay.cli import run
 from syncrelay.cli.boundary import DONE, put
-from syncrelay.cli.dispatch import COMMANDS, COMPLETES
-from syncrelay.cli.parser import ROS_ARGS, Parser
-from syncrelay.cli.recording_parsers import IMAGE_FORMATS
+from syncrelay.cli.commands import COMMANDS
+from syncrelay.cli.parser import IMAGE_FORMATS, ROS_ARGS, Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 from syncrelay.yaml_files import yaml_files
@@ -36,6 +35,22 @@ _MOST_BYTES: Final = 1_000_000
 _BEFORE: Final = re.compile(r".*[;&|({]|\w+=.*|sudo|env|exec|nice|nohup|time|!")
 
 _Completer = Callable[[str, Namespace], Iterable[str] | Mapping[str, str]]
+
+
+def parser() -> Parser:
+    """Return the parser of `syncrelay completion`."""
+    parser = Parser(
+        "syncrelay completion",
+        example="syncrelay completion fish > ~/.config/fish/completions/syncrelay.fish",
+        description="Prints a script that makes a shell complete syncrelay's commands, options and files, the groups "
+        "of a file and the topics of a recording.",
+        epilog="where to put it:\n"
+        "  bash  ~/.local/share/bash-completion/completions/syncrelay\n"
+        "  zsh   _syncrelay in a folder of $fpath, before compinit\n"
+        "  fish  ~/.config/fish/completions/syncrelay.fish\n",
+    )
+    parser.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
+    return parser
 
 
 def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
@@ -60,7 +75,7 @@ def complete() -> int:
     parser.add_help_option()
     _set_completers(parser)
     has_positionals = any(not action.option_strings for action in parser.actions)
-    os.environ[COMPLETES] = str(start + 1 + has_command)
+    os.environ["_ARGCOMPLETE"] = str(start + 1 + has_command)
     ExclusiveCompletionFinder()(
         parser,
         # Where a file is expected, options are offered once a dash is typed.
@@ -82,7 +97,7 @@ def _is_start(words: Sequence[str], place: int) -> bool:
 
 def _relay_parser(words: Sequence[str]) -> Parser:
     """Return the relay's parser; as the first word, a command may stand too."""
-    parser = parsers.relay()
+    parser = run.parser()
     if not words:
         parser.add_argument("command", metavar="COMMAND", nargs="?")
     return parser

@@ -8,64 +8,79 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from importlib.resources import files
-from typing import TYPE_CHECKING, TypeAlias
-
-from rich.console import Console
-from rich.live import Live
-from rich.text import Text
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
-from syncrelay.cli.demo_screen import Moment, frame, plain_line, summary
-from syncrelay.cli.parser import Parser
+from syncrelay.cli.commands import is_installed, line_to_install
+from syncrelay.cli.parser import Parser, output, positive
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config import load_text
-from syncrelay.logs import configure, held_back
-from syncrelay.status import status_of
-from syncrelay.status.document import Status
+from syncrelay.printable import printable
 
 if TYPE_CHECKING:
     from syncrelay.rig.processes import Rig
     from syncrelay.ros.relay import Relay
+    from syncrelay.status.document import Status
+    from syncrelay.top.demo_text import Moment
 
-_STARTING = "Starting a simulated camera, lidar and IMU ..."
-_FRAME_S = 0.125
-_LINE_S = 1.0
+_STARTING: Final = "Starting a simulated camera, lidar and IMU ..."
+_FRAME_S: Final = 0.125
+_LINE_S: Final = 1.0
+_RECORDED_S: Final = 30.0
+_SECOND: Final = 1_000_000_000
+# Any time would do; always the same makes the same recording.
+_START: Final = 1_767_225_600 * _SECOND
+# How long a message takes from its publisher to the recorder.
+_ON_THE_WAY: Final = 500_000
 
-Show: TypeAlias = Callable[[Moment], None]
+Show: TypeAlias = "Callable[[Moment], None]"
 """Shows a moment, if it is time to."""
 
 
-def shipped_config() -> str:
-    """Return the text of the file that the demo relays."""
-    return (files("syncrelay.cli") / "demo.yaml").read_text(encoding="utf-8")
+def parser() -> Parser:
+    """Return the parser of `syncrelay demo`."""
+    parser = Parser(
+        "syncrelay demo",
+        example="syncrelay demo --seconds 30",
+        description="Starts a simulated camera, lidar and IMU, relays them, and draws what happens. Ctrl-C ends it. "
+        "Exit code 1 if a group produced no set.",
+    )
+    parser.add_argument("--seconds", metavar="N", type=positive, help="end N seconds after the sensors are up")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
+    parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays, and exit")
+    parser.add_argument(
+        "--record",
+        metavar="OUT",
+        type=output,
+        help="write what the sensors send in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT"
+        " as a rosbag2 folder",
+    )
+    return parser
 
 
 def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
-    """Run `syncrelay demo`."""
+    """Run `syncrelay demo`: 0 if every group gave sets, 1 if not."""
     if arguments.record is not None:
-        from syncrelay.cli.demo_recording import record
-
-        return record(arguments.record, arguments.seconds, arguments.seed)
-    return demo(arguments.seconds, arguments.seed, arguments.show_config, stop=stop)
-
-
-def demo(seconds: float | None, seed: int, show_config: bool, *, stop: StopRequest) -> int:  # noqa: FBT001 - as parsed
-    """Run the demo for a time, or until asked to stop; 0 if every group gave sets, 1 if not.
-
-    With `show_config` the shipped file is printed and nothing runs. Raises RosUnavailableError where ROS
-    cannot be used.
-    """
-    if show_config:
+        return record(arguments.record, arguments.seconds or _RECORDED_S, arguments.seed)
+    if arguments.show_config:
         sys.stdout.write(shipped_config())
         return DONE
+    from syncrelay.logs import configure
+    from syncrelay.top.demo_text import summary
+
     configure("warning", "text")
     prepare_ros()
-    final = relay_rig(_view(Console(highlight=False)), total_s=seconds, seed=seed, stop=stop)
+    final = relay_rig(_view(), total_s=arguments.seconds, seed=arguments.seed, stop=stop)
     if final is None:
         remark("stopped before it started")
         return DONE
     put(summary(final))
     return DONE if all(group.sets for group in final.state.groups) else AT_FAULT
+
+
+def shipped_config() -> str:
+    """Return the text of the file that the demo relays."""
+    return (files("syncrelay.cli") / "demo.yaml").read_text(encoding="utf-8")
 
 
 def prepare_ros() -> None:
@@ -80,12 +95,13 @@ def prepare_ros() -> None:
 
 def relay_rig(
     view: AbstractContextManager[Show], *, total_s: float | None, seed: int, stop: StopRequest
-) -> Moment | None:
+) -> "Moment | None":
     """Start the rig, relay it and show every moment; return how it stood when all was drained.
 
     The view is left before the rig ends, which may take time and words. Time counts from when every sensor publishes:
     how long their start takes is the machine's affair. None if it was stopped before.
     """
+    from syncrelay.config import load_text
     from syncrelay.environment.quick_discovery import quick_discovery
     from syncrelay.rig.processes import Rig
 
@@ -103,11 +119,14 @@ def relay_rig(
             return _relay(relay, rig, show, total_s=total_s, stop=stop)
 
 
-def _relay(relay: "Relay", rig: "Rig", show: Show, *, total_s: float | None, stop: StopRequest) -> Moment:
+def _relay(relay: "Relay", rig: "Rig", show: Show, *, total_s: float | None, stop: StopRequest) -> "Moment":
+    from syncrelay.status import status_of
+    from syncrelay.top.demo_text import Moment
+
     began = time.monotonic()
     end = math.inf if total_s is None else began + total_s
 
-    def moment(state: Status) -> Moment:
+    def moment(state: "Status") -> Moment:
         return Moment(state, time.monotonic() - began, total_s, time.time_ns())
 
     stop.wake_with(relay.wake)
@@ -137,43 +156,79 @@ def isolation(environ: Mapping[str, str]) -> dict[str, str]:
     return {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "FASTDDS_BUILTIN_TRANSPORTS": "DEFAULT"}
 
 
-class _Screen:
-    """The whole terminal, drawn anew at each moment."""
-
-    def __init__(self, live: Live) -> None:
-        self._live = live
-
-    def show(self, moment: Moment) -> None:
-        width, height = self._live.console.size
-        self._live.update(frame(moment, width=width, height=height), refresh=True)
-
-
-class _Lines:
-    """A plain line, once a second."""
-
-    def __init__(self) -> None:
-        self._next_s = _LINE_S
-        self._say(_STARTING)
-
-    def show(self, moment: Moment) -> None:
-        if moment.elapsed_s >= self._next_s:
-            self._say(plain_line(moment))
-            self._next_s = math.floor(moment.elapsed_s) + _LINE_S
-
-    def _say(self, line: str) -> None:
-        sys.stdout.write(f"{line}\n")
-        sys.stdout.flush()
-
-
-def _can_draw(console: Console) -> bool:
+@contextmanager
+def _view() -> Iterator[Show]:
+    """Draw on the whole terminal where that can be, else print a plain line a second."""
     # Not rich's is_terminal: FORCE_COLOR makes that true for a pipe.
-    return sys.stdout.isatty() and not console.is_dumb_terminal and console.encoding.startswith("utf")
+    is_terminal = sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in {"dumb", "unknown"}
+    can_draw = is_terminal and sys.stdout.encoding.lower().startswith("utf")
+    if can_draw and is_installed("top"):
+        with _drawing() as show:
+            yield show
+        return
+    if can_draw:
+        remark(f"this is drawn where `rich` is installed: {line_to_install('top')}")
+    from syncrelay.top.demo_text import plain_line
+
+    next_s = _LINE_S
+
+    def show_line(moment: "Moment") -> None:
+        nonlocal next_s
+        if moment.elapsed_s >= next_s:
+            print(plain_line(moment), flush=True)  # noqa: T201  as it happens, through a pipe too
+            next_s = math.floor(moment.elapsed_s) + _LINE_S
+
+    print(_STARTING, flush=True)  # noqa: T201
+    yield show_line
 
 
 @contextmanager
-def _view(console: Console) -> Iterator[Show]:
-    if not _can_draw(console):
-        yield _Lines().show
-        return
+def _drawing() -> Iterator[Show]:
+    from rich.console import Console
+    from rich.live import Live
+    from rich.text import Text
+
+    from syncrelay.logs import held_back
+    from syncrelay.top.demo_screen import frame
+
+    console = Console(highlight=False)
     with held_back(), Live(Text(_STARTING), console=console, screen=True, auto_refresh=False) as live:
-        yield _Screen(live).show
+
+        def draw(moment: "Moment") -> None:
+            width, height = console.size
+            live.update(frame(moment, width=width, height=height), refresh=True)
+
+        yield draw
+
+
+def record(name: str, seconds: float, seed: int) -> int:
+    """Write what the rig sends in a time, without ROS; the same seed gives the same recording. Returns 0."""
+    from heapq import merge
+    from itertools import takewhile
+
+    from syncrelay.cdr import patch_stamp
+    from syncrelay.recordings.bag.definitions import jazzy_definition
+    from syncrelay.recordings.bag.mcap_output import McapOutput
+    from syncrelay.recordings.bag.qos import Profile
+    from syncrelay.rig.scene import SCENES
+    from syncrelay.rig.schedule import SENSORS, schedule
+
+    end = _START + round(seconds * _SECOND)
+
+    def sent(name: str) -> Iterator[tuple[int, str, bytes]]:
+        frames = SCENES[name][1]()
+        for shot in takewhile(lambda shot: shot.sent < end, schedule(SENSORS[name], seed=seed, start=_START)):
+            yield shot.sent + _ON_THE_WAY, name, patch_stamp(frames[shot.number % len(frames)], shot.stamp)
+
+    counts = dict.fromkeys(SENSORS, 0)
+    with McapOutput(Path(name)) as recording:
+        outputs = {}
+        for sensor_name, sensor in SENSORS.items():
+            profile = Profile(depth=5, reliability="reliable" if sensor.reliable else "best_effort")
+            type_name = SCENES[sensor_name][0]
+            outputs[sensor_name] = recording.add(sensor.topic, type_name, *jazzy_definition(type_name), profile)
+        for received, sensor_name, payload in merge(*map(sent, SENSORS)):
+            recording.write(outputs[sensor_name], payload, received)
+            counts[sensor_name] += 1
+    put(f"{printable(name)}: {', '.join(f'{count} of {SENSORS[each].topic}' for each, count in counts.items())}")
+    return DONE

@@ -2,145 +2,48 @@
 
 import json
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import Any, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config import Config, ConfigError, Problem, load
-from syncrelay.config.difference import Difference, Endpoints, GroupChange, KeyChange, difference
-from syncrelay.config.wording import all_of, counted
 
-_ANY_TYPE: Final = "(type from the graph)"
+
+def parser() -> Parser:
+    """Return the parser of `syncrelay diff`."""
+    parser = Parser(
+        "syncrelay diff",
+        example="syncrelay diff fusion.yaml wider.yaml",
+        description="Says what a reload would do to a relay that runs OLD and reads NEW: which groups go on, are "
+        "rebuilt, start and end, for which keys, and which subscriptions and publishers go and come. Needs no ROS. "
+        "For files that run together, name a directory of them. "
+        "Exit code 0 if nothing changes, 1 if something does or a file has an error.",
+    )
+    parser.add_argument("old", metavar="OLD", help="what the relay runs: a YAML file, a directory of them, or -")
+    parser.add_argument("new", metavar="NEW", help="what it would read: a YAML file, a directory of them, or -")
+    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
+    return parser
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay diff`."""
+    """Run `syncrelay diff`. Raises ConfigError with what is wrong with either file."""
+    from syncrelay.config import Config, ConfigError, Problem, load
+    from syncrelay.config.difference import difference
+    from syncrelay.config.difference_report import difference_as_json, difference_lines
+
     if arguments.old == arguments.new == "-":
         parser.error("standard input can be read only once")
-    return diff(arguments.old, arguments.new, "json" if arguments.json else "text")
-
-
-def diff(old: str, new: str, output_format: str) -> int:
-    """Print what a reload from one file to another does, as `text` or `json`; 1 if that is anything.
-
-    Raises ConfigError for faulty files.
-    """
-    found = difference(*_loaded(old, new))
-    if output_format == "json":
-        put(json.dumps(_as_json(found), indent=2, ensure_ascii=False))
-    else:
-        for line in difference_lines(found):
-            put(line)
-    return DONE if found.is_empty else AT_FAULT
-
-
-def _loaded(*files: str) -> Iterator[Config]:
-    """Yield what each file says; raises ConfigError, at the end, with what is wrong in all."""
+    configs: list[Config] = []
     problems: list[Problem] = []
-    for file in files:
+    for file in (arguments.old, arguments.new):
         try:
-            yield load(file)
+            configs.append(load(file))
         except ConfigError as error:
             problems += error.problems
     if problems:
         raise ConfigError(problems)
-
-
-def difference_lines(found: Difference) -> Iterator[str]:
-    """Yield what a reload does, in lines."""
-    yield _summary(found)
-    yield from (f"  {section}" for section in found.sections)
-    gone = found.exchange
-    if not found.is_empty and not found.restart:
-        yield from (f"  {name}: keeps running, loses nothing" for name in gone.kept)
-    rebuilt = "changed" if found.restart else "rebuilt; what waits in its queues is dropped"
-    for change in found.groups:
-        # At a restart all groups begin anew; those are worth a line of which keys change.
-        if lines := list(_group_lines(change)):
-            yield f"~ {change.name}: {rebuilt}"
-            yield from (f"    {line}" for line in lines)
-    yield from (f"+ {name}: started" for name in gone.started)
-    yield from (f"- {name}: ended" for name in gone.ended)
-    yield from _endpoint_lines("subscriptions", found.subscriptions)
-    yield from _endpoint_lines(
-        "publishers", replace(found.publishers, made_again=()) if found.restart else found.publishers
-    )
-
-
-def _summary(found: Difference) -> str:
-    gone = found.exchange
-    if found.is_empty:
-        return f"a reload changes nothing: {counted(len(gone.kept), 'group')} unchanged"
-    if found.restart:
-        keys = all_of(f"`{key}`" for key in found.restart)
-        return f"a reload would be refused: {keys} cannot change while the relay runs; after a restart:"
-    done = {"keeps": gone.kept, "rebuilds": gone.rebuilt, "starts": gone.started, "ends": gone.ended}
-    return "a reload " + all_of(f"{verb} {counted(len(names), 'group')}" for verb, names in done.items() if names)
-
-
-def _group_lines(change: GroupChange) -> Iterator[str]:
-    yield from map(str, change.keys)
-    yield from (f"{topic}: no longer an input" for topic in change.removed)
-    yield from (f"{topic}: a new input" for topic in change.added)
-    if change.reordered:
-        yield "its inputs are in another order"
-
-
-def _endpoint_lines(title: str, endpoints: Endpoints) -> Iterator[str]:
-    if endpoints.lost or endpoints.made or endpoints.made_again:
-        yield f"{title}:"
-    yield from (f"- {_endpoint(each)}" for each in endpoints.lost)
-    yield from (f"+ {_endpoint(each)}" for each in endpoints.made)
-    yield from (f"~ {_endpoint(each)}: made again" for each in endpoints.made_again)
-
-
-def _endpoint(words: Sequence[str]) -> str:
-    topic, type_name, *qos = words
-    said = [topic, type_name or _ANY_TYPE, *(f"qos {each}" for each in qos if each != "auto")]
-    return " ".join(said)
-
-
-def _as_json(found: Difference) -> dict[str, Any]:
-    gone = found.exchange
-    return {
-        "reload": "none" if found.is_empty else "refused" if found.restart else "taken",
-        "restart": list(found.restart),
-        "sections": [_key_as_json(each) for each in found.sections],
-        "groups": {
-            "kept": list(gone.kept),
-            "rebuilt": [_group_as_json(each) for each in found.groups],
-            "started": list(gone.started),
-            "ended": list(gone.ended),
-        },
-        "subscriptions": _endpoints_as_json(found.subscriptions),
-        "publishers": {
-            **_endpoints_as_json(found.publishers),
-            "made_again": [_endpoint_as_json(each) for each in found.publishers.made_again],
-        },
-    }
-
-
-def _key_as_json(change: KeyChange) -> dict[str, Any]:
-    return {"key": change.key, "old": change.old, "new": change.new}
-
-
-def _group_as_json(change: GroupChange) -> dict[str, Any]:
-    return {
-        "name": change.name,
-        "keys": [{"topic": each.topic, **_key_as_json(each)} for each in change.keys],
-        "inputs_removed": list(change.removed),
-        "inputs_added": list(change.added),
-        "inputs_reordered": change.reordered,
-    }
-
-
-def _endpoints_as_json(endpoints: Endpoints) -> dict[str, Any]:
-    told = {"lost": endpoints.lost, "made": endpoints.made}
-    return {what: [_endpoint_as_json(each) for each in those] for what, those in told.items()}
-
-
-def _endpoint_as_json(words: Sequence[str]) -> dict[str, str | None]:
-    return {key: word or None for key, word in zip(("topic", "type", "qos"), words, strict=False)}
+    found = difference(*configs)
+    if arguments.json:
+        put(json.dumps(difference_as_json(found), indent=2, ensure_ascii=False))
+    else:
+        put("\n".join(difference_lines(found)))
+    return DONE if found.is_empty else AT_FAULT

@@ -2,30 +2,71 @@
 
 from argparse import Namespace
 from collections.abc import Sequence
-from contextlib import closing
-from dataclasses import dataclass, replace
-from importlib import import_module
+from dataclasses import replace
 from pathlib import Path
-from typing import Self, cast
+from typing import TYPE_CHECKING, cast
 
-from syncrelay.cli.export_lerobot import export_lerobot
-from syncrelay.cli.fleet import do_on_many
-from syncrelay.cli.fleet_tasks import ReplayTask, about, counts_of, few_sets
-from syncrelay.cli.parser import Parser
-from syncrelay.cli.reading import eased_collector
-from syncrelay.cli.recording_parsers import IMAGE_FORMATS
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
+from syncrelay.cli.fleet_options import add_fleet_options
+from syncrelay.cli.parser import IMAGE_FORMATS, Parser
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config import Config, load
-from syncrelay.config.wording import all_of, did_you_mean
 from syncrelay.errors import UsageError
-from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
-from syncrelay.recordings.bag.replay import Replay
-from syncrelay.recordings.datasets.images import ImageFormat
-from syncrelay.recordings.datasets.parquet import write_parquet
-from syncrelay.recordings.datasets.reading import SetsOf, resolved
-from syncrelay.recordings.datasets.tables import Content
-from syncrelay.recordings.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
+from syncrelay.printable import printable
+
+if TYPE_CHECKING:
+    from syncrelay.config import Config
+    from syncrelay.recordings.datasets.images import ImageFormat
+    from syncrelay.recordings.fleet.run import Run
+    from syncrelay.recordings.fleet.task import Source
+
+
+def parser() -> Parser:
+    """Return the parser of `syncrelay export`."""
+    parser = Parser(
+        "syncrelay export",
+        example="syncrelay export drive.mcap --config fusion.yaml -o dataset",
+        description="Writes the sets that the groups of a file make of recordings as a dataset: in Parquet, a row a "
+        "set, with the messages decoded. They are the sets of `syncrelay replay`. Exit code 1 if a recording lacks a "
+        "required topic, or part of it is missing or cannot be read.",
+    )
+    parser.add_argument("bags", metavar="BAG", nargs="+", help="a recording as for replay; each is exported by itself")
+    parser.add_argument(
+        "--config",
+        metavar="FILE",
+        action="append",
+        required=True,
+        help="the file with the groups, or a directory of files; may be repeated",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("parquet", "mcap", "lerobot"),
+        default="parquet",
+        metavar="FORMAT",
+        help="parquet (default): BAG/GROUP.parquet in FOLDER; mcap: the sets as a recording, as replay -o writes them;"
+        " lerobot: FOLDER is one LeRobotDataset v3.0, as `export:` in the file says",
+    )
+    parser.add_argument(
+        "--group", metavar="NAME", action="append", default=[], help="export this group only; may be repeated"
+    )
+    parser.add_argument(
+        "--fields",
+        metavar="TOPIC:FIELD,...",
+        action="append",
+        default=[],
+        help="of this input's messages write these fields only, such as /imu/data:linear_acceleration,header.stamp; may"
+        " be repeated",
+    )
+    parser.add_argument(
+        "--images",
+        metavar="[TOPIC=]FORMAT",
+        action="append",
+        default=[],
+        help="write images as png or jpeg instead of raw pixels: those of this input, or all that no --images names;"
+        " may be repeated, as in --images jpeg --images /depth=png",
+    )
+    parser.add_argument("--raw", action="store_true", help="write each message as the CDR bytes that were recorded")
+    add_fleet_options(parser, "-o", "--output")
+    return parser
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
@@ -33,20 +74,27 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     parser.refuse_repeated(arguments.config)
     if arguments.into is None:
         parser.error("the following arguments are required: -o/--output")
-    if arguments.raw and (arguments.fields or arguments.images):
+    has_columns = bool(arguments.fields or arguments.images)
+    if arguments.raw and has_columns:
         parser.error("--raw keeps each message as it is: --fields and --images do not go with it")
+    if (arguments.raw or has_columns) and arguments.format != "parquet":
+        whole = "--format mcap writes whole messages"
+        why = whole if arguments.format == "mcap" else "`export:` in the file says what LeRobot gets"
+        parser.error(f"--fields, --images and --raw are for tables: {why}")
+    from syncrelay.cli.fleet import do_on_many
+    from syncrelay.config import load
+
     config = _of_groups(load(*arguments.config), arguments.group)
     if arguments.format == "mcap":
-        if arguments.raw or arguments.fields or arguments.images:
-            parser.error("--fields, --images and --raw are for tables: --format mcap writes whole messages")
+        from syncrelay.recordings.fleet.tasks import ReplayTask
+
         return do_on_many(ReplayTask.of(config, (), 0), arguments.bags, arguments)
     if arguments.format == "lerobot":
-        if arguments.raw or arguments.fields or arguments.images:
-            parser.error("--fields, --images and --raw are for tables: `export:` in the file says what LeRobot gets")
-        return export_lerobot(config, arguments.bags, arguments)
-    if arguments.images:
-        # In a worker it would be a bug.
-        import_module("PIL.Image")
+        return _export_lerobot(config, arguments)
+    from syncrelay.recordings.datasets.reading import resolved
+    from syncrelay.recordings.datasets.tables import Content
+    from syncrelay.recordings.fleet.export_tasks import ParquetTask
+
     by_topic, others = _formats(arguments.images)
     content = Content(
         resolved(_parsed(arguments.fields), config), resolved(by_topic, config), others, raw=arguments.raw
@@ -54,51 +102,33 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     return do_on_many(ParquetTask.of(config, content), arguments.bags, arguments)
 
 
-@dataclass(frozen=True, slots=True)
-class ParquetTask:
-    """Writes the sets of a recording as a Parquet file for each group; see Task. Facts are the counts of each input."""
+def _export_lerobot(config: "Config", arguments: Namespace) -> int:
+    """Write a LeRobotDataset of all recordings into the folder of the arguments, from an episode of each."""
+    from syncrelay.cli.fleet import do_on_many
+    from syncrelay.config.wording import counted
+    from syncrelay.recordings.fleet.export_tasks import EPISODES, LerobotTask, join, require_own
 
-    config: Config
-    content: Content
-    decided_by: str
+    task = LerobotTask.of(config)
+    out = Path(arguments.into).absolute()
+    require_own(out)
 
-    @classmethod
-    def of(cls, config: Config, content: Content) -> Self:
-        """Return the task of a file."""
-        fields: dict[str, JSON] = {topic: list(paths) for topic, paths in content.fields.items()}
-        groups: list[JSON] = [group.name for group in config.groups]
-        options: dict[str, JSON] = {
-            "format": "parquet",
-            "groups": groups,
-            "fields": fields,
-            "images": dict(content.images),
-            "other_images": content.other_images,
-            "raw": content.raw,
-        }
-        return cls(
-            config,
-            content,
-            fingerprint_of("export", config=what_decides_sets(config.groups), options=options),
-        )
+    def finish(run: "Run", sources: "Sequence[Source]") -> int:
+        facts = join(run, sources, out)
+        for problem in facts["problems"]:
+            remark(problem)
+        episodes, frames = counted(facts["total_episodes"], "episode"), counted(facts["total_frames"], "frame")
+        held, left_out = counted(facts["held"], "frame"), counted(facts["left_out"], "set")
+        put(printable(f"{out}: {episodes} with {frames}; {held} repeated, {left_out} between frames left out"))
+        return AT_FAULT if facts["problems"] else DONE
 
-    def fingerprint(self) -> str:
-        """See Task."""
-        return self.decided_by
-
-    def run(self, source: Source, folder: Path) -> dict[str, JSON]:
-        """See Task."""
-        with closing(open_recording(source.words)) as recording, eased_collector():
-            bindings = bind(self.config, recording)
-            sets = SetsOf(bindings, self.content, name=source.name)
-            replay = Replay(recording, bindings, listeners=sets.listeners)
-            write_parquet(sets, replay.steps(), folder)
-            results = replay.results()
-            facts = {**about(recording, bindings, more=sets.faults()), **few_sets(recording, bindings, results)}
-            return {**facts, "groups": [counts_of(result) for result in results]}
+    into = Namespace(**{**vars(arguments), "into": str(out / EPISODES)})
+    return do_on_many(task, arguments.bags, into, finish=finish)
 
 
-def _of_groups(config: Config, names: Sequence[str]) -> Config:
+def _of_groups(config: "Config", names: Sequence[str]) -> "Config":
     """Return a file with these of its groups alone, all where none is named."""
+    from syncrelay.config.wording import all_of, did_you_mean
+
     known = [group.name for group in config.groups]
     for name in names:
         if name not in known:
@@ -118,7 +148,7 @@ def _parsed(words: Sequence[str]) -> dict[str, list[str]]:
     return fields
 
 
-def _formats(words: Sequence[str]) -> tuple[dict[str, ImageFormat], ImageFormat | None]:
+def _formats(words: Sequence[str]) -> "tuple[dict[str, ImageFormat], ImageFormat | None]":
     """Return what the images of each named input become and what all others do, from words as /depth=png and jpeg."""
     formats: dict[str, ImageFormat] = {}
     for word in words:

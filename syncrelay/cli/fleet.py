@@ -13,7 +13,6 @@ from types import FrameType
 from typing import Any, Final, Self, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, OUR_BUG, put, remark, say
-from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import TERMINATED
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
@@ -33,16 +32,6 @@ _CLEARED: Final = "\r\033[K"
 
 Finish: TypeAlias = Callable[[Run, Sequence[Source]], int]
 """What is done with the results of all recordings, named in their order; returns an exit code."""
-
-
-def require_into(parser: Parser, arguments: Namespace) -> None:
-    """Refuse options that only go with a folder for many results."""
-    if arguments.into is None:
-        for name in ("strict", "overwrite", "time_limit"):
-            if getattr(arguments, name):
-                parser.error(f"--{name.replace('_', '-')} goes with --into")
-        if arguments.engine != "local":
-            parser.error("--engine goes with --into")
 
 
 def do_on_many(

@@ -1,4 +1,6 @@
-"""The options of every command that goes over many recordings. Imports nothing slow, as parsers.py says."""
+"""The options of every command that goes over many recordings. Imports nothing slow."""
+
+from argparse import Namespace
 
 from syncrelay.cli.parser import Parser, count, duration, output
 
@@ -33,3 +35,13 @@ def add_fleet_options(parser: Parser, *into: str) -> None:
     )
     add("--strict", action="store_true", help="end at the first recording that is at fault")
     add("--overwrite", action="store_true", help="replace results that other values or options gave")
+
+
+def require_into(parser: Parser, arguments: Namespace) -> None:
+    """Refuse options that only go with a folder for many results."""
+    if arguments.into is None:
+        for name in ("strict", "overwrite", "time_limit"):
+            if getattr(arguments, name):
+                parser.error(f"--{name.replace('_', '-')} goes with --into")
+        if arguments.engine != "local":
+            parser.error("--engine goes with --into")

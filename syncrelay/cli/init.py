@@ -2,56 +2,74 @@
 
 import sys
 from argparse import Namespace
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
-from syncrelay.cli.parser import Parser
-from syncrelay.cli.reading import reading
+from syncrelay.cli.parser import Parser, output, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
-from syncrelay.explain import UNREADABLE
 from syncrelay.printable import printable
-from syncrelay.recordings.analysis import Proposal, inventory_of, propose, propose_for
-from syncrelay.recordings.analysis.inventory import no_header
-from syncrelay.recordings.analysis.streams import Stream
-from syncrelay.recordings.bag import Channel, Encoding, open_recording
-from syncrelay.recordings.bag.qos import Profile
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from syncrelay.recordings.analysis import Proposal
+    from syncrelay.recordings.analysis.streams import Stream
+    from syncrelay.recordings.bag import Channel
     from syncrelay.ros.listening import Heard
 
 
+def parser() -> Parser:
+    """Return the parser of `syncrelay init`."""
+    parser = Parser(
+        "syncrelay init",
+        example="syncrelay init --from-bag drive.mcap -o fusion.yaml",
+        description="Proposes a file for a recording or for a live ROS graph: groups of its topics, their types, and "
+        "values that fit, with what was measured as comments.",
+    )
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
+    source.add_argument("--from-graph", action="store_true", help="listen to what is being published now")
+    parser.add_argument("--seconds", metavar="N", type=positive, help="with --from-graph: listen for N s (10)")
+    parser.add_argument("-o", "--output", metavar="NEW", type=output, help="write the file here instead of printing it")
+    return parser
+
+
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay init`."""
-    if arguments.from_graph:
-        return init_from_graph(arguments.seconds or 10.0, arguments.output)
-    if arguments.seconds is not None:
+    """Run `syncrelay init`: print a file, or write it where --output says."""
+    if not arguments.from_graph and arguments.seconds is not None:
         parser.error("--seconds N needs --from-graph: it is how long to listen")
-    return init_from_bag(arguments.from_bag, arguments.output)
+    proposal = _from_graph(arguments.seconds or 10.0) if arguments.from_graph else _from_bag(arguments.from_bag)
+    for sentence in proposal.left_out:
+        remark(printable(f"left out: {sentence}"))
+    if arguments.output is None:
+        put(proposal.text.rstrip())
+    else:
+        write_new(arguments.output, proposal.text)
+    return DONE
 
 
-def init_from_bag(bag: str, output: str | None) -> int:
-    """Print a file that gives sets of a recording, or write it where `output` says; 0.
+def _from_bag(bag: str) -> "Proposal":
+    """Raises BagError for a recording that cannot be read, NothingToMatchError where it holds too little."""
+    from syncrelay.cli.reading import reading
+    from syncrelay.recordings.analysis import propose
+    from syncrelay.recordings.bag import open_recording
 
-    Raises BagError for a recording that cannot be read, NothingToMatchError where it holds too little.
-    """
     with closing(open_recording([bag], tell=remark)) as recording:
         with reading(recording):
             proposal = propose(recording)
         for fault in recording.faults:
             remark(printable(fault))
-    return _give(proposal, output)
+    return proposal
 
 
-def init_from_graph(seconds: float, output: str | None) -> int:
-    """Listen to the graph and give a file as init_from_bag does; 0.
-
-    Raises RosUnavailableError where ROS cannot be used, NothingToMatchError where too little is published.
-    """
+def _from_graph(seconds: float) -> "Proposal":
+    """Raises RosUnavailableError where ROS cannot be used, NothingToMatchError where too little is published."""
+    from syncrelay.recordings.analysis import inventory_of, propose_for
+    from syncrelay.recordings.analysis.inventory import no_header
     from syncrelay.ros.environment import require_rclpy
 
     require_rclpy()
@@ -68,20 +86,15 @@ def init_from_graph(seconds: float, output: str | None) -> int:
         proposal = propose_for(inventory_of(list(_streams(heard))), source=f"{seconds:g} s of the graph")
     except NothingToMatchError as error:
         raise NothingToMatchError("\n  ".join([str(error), *without, _what_helps(heard)])) from error
-    return _give(replace(proposal, left_out=(*proposal.left_out, *without)), output)
+    return replace(proposal, left_out=(*proposal.left_out, *without))
 
 
-def _give(proposal: Proposal, output: str | None) -> int:
-    for sentence in proposal.left_out:
-        remark(printable(f"left out: {sentence}"))
-    if output is None:
-        put(proposal.text.rstrip())
-    else:
-        write_new(output, proposal.text)
-    return DONE
+def _streams(heard: "Heard") -> "Iterator[tuple[Channel, Stream]]":
+    from syncrelay.explain import UNREADABLE
+    from syncrelay.recordings.analysis.streams import Stream
+    from syncrelay.recordings.bag import Channel, Encoding
+    from syncrelay.recordings.bag.qos import Profile
 
-
-def _streams(heard: "Heard") -> Iterator[tuple[Channel, Stream]]:
     for number, topic in enumerate(heard.topics):
         profile = Profile(reliability="reliable" if topic.is_reliable else "best_effort")
         stream = Stream(topic.name, topic.type, received=topic.received, places=topic.places)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.config_files import ConfigFiles
 from syncrelay.cli.stop import StopRequest
-from syncrelay.cli.summary import log_summary
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
+from syncrelay.explain.summary import log_summary
 from syncrelay.logs import LOGGER
 from syncrelay.status import Phase
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
 from syncrelay.cli.new_file import write_suggested
-from syncrelay.cli.parser import Parser
+from syncrelay.cli.parser import Parser, output, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
 from syncrelay.errors import UsageError
@@ -55,6 +55,34 @@ class Observed:
     seconds: float
     state: "RelayState"
     analyses: "tuple[GroupAnalysis, ...]"
+
+
+def parser() -> Parser:
+    """Return the parser of `syncrelay observe`."""
+    parser = Parser(
+        "syncrelay observe",
+        example="syncrelay observe --config fusion.yaml --seconds 30",
+        description="Tries a file beside a running robot: subscribes, publishes nothing, and shows live, as top does, "
+        "what its groups make of what comes. Ends with what would have left, why not more, and the values that would "
+        "fit. Exit code 1 unless all groups are healthy.",
+    )
+    parser.add_argument(
+        "--config",
+        metavar="FILE",
+        action="append",
+        required=True,
+        help="the file to try, or a directory of files; may be repeated",
+    )
+    parser.add_argument(
+        "--group", metavar="NAME", action="append", default=[], help="try this group only; may be repeated"
+    )
+    parser.add_argument("--seconds", metavar="N", type=positive, help="end after N s, and print text only")
+    parser.add_argument("--json", action="store_true", help="print JSON at the end, for programs")
+    parser.add_argument(
+        "--write", metavar="NEW", type=output, help="write the file with the suggested values; keeps its comments"
+    )
+    parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
+    return parser
 
 
 def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
@@ -174,7 +202,7 @@ def _answer(relay: "Relay") -> "Answer":
 
 def _as_json(observed: Observed) -> object:
     """Return the state as /status has it, for how long was observed, and what is suggested for each group."""
-    from syncrelay.cli.analysis_json import suggestion_as_json
+    from syncrelay.recordings.analysis.report_json import suggestion_as_json
     from syncrelay.status import status_of
 
     suggestions = [{"group": each.group.name, **suggestion_as_json(each.suggestion)} for each in observed.analyses]
@@ -194,8 +222,8 @@ def _fitted(text: str, columns: float) -> list[str]:
 
 
 def _lines(observed: Observed, columns: float) -> Iterator[str]:
-    from syncrelay.cli.analysis_text import suggestion_lines
     from syncrelay.explain import words
+    from syncrelay.recordings.analysis.report_text import suggestion_lines
     from syncrelay.status import status_of
     from syncrelay.top.plain import WIDTH, group_lines
 

@@ -14,6 +14,9 @@ from syncrelay.yaml_files import yaml_files
 
 ROS_ARGS: Final = "--ros-args"
 _WIDTH: Final = 78
+IMAGE_FORMATS: Final = ("png", "jpeg")
+"""What `export --images` can make of an image."""
+
 # The metavars of words that name YAML files which are read.
 _YAML_FILES: Final = ("FILE", "OLD", "NEW")
 

@@ -1,20 +1,16 @@
 """What surrounds the reading of a recording: a bar, where stderr is a terminal, and a garbage collector at ease."""
 
-import gc
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Final
 
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, DownloadColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, remark
+from syncrelay.collector import eased_collector
 from syncrelay.printable import printable
 from syncrelay.recordings.bag import Recording
-
-# So many more than before make the collector look: a chunk of small messages.
-_NEW_OBJECTS: Final = 50_000
 
 
 class _Bar(Progress):
@@ -49,17 +45,3 @@ def tell_faults(recording: Recording) -> int:
     for fault in recording.faults:
         remark(printable(fault))
     return AT_FAULT if recording.faults else DONE
-
-
-@contextmanager
-def eased_collector() -> Iterator[None]:
-    """Have the garbage collector look less often: messages live for a chunk and make no cycles, and are many.
-
-    At its usual pace, it takes an eighth of the time of a replay.
-    """
-    usual = gc.get_threshold()
-    gc.set_threshold(_NEW_OBJECTS, *usual[1:])
-    try:
-        yield
-    finally:
-        gc.set_threshold(*usual)

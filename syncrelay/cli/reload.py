@@ -5,16 +5,16 @@ import signal
 import time
 from argparse import Namespace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
 from syncrelay.cli.parser import Parser
-from syncrelay.cli.relays import find_one
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
 from syncrelay.printable import one_entry, printable
-from syncrelay.status.document import Relay
-from syncrelay.top.client import NoAnswerError, OtherServerError, ask
+
+if TYPE_CHECKING:
+    from syncrelay.status.document import Relay
 
 # Reading a file takes milliseconds; a relay that is busy turns to it within a second or two.
 _PATIENCE_S: Final = 10.0
@@ -22,17 +22,26 @@ _POLL_S: Final = 0.1
 _OTHERWISE: Final = "  If the relay's file says `metrics: null`, send SIGHUP to its process"
 
 
+def parser() -> Parser:
+    """Return the parser of `syncrelay reload`."""
+    parser = Parser(
+        "syncrelay reload",
+        example="syncrelay reload --url localhost:9464",
+        description="Makes the relay on this machine read its file again. Groups that did not change keep running and "
+        "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
+    )
+    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host:port or URL")
+    return parser
+
+
 def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
-    """Run `syncrelay reload`."""
-    return reload(arguments.url)
-
-
-def reload(named: str | None) -> int:
-    """Signal the relay and wait until it has read its file; 1 if it kept its configuration.
+    """Run `syncrelay reload`: signal the relay and wait until it has read its file; 1 if it kept its configuration.
 
     Raises SyncRelayError where no relay, or more than one, or one of another machine is found.
     """
-    url = find_one(named, otherwise=_OTHERWISE).url
+    from syncrelay.cli.relays import find_one
+
+    url = find_one(arguments.url, otherwise=_OTHERWISE).url
     before = _relay(url)
     _signal(before.pid)
     end = time.monotonic() + _PATIENCE_S
@@ -48,7 +57,9 @@ def reload(named: str | None) -> int:
     raise SyncRelayError(f"{before.node} did not read its file again within {_PATIENCE_S:.0f} s")
 
 
-def _relay(url: str) -> Relay:
+def _relay(url: str) -> "Relay":
+    from syncrelay.top.client import NoAnswerError, OtherServerError, ask
+
     try:
         return ask(url).state.relay
     except (NoAnswerError, OtherServerError) as error:

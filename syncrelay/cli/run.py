@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from syncrelay import own_version
-from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.boundary import DONE, EXIT_CODES, put
 from syncrelay.cli.config_files import ConfigFiles, Reading
-from syncrelay.cli.heartbeat import VARIABLE, Heartbeat
-from syncrelay.cli.parser import Parser
+from syncrelay.cli.healthcheck import VARIABLE, Heartbeat
+from syncrelay.cli.parser import Parser, folded
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
 from syncrelay.errors import ListenError, ReloadError, SyncRelayError, UsageError
@@ -29,6 +29,45 @@ _BUG: Final = (
     "reload failed because of a bug in syncrelay; keeping the running configuration;"
     " please report it with these lines and the file:"
 )
+
+
+def parser() -> Parser:
+    """Return the parser of `syncrelay --config FILE`."""
+    from syncrelay.cli.commands import commands_help
+
+    exit_codes = f"exit codes: {', '.join(f'{code} {means}' for code, means in EXIT_CODES.items())}"
+    parser = Parser(
+        "syncrelay",
+        example="syncrelay --config fusion.yaml",
+        description="Matches ROS 2 messages by time, as a YAML file says, and republishes the sets.",
+        usage="syncrelay --config FILE [option ...] | syncrelay COMMAND ...",
+        epilog=f"commands:\n{commands_help()}\n\n{folded(exit_codes)}",
+    )
+    add = parser.add_argument
+    add(
+        "--config",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="run groups of FILE, or a directory; may be repeated",
+    )
+    add("--group", metavar="NAME", action="append", default=[], help="run this group only; may be repeated")
+    add(
+        "--watch",
+        action="store_true",
+        help="read FILE again when it changes, not only at SIGHUP",
+    )
+    add(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="info",
+        metavar="LEVEL",
+        help="debug, info (default), warning or error",
+    )
+    add("--log-format", choices=("text", "json"), default="text", metavar="FORMAT", help="text (default) or json")
+    add("--ros-args", action="store_true", help="pass what follows to ROS, such as -r __ns:=/robot1")
+    parser.add_argument("--version", action="store_true", help="print the version")
+    return parser
 
 
 def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
@@ -78,7 +117,7 @@ def run(
     require_rclpy()
     with resting_collector():
         from syncrelay.cli.services import services
-        from syncrelay.cli.summary import log_summary
+        from syncrelay.explain.summary import log_summary
         from syncrelay.ros.relay import Relay
 
     def managed(relay: Relay) -> Callable[..., Any]:

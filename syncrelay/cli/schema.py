@@ -6,7 +6,17 @@ from argparse import Namespace
 from syncrelay.cli.boundary import DONE, put
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config.schema import Schema, json_schema
+
+
+def parser() -> Parser:
+    """Return the parser of `syncrelay schema`."""
+    parser = Parser(
+        "syncrelay schema",
+        example="syncrelay schema > syncrelay.json",
+        description="Prints the JSON Schema (draft 7) of the file: with it, editors complete and check what you write.",
+    )
+    parser.add_argument("--test", action="store_true", help="print that of test files, see syncrelay test")
+    return parser
 
 
 def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
@@ -14,10 +24,10 @@ def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     if arguments.test:
         from syncrelay.recordings.cases.schema import cases_schema
 
-        return _print(cases_schema())
-    return _print(json_schema())
+        schema = cases_schema()
+    else:
+        from syncrelay.config.schema import json_schema
 
-
-def _print(schema: Schema) -> int:
+        schema = json_schema()
     put(json.dumps(schema, indent=2, ensure_ascii=False))
     return DONE

@@ -4,56 +4,60 @@ import json
 import os
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Sequence
-from enum import Enum
+from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.commands import is_installed, line_to_install
 from syncrelay.cli.parser import Parser
-from syncrelay.cli.relays import find, find_one, otherwise
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
-from syncrelay.top.client import Answer, ask, base_urls
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from syncrelay.top.client import Answer
 
 
-class Output(Enum):
-    """What the state becomes."""
-
-    SCREEN = "screen"
-    TEXT = "text"
-    JSON = "json"
+def parser() -> Parser:
+    """Return the parser of `syncrelay top`."""
+    parser = Parser(
+        "syncrelay top",
+        example="syncrelay top --url robot:9464",
+        description="Shows a running relay live: its groups, their inputs, their last sets, and what is wrong. "
+        "Without --url it shows the relay of this machine, and asks which if there are several. "
+        "Exit code 1 if no relay answers.",
+    )
+    parser.add_argument(
+        "--url", metavar="URL", help="the relay's host, host:port or URL, such as robot or http://robot:9464"
+    )
+    parser.add_argument("--once", action="store_true", help="print the state once as text, and exit")
+    parser.add_argument("--json", action="store_true", help="with --once: print the state as JSON")
+    return parser
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay top`."""
     if arguments.json and not arguments.once:
         parser.error("--json goes with --once")
-    return top(arguments.url, Output.JSON if arguments.json else Output.TEXT if arguments.once else Output.SCREEN)
+    from syncrelay.cli.relays import find, find_one, otherwise
+    from syncrelay.top.client import ask, base_urls
+    from syncrelay.top.plain import plain_text
 
-
-def top(named: str | None, output: Output) -> int:
-    """Show the state of a relay on this machine, or of one that is named by host, host:port or URL.
-
-    Raises SyncRelayError where there is none, or several of which none can be chosen, and UsageError for a wrong name.
-    """
-    if output is Output.SCREEN:
+    named = arguments.url
+    if not arguments.once:
         # What is no name of a relay is said with or without a terminal.
         base_urls(named)
-        _require_terminal()
-        show(find(named, otherwise=otherwise(named)))
+        if (why := why_no_screen()) is not None:
+            raise SyncRelayError(f"{why}\n  `syncrelay top --once` prints text")
+        show(find(named, otherwise=otherwise(named)), ask)
         return DONE
     answer = find_one(named, otherwise=otherwise(named))
-    # Made anew: JSON may hold as they are what a terminal must not see.
-    put(json.dumps(json.loads(answer.document)) if output is Output.JSON else _as_text(answer))
+    # Written anew: JSON may hold as they are what a terminal must not see.
+    put(json.dumps(json.loads(answer.document)) if arguments.json else plain_text(answer))
     return DONE
 
 
-def _as_text(answer: Answer) -> str:
-    from syncrelay.top.plain import plain_text
-
-    return plain_text(answer)
-
-
-def show(relays: Sequence[Answer], source: Callable[[str], Answer] = ask) -> None:
+def show(relays: "Sequence[Answer]", source: "Callable[[str], Answer]") -> None:
     """Show relays on the terminal until the user has seen enough, or `source`, as TopApp takes it, ends."""
     from syncrelay.top.app import TopApp, end_with_terminal
 
@@ -64,13 +68,10 @@ def show(relays: Sequence[Answer], source: Callable[[str], Answer] = ask) -> Non
         raise app.failure
 
 
-def _require_terminal() -> None:
-    if (why := why_no_screen()) is not None:
-        raise SyncRelayError(f"{why}\n  `syncrelay top --once` prints text")
-
-
 def why_no_screen() -> str | None:
     """Say why nothing can be drawn here, None if it can."""
+    if not is_installed("top"):
+        return f"top needs packages that are not installed here\n  {line_to_install('top')}"
     # Keys come from stdin and the screen goes to stderr; who redirects stdout wants text.
     if not all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr)):
         return "top needs a terminal, and there is none here"

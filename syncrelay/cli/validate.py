@@ -3,101 +3,122 @@
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
 from syncrelay.cli.parser import Parser
-from syncrelay.cli.problems import inert, problem_as_json, problem_command
 from syncrelay.cli.stop import StopRequest
-from syncrelay.config import Config, ConfigError, Problem, Severity, load, render
-from syncrelay.config.source import listed, shown_name
-from syncrelay.config.wording import counted
 from syncrelay.printable import printable
+
+if TYPE_CHECKING:
+    from syncrelay.config import Config, Problem
+
+
+def parser() -> Parser:
+    """Return the parser of `syncrelay validate`."""
+    parser = Parser(
+        "syncrelay validate",
+        example="syncrelay validate fusion.yaml",
+        description="Checks files without ROS and shows every error at once, each at its line, with the nearest valid "
+        "word. Message types are checked where ROS is installed; a package that is missing there is only a note. "
+        "Exit code 1 if a file has an error.",
+    )
+    parser.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="a YAML file, a directory of files that run together, or - for standard input",
+    )
+    parser.add_argument(
+        "--together", action="store_true", help="check the files as one, as the relay does: --config FILE ..."
+    )
+    parser.add_argument(
+        "--format",
+        choices=("text", "json", "github"),
+        default="text",
+        metavar="FORMAT",
+        help="text (default), json, or github: annotations for a workflow",
+    )
+    return parser
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
-    """What files that run together came to: a config if they are in order, and their problems, notes among them."""
+class Checked:
+    """Files that run together: what they say if they are in order, and their problems, notes among them."""
 
     files: tuple[str, ...]
-    config: Config | None
-    problems: tuple[Problem, ...]
+    config: "Config | None"
+    problems: "tuple[Problem, ...]"
 
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay validate`."""
     files = arguments.files
     parser.refuse_repeated(files if arguments.together else [each for each in files if each == "-"])
-    return validate([files] if arguments.together else [[file] for file in files], arguments.format)
+    found = [_check(each) for each in ([files] if arguments.together else [[file] for file in files])]
+    {"text": _print_text, "json": _print_json, "github": _print_github}[arguments.format](found)
+    return DONE if all(each.config for each in found) else AT_FAULT
 
 
-def validate(sets: Sequence[Sequence[str]], output_format: str) -> int:
-    """Check sets of files, each as one, and print what was found as `text`, `json` or `github`; 1 for any error."""
-    findings = [_check(files) for files in sets]
-    _PRINT[output_format](findings)
-    return DONE if all(finding.config for finding in findings) else AT_FAULT
+def _check(files: Sequence[str]) -> Checked:
+    from syncrelay.config import ConfigError, load
+    from syncrelay.config.source import listed, shown_name
 
-
-def _check(files: Sequence[str]) -> Finding:
-    names = tuple(shown_name(each) for file in files for each in _listed(file))
+    names: list[str] = []
+    for file in files:
+        try:
+            names += map(shown_name, listed(file))
+        except ConfigError:
+            # No directory, or one without files: it is itself at fault.
+            names.append(shown_name(file))
     try:
         config = load(*files)
     except ConfigError as error:
-        return Finding(names, None, error.problems)
-    return Finding(names, config, config.notes)
+        return Checked(tuple(names), None, error.problems)
+    return Checked(tuple(names), config, config.notes)
 
 
-def _listed(file: str) -> tuple[str, ...]:
-    """Return the files of a directory; what is no directory, or has none, is itself what something is wrong with."""
-    try:
-        return listed(file)
-    except ConfigError:
-        return (file,)
+def _print_text(found: Sequence[Checked]) -> None:
+    from syncrelay.config import render
 
-
-def _print_text(findings: Sequence[Finding]) -> None:
-    for finding in findings:
-        if finding.config is None:
-            say(render(finding.problems, colour=wants_colour(sys.stderr.isatty())))
+    for each in found:
+        if each.config is None:
+            say(render(each.problems, colour=wants_colour(sys.stderr.isatty())))
             continue
-        put(_ok(finding.files, finding.config))
-        if finding.problems:
-            put(render(finding.problems, colour=wants_colour(sys.stdout.isatty())))
+        put(_summary(each.files, each.config))
+        if each.problems:
+            put(render(each.problems, colour=wants_colour(sys.stdout.isatty())))
 
 
-def _print_json(findings: Sequence[Finding]) -> None:
-    listed = [_as_json(file, finding) for finding in findings for file in finding.files]
-    put(json.dumps(listed, indent=2))
+def _print_json(found: Sequence[Checked]) -> None:
+    from syncrelay.config import Severity
+    from syncrelay.config.annotations import problem_as_json
+
+    documents = []
+    for each in found:
+        for file in each.files:
+            problems = [problem for problem in each.problems if problem.file == file]
+            is_ok = all(problem.severity is not Severity.ERROR for problem in problems)
+            documents.append({"file": file, "ok": is_ok, "problems": list(map(problem_as_json, problems))})
+    put(json.dumps(documents, indent=2))
 
 
-def _print_github(findings: Sequence[Finding]) -> None:
-    for finding in findings:
-        for problem in finding.problems:
+def _print_github(found: Sequence[Checked]) -> None:
+    from syncrelay.config.annotations import inert, problem_command
+
+    for each in found:
+        for problem in each.problems:
             put(problem_command(problem))
-        if finding.config is not None:
-            put(inert(_ok(finding.files, finding.config)))
+        if each.config is not None:
+            put(inert(_summary(each.files, each.config)))
 
 
-_PRINT: Final[dict[str, Callable[[Sequence[Finding]], None]]] = {
-    "text": _print_text,
-    "json": _print_json,
-    "github": _print_github,
-}
+def _summary(files: Sequence[str], config: "Config") -> str:
+    from syncrelay.config.wording import counted
 
-
-def _ok(files: Sequence[str], config: Config) -> str:
     n_topics = len({topic.topic for group in config.groups for topic in group.topics})
     together = "ok together" if len(files) > 1 else "ok"
     counts = f"{counted(len(config.groups), 'group')}, {counted(n_topics, 'topic')}"
     return f"{printable(', '.join(files))}: {together}, {counts}"
-
-
-def _as_json(file: str, finding: Finding) -> dict[str, Any]:
-    problems = [problem for problem in finding.problems if problem.file == file]
-    return {
-        "file": file,
-        "ok": all(problem.severity is not Severity.ERROR for problem in problems),
-        "problems": [problem_as_json(problem) for problem in problems],
-    }

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.errors import SyncRelayError
-from syncrelay.printable import printable
+from syncrelay.printable import columns_of, printable
 
 Path: TypeAlias = tuple[str | int, ...]
 """Keys and list indices from the top of the file down to a value."""
@@ -137,7 +137,7 @@ def _excerpt(source: str, span: Span, *, colour: bool) -> str:
     after = _shown(source[end:last]) + ("…" if last < len(source) else "")
     number = f"{span.line:>5} | "
     gutter = " " * 5 + " | "
-    underline = " " * _columns(before) + "^" * max(1, _columns(token))
+    underline = " " * columns_of(before) + "^" * max(1, columns_of(token))
     if colour:
         number, gutter = f"{_BLUE}{number}{_RESET}", f"{_BLUE}{gutter}{_RESET}"
         underline = f"{_RED}{underline}{_RESET}"
@@ -155,14 +155,3 @@ def _shown_character(character: str) -> str:
     if unicodedata.category(character) in ("Cc", "Cf", "Cs"):
         return "\N{REPLACEMENT CHARACTER}"
     return character
-
-
-def _columns(text: str) -> int:
-    """Return how many columns of a terminal a text takes."""
-    return sum(_width(character) for character in text)
-
-
-def _width(character: str) -> int:
-    if unicodedata.combining(character):
-        return 0
-    return 2 if unicodedata.east_asian_width(character) in ("W", "F") else 1

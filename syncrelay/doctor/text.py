@@ -4,13 +4,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from rich.cells import cell_len
-
 from syncrelay.config.wording import counted
 from syncrelay.doctor.diagnosis import Diagnosis, Severity
 from syncrelay.doctor.examine import Observed
 from syncrelay.explain import Code, GroupFacts, InputFacts, words
-from syncrelay.printable import printable
+from syncrelay.printable import aligned, printable
 
 _BOLD, _RED, _YELLOW, _DIM, _RESET = "\033[1m", "\033[31m", "\033[33m", "\033[2m", "\033[0m"
 _MARK: Final = {Severity.ERROR: _RED, Severity.WARNING: _YELLOW, Severity.INFO: _BOLD}
@@ -45,14 +43,6 @@ def observed_lines(observed: Observed) -> Iterator[str]:
     yield from aligned([_row(facts, index) for facts, index in places.values()])
     for report in observed.reports:
         yield from (f"  {report.facts.name}: {each.text}" for each in report.findings if each.code is Code.HEALTHY)
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield rows as lines, each column as wide as its widest cell."""
-    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        padded = [cell + " " * (width - cell_len(cell)) for cell, width in zip(row, widths, strict=True)]
-        yield f"  {'  '.join(padded)}".rstrip()
 
 
 def _row(facts: GroupFacts, index: int) -> tuple[str, ...]:

@@ -1,19 +1,15 @@
 """What the simulated sensors see, serialized once: colours that slide, a beam that sweeps a room, an IMU that turns.
 
-No ROS is needed: rosbags serializes, so that the rig can be recorded where none is installed.
+No ROS is needed, so that the rig can be recorded where none is installed: three types are serialized by hand.
 """
 
 import math
+import struct
 import sys
 from array import array
 from collections.abc import Callable, Mapping
-from functools import cache
 from types import MappingProxyType
-from typing import Any, Final
-
-import numpy as np
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
+from typing import Final, Self
 
 IMAGE: Final = "sensor_msgs/msg/Image"
 POINT_CLOUD: Final = "sensor_msgs/msg/PointCloud2"
@@ -45,7 +41,8 @@ def _rainbow(turn: float) -> bytes:
 def _image(row: bytes, *, shift: int) -> bytes:
     step = 3 * WIDTH
     pixels = b"".join(row[3 * (shift + y) : 3 * (shift + y) + step] for y in range(HEIGHT))
-    return _serialized(IMAGE, _header("camera"), HEIGHT, WIDTH, "rgb8", 0, step, np.frombuffer(pixels, np.uint8))
+    message = _Message("camera").numbers("I", HEIGHT, WIDTH).text("rgb8")
+    return message.numbers("B", 0).numbers("I", step).sequence(pixels).content()
 
 
 def clouds() -> tuple[bytes, ...]:
@@ -73,11 +70,12 @@ def _room() -> "array[float]":
 def _cloud(room: "array[float]", *, beam: float) -> bytes:
     points = room[:]
     points[3::4] = array("f", [255 * (0.5 + 0.5 * math.cos(azimuth - beam)) ** 8 for azimuth in _azimuths()] * RINGS)
-    fields = [_message("PointField", name, 4 * place, _FLOAT32, 1) for place, name in enumerate(_FIELDS)]
-    content = np.frombuffer(points.tobytes(), np.uint8)
-    is_bigendian = sys.byteorder == "big"
-    shape = (RINGS, POINTS_PER_RING, fields, is_bigendian, 16, 16 * POINTS_PER_RING, content, True)
-    return _serialized(POINT_CLOUD, _header("lidar"), *shape)
+    message = _Message("lidar").numbers("I", RINGS, POINTS_PER_RING, len(_FIELDS))
+    for place, name in enumerate(_FIELDS):
+        message.text(name).numbers("I", 4 * place).numbers("B", _FLOAT32).numbers("I", 1)
+    message.numbers("B", sys.byteorder == "big").numbers("I", 16, 16 * POINTS_PER_RING).sequence(points.tobytes())
+    is_dense = True
+    return message.numbers("B", is_dense).content()
 
 
 def imu_samples() -> tuple[bytes, ...]:
@@ -86,28 +84,38 @@ def imu_samples() -> tuple[bytes, ...]:
 
 
 def _imu_sample(yaw: float) -> bytes:
-    orientation = _message("Quaternion", 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2), package="geometry_msgs")
-    turning = _message("Vector3", 0.0, 0.0, math.tau / 2, package="geometry_msgs")
-    gravity = _message("Vector3", 0.0, 0.0, 9.81, package="geometry_msgs")
-    unknown = np.zeros(9)
-    return _serialized(IMU, _header("imu"), orientation, unknown, turning, unknown, gravity, unknown)
+    orientation = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    turning, gravity, covariance = (0.0, 0.0, math.tau / 2), (0.0, 0.0, 9.81), (0.0,) * 9
+    numbers = (*orientation, *covariance, *turning, *covariance, *gravity, *covariance)
+    return _Message("imu").numbers("d", *numbers).content()
 
 
-@cache
-def _types() -> Typestore:
-    return get_typestore(Stores.ROS2_JAZZY)
+class _Message:
+    """A message with a std_msgs/msg/Header of stamp 0, serialized as CDR field by field."""
 
+    def __init__(self, frame_id: str) -> None:
+        # Alignment counts from behind the encapsulation header, which says which end of a number comes first.
+        self._head = bytes([0, sys.byteorder == "little", 0, 0])
+        self._body = bytearray()
+        self.numbers("i", 0).numbers("I", 0).text(frame_id)
 
-def _message(name: str, *fields: Any, package: str = "sensor_msgs") -> Any:
-    return _types().types[f"{package}/msg/{name}"](*fields)
+    def numbers(self, kind: str, *values: float) -> Self:
+        """Add numbers of one of struct's kinds, aligned to their size."""
+        self._body += bytes(-len(self._body) % struct.calcsize(kind))
+        self._body += struct.pack(f"={len(values)}{kind}", *values)
+        return self
 
+    def text(self, text: str) -> Self:
+        return self.sequence(text.encode() + b"\0")
 
-def _header(frame_id: str) -> Any:
-    return _message("Header", _message("Time", 0, 0, package="builtin_interfaces"), frame_id, package="std_msgs")
+    def sequence(self, content: bytes) -> Self:
+        """Add bytes behind their number."""
+        self.numbers("I", len(content))
+        self._body += content
+        return self
 
-
-def _serialized(type_name: str, *fields: Any) -> bytes:
-    return bytes(_types().serialize_cdr(_types().types[type_name](*fields), type_name))
+    def content(self) -> bytes:
+        return self._head + self._body
 
 
 SCENES: Mapping[str, tuple[str, Callable[[], tuple[bytes, ...]]]] = MappingProxyType(

@@ -1,20 +1,14 @@
 """The commands that read recordings, run here: hundreds of times in the time that a process takes to start."""
 
 import json
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
-from syncrelay.cli.analyze import Asked, analyze_bag
 from syncrelay.cli.boundary import AT_FAULT, DONE
-from syncrelay.cli.init import init_from_bag
-from syncrelay.cli.replay import Wanted, replay
-from syncrelay.cli.test import test as run_tests
+from syncrelay.cli.dispatch import dispatch
+from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import SyncRelayError
-from syncrelay.rig.what_if import parse_fault
 
-_WORDS = ("late: /camera 60s", "drop: /lidar 40%", "offset: /camera 290min", "drift: /lidar -99999ppm", "dead: /lidar")
-_FAULTS = tuple(map(parse_fault, (*_WORDS[:4], f"{_WORDS[4]} from 12s")))
+_FAULTS = ("late: /camera 60s", "drop: /lidar 40%", "offset: /camera 290min", "drift: /lidar -99999ppm", "dead: /lidar")
 
 
 def _test_file(bag: str, file: str, folder: Path) -> str:
@@ -30,39 +24,37 @@ def _test_file(bag: str, file: str, folder: Path) -> str:
         "inputs": {"camera": {"received": 3, "drops": {"late": 2}}},
     }
     cases = {
-        name: {"recording": bag, "what_if": faults, "expect": expect} for name, faults in (("it", ()), ("if", _WORDS))
+        name: {"recording": bag, "what_if": faults, "expect": expect} for name, faults in (("it", ()), ("if", _FAULTS))
     }
     path = folder / "tests.yaml"
     path.write_text(json.dumps({"version": 1, "config": file, "cases": cases}))
     return str(path)
 
 
-def _readers(bag: str, file: str, folder: Path) -> dict[str, Callable[[], int]]:
-    """What reads a recording, by how it is called; what is written goes into the folder."""
-    of_file = Asked(config=file, text=Path(file).read_text(), topics=(), write=None, html=None, json=False, indent=None)
-    by_topics = replace(of_file, config=None, text=None, topics=("/camera", "/lidar"))
-    with_html = replace(of_file, html=str(folder / "report.html"))
-    as_json = replace(of_file, json=True)
+def _commands(bag: str, file: str, folder: Path) -> dict[str, tuple[str, ...]]:
+    """What reads a recording, by a name for it; what is written goes into the folder."""
+    given = (bag, "--config", file)
+    faults = [word for fault in (*_FAULTS[:4], f"{_FAULTS[4]} from 12s") for word in ("--what-if", fault)]
     return {
-        "replay": lambda: replay([bag], [file], Wanted(sets=True, drops=True, output=None)),
-        "replay --what-if": lambda: replay([bag], [file], Wanted(sets=True, drops=True, output=None, what_if=_FAULTS)),
-        "test": lambda: run_tests([_test_file(bag, file, folder)], "junit", update=True),
-        "replay -o": lambda: replay([bag], [file], Wanted(sets=False, drops=False, output=str(folder / "out.mcap"))),
-        "analyze": lambda: analyze_bag(bag, with_html),
-        "analyze, JSON": lambda: analyze_bag(bag, as_json),
-        "analyze, topics": lambda: analyze_bag(bag, by_topics),
-        "init": lambda: init_from_bag(bag, None),
+        "replay": ("replay", *given, "--json", "--drops"),
+        "replay --what-if": ("replay", *given, "--json", "--drops", *faults),
+        "test": ("test", _test_file(bag, file, folder), "--format", "junit", "--update"),
+        "replay -o": ("replay", *given, "-o", str(folder / "out.mcap")),
+        "analyze": ("analyze", *given, "--html", str(folder / "report.html")),
+        "analyze, JSON": ("analyze", *given, "--json"),
+        "analyze, topics": ("analyze", bag, "/camera", "/lidar"),
+        "init": ("init", "--from-bag", bag),
     }
 
 
 def read_by_all(bag: Path, file: Path, folder: Path, about: str) -> None:
     """Run all of them; what flies out of one, but an error in words, tells it, and `about` the recording."""
-    for command, run in _readers(str(bag), str(file), folder).items():
+    for name, words in _commands(str(bag), str(file), folder).items():
         (folder / "out.mcap").unlink(missing_ok=True)
         try:
-            assert run() in (DONE, AT_FAULT)
+            assert dispatch(words, stop=StopRequest()) in (DONE, AT_FAULT)
         except SyncRelayError as error:
-            assert str(error), command  # noqa: PT017  any error of ours will do
+            assert str(error), name  # noqa: PT017  any error of ours will do
         except Exception as error:
-            error.add_note(f"{command} of a recording with {about}")
+            error.add_note(f"{name} of a recording with {about}")
             raise

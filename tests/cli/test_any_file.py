@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 import yaml
 
-from syncrelay.cli.analysis_json import suggestion_as_json
-from syncrelay.cli.analysis_text import suggestion_lines
 from syncrelay.config import Config, load_text
 from syncrelay.recordings.analysis.live import LiveStreams, analyze_live
+from syncrelay.recordings.analysis.report_json import suggestion_as_json
+from syncrelay.recordings.analysis.report_text import suggestion_lines
 from tests.cli.command import ROOT, run_here
 from tests.drawn_files import drawn_files, frames_for
 from tests.recordings.bag.making import write_mcap

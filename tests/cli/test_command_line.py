@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from syncrelay.cli import parsers
-from syncrelay.cli.dispatch import COMMANDS
+from syncrelay.cli import run as relay
+from syncrelay.cli.commands import COMMANDS
 from syncrelay.cli.parser import HelpRequested
 from tests.cli.command import BAD, GOOD, ROOT, run, run_here, run_python
 
@@ -122,7 +122,7 @@ def test_the_relay_shows_the_faults_of_its_file_as_validate_does(tmp_path):
 @pytest.mark.parametrize("command", ["", *COMMANDS])
 def test_the_help_of_every_command_ends_with_an_example_of_it(command):
     with pytest.raises(HelpRequested) as asked:
-        (COMMANDS[command].parser if command else parsers.relay)().read(["--help"])
+        (COMMANDS[command].parser if command else relay.parser)().read(["--help"])
     *_, example = str(asked.value).splitlines()
     assert example.startswith("example: ")
     assert len(example) <= 80
@@ -130,7 +130,7 @@ def test_the_help_of_every_command_ends_with_an_example_of_it(command):
     at = words.index("syncrelay")
     assert all("=" in word for word in words[:at])
     if not command:
-        assert parsers.relay().read(words[at + 1 :]).config
+        assert relay.parser().read(words[at + 1 :]).config
         return
     assert words[at + 1] == command
     COMMANDS[command].parser().read(words[at + 2 :])

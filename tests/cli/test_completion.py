@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.cli import parsers
+from syncrelay.cli import completion
+from syncrelay.cli import run as relay
+from syncrelay.cli.commands import COMMANDS
 from syncrelay.cli.completion import COMPLETERS, group_names
-from syncrelay.cli.dispatch import COMMANDS
 from tests.cli.command import ROOT, run, run_python
 from tests.cli.shells import Shell
 from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
@@ -81,7 +82,7 @@ _LINES = {
     "syncrelay validate ": ["conf/", "fusion.yaml", "maps/"],
     "syncrelay diff ": ["conf/", "fusion.yaml", "maps/"],
     "syncrelay diff fusion.yaml f": ["fusion.yaml"],
-    "syncrelay graph fusion.yaml --format ": ["mermaid", "dot", "svg"],
+    "syncrelay graph fusion.yaml --format ": ["mermaid", "text"],
     "syncrelay validate fusion.yaml --fo": ["--format"],
     "syncrelay test ": ["conf/", "fusion.yaml", "maps/"],
     "syncrelay test fusion.yaml --format ": ["text", "junit", "json", "github"],
@@ -158,7 +159,7 @@ def test_bytes_that_are_no_text_have_no_groups():
 def test_every_word_that_a_command_takes_is_known_to_completion():
     taken = {
         action.metavar
-        for parser in (parsers.relay, *(command.parser for command in COMMANDS.values()))
+        for parser in (relay.parser, *(command.parser for command in COMMANDS.values()))
         for action in parser().actions
         if action.choices is None and action.nargs != 0
     }
@@ -242,7 +243,7 @@ def test_fish_is_told_what_may_follow_and_why(folder, environ):
 
 def test_the_places_that_the_help_names_are_those_of_the_page_on_installing():
     page = (Path(ROOT) / "docs/howto/install.md").read_text()
-    places = [line for line in (parsers.completion().epilog or "").splitlines() if line.startswith("  ")]
+    places = [line for line in (completion.parser().epilog or "").splitlines() if line.startswith("  ")]
     assert len(places) == 3
     for line in places:
         assert line.split()[1] in page

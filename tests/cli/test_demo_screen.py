@@ -8,8 +8,9 @@ import pytest
 from rich.console import Console
 
 from syncrelay.cli.demo import shipped_config
-from syncrelay.cli.demo_screen import Moment, frame, plain_line, summary
 from syncrelay.status import status_of
+from syncrelay.top.demo_screen import frame, head_of
+from syncrelay.top.demo_text import Moment, plain_line, summary
 from tests.top.rigs import Sensor, simulated
 
 CAMERA, LIDAR, IMU = "/demo/camera/image_raw", "/demo/lidar/points", "/demo/imu/data"
@@ -83,7 +84,7 @@ def test_what_is_wrong_stands_in_place_of_the_rate():
 def test_the_strip_moves_on_between_two_reports():
     one = moment()
     later = Moment(one.state, one.elapsed_s, one.total_s, one.now + 500_000_000)
-    assert later.head == one.head + 500_000_000
+    assert head_of(later) == head_of(one) + 500_000_000
     assert shown(one) != shown(later)
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from syncrelay.cli.analysis_html import as_html
-from syncrelay.cli.analysis_json import as_json
 from syncrelay.recordings.analysis import Analysis
+from syncrelay.recordings.analysis.html import as_html
+from syncrelay.recordings.analysis.report_json import as_json
 from tests.browser import launched, needs_chromium, opened
 from tests.cli.html_reports import HOSTILE, TOPICS, analyzed, drive, renamed
 from tests.ros.cdr_messages import VECTOR

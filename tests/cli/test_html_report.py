@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.cli.analysis_html import as_html
-from syncrelay.cli.analysis_html.lanes import Lanes, lanes_of
-from syncrelay.cli.analysis_html.packing import pack
+from syncrelay.recordings.analysis.html import as_html
+from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
+from syncrelay.recordings.analysis.html.packing import pack
 from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 from tests.cli.command import run_here
@@ -129,7 +129,7 @@ def test_what_is_too_much_is_thinned_by_whole_stretches(tmp_path):
 
 def test_the_page_says_what_was_thinned_and_its_tables_are_of_all(analysis, monkeypatch):
     whole = as_html("rig", analysis)
-    monkeypatch.setattr("syncrelay.cli.analysis_html.document._MOST_MESSAGES", 500)
+    monkeypatch.setattr("syncrelay.recordings.analysis.html.document._MOST_MESSAGES", 500)
     thinned = as_html("rig", analysis)
     assert "more messages than the page can hold" not in whole
     assert "one of every 5 stretches of 10 s is drawn" in thinned

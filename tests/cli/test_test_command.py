@@ -11,9 +11,9 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from syncrelay.cli import parsers
-from syncrelay.cli.test import command, replace_text
+from syncrelay.cli.test import command, parser
 from syncrelay.errors import SyncRelayError, UsageError
+from syncrelay.recordings.cases.running import replace_text
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.recordings.cases.suites import write
 
@@ -71,8 +71,8 @@ def folder(tmp_path, monkeypatch):
 
 
 def run(*words):
-    parser = parsers.test()
-    return command(parser, parser.read(words), None)  # type: ignore[arg-type]  # nobody ends it
+    taken = parser()
+    return command(taken, taken.read(words), None)  # type: ignore[arg-type]  # nobody ends it
 
 
 @pytest.mark.usefixtures("folder")

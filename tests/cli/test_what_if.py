@@ -2,8 +2,7 @@
 
 import pytest
 
-from syncrelay.cli import recording_parsers
-from syncrelay.cli.replay import command
+from syncrelay.cli.replay import command, parser
 from syncrelay.errors import UsageError
 from tests.recordings.bag.making import rig, write_mcap
 from tests.recordings.cases.suites import write
@@ -19,9 +18,9 @@ def replayed(tmp_path, monkeypatch, capsys):
     write(tmp_path, {}, topics=_TOPICS)
 
     def run(*words):
-        parser = recording_parsers.replay()
-        arguments = parser.read(["rig.mcap", "--config", "fusion.yaml", *words])
-        code = command(parser, arguments, None)  # type: ignore[arg-type]  # nobody ends it
+        taken = parser()
+        arguments = taken.read(["rig.mcap", "--config", "fusion.yaml", *words])
+        code = command(taken, arguments, None)  # type: ignore[arg-type]  # nobody ends it
         told = capsys.readouterr()
         return code, told.out.splitlines(), told.err
 

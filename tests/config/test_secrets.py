@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 import yaml
 
-from syncrelay.cli.problems import problem_as_json, problem_command
 from syncrelay.config import Config, ConfigError, load_text, render
+from syncrelay.config.annotations import problem_as_json, problem_command
 from syncrelay.config.difference import difference
 from syncrelay.recordings.cases.load import load_suite_text
 from tests.config.test_schema import Yaml12Loader

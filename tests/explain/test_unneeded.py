@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from syncrelay.cli.summary import summarize
 from syncrelay.explain import FOR_WANT_OF_A_PARTNER, RecentDrop, Standing, drop_fates
+from syncrelay.explain.summary import summarize
 from syncrelay.explain.unneeded import may_set_pace
 from syncrelay.status import RelayState, status_of
 from syncrelay.sync import DropReason

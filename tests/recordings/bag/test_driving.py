@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.cli.analysis_html import as_html
-from syncrelay.cli.analysis_json import as_json
-from syncrelay.cli.analysis_text import report
 from syncrelay.config import load_text
 from syncrelay.recordings.analysis import analyze
 from syncrelay.recordings.analysis.evaluation import DropOut, completed, evaluate
+from syncrelay.recordings.analysis.html import as_html
+from syncrelay.recordings.analysis.report_json import as_json
+from syncrelay.recordings.analysis.report_text import report
 from syncrelay.recordings.analysis.streams import read_streams
 from syncrelay.recordings.analysis.watching import watch_group
 from syncrelay.recordings.bag import Channel, Encoding

@@ -10,13 +10,11 @@ from typing import Any, Final
 
 import pytest
 
-from syncrelay.cli.analyze import Asked
-from syncrelay.cli.export import ParquetTask
-from syncrelay.cli.export_lerobot import LerobotTask
-from syncrelay.cli.fleet_tasks import AnalyzeTask, ReplayTask
 from syncrelay.config import Config, ConfigError, load_text
 from syncrelay.recordings.datasets.tables import Content
+from syncrelay.recordings.fleet.export_tasks import LerobotTask, ParquetTask
 from syncrelay.recordings.fleet.task import Source, Task
+from syncrelay.recordings.fleet.tasks import AnalyzeTask, ReplayTask
 from tests.faults.extent import chosen
 from tests.recordings.bag.making import write_mcap
 from tests.ros.streams import at, jittery, merged
@@ -170,12 +168,11 @@ class Edited:
 
 def tasks_of(text: str) -> dict[str, Task]:
     config = load_text(text)
-    asked = Asked("file.yaml", text, (), None, None, json=False, indent=None)
     front = [group for group in config.groups if group.name == "front"]
     return {
         "parquet": ParquetTask.of(only(config, front), Content()),
         "lerobot": LerobotTask.of(config),
-        "analyze": AnalyzeTask.of(asked),
+        "analyze": AnalyzeTask.of(file="file.yaml", text=text, topics=()),
         "mcap": ReplayTask.of(config, (), 0),
     }
 

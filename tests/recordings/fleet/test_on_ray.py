@@ -10,8 +10,7 @@ import tempfile
 
 import pytest
 
-from syncrelay.cli.demo import shipped_config
-from syncrelay.cli.demo_recording import record
+from syncrelay.cli.demo import record, shipped_config
 from tests.cli.command import ROOT
 from tests.faults.extent import IS_LONG
 from tests.recordings.fleet.fleets import FILE, make_fleet, replay_into, tree

@@ -10,8 +10,8 @@ from threading import Event, Thread
 
 import pytest
 
-import syncrelay.cli.heartbeat
-from syncrelay.cli.heartbeat import VARIABLE, Heartbeat, ailment
+import syncrelay.cli.healthcheck
+from syncrelay.cli.healthcheck import VARIABLE, Heartbeat, ailment
 
 _SECOND_NS = 1_000_000_000
 
@@ -77,7 +77,7 @@ def beating(heartbeat):
 
 @pytest.mark.parametrize(
     "command",
-    [["-m", "syncrelay", "healthcheck"], ["-I", "-S", str(Path(syncrelay.cli.heartbeat.__file__))]],
+    [["-m", "syncrelay", "healthcheck"], ["-I", "-S", str(Path(syncrelay.cli.healthcheck.__file__))]],
     ids=["command", "bare"],
 )
 def test_the_command_and_the_bare_probe_say_the_same(tmp_path, command):

@@ -1,6 +1,6 @@
 """A relay's heartbeat: a file that its receive loop writes the time into, and `syncrelay healthcheck`, which reads it.
 
-The check needs the standard library only: `python3 -I -S heartbeat.py` skips what the ROS wheels do whenever Python
+The check needs the standard library only: `python3 -I -S healthcheck.py` skips what the ROS wheels do whenever Python
 starts. Times are those of the machine's monotonic clock, which its containers share.
 """
 
@@ -64,6 +64,18 @@ def ailment(path: Path) -> str | None:
     if 0 <= age <= _STALE_NS:
         return None
     return f"the receive loop last turned {age / 1e9:.0f} s ago" if age > 0 else "the heartbeat is from an earlier run"
+
+
+def parser() -> "Parser":
+    """Return the parser of `syncrelay healthcheck`."""
+    from syncrelay.cli.parser import Parser
+
+    return Parser(
+        "syncrelay healthcheck",
+        example=f"{VARIABLE}=/run/syncrelay/heartbeat syncrelay healthcheck",
+        description=f"Checks that the relay is receiving: the relay writes a heartbeat into the file that {VARIABLE} "
+        "names. Exit code 1 if it is not receiving.",
+    )
 
 
 def command(_parser: "Parser", _arguments: "Namespace", _stop: "StopRequest") -> int:

@@ -4,8 +4,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from syncrelay.cli.analysis_html.drawings import Drawings
-from syncrelay.cli.analysis_text import (
+from syncrelay.config.wording import all_of, counted
+from syncrelay.explain import Severity, in_words, words
+from syncrelay.recordings.analysis import GroupAnalysis, patch
+from syncrelay.recordings.analysis.html.drawings import Drawings
+from syncrelay.recordings.analysis.nearest import Pair, worth_seeing
+from syncrelay.recordings.analysis.report_text import (
     delay_line,
     faults_of,
     other_pairs,
@@ -17,10 +21,6 @@ from syncrelay.cli.analysis_text import (
     slop_text,
     unneeded_line,
 )
-from syncrelay.config.wording import all_of, counted
-from syncrelay.explain import Severity, in_words, words
-from syncrelay.recordings.analysis import GroupAnalysis, patch
-from syncrelay.recordings.analysis.nearest import Pair, worth_seeing
 from syncrelay.recordings.analysis.topics import TopicFigures
 from syncrelay.recordings.analysis.unneeded import InputFates
 from syncrelay.recordings.analysis.watching import LastingFinding, alike

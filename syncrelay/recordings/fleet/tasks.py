@@ -1,4 +1,4 @@
-"""What `replay --into` and `analyze --into` do with each recording."""
+"""What `replay --into`, `export --format mcap` and `analyze --into` do with each recording."""
 
 import json
 from collections.abc import Sequence
@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
 
-from syncrelay.cli.analysis_json import as_json
-from syncrelay.cli.analyze import Asked, bound, measured
-from syncrelay.cli.inventory import inventory_as_json
-from syncrelay.cli.reading import eased_collector
+from syncrelay.collector import eased_collector
 from syncrelay.config import Config, load_text
-from syncrelay.recordings.analysis import inventory
+from syncrelay.recordings.analysis import analyze, inventory, settled
+from syncrelay.recordings.analysis.binding import bind_file_or_topics
 from syncrelay.recordings.analysis.few_sets import why_few_sets
+from syncrelay.recordings.analysis.report_json import as_json, inventory_as_json
 from syncrelay.recordings.bag import Recording, open_recording
 from syncrelay.recordings.bag.bindings import GroupBinding, bind
 from syncrelay.recordings.bag.mcap_output import McapOutput
@@ -84,17 +83,19 @@ class ReplayTask:
 class AnalyzeTask:
     """Writes the analysis of a recording; see Task. Facts are the sets and the findings of each group."""
 
-    asked: Asked
+    file: str | None
+    text: str | None
+    topics: tuple[str, ...]
     file_hash: str | None
     decided_by: str
 
     @classmethod
-    def of(cls, asked: Asked) -> Self:
-        """Return the task of what is asked of each recording."""
-        file = None if asked.text is None else load_text(asked.text, name=asked.config or "<text>")
-        config = "" if file is None else what_decides_sets(file.groups)
-        fingerprint = fingerprint_of("analyze", config=config, options={"topics": list(asked.topics)})
-        return cls(asked, short_hash(config) if config else None, fingerprint)
+    def of(cls, *, file: str | None, text: str | None, topics: tuple[str, ...]) -> Self:
+        """Return the task for the groups of a file's text, for topics as one group, or for neither: an inventory."""
+        groups = () if text is None else load_text(text, name=file or "<text>").groups
+        config = what_decides_sets(groups) if groups else ""
+        fingerprint = fingerprint_of("analyze", config=config, options={"topics": list(topics)})
+        return cls(file, text, topics, short_hash(config) if config else None, fingerprint)
 
     def fingerprint(self) -> str:
         """See Task."""
@@ -103,12 +104,14 @@ class AnalyzeTask:
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
         with closing(open_recording(source.words)) as recording, eased_collector():
-            if self.asked.text is None and not self.asked.topics:
+            if self.text is None and not self.topics:
                 document = inventory_as_json(source.shown[0], recording, inventory(recording))
                 facts = about(recording, ())
             else:
-                text, bindings = bound(recording, self.asked)
-                analysis = measured(recording, text, bindings, self.asked)
+                text, bindings = bind_file_or_topics(recording, file=self.file, text=self.text, topics=self.topics)
+                analysis = analyze(recording, text, bindings)
+                if self.text is None:
+                    analysis = settled(analysis)
                 document = as_json(source.shown[0], analysis)
                 groups: list[JSON] = [
                     {
@@ -123,7 +126,7 @@ class AnalyzeTask:
                     analysis,
                     recording=source.shown[0],
                     problems=problems_of(recording, bindings),
-                    file=self.asked.config,
+                    file=self.file,
                     file_hash=self.file_hash,
                 )
                 (folder / FACTS).write_text("".join(f"{row.model_dump_json()}\n" for row in rows), encoding="utf-8")

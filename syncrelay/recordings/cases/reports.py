@@ -1,18 +1,17 @@
 """What came of tests, for people and for programs: text, JUnit's XML, JSON, GitHub's annotations."""
 
 import json
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from difflib import SequenceMatcher
+from typing import Any, Final, NamedTuple, Protocol
 from xml.sax.saxutils import escape, quoteattr
 
-from syncrelay.cli.boundary import put, remark, say, wants_colour
-from syncrelay.cli.problems import inert, problem_as_json, problem_command, workflow_command
 from syncrelay.config import Problem, render
+from syncrelay.config.annotations import inert, problem_as_json, problem_command, workflow_command
 from syncrelay.config.problems import dotted
 from syncrelay.printable import one_entry, printable, printable_lines
-from syncrelay.recordings.cases import Mismatch, Result
+from syncrelay.recordings.cases.checking import Mismatch, Result
 from syncrelay.recordings.cases.drawing import lanes
 
 _BOLD, _RED, _RESET = "\033[1m", "\033[31m", "\033[0m"
@@ -30,6 +29,16 @@ class FileResult:
     def failed(self) -> bool:
         """Whether something is not as it shall be."""
         return bool(self.problems) or any(case.failed for case in self.cases)
+
+
+class Talk(NamedTuple):
+    """Where a report goes: `put` prints data, `say` lines of talk and `remark` a sentence, coloured or not."""
+
+    put: Callable[[str], None]
+    say: Callable[[str], None]
+    remark: Callable[[str], None]
+    data_is_coloured: bool
+    talk_is_coloured: bool
 
 
 class Report(Protocol):
@@ -55,25 +64,25 @@ class Report(Protocol):
 class Text:
     """For people: a line a case, of those that fail or are updated what differs, and a closing line."""
 
-    def __init__(self) -> None:
-        is_coloured = wants_colour(sys.stdout.isatty())
-        self._bold, self._red, self._reset = (_BOLD, _RED, _RESET) if is_coloured else ("", "", "")
+    def __init__(self, talk: Talk) -> None:
+        self._talk = talk
+        self._bold, self._red, self._reset = (_BOLD, _RED, _RESET) if talk.data_is_coloured else ("", "", "")
 
     def begin(self, name: str) -> None:
         """See Report."""
-        put(f"{self._bold}{printable(name)}{self._reset}")
+        self._talk.put(f"{self._bold}{printable(name)}{self._reset}")
 
     def fault(self, result: FileResult) -> None:
         """See Report."""
-        say(render(result.problems, colour=wants_colour(sys.stderr.isatty())))
+        self._talk.say(render(result.problems, colour=self._talk.talk_is_coloured))
 
     def case(self, name: str, result: Result) -> None:
         """See Report."""
-        put(f"  {self._status(result)}  {printable(result.case.name)}")
+        self._talk.put(f"  {self._status(result)}  {printable(result.case.name)}")
         for line in what_differs(result):
-            put(f"        {printable(line)}")
+            self._talk.put(f"        {printable(line)}")
         for sentence in _remarks(name, result):
-            remark(sentence)
+            self._talk.remark(sentence)
 
     def _status(self, result: Result) -> str:
         if result.failed:
@@ -82,7 +91,7 @@ class Text:
 
     def end(self, results: Sequence[FileResult]) -> None:
         """See Report."""
-        put(summary(results))
+        self._talk.put(summary(results))
 
 
 class Github(Text):
@@ -90,22 +99,22 @@ class Github(Text):
 
     def begin(self, name: str) -> None:
         """See Report."""
-        put(inert(printable(name)))
+        self._talk.put(inert(printable(name)))
 
     def fault(self, result: FileResult) -> None:
         """See Report."""
         for problem in result.problems:
-            put(problem_command(problem))
+            self._talk.put(problem_command(problem))
 
     def case(self, name: str, result: Result) -> None:
         """See Report."""
         if result.failed:
             text = "\n".join([result.case.name, *what_differs(result)])
-            put(workflow_command("error", text, file=name, span=result.case.span))
+            self._talk.put(workflow_command("error", text, file=name, span=result.case.span))
         else:
-            put(inert(f"  {self._status(result)}  {printable(result.case.name)}"))
+            self._talk.put(inert(f"  {self._status(result)}  {printable(result.case.name)}"))
         for sentence in _remarks(name, result):
-            remark(inert(sentence))
+            self._talk.remark(inert(sentence))
 
 
 def _remarks(name: str, result: Result) -> Iterator[str]:
@@ -116,6 +125,9 @@ def _remarks(name: str, result: Result) -> Iterator[str]:
 
 class Json:
     """One document, when all is done."""
+
+    def __init__(self, talk: Talk) -> None:
+        self._put = talk.put
 
     def begin(self, _name: str) -> None:
         """See Report."""
@@ -130,7 +142,7 @@ class Json:
         """See Report."""
         passed, updated, failed = counts(results)
         figures = {"passed": passed, "updated": updated, "failed": failed}
-        put(json.dumps({**figures, "files": [_file(each) for each in results]}, indent=2))
+        self._put(json.dumps({**figures, "files": [_file(each) for each in results]}, indent=2))
 
 
 class Junit(Json):
@@ -138,10 +150,10 @@ class Junit(Json):
 
     def end(self, results: Sequence[FileResult]) -> None:
         """See Report."""
-        put("\n".join(_junit(results)))
+        self._put("\n".join(_junit(results)))
 
 
-REPORTS: Final[dict[str, Callable[[], Report]]] = {"text": Text, "junit": Junit, "json": Json, "github": Github}
+REPORTS: Final[dict[str, Callable[[Talk], Report]]] = {"text": Text, "junit": Junit, "json": Json, "github": Github}
 
 
 def counts(results: Sequence[FileResult]) -> tuple[int, int, int]:
@@ -184,8 +196,6 @@ def _headline(result: Result) -> str:
 
 
 def _diff(mismatch: Mismatch) -> Iterator[str]:
-    from difflib import SequenceMatcher
-
     expected, found = mismatch.expected, mismatch.found
     for kind, begin, end, other_begin, other_end in SequenceMatcher(None, expected, found).get_opcodes():
         if kind == "equal":

@@ -1,7 +1,6 @@
-"""The demo's screen, lines and last words: what `top` shows of a relay, and what a newcomer needs beside it."""
+"""The demo's screen: what `top` shows of a relay, and what a newcomer needs beside it."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from typing import Final
 
@@ -9,42 +8,28 @@ from rich.console import Group as Lines
 from rich.text import Text
 
 from syncrelay.explain import RecentDrop
-from syncrelay.status.document import Group, Status
+from syncrelay.status.document import Group
 from syncrelay.top import group_blocks, phrases
+from syncrelay.top.demo_text import TITLE, Moment
 from syncrelay.top.pieces import line
-from syncrelay.top.plain import group_lines
 from syncrelay.top.strip import COLUMN_NS, UNNEEDED, Sweep, letter_style, mark_of, newest_stamp
 
-_TITLE: Final = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
 # Reports come once a second, and hold what left by then. Shown so much later, the strip moves on between them.
 _DELAY_NS: Final = 1_250_000_000
 # On a wider strip what a report holds of a 100 Hz input would not reach back to the begin.
 WIDEST_STRIP: Final = 65
 
 
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """The relay's state as of its last report, `elapsed_s` after the start, of `total_s` if an end is set.
-
-    `now` is the time, in nanoseconds of the clock that the rig stamps by.
-    """
-
-    state: Status
-    elapsed_s: float
-    total_s: float | None
-    now: int
-
-    @property
-    def head(self) -> int:
-        """The stamp up to which the strip is drawn, in nanoseconds."""
-        recent = chain.from_iterable(map(group_blocks.as_matched, self.state.groups))
-        return min(self.now - _DELAY_NS, newest_stamp(recent))
+def head_of(moment: Moment) -> int:
+    """Return the stamp up to which the strip is drawn, in nanoseconds."""
+    recent = chain.from_iterable(map(group_blocks.as_matched, moment.state.groups))
+    return min(moment.now - _DELAY_NS, newest_stamp(recent))
 
 
 def frame(moment: Moment, *, width: int, height: int) -> Lines:
     """Draw a moment for a terminal of so many columns and lines; 80x24 shows all of two groups of two inputs."""
     groups = moment.state.groups
-    sweep = Sweep(head=moment.head, width=min(width - group_blocks.LANE_LABEL - 2, WIDEST_STRIP))
+    sweep = Sweep(head=head_of(moment), width=min(width - group_blocks.LANE_LABEL - 2, WIDEST_STRIP))
     strips = [list(group_blocks.lanes(group, group_blocks.as_matched(group), sweep)) for group in groups]
     legend = list(_legend(groups, sweep, width))
     for draw in (_large_block, _block, _small_block):
@@ -84,7 +69,7 @@ def _small_block(group: Group, strip: Sequence[Text], width: int) -> Iterator[Te
 
 def _title(moment: Moment, width: int) -> Text:
     clock = f"{moment.elapsed_s:.1f}" + (" s" if moment.total_s is None else f" / {moment.total_s:g} s")
-    title = Text(_TITLE, style="bold", no_wrap=True)
+    title = Text(TITLE, style="bold", no_wrap=True)
     title.truncate(width - len(clock) - 1, overflow="ellipsis", pad=True)
     return Text.assemble(title, " ", clock)
 
@@ -98,22 +83,3 @@ def _legend(groups: Sequence[Group], sweep: Sweep, width: int) -> Iterator[Text]
     yield from group_blocks.side_by_side(group_blocks.marks({UNNEEDED, *occurred}), width)
     column, strip_s = phrases.duration(COLUMN_NS / 1e6), sweep.width * COLUMN_NS / 1e9
     yield line((f"a column is {column}; after {strip_s:.1f} s it starts again on the left; Ctrl-C ends it", "dim"))
-
-
-def plain_line(moment: Moment) -> str:
-    """Return one line on all groups, for where nothing can be drawn."""
-    return f"{moment.elapsed_s:5.1f} s  {'; '.join(map(_in_short, moment.state.groups))}"
-
-
-def _in_short(group: Group) -> str:
-    if not group.rate_hz or group.span_ms is None:
-        return f"{group.name}: {group.explanation.text if group.explanation else 'no set yet'}"
-    rates = f"{phrases.sets_of_possible(group)} possible sets a second, span {phrases.duration(group.span_ms.p50)}"
-    problems = ", ".join(problem.label for problem in group.problems)
-    return f"{group.name}: {rates}{f' ({problems})' if problems else ''}"
-
-
-def summary(moment: Moment) -> str:
-    """Say at the end what became of every message and what the relay found, as `syncrelay top --once` does."""
-    groups = chain.from_iterable(["", *group_lines(group)] for group in moment.state.groups)
-    return "\n".join([f"{_TITLE}: {moment.elapsed_s:.1f} s", *groups])

@@ -1,19 +1,23 @@
-"""An analysis as lines of text."""
+"""What a recording holds, and what groups make of it, as lines of text."""
 
 from collections.abc import Iterator, Sequence
+from shlex import quote
+from typing import Final
 
-from syncrelay.cli.summary import why_unneeded
 from syncrelay.config.wording import counted
 from syncrelay.explain import in_words, words
-from syncrelay.printable import printable
-from syncrelay.recordings.analysis import Analysis, GroupAnalysis, patch
+from syncrelay.explain.summary import why_unneeded
+from syncrelay.printable import aligned, printable
+from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic, patch
 from syncrelay.recordings.analysis.curves import Curves, Point, slop_key
 from syncrelay.recordings.analysis.nearest import Pair, worth_seeing
 from syncrelay.recordings.analysis.suggest import Suggestion
 from syncrelay.recordings.analysis.topics import TopicFigures
 from syncrelay.recordings.analysis.unneeded import InputFates
+from syncrelay.recordings.bag import Recording
 
-_SECOND = 1_000_000_000
+_SECOND: Final = 1_000_000_000
+_HEADING: Final = ("topic", "type", "messages", "rate", "stamps")
 
 
 def report(name: str, analysis: Analysis) -> Iterator[str]:
@@ -203,3 +207,43 @@ def _curves(each: GroupAnalysis) -> Iterator[str]:
     ):
         if points:
             yield f"sets by {option}{sampled}: {', '.join(f'{point.sets} at {text(each, point)}' for point in points)}"
+
+
+def inventory_lines(name: str, recording: Recording, topics: Sequence[Topic]) -> Iterator[str]:
+    """Yield the topics of a recording with their types, counts, rates and stamps, then what to type next."""
+    messages = sum(topic.figures.messages for topic in topics)
+    lasts = words.seconds(recording.end - recording.begin)
+    yield f"{printable(name)}: {lasts}, {counted(messages, 'message')} of {counted(len(topics), 'topic')}"
+    yield from aligned([_HEADING, *map(_row, topics)])
+    yield from _next(name, [topic.channel.topic for topic in topics if topic.unfit is None])
+
+
+def _row(topic: Topic) -> tuple[str, ...]:
+    figures = topic.figures
+    rate = words.rate(figures.rate_hz) if figures.rate_hz else "-"
+    return topic.channel.topic, topic.channel.type or "-", str(figures.messages), rate, _stamps(topic)
+
+
+def _stamps(topic: Topic) -> str:
+    if topic.lack is not None:
+        return f"none: {topic.lack}"
+    if not topic.figures.messages:
+        return "-"
+    faults, delay = faults_of(topic.figures), topic.figures.delay
+    if delay is None:
+        return ", ".join(faults) or "equal to receipt"
+    return ", ".join([f"{words.span_of_time(delay.median)} before receipt", *faults])
+
+
+def _next(bag: str, fit: Sequence[str]) -> Iterator[str]:
+    """Yield what to type with this recording, whose name is quoted for a shell."""
+    name = quote(printable(bag))
+    yield ""
+    if len(fit) < 2:  # noqa: PLR2004  one alone has nothing to be matched with
+        yield "No two topics have stamps and enough messages. In a file, `stamp: receive` matches a topic by arrival."
+        return
+    yield "Next, to match two topics or more:"
+    yield f"  syncrelay analyze {name} {' '.join(fit[:2])}"
+    yield "or to get a file for all of them, and see what it gives:"
+    yield f"  syncrelay init --from-bag {name} -o fusion.yaml"
+    yield f"  syncrelay analyze {name} --config fusion.yaml"

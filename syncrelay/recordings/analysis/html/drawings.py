@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from syncrelay.cli.analysis_html.charts import Histogram, histogram, queue_marks, slop_marks
-from syncrelay.cli.analysis_html.lanes import Lanes, lanes_of
-from syncrelay.cli.analysis_html.packing import pack
 from syncrelay.config import GroupConfig
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis
+from syncrelay.recordings.analysis.html.charts import Histogram, histogram, queue_marks, slop_marks
+from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
+from syncrelay.recordings.analysis.html.packing import pack
 
 # With other stamps, the drawn distances are not those that suggested values are for.
 _OTHER_STAMPS = ("stamp", "offset")

@@ -1,25 +1,27 @@
-"""`export --format lerobot`: an episode of each recording, as the fleet's results, then one dataset of all."""
+"""What `export` does with each recording: a Parquet file for each group, or an episode of a LeRobotDataset."""
 
 import shutil
-from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import Final, Self
+from typing import Any, Final, Self
 from uuid import uuid4
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
-from syncrelay.cli.fleet import do_on_many
-from syncrelay.cli.reading import eased_collector
+from syncrelay.collector import eased_collector
 from syncrelay.config import Config
-from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
-from syncrelay.printable import printable
+from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.bindings import bind
+from syncrelay.recordings.bag.replay import Replay
 from syncrelay.recordings.datasets.lerobot import join_episodes, lerobot_of, write_episode
+from syncrelay.recordings.datasets.parquet import write_parquet
+from syncrelay.recordings.datasets.reading import SetsOf
+from syncrelay.recordings.datasets.tables import Content
 from syncrelay.recordings.fleet.ledger import State
 from syncrelay.recordings.fleet.run import Run
 from syncrelay.recordings.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
+from syncrelay.recordings.fleet.tasks import about, counts_of, few_sets
 from syncrelay.recordings.fleet.work import SCRATCH
 
 EPISODES: Final = ".episodes"
@@ -29,20 +31,47 @@ EPISODES: Final = ".episodes"
 _PARTS: Final = ("data", "videos", "meta")
 
 
-def export_lerobot(config: Config, bags: Sequence[str], arguments: Namespace) -> int:
-    """Write a LeRobotDataset of all recordings that `bags` name into the folder of the arguments; return the exit code.
+@dataclass(frozen=True, slots=True)
+class ParquetTask:
+    """Writes the sets of a recording as a Parquet file for each group; see Task. Facts are the counts of each input."""
 
-    Raises UsageError where the file says nothing of LeRobot, SyncRelayError where the folder holds something else.
-    """
-    task = LerobotTask.of(config)
-    # In a worker it would be a bug.
-    for module in ("av", "PIL.Image", "pyarrow"):
-        import_module(module)
-    out = Path(arguments.into).absolute()
-    _require_own(out)
-    into = out / EPISODES
-    chosen = Namespace(**{**vars(arguments), "into": str(into)})
-    return do_on_many(task, bags, chosen, finish=lambda run, sources: _join(run, sources, out))
+    config: Config
+    content: Content
+    decided_by: str
+
+    @classmethod
+    def of(cls, config: Config, content: Content) -> Self:
+        """Return the task of a file."""
+        fields: dict[str, JSON] = {topic: list(paths) for topic, paths in content.fields.items()}
+        groups: list[JSON] = [group.name for group in config.groups]
+        options: dict[str, JSON] = {
+            "format": "parquet",
+            "groups": groups,
+            "fields": fields,
+            "images": dict(content.images),
+            "other_images": content.other_images,
+            "raw": content.raw,
+        }
+        return cls(
+            config,
+            content,
+            fingerprint_of("export", config=what_decides_sets(config.groups), options=options),
+        )
+
+    def fingerprint(self) -> str:
+        """See Task."""
+        return self.decided_by
+
+    def run(self, source: Source, folder: Path) -> dict[str, JSON]:
+        """See Task."""
+        with closing(open_recording(source.words)) as recording, eased_collector():
+            bindings = bind(self.config, recording)
+            sets = SetsOf(bindings, self.content, name=source.name)
+            replay = Replay(recording, bindings, listeners=sets.listeners)
+            write_parquet(sets, replay.steps(), folder)
+            results = replay.results()
+            facts = {**about(recording, bindings, more=sets.faults()), **few_sets(recording, bindings, results)}
+            return {**facts, "groups": [counts_of(result) for result in results]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +99,8 @@ class LerobotTask:
             return write_episode(source.name, source.words, self.config, folder)
 
 
-def _require_own(out: Path) -> None:
+def require_own(out: Path) -> None:
+    """Raise SyncRelayError where a folder holds anything but a former dataset of ours."""
     try:
         is_other = out.exists() and not (out / EPISODES).is_dir() and any(out.iterdir())
     except OSError as error:
@@ -79,8 +109,11 @@ def _require_own(out: Path) -> None:
         raise SyncRelayError(f"{out}: holds something else: name another folder, or an empty one")
 
 
-def _join(run: Run, sources: Sequence[Source], out: Path) -> int:
-    """Put the dataset of all episodes in place, in the order of the recordings, and say what it has."""
+def join(run: Run, sources: Sequence[Source], out: Path) -> dict[str, Any]:
+    """Put the dataset of all episodes in place, in the order of the recordings, and return what it has.
+
+    Raises SyncRelayError where no recording gave an episode.
+    """
     entries = {job.source.name: run.entry(job) for job in run.jobs}
     into = out / EPISODES
     done = [
@@ -98,9 +131,4 @@ def _join(run: Run, sources: Sequence[Source], out: Path) -> int:
     for part in _PARTS:
         if (scratch / part).exists():
             (scratch / part).rename(out / part)
-    for problem in facts["problems"]:
-        remark(problem)
-    episodes, frames = counted(facts["total_episodes"], "episode"), counted(facts["total_frames"], "frame")
-    held, left_out = counted(facts["held"], "frame"), counted(facts["left_out"], "set")
-    put(printable(f"{out}: {episodes} with {frames}; {held} repeated, {left_out} between frames left out"))
-    return AT_FAULT if facts["problems"] else DONE
+    return facts

@@ -1,17 +1,18 @@
 """An analysis for programs. All times and durations are nanoseconds, shares are of 1."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
 
-from syncrelay.recordings.analysis import Analysis, GroupAnalysis
+from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic
 from syncrelay.recordings.analysis.buckets import counted_in_buckets
 from syncrelay.recordings.analysis.nearest import Pair
 from syncrelay.recordings.analysis.suggest import Suggestion
 from syncrelay.recordings.analysis.topics import spread
 from syncrelay.recordings.analysis.watching import LastingFinding
+from syncrelay.recordings.bag import Recording
 
 _LONGEST: Final = 2**63 - 1
 
@@ -25,6 +26,18 @@ def as_json(name: str, analysis: Analysis) -> dict[str, Any]:
         "faults": list(analysis.faults),
         "topics": [asdict(topic) for topic in analysis.topics],
         "groups": [_group(group) for group in analysis.groups],
+    }
+
+
+def inventory_as_json(name: str, recording: Recording, topics: Sequence[Topic]) -> dict[str, Any]:
+    """Return what json.dumps takes, in the form of an analysis without groups; `unfit` as Topic has it."""
+    return {
+        "recording": name,
+        "begin": recording.begin,
+        "end": recording.end,
+        "faults": recording.faults,
+        "topics": [{**asdict(topic.figures), "unfit": topic.unfit} for topic in topics],
+        "groups": [],
     }
 
 

@@ -2,16 +2,16 @@
 
 from typing import Any, Final
 
-from syncrelay.cli.analysis_html.drawings import drawings_of
-from syncrelay.cli.analysis_html.words import TopicRow, group_words, topic_row
-from syncrelay.cli.pages import MARK, content_hash, joined, template, when
 from syncrelay.errors import BagError
 from syncrelay.explain import words
 from syncrelay.printable import printable, printable_lines
 from syncrelay.recordings.analysis import Analysis, file_with_changes
+from syncrelay.recordings.analysis.html.drawings import drawings_of
+from syncrelay.recordings.analysis.html.words import TopicRow, group_words, topic_row
+from syncrelay.recordings.pages import MARK, content_hash, joined, template, when
 from syncrelay.status.fates import FATES, Fate
 
-_PACKAGE: Final = "syncrelay.cli.analysis_html"
+_PACKAGE: Final = "syncrelay.recordings.analysis.html"
 _STYLES: Final = ("uplot/uPlot.min.css", "../../status/page/colours.css", "page/report.css")
 _SCRIPTS: Final = ("uplot/uPlot.iife.min.js", "page/unpack.js", "page/plots.js", "page/lanes.js", "page/report.js")
 # Up to 10 characters each: below 6 MB, however long the recording.

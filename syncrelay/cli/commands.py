@@ -1,0 +1,128 @@
+"""The commands, each with a module of its name, and the extras that they need. Imports nothing slow.
+
+The module of a command has its `parser()`, which completion asks at every press of TAB, and its `command`, which does
+the work and imports what that takes.
+"""
+
+from argparse import Namespace
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Final, NamedTuple
+
+from syncrelay.cli.parser import Parser
+from syncrelay.errors import UnavailableError
+
+EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
+    "recordings": ("jinja2", "lz4", "mcap", "numpy", "rich", "rosbags", "ruamel.yaml", "zstandard"),
+    "datasets": ("PIL", "av", "pyarrow"),
+    "fleet": ("ray",),
+    "top": ("rich", "textual"),
+}
+"""The packages that an extra of pyproject.toml brings, as they are imported."""
+
+
+class Need(NamedTuple):
+    """An extra that a command needs: always, or `when` it `applies`, which is said in words for the reference."""
+
+    extra: str
+    when: str = ""
+    applies: Callable[[Namespace], bool] = lambda _: True
+
+
+class Command(NamedTuple):
+    """A command: how it is called, what it does, the extras that it needs."""
+
+    usage: str
+    does: str
+    needs: tuple[Need, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The word that calls it, and the name of its module."""
+        return self.usage.split()[0]
+
+    def parser(self) -> Parser:
+        """Return the parser of its words."""
+        parser: Parser = import_module(f"syncrelay.cli.{self.name}").parser()
+        return parser
+
+
+_RECORDINGS: Final = Need("recordings")
+_TO_DRAW: Final = Need("top", "to draw on a terminal, where it prints text otherwise", lambda _: False)
+_TABLE: Final = Need("datasets", "for `--into`", lambda arguments: arguments.into is not None)
+_RAY: Final = Need("fleet", "for `--engine ray`", lambda arguments: arguments.engine == "ray")
+
+COMMANDS: Final[Mapping[str, Command]] = {
+    each.name: each
+    for each in (
+        Command("validate FILE...", "check files; show every error at its line"),
+        Command("diff OLD NEW", "say what a reload to another file would do"),
+        Command("graph FILE...", "draw the groups of files as Mermaid or text"),
+        Command("init --from-bag BAG", "propose a file for a recording, or for a live graph", (_RECORDINGS,)),
+        Command("analyze BAG...", "measure recordings, and suggest values that fit", (_RECORDINGS, _TABLE, _RAY)),
+        Command("replay BAG...", "run a file's groups on a recording, without ROS", (_RECORDINGS, _RAY)),
+        Command(
+            "export BAG...",
+            "write the matched sets of recordings as datasets",
+            (
+                _RECORDINGS,
+                Need("datasets", "for `--format parquet` and `lerobot`", lambda given: given.format != "mcap"),
+                _RAY,
+            ),
+        ),
+        Command("test FILE...", "run the tests of a configuration, without ROS", (_RECORDINGS,)),
+        Command(
+            "demo",
+            "try it on simulated sensors; needs no robot",
+            (Need("recordings", "for `--record`", lambda arguments: arguments.record is not None), _TO_DRAW),
+        ),
+        Command("doctor", "find out why messages may not arrive"),
+        Command("observe", "try a file beside a running robot; publishes nothing", (_RECORDINGS, _TO_DRAW)),
+        Command(
+            "top",
+            "watch a running relay, here or on another machine",
+            (Need("top", "unless `--once` is given", lambda arguments: not arguments.once),),
+        ),
+        Command("tap [GROUP]", "print each set and drop of a running relay"),
+        Command("reload", "make a running relay read its file again"),
+        Command("healthcheck", "check that the relay is receiving"),
+        Command(
+            "schema",
+            "print the JSON Schema of the file, for editors",
+            (Need("recordings", "for `--test`", lambda arguments: arguments.test),),
+        ),
+        Command("completion SHELL", "print a script for bash, zsh or fish"),
+    )
+}
+
+
+def commands_help() -> str:
+    """Return a line for each command."""
+    return "\n".join(f"  {each.usage:<21}{each.does}" for each in COMMANDS.values())
+
+
+def require_extras(command: Command, arguments: Namespace) -> None:
+    """Raise UnavailableError where what the command needs for these words is not installed. Imports none of it."""
+    missing = [need.extra for need in command.needs if need.applies(arguments) and not is_installed(need.extra)]
+    if missing:
+        line = line_to_install(",".join(dict.fromkeys(missing)))
+        raise UnavailableError(f"{command.name} needs packages that are not installed here\n  {line}")
+
+
+def line_to_install(extras: str) -> str:
+    """Return what to type for extras, which are separated by commas."""
+    return f"pip install 'syncrelay[{extras}]'     (in a clone: pip install '.[{extras}]')"
+
+
+def is_installed(extra: str) -> bool:
+    """Tell whether the packages of an extra are there."""
+    return all(map(_is_there, EXTRAS[extra]))
+
+
+def _is_there(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except ModuleNotFoundError:
+        # What it is a part of is missing.
+        return False
