@@ -104,10 +104,10 @@ def commands_help() -> str:
 
 def require_extras(command: Command, arguments: Namespace) -> None:
     """Raise UnavailableError where what the command needs for these words is not installed. Imports none of it."""
-    missing = [need.extra for need in command.needs if need.applies(arguments) and not is_installed(need.extra)]
-    if missing:
-        line = line_to_install(",".join(dict.fromkeys(missing)))
-        raise UnavailableError(f"{command.name} needs packages that are not installed here\n  {line}")
+    missing = {each.extra: _missing(each.extra) for each in command.needs if each.applies(arguments)}
+    if packages := [package for of_extra in missing.values() for package in of_extra]:
+        line = line_to_install(",".join(extra for extra, of_extra in missing.items() if of_extra))
+        raise UnavailableError(f"{command.name} needs {', '.join(packages)}, not installed here\n  {line}")
 
 
 def line_to_install(extras: str) -> str:
@@ -117,7 +117,11 @@ def line_to_install(extras: str) -> str:
 
 def is_installed(extra: str) -> bool:
     """Tell whether the packages of an extra are there."""
-    return all(map(_is_there, EXTRAS[extra]))
+    return not _missing(extra)
+
+
+def _missing(extra: str) -> list[str]:
+    return [package for package in EXTRAS[extra] if not _is_there(package)]
 
 
 def _is_there(module: str) -> bool:

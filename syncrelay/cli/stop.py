@@ -75,13 +75,14 @@ class StopRequest:
     def __init__(self) -> None:
         self.requested = False
         self._reload = False
-        self._had_terminal = os.isatty(sys.stderr.fileno())
+        self._had_terminal = False
         self._wake: Callable[[], None] | None = None
         self._deferred = False
         self._signalled = False
 
     def install(self) -> None:
         """Handle the signals from here on."""
+        self._had_terminal = os.isatty(sys.stderr.fileno())
         for number in _SIGNALS:
             signal.signal(number, self._request)
         signal.signal(signal.SIGHUP, self._request_reload)

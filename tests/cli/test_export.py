@@ -207,15 +207,6 @@ def test_words_that_make_no_sense_are_refused(tmp_path, words, code, told):
     assert (done.returncode, told in done.stderr) == (code, True), done.stderr
 
 
-def test_without_pyarrow_it_says_what_to_install(tmp_path):
-    without = "import sys; sys.modules['pyarrow'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
-    (tmp_path / "pair.yaml").write_text(PAIR)
-    done = run_python("-c", without, "export", "bag.mcap", "--config", "pair.yaml", "-o", "out", folder=tmp_path)
-    assert done.returncode == 69
-    assert "pyarrow" in done.stderr
-    assert "pip install 'FOLDER-OF-SYNCRELAY[datasets]'" in done.stderr
-
-
 def test_memory_does_not_grow_with_the_recording(tmp_path):
     image = STORE.types["sensor_msgs/msg/Image"]
     empty = np.zeros(4_000_000, np.uint8)

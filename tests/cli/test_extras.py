@@ -24,12 +24,13 @@ _BARE = os.environ.get("SYNCRELAY_BARE")
 _HIDING = """
 import atexit, sys
 given = set(sys.argv.pop(1).split(","))
+from importlib.machinery import PathFinder
 class Hiding:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in given or path is not None or name.startswith("_sysconfigdata"):
-            return None
-        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-sys.meta_path.insert(2, Hiding())
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        is_given = name.partition(".")[0] in given or name.startswith("_sysconfigdata")
+        return PathFinder.find_spec(name, path, target) if is_given else None
+sys.meta_path[sys.meta_path.index(PathFinder)] = Hiding
 slow = ("pydantic", "yaml", "numpy", "asyncio", "rclpy")
 atexit.register(lambda: print("slow:", *(each for each in slow if each in sys.modules), file=sys.stderr))
 from syncrelay.cli import main
@@ -73,40 +74,47 @@ def _example(name: str) -> list[str]:
 
 
 _TOLD = re.compile(r"pip install 'syncrelay\[([a-z,]+)\]'")
-_ALWAYS = {name: [each.extra for each in command.needs if not each.when] for name, command in COMMANDS.items()}
-_WITH = {
-    "demo --record rig.mcap": "recordings",
-    "schema --test": "recordings",
-    "top": "top",
-    "export drive.mcap --config fusion.yaml -o sets": "recordings,datasets",
-    "export drive.mcap --config fusion.yaml -o sets --format mcap --engine ray": "recordings,fleet",
-}
+_WORDS = [
+    *map(_example, COMMANDS),
+    *map(
+        str.split,
+        (
+            "demo --record rig.mcap",
+            "schema --test",
+            "top --once",
+            "analyze drive.mcap --into sets --engine ray",
+            "export drive.mcap --config fusion.yaml -o sets --format mcap",
+        ),
+    ),
+]
 
 
-@pytest.mark.parametrize("words", [*(shlex.join(_example(name)) for name, needs in _ALWAYS.items() if needs), *_WITH])
+def _missing(name: str, *words: str) -> list[str]:
+    """The extras that a command needs for these words."""
+    command = COMMANDS[name]
+    arguments = command.parser().read(words)
+    return [each.extra for each in command.needs if each.applies(arguments)]
+
+
+@pytest.mark.parametrize("words", [each for each in _WORDS if _missing(*each)], ids=" ".join)
 def test_a_command_whose_extra_is_missing_says_what_to_type_before_anything_slow_is_imported(words, tmp_path):
-    done = _run(shlex.split(words), tmp_path)
+    done = _run(words, tmp_path)
     assert (done.returncode, done.stdout) == (69, ""), done.stderr
-    wanted = _WITH.get(words) or ",".join(_ALWAYS[words.split()[0]])
-    assert _TOLD.findall(done.stderr) == [wanted]
+    assert _TOLD.findall(done.stderr) == [",".join(_missing(*words))]
     if _BARE is None:
         assert done.stderr.splitlines()[-1] == "slow:"
 
 
-_OTHERS = {
-    **{name: _example(name) for name, needs in _ALWAYS.items() if not needs and name not in {"demo", "top"}},
-    "top": ["top", "--once", "--url", "localhost:1"],
-    "tap": ["tap", "--url", "localhost:1"],
-    "reload": ["reload", "--url", "localhost:1"],
-    "demo": ["demo", "--show-config"],
-}
+_OTHERS = [each for each in _WORDS if not _missing(*each) and each[0] != "demo"]
+# No relay of this machine is meant.
+_ASK = ("tap", "reload", "top")
 
 
-@pytest.mark.parametrize("name", _OTHERS)
-def test_every_other_command_runs_on_what_the_base_installation_brings(name, tmp_path):
+@pytest.mark.parametrize("words", [*_OTHERS, ["demo", "--show-config"]], ids=" ".join)
+def test_every_other_command_runs_on_what_the_base_installation_brings(words, tmp_path):
     for file in ("fusion.yaml", "wider.yaml"):
         (tmp_path / file).write_text(GOOD)
-    done = _run(_OTHERS[name], tmp_path)
+    done = _run([*words, "--url", "localhost:1"] if words[0] in _ASK else words, tmp_path)
     assert done.returncode in {0, 1}, done.stderr
     assert "Traceback" not in done.stderr
     assert "lacks a Python package" not in done.stderr

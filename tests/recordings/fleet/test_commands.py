@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from tests.cli.command import run, run_python
+from tests.cli.command import run
 from tests.cli.terminals import on_terminal
 from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
 from tests.recordings.fleet.fleets import FILE, TOPICS, entries, file_text, make_fleet, replay_into, result
@@ -163,15 +163,6 @@ def test_options_that_make_no_sense_together_are_told(words, told, done):
     assert ended.returncode == 2
     assert told in ended.stderr
     assert not (done / "o").exists()
-
-
-def test_ray_that_is_missing_is_told(done, tmp_path):
-    script = "import sys; sys.modules['ray'] = None; from syncrelay.cli import main; sys.exit(main(sys.argv[1:]))"
-    words = ("replay", "bags", "--config", FILE, "--engine", "ray", "--into", str(tmp_path / "out"))
-    ended = run_python("-c", script, *words, folder=done)
-    assert ended.returncode == 1
-    install = "pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
-    assert ended.stderr == f"syncrelay: --engine ray needs Ray, which is not installed: {install}\n"
 
 
 def test_on_a_terminal_progress_is_one_line_that_is_gone_at_the_end(done, tmp_path):

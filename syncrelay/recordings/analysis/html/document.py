@@ -12,7 +12,7 @@ from syncrelay.recordings.pages import MARK, content_hash, joined, template, whe
 from syncrelay.status.fates import FATES, Fate
 
 _PACKAGE: Final = "syncrelay.recordings.analysis.html"
-_STYLES: Final = ("uplot/uPlot.min.css", "../../status/page/colours.css", "page/report.css")
+_STYLES: Final = ("uplot/uPlot.min.css", "../../../status/page/colours.css", "page/report.css")
 _SCRIPTS: Final = ("uplot/uPlot.iife.min.js", "page/unpack.js", "page/plots.js", "page/lanes.js", "page/report.js")
 # Up to 10 characters each: below 6 MB, however long the recording.
 _MOST_MESSAGES: Final = 500_000
