@@ -63,8 +63,8 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     from syncrelay.config import load_text
     from syncrelay.config.source import read_source
     from syncrelay.recordings.bag import is_recording
-    from syncrelay.urls import redacted
     from syncrelay.recordings.fleet.recordings import names_recordings
+    from syncrelay.urls import redacted
 
     config, *others = arguments.config or [None]
     if others:

@@ -51,7 +51,7 @@ class Command(NamedTuple):
 _RECORDINGS: Final = Need("recordings")
 _TO_DRAW: Final = Need("top", "to draw on a terminal, where it prints text otherwise", lambda _: False)
 _TABLE: Final = Need("datasets", "for `--into`", lambda arguments: arguments.into is not None)
-_RAY: Final = Need("fleet", "for `--engine ray`", lambda arguments: arguments.engine == "ray")
+_RAY: Final = Need("fleet", "for `--engine ray`", lambda given: given.engine == "ray" and given.into is not None)
 
 COMMANDS: Final[Mapping[str, Command]] = {
     each.name: each
