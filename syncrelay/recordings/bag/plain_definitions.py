@@ -13,11 +13,11 @@ _MOST_EXPRESSIONS: Final = 500
 _IDL_RULE: Final = "=" * 80 + "\n"
 _NO_LINE: Final = re.compile(r"^[ \t\r]*(?:#[^\n]*)?(?:\n|\Z)", re.MULTILINE)
 _STRING: Final = r'"(?:\\[\s\S]?|[^"\\])*(?:"|\Z)'
-# Of the annotations, an enumerator's value alone tells something.
+# Of annotations only the value of an enumerator matters. A line with # is `#include`: all types follow in the text.
 _TOKEN: Final = re.compile(
     rf"""  # What has no end goes to the end: nothing is gone through twice.
     (?P<kept>{_STRING}|@value\s*\(\s*-?\w+\s*\))
-    |(?P<gap>(?:\s|//[^\n]*|/\*[\s\S]*?(?:\*/|\Z)|@(?!value\b)[\w:]+(?:\s*\((?:{_STRING}|[^"()])*\))?)+)""",
+    |(?P<gap>(?:\s|//[^\n]*|\#[^\n]*|/\*[\s\S]*?(?:\*/|\Z)|@(?!value\b)[\w:]+(?:\s*\((?:{_STRING}|[^"()])*\))?)+)""",
     re.VERBOSE,
 )
 # Each bracket of a constant takes the parser 50 times longer, and a number may be shifted by gigabytes.

@@ -5,7 +5,7 @@ list, and `uint8[]` and `byte[]` are binary: images, clouds and packets stay byt
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeAlias
 
 import pyarrow as pa
@@ -16,24 +16,38 @@ from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError
 from syncrelay.recordings.datasets.units import unit_of
 
+Sizes: TypeAlias = tuple[int, ...] | None
+"""How many bytes a value takes with the padding before it: for a value that begins 0, 1, ... 7 bytes behind a multiple
+of 8 bytes. None where the size depends on the message: of strings and sequences, and what they are in.
+"""
+
+_LARGEST_ALIGNMENT: Final = 8
+
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number or a bool: numpy's code of it without its byte order, and Arrow's type."""
+    """A number or a bool: numpy's code without a byte order, Arrow's type, and how many bytes it has."""
 
     code: str
     arrow: pa.DataType
     size: int
+    sizes: Sizes = field(init=False)
+
+    def __post_init__(self) -> None:
+        sizes = tuple([-place % self.size + self.size for place in range(_LARGEST_ALIGNMENT)])
+        object.__setattr__(self, "sizes", sizes)
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
     """A string."""
 
+    sizes: Sizes = field(init=False, default=None)
+
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a message; one that nobody asks for is gone through and not given."""
+    """A field of a message. One that is not asked for is skipped, and is not in the result."""
 
     name: str
     node: "Node"
@@ -42,10 +56,14 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Struct:
-    """A message, of a type (`pkg/msg/Name`)."""
+    """A message of a type (`pkg/msg/Name`)."""
 
     type: str
     fields: tuple[Field, ...]
+    sizes: Sizes = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sizes", _size_of_all([each.node.sizes for each in self.fields]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +72,13 @@ class Array:
 
     element: "Node"
     count: int
+    sizes: Sizes = field(init=False)
+
+    def __post_init__(self) -> None:
+        each = self.element.sizes
+        places = range(_LARGEST_ALIGNMENT)
+        sizes = None if each is None else tuple([size_of_many(each, self.count, place) for place in places])
+        object.__setattr__(self, "sizes", sizes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +86,12 @@ class Run:
     """As many elements as the message says."""
 
     element: "Node"
+    sizes: Sizes = field(init=False, default=None)
 
     @property
     def is_bytes(self) -> bool:
         """Whether Arrow has it as binary."""
-        return isinstance(self.element, Number) and self.element.code == "u1"
+        return isinstance(self.element, Number) and self.element.arrow == pa.uint8()
 
 
 Node: TypeAlias = Number | Text | Struct | Array | Run
@@ -73,7 +99,7 @@ Node: TypeAlias = Number | Text | Struct | Array | Run
 _NUMBERS: Final = {
     name: Number(code, arrow, int(code[1]))
     for name, code, arrow in (
-        ("bool", "?1", pa.bool_()),
+        ("bool", "u1", pa.bool_()),
         ("byte", "u1", pa.uint8()),
         ("octet", "u1", pa.uint8()),
         ("char", "u1", pa.uint8()),
@@ -89,6 +115,28 @@ _NUMBERS: Final = {
         ("float64", "f8", pa.float64()),
     )
 }
+
+
+def size_of_many(each: tuple[int, ...], count: int, place: int) -> int:
+    """Return how many bytes equal elements take, given the sizes of one; see Sizes."""
+    if not count:
+        return 0
+    first = each[place % _LARGEST_ALIGNMENT]
+    # From the second on all take the same: each begins where one ends, at the same distance from its last alignment.
+    return first + (count - 1) * each[(place + first) % _LARGEST_ALIGNMENT]
+
+
+def _size_of_all(parts: Sequence[Sizes]) -> Sizes:
+    """Return the sizes of fields that follow each other. A message without fields is one byte (rosidl)."""
+    sizes = []
+    for place in range(_LARGEST_ALIGNMENT):
+        end = place
+        for part in parts:
+            if part is None:
+                return None
+            end += part[end % _LARGEST_ALIGNMENT]
+        sizes.append(end - place if parts else 1)
+    return tuple(sizes)
 
 
 def type_tree(store: Typestore, type_name: str) -> Struct:

@@ -244,7 +244,7 @@ class _InputColumn:
         tree = type_tree(store, type_name)
         if paths is not None:
             tree = only(tree, [*paths, *(NEEDED if self._images is not None else ())], self.topic)
-        return Decoder(store, tree)
+        return Decoder(tree)
 
 
 def _stamp_of(match: Match) -> int:

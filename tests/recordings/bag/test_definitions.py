@@ -111,11 +111,12 @@ _USELESS_IDL = {
 }
 
 
-def test_annotations_and_comments_of_idl_do_not_matter():
+def test_annotations_comments_and_includes_of_idl_do_not_matter():
     verbatim = '@verbatim (language="comment", text=\n  "Of (all) \\"blips\\"" "\\n" // hm\n)'
     enum = "enum Kind { @value(1) ONE, @value (2) TWO };"
     members = "".join(f"{verbatim} @unit(value='m') uint8 x{n}; /* ( */ // (\n" for n in range(1000))
-    fields = fields_of(_channel(_idl(members, enum), form="ros2idl"))
+    include = '#include "rig_msgs/msg/Header.idl"\n\n'
+    fields = fields_of(_channel(include + _idl(members, enum), form="ros2idl"))
     assert fields is not None
     assert fields("rig_msgs/Blip") == {f"x{n}": "uint8" for n in range(1000)}
 

@@ -1,6 +1,8 @@
 """Real recordings as datasets, with the file that `init` proposes: the sets of a replay, every message decoded."""
 
+from collections import defaultdict
 from contextlib import closing
+from itertools import chain
 
 import pytest
 
@@ -8,10 +10,15 @@ from syncrelay.config import load_text
 from syncrelay.recordings.analysis import propose
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
+from syncrelay.recordings.bag.definitions import converter, typestore
+from syncrelay.recordings.bag.recording import Encoding
 from syncrelay.recordings.bag.replay import Replay, received
+from syncrelay.recordings.datasets.decoding import Decoder
+from syncrelay.recordings.datasets.message_types import type_tree
 from syncrelay.recordings.datasets.reading import SetsOf
 from syncrelay.recordings.datasets.tables import Content
 from syncrelay.sync import Match
+from tests.recordings.datasets.reference_decoder import decode
 from tests.recordings.datasets.times import rows_of
 
 pytestmark = pytest.mark.real_data
@@ -25,6 +32,33 @@ _RECORDINGS = [
     "multicam_tagslam/test_21.tag_detections.bag.bz2",
     "vehicle_mtig_sick_tilt_laser/tilt_laser.bag",
 ]
+
+
+_OTHERS = ["event_camera_mcap/test_events_2", "ouster_packets/512x10_raw.bag", "raspicam_fiducials/aruco_images.bag"]
+_MOST = 50
+"""So many messages of a topic are decoded slowly."""
+
+
+@pytest.mark.parametrize("name", [*_RECORDINGS, *_OTHERS])
+def test_every_topic_is_decoded_as_a_slow_decoder_does(name, real_data):
+    payloads = defaultdict(list)
+    with closing(open_recording([str(real_data / name)])) as recording:
+        for channel, _, payload in chain.from_iterable(recording.batches(recording.channels)):
+            cdr = payload if channel.encoding is Encoding.CDR else converter(channel)(payload)
+            assert cdr is not None, channel.topic
+            payloads[channel].append(cdr)
+    assert payloads
+    for channel, found in payloads.items():
+        store = typestore(channel.type, channel.definition)
+        if store is None:
+            assert channel.definition is None, channel.type
+            continue
+        decoder = Decoder(type_tree(store, channel.type))
+        column = decoder.decode(found)
+        assert (len(column), decoder.undecodable) == (len(found), 0), channel.topic
+        step = len(found) // _MOST + 1
+        rows = [row.as_py() for row in column[::step]]
+        assert repr(rows) == repr([decode(store, channel.type, each) for each in found[::step]]), channel.topic
 
 
 @pytest.mark.parametrize("name", _RECORDINGS)
