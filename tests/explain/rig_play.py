@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 from syncrelay.explain import Endpoint, Mismatch, Standstill
 from tests.explain.scenario import BEGAN, S, Source, Told, run
-from tests.scenarios.play import ACT_S, Scenario, group_of, offered, placed, write
+from tests.scenarios.play import ACT_S
+from tests.scenarios.rigs import Scenario, cure_in, group_of, placed, write
 from tests.scenarios.streams import Stream
 
 LONGEST_ACT_S = 75.0
@@ -223,9 +224,9 @@ class Play:
         return any(not self.publishers(topic, second) for topic in self.rows)
 
 
-def _stamped(stream: Stream, ns: int, first: float) -> int:
-    if stream.clock == "zero":
-        return 0
+def _stamped(stream: Stream, ns: int, first: float) -> int | None:
+    if stream.clock in ("zero", "none"):
+        return 0 if stream.clock == "zero" else None
     if stream.repeat == 1:
         return ns
     zero, grid = BEGAN + round(first * S), round(stream.repeat / stream.hz * S)
@@ -264,7 +265,7 @@ def _cured(broken: Play, told: Told, moments: Moments) -> Play:
     name, scenario = broken.name, broken.scenario
     text = next((line.text for line in told.warnings if line.code == scenario.first), "")
     about = next((each.input for _, each in told.findings(scenario.first) if each.input is not None), 0)
-    changes = offered(text, broken.group["topics"][about]["topic"], scenario.cure)
+    changes = cure_in(text, broken.group["topics"][about]["topic"], scenario)
     ago = broken.moments.acts[1][2] - broken.moments.begins
     moments = replace(moments, begins=-ago, lengths=(LONGEST_ACT_S, 0, 0), leads=(0.0,) * _CHANGES)
     streams = [replace(each, acts="1") for each in scenario.streams if "3" in each.acts]

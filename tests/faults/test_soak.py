@@ -47,7 +47,7 @@ def test_nothing_is_lost_and_nothing_grows(stage: Stage, figures):
     assert inputs[0]["buffered"] <= 1
     missed = due - inputs[0]["matched"]
     # A machine that starves the relay for longer than the queues hold costs sets, and the relay says so.
-    assert missed == 0 or "messages waited up to" in relay.stderr
+    assert missed == 0 or "[WARN]" in relay.stderr
     due -= missed
     assert [each["matched"] for each in inputs] == [due] * len(_TOPICS)
     witness.process.wait_until(lambda: witness.report().sets >= due, f"{due} sets")

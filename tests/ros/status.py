@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Collection
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import urlopen
@@ -61,22 +62,20 @@ def findings(relay: Process, group: str = "front") -> dict[str, dict[str, Any]]:
     return {each["code"]: each for each in groups[group]["findings"]} if group in groups else {}
 
 
-def wait_for_finding(
-    relay: Process, code: str, group: str = "front", *, text: str = "", suggestion: str = ""
-) -> dict[str, Any]:
-    """A finding, as soon as it is there and says what these patterns, where they are given, match as a whole.
+def problems(relay: Process, group: str = "front") -> set[str]:
+    """The codes of what is wrong with a group."""
+    return {code for code, each in findings(relay, group).items() if each["severity"] != "ok"}
 
-    Its figures are those of the moment: what a busy machine holds up may disturb them for a while.
-    """
+
+def wait_for_finding(
+    relay: Process, code: str, group: str = "front", *, naming: Collection[str] = ()
+) -> dict[str, Any]:
+    """A finding, as soon as it is there and names all of these; a node's name may be known later than its publisher."""
     found: dict[str, Any] = {}
 
     def is_there() -> bool:
         found.update(findings(relay, group).get(code, {}))
-        return bool(
-            found
-            and (not text or re.fullmatch(text, found["text"]))
-            and (not suggestion or re.fullmatch(suggestion, found["suggestion"] or ""))
-        )
+        return bool(found) and all(name in f"{found['text']} {found['suggestion']}" for name in naming)
 
     try:
         wait_until(is_there, f"the finding {code}")

@@ -17,7 +17,7 @@ from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
 from tests.ros.frames import Frame
 from tests.ros.processes import Process, wait_until
 from tests.ros.stage import Collector, Player, Stage, both_backends
-from tests.ros.status import ANY_PORT, findings, first_group, page, status
+from tests.ros.status import ANY_PORT, first_group, page, problems, status
 from tests.ros.streams import BEGIN, MS, at, merged
 from tests.ros.summary import read_summary
 
@@ -100,7 +100,7 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
     manager.ask("watch")
     assert manager.change("configure")
     wait_until(lambda: status(relay)["relay"]["phase"] == "inactive", "the inactive relay")
-    wait_until(lambda: list(findings(relay)) == ["inactive"], "the finding and no other")
+    wait_until(lambda: problems(relay) == {"inactive"}, "the finding and no other")
     wait_until(lambda: page(relay, "/livez") == (200, "receiving\n"), "a relay that lives")
     for _ in range(2):
         player.play(next(_pairs(0)))
@@ -165,7 +165,7 @@ def test_a_faulty_file_fails_to_configure_and_a_mended_one_is_what_runs(stage: S
     relay.send(signal.SIGHUP)
     wait_until(lambda: len(status(relay)["groups"]) == 2, "the groups of a file that is reloaded while inactive")
     assert manager.state == "inactive"
-    assert list(findings(relay, "side")) == ["inactive"]
+    assert problems(relay, "side") == {"inactive"}
     _end(relay, signal.SIGINT)
 
 

@@ -101,20 +101,12 @@ def test_what_dds_refuses_is_a_finding_of_its_group_and_others_go_on(stage: Stag
     player.play(recording)
     relaying.conclude(player, collector, recording, _ALIGNED)
     assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 3
-    told = {name: wait_for_finding(file.relay, "refused_by_dds", name) for name in ("outputs", "subscriptions")}
-    events, log = "rcl_interfaces/msg/ParameterEvent", "rcl_interfaces/msg/Log"
-    assert {name: (finding["severity"], finding["topic"], finding["text"]) for name, finding in told.items()} == {
-        "outputs": (
-            "error",
-            "/x",
-            f"the relay cannot publish /taken as {_IMU}: this process has it as {events} already",
-        ),
-        "subscriptions": (
-            "error",
-            "/z",
-            f"the relay cannot subscribe to /z as {_FIELD}: this process has it as {log} already",
-        ),
-    }
+    for name, topic, naming in (
+        ("outputs", "/x", ["/taken", _IMU, "rcl_interfaces/msg/ParameterEvent"]),
+        ("subscriptions", "/z", ["/z", _FIELD, "rcl_interfaces/msg/Log"]),
+    ):
+        finding = wait_for_finding(file.relay, "refused_by_dds", name, naming=naming)
+        assert (finding["severity"], finding["topic"]) == ("error", topic)
     assert "refused_by_dds" not in findings(file.relay)
     # rcl's own lines would come at every try.
     assert ">>> [rcutils" not in file.relay.stderr
@@ -179,8 +171,7 @@ def test_a_bug_stops_its_group_until_a_reload_and_others_on_the_same_topics_go_o
     player.play(recording)
     relaying.conclude(player, collector, recording, _ALIGNED)
     assert len(relaying.sets_within(recording, collector, _ALIGNED)) == 4
-    finding = wait_for_finding(file.relay, "internal_error", "failing")
-    assert finding["text"].startswith("a bug in syncrelay stopped this group: KeyError: ")
+    wait_for_finding(file.relay, "internal_error", "failing", naming=["KeyError: "])
     assert "internal_error" not in findings(file.relay)
     assert file.relay.stderr.count("Traceback") == 1
     file.reload(front=_FRONT, failing=failing)

@@ -133,8 +133,9 @@ class _Source:
             self._push(stream)
             if left < -_LOST_S:
                 continue
-            ns = 0 if stream.clock == "zero" else self._clocks[stream.clock] + round(stamp * 1e9)
-            self._graph.publisher(stream).publish(vector(ns))
+            ns = self._clocks.get(stream.clock, 0) + round(stamp * 1e9)
+            message = vector(0 if stream.clock == "zero" else ns)
+            self._graph.publisher(stream).publish(message[:8] if stream.clock == "none" else message)
         return _LONGEST_SLEEP_S
 
     def _push(self, stream: Stream) -> None:

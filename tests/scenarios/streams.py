@@ -23,7 +23,8 @@ class Stream:
     """A sensor's messages in some acts of a play. Without an act in which it is named, its publisher is gone.
 
     Samples are taken on one grid for all streams: at multiples of the period, `phase_ms` later. Stamps tell the time
-    of the sample by the stream's `clock` (`wall`, `boot` or `zero`), which is `shift_ms` off and runs `ppm` too fast.
+    of the sample by the stream's `clock` (`wall`, `boot`, `zero`, or `none` for messages that are cut short), which is
+    `shift_ms` off and runs `ppm` too fast.
     A message is sent `late_ms` after its sample, give or take `jitter_ms`; with `batch_ms`, all of such a time at once.
     A rate of 0 is a publisher that sends nothing.
     """
