@@ -1,4 +1,4 @@
-"""One line of the log for one cause, however many groups it hits: which node it is, and how many groups."""
+"""One log line for each cause, however many groups it affects: it names the node and counts the groups."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -12,17 +12,17 @@ from syncrelay.explain.finding_log import Remark
 from syncrelay.explain.findings import Finding
 
 _SECOND: Final = 1_000_000_000
-# A group that was not judged for so long, as one that a bug stopped, is waited for no longer.
+# Lines wait until every group was judged, but no longer than this: a bug may have stopped a group.
 _ROUND: Final = 5 * _SECOND
-# Groups that a cause has kept from giving sets recover one after the other, slow ones last.
+# After a cause is gone, groups recover one after the other. One line names all that recover within this time.
 _UNTIL_ALL_ARE_BACK: Final = 30 * _SECOND
-# As the log of a group has it: the first reminder after this, then at twice the time.
+# The first reminder comes after this pause, each further one after twice the pause before it.
 _FIRST_PAUSE: Final = 5 * _SECOND
 _LONGEST_PAUSE: Final = 600 * _SECOND
-# Groups are judged about once a second: a reminder may be due so much before its time.
+# Groups are judged about once a second, so a reminder may come this much early.
 _EARLY: Final = _SECOND
 _FORGOTTEN: Final = 60 * _SECOND
-# An input that gives nothing gives nothing to whoever uses it, found there already or not.
+# With these codes, every group that uses the topic is affected, even one that was not yet found to be.
 _GIVES_NOTHING: Final = frozenset({Code.SILENT, Code.NO_PUBLISHER})
 _NAMED: Final = 3
 
@@ -37,7 +37,7 @@ class Line(NamedTuple):
 
 
 class _Cause(NamedTuple):
-    """A code, and whose it is: a node's, a group's, that of topics which may have other names, else the relay's."""
+    """A code and what it belongs to: a node, a group, topics that may be misspelled, or otherwise the relay."""
 
     code: Code | None
     node: str = ""
@@ -46,7 +46,7 @@ class _Cause(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """A finding that a cause makes in a group, and the topics that it is about there."""
+    """A finding of a cause in one group, and the topics of that group that it is about."""
 
     facts: GroupFacts
     finding: Finding
@@ -54,7 +54,7 @@ class _Found(NamedTuple):
 
 
 class _Said:
-    """What was said of a cause: the topics and groups that it hit then, and when it may be said again."""
+    """What the log said about a cause: the topics and groups it named, and when it may be repeated."""
 
     def __init__(self) -> None:
         self.topics: frozenset[str] = frozenset()
@@ -64,7 +64,7 @@ class _Said:
 
 
 class _End:
-    """Groups in which a cause is over, while it goes on in others."""
+    """The groups in which a cause is over while it lasts in others."""
 
     def __init__(self, now: int) -> None:
         self.since = now
@@ -73,9 +73,9 @@ class _End:
 
 
 class CauseLog:
-    """Turns what the logs of all groups would say into what is worth saying.
+    """Merges the remarks of all groups into one line for each cause.
 
-    `now` is of a clock that is never set back, in nanoseconds.
+    `now` is in nanoseconds, of a clock that is never set back.
     """
 
     def __init__(self) -> None:
@@ -95,11 +95,11 @@ class CauseLog:
         self._found = {name: found for name, found in self._found.items() if name in names}
         self._waiting = [each for each in self._waiting if each[0] in names]
         self._hit = {key: hit & names for key, hit in self._hit.items()}
-        # Groups that have yet to be judged are waited for.
+        # A group that has not been judged yet counts as heard at 0, so lines wait for it.
         self._heard = {name: self._heard.get(name, 0) for name in names}
 
     def hear(self, facts: GroupFacts, findings: tuple[Finding, ...], remarks: Iterable[Remark], *, now: int) -> None:
-        """Take what is found in a group, and what its log would say of that."""
+        """Take the findings of a group, and the remarks that its own log would make."""
         self._found[facts.name] = facts, findings
         self._heard[facts.name] = now
         for each in facts.inputs:
@@ -114,10 +114,10 @@ class CauseLog:
         self._waiting += remarks
 
     def lines(self, *, now: int, is_last: bool = False) -> Iterator[Line]:
-        """Yield what is to be said, once all groups were judged since the first of them had something to say."""
+        """Yield the lines that are due: once every group was judged after the first remark came in."""
         if self._waiting and (is_last or self._is_complete(now)):
             waiting, self._waiting = self._waiting, []
-            yield from self._told(waiting, now)
+            yield from self._merged(waiting, now)
         for key, end in [*self._ends.items()]:
             if is_last or not self._hit.get(key) or now - end.since >= _UNTIL_ALL_ARE_BACK:
                 del self._ends[key]
@@ -128,7 +128,7 @@ class CauseLog:
         others = (at for name, at in self._heard.items() if name != self._waiting[0][0])
         return all(at > self._since for at in others) or now - self._since >= _ROUND
 
-    def _told(self, waiting: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
+    def _merged(self, waiting: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
         warned: dict[_Cause, list[tuple[str, Remark]]] = {}
         for group, remark in waiting:
             if remark.severity is Severity.OK:
@@ -150,7 +150,7 @@ class CauseLog:
         return [*causes]
 
     def _topics_by_cause(self, facts: GroupFacts, finding: Finding) -> Mapping[_Cause, tuple[str, ...]]:
-        """Return the causes of a finding, with the topics that it is about."""
+        """Return the causes of a finding, each with its topics."""
         if not finding.about and finding.code in OF_RELAY:
             return {_Cause(finding.code): ()}
         if not finding.about or finding.code not in OF_PUBLISHER:
@@ -161,14 +161,14 @@ class CauseLog:
             return {_Cause(finding.code): tuple(topics)}
         by_cause: dict[_Cause, tuple[str, ...]] = {}
         for topic, node in zip(topics, nodes, strict=True):
-            # What is suggested for one topic is not for others.
+            # A suggested name fits one topic only, so each misspelled topic is a cause of its own.
             is_misnamed = not node and any(facts.inputs[index].graph.alike for index in finding.about)
             cause = _Cause(finding.code, node, misnamed=tuple(topics) if is_misnamed else ())
             by_cause[cause] = (*by_cause.get(cause, ()), topic)
         return by_cause
 
     def _is_all_silent(self) -> bool:
-        """Whether nothing comes from anybody: the network, or whoever plays a recording, is the likely cause."""
+        """Whether no group receives anything: then the network, or a player of recordings, is the likely cause."""
         return all(
             any(each.code is Code.SILENT and len(each.about) == len(facts.inputs) for each in findings)
             for facts, findings in self._found.values()
@@ -192,7 +192,7 @@ class CauseLog:
         is_news = not (topics <= said.topics and groups <= said.groups)
         if said.groups and now + _EARLY < (said.at + _FIRST_PAUSE if is_news else said.again):
             if is_news:
-                # Some more may be found meanwhile.
+                # Keep them for the next line: more groups may be found by then.
                 self._wait(remarks, now)
             return
         said.topics, said.groups, said.at = said.topics | topics, said.groups | groups, now
@@ -203,7 +203,7 @@ class CauseLog:
         return {*self._hit.get((cause, None), ()), *self._hit.get((cause, cause.code), ())}
 
     def _found_of(self, cause: _Cause) -> list[_Found]:
-        """Return the findings that a cause makes in all groups, those that keep sets from leaving first."""
+        """Return the findings of a cause in all groups, the most severe first."""
         found = [
             _Found(facts, finding, topics)
             for facts, findings in self._found.values()
@@ -215,7 +215,7 @@ class CauseLog:
         return sorted(found, key=lambda each: (-each.finding.severity, each.finding.input is None))
 
     def _found_then(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]]) -> list[_Found]:
-        """Return what was found when there was something to say; by now it may be over."""
+        """Return the findings of the time of the remarks, which may be over by now."""
         then = [(self._found[group][0], finding) for group, remark in remarks for finding in remark.findings]
         return [
             _Found(facts, finding, topics)
@@ -234,7 +234,7 @@ class CauseLog:
         ]
 
     def _end(self, group: str, remark: Remark, now: int) -> None:
-        """Note that a group has recovered, or that a warning no longer holds in it."""
+        """Note that a group has recovered, or that one of its warnings is over."""
         facts, _ = self._found[group]
         if remark.findings:
             causes = [cause for each in remark.findings for cause in self._topics_by_cause(facts, each)]
@@ -246,7 +246,7 @@ class CauseLog:
                 hit.discard(group)
         end = self._ends.setdefault(key, _End(now))
         end.groups.append(group)
-        # Who recovers last was silent for longest.
+        # The last group to recover was silent for the longest time: its remark is the one to show.
         end.remark = remark
 
 
@@ -267,7 +267,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _text(cause: _Cause, found: Sequence[_Found], hit: Sequence[GroupFacts]) -> str:
-    """Say what is so, in the words of the group that it is worst for, and what is not in these."""
+    """Word a cause as the worst affected group words it, then add the other topics, the node and the silence."""
     first, own = found[0].finding, found[0].topics
     text, said = first.text, f"{first.text} {first.suggestion}"
     others = [topic for topic in dict.fromkeys(each for one in found for each in one.topics) if topic not in own]
@@ -289,5 +289,5 @@ def _text(cause: _Cause, found: Sequence[_Found], hit: Sequence[GroupFacts]) -> 
 
 
 def _names(text: str, name: str) -> bool:
-    """Whether a text has a name as a whole, and not only as a part of another."""
+    """Whether a text contains a name, not merely as part of a longer one."""
     return re.search(rf"(?<![\w/]){re.escape(name)}(?![\w/])", text) is not None

@@ -1,4 +1,4 @@
-"""How a group stands: by the share of its possible sets that left, with hysteresis, so that chance changes nothing."""
+"""A group's standing: the share of its possible sets that left, with hysteresis against chance."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -11,22 +11,22 @@ from syncrelay.sync.messages import DropReason
 
 _SECOND: Final = 1_000_000_000
 SHARE_WINDOW_NS: Final = 10 * _SECOND
-"""The share is that of about this long, and longer where that holds too few possible sets."""
+"""The share covers about this time, or more if fewer than 30 sets were possible in it."""
 _LONGEST: Final = 600 * _SECOND
-# Of fewer possible sets, no share is known; a full window holds so many, and no chance decides.
+# With fewer possible sets than this there is no share. A window that holds the second number is long enough.
 _FEWEST: Final = 10
 _ENOUGH_TO_TELL: Final = 30
-# Fewer than this share of the possible sets are few, until it is over the other.
+# Below this share a group gives too few sets, until the share is above the other bound.
 _FEW: Final = 0.8
 BACK: Final = 0.95
 """The share at which few sets are enough again."""
-# After a silence, sets leave again once it is half of them: one stray set in 5 s is at most a third.
+# A silence ends at this share: a single stray set in 5 s is at most a third of the possible ones.
 _AGAIN: Final = 0.5
-# Of what a steady input should have sent, so much may be missing: its pace is measured as well as that.
+# The pace of a steady input is measured this precisely: a smaller share of missing messages is not counted.
 _UNSURE: Final = 0.05
-# A pause is longer than a second, and than so many periods.
+# An input pauses if nothing came for more than a second and for more periods than this.
 _PAUSE: Final = 5
-# So many periods after the last message of all inputs, none comes any more.
+# This many periods after the last message of any input, nothing more is expected.
 _LATE: Final = 2
 NO_SET_MISSED: Final = frozenset(
     {
@@ -37,11 +37,11 @@ NO_SET_MISSED: Final = frozenset(
         DropReason.TIME_JUMP,
     }
 )
-"""Reasons that cost no set that was possible: left out on purpose, or replaced by a message of the same stamp."""
+"""Drop reasons that cost no possible set: dropped on purpose, or replaced by a message of the same stamp."""
 
 
 class Standing(Enum):
-    """How many of the possible sets leave: enough, few, or none since a silence began that is not over."""
+    """How many of the possible sets leave: enough, few, or none since the silence began."""
 
     ENOUGH = "enough"
     FEW = "few"
@@ -50,11 +50,11 @@ class Standing(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """How many sets left of those that were possible in the last `ns` nanoseconds.
+    """The sets that left, and those that were possible, in the last `ns` nanoseconds.
 
-    `possible` goes by the required input of which fewest messages came, or should have: `pacemaker`, None where a clock
-    makes the sets. `absent` of its messages did not come, at the pace that it otherwise has. `is_pausing` says that
-    they still do not: until it is back, or is silent, nobody knows for how long.
+    The required input with the fewest messages, received or expected, limits what is `possible`. It is the `pacemaker`;
+    None if a clock makes the sets. `absent` counts its messages that should have come, at its usual pace, and did not.
+    `is_pausing` is set while they still do not come.
     """
 
     left: int = 0
@@ -66,7 +66,7 @@ class Share:
 
     @property
     def value(self) -> float | None:
-        """From 0 to 1; None of too few to tell."""
+        """From 0 to 1; None while fewer than 10 sets were possible."""
         return min(1.0, self.left / self.possible) if self.possible >= _FEWEST else None
 
 
@@ -74,9 +74,9 @@ NOT_KNOWN: Final = Share()
 
 
 class Pace(NamedTuple):
-    """When the first and the last message of an input were received, None if none was, and how far apart they come.
+    """When the first and the last message of an input were received (None if none was), and its period.
 
-    `period` is that while they come, None of an input that has no steady one.
+    `period` is None for an input without a steady rate.
     """
 
     first: int | None
@@ -85,10 +85,10 @@ class Pace(NamedTuple):
 
 
 class _Poll(NamedTuple):
-    """What there was until a poll: sets, and of each counted input messages that came, that left or were thinned.
+    """The counts at one poll, in total since the start: of sets, and of the messages of each counted input.
 
-    `clock` is the time of the clock that makes the sets, `owed` how many messages should have come at a steady pace,
-    `taken` how many of those that came may make sets: that left or are buffered.
+    `clock` is the time of the clock that makes the sets. `owed` counts the messages that should have come at a steady
+    pace, `taken` those that left or are still buffered.
     """
 
     at: int
@@ -104,9 +104,9 @@ class _Poll(NamedTuple):
 class ShareWindow:
     """Measures the share, poll by poll, over the last seconds.
 
-    No set is possible before each of the `required` inputs has come; `counted` are those of them that may set the pace:
-    all, or the trigger. `ticks_hz` is the rate of the clock that makes the sets, None where none does; `every` and
-    `least_period` are how sets are thinned.
+    No set is possible before each of the `required` inputs has come. `counted` are the inputs that can limit the number
+    of sets: all of these, or the trigger alone. `ticks_hz` is the rate of the clock that makes the sets, or None.
+    `every` and `least_period` say how sets are thinned.
     """
 
     def __init__(
@@ -137,7 +137,7 @@ class ShareWindow:
         if any(paces[index].first is None for index in self._required):
             self._polls.clear()
         elif self._ticks_hz is not None and self._polls and not self._polls[-1].sets:
-            # The first tick is waited for as long as any, and no message counts how many were.
+            # Nothing counts the ticks before the first set, so the window begins with that set.
             self._polls.clear()
         inputs = [counts[index] for index in self._counted]
         thinned = tuple([each.dropped.get(DropReason.THINNED, 0) for each in inputs])
@@ -156,7 +156,7 @@ class ShareWindow:
         return self._since(self._polls[0]) if self._polls else NOT_KNOWN
 
     def _owed(self, fed: tuple[int, ...], paces: Sequence[Pace], now: int) -> tuple[float, ...]:
-        """Return how many messages of each input should have come by now: nothing is missing while none come at all."""
+        """Return how many messages each input should have sent by now; while all are away, nothing is owed."""
         if not self._polls:
             return fed
         before = self._polls[-1]
@@ -191,8 +191,8 @@ class ShareWindow:
 
     @staticmethod
     def _due(place: int, first: _Poll, last: _Poll) -> tuple[int, int]:
-        """Return how many sets an input would have given, and how many of its messages for them did not come."""
-        # What has piled up before the first poll counts for the time before.
+        """Return how many sets an input allows, and how many of its messages are absent."""
+        # Messages that were buffered before the first poll count for the time before it.
         gone = min(last.gone[place] - first.gone[place], last.taken[place] - first.taken[place])
         thinned = last.thinned[place] - first.thinned[place]
         owed = int(last.owed[place] - first.owed[place])
