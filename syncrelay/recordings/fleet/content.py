@@ -6,7 +6,9 @@ from contextlib import closing
 from dataclasses import dataclass
 from hashlib import blake2b, file_digest
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
+
+from pydantic import Field
 
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.listing import local_files
@@ -33,8 +35,8 @@ class Content:
 class ResultFile:
     """A file of a result: its size in bytes, and the hash of its content."""
 
-    size: int
-    hash: str
+    size: Annotated[int, Field(alias="bytes")]
+    hash: Annotated[str, Field(alias="blake2b")]
 
 
 def content_of(words: Sequence[str]) -> Content:

@@ -1,69 +1,84 @@
-"""OUT/_ledger.jsonl: what was done to which recording, a line each, written before its result is put in place."""
+"""OUT/_ledger.jsonl: a line for each recording that was done, written before its result is put in place."""
 
 import fcntl
 import json
 import os
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from enum import Enum
+from enum import StrEnum
 from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Annotated, Any, Final, Self
+
+from pydantic import AfterValidator, Field, InstanceOf, TypeAdapter
 
 from syncrelay.errors import OutputError, SyncRelayError
 from syncrelay.output_files import cannot_be_written
 from syncrelay.recordings.fleet.content import ResultFile, sync_folder
 from syncrelay.recordings.fleet.recordings import is_result_name
-from syncrelay.recordings.fleet.task import JSON, NOTES, PROBLEMS
+from syncrelay.recordings.fleet.task import NOTES, PROBLEMS
 
-# What reads a folder of Parquet files as one table skips names that begin with `_`.
+# Programs that read a folder of Parquet files as one table skip names that begin with `_`.
 LEDGER: Final = "_ledger.jsonl"
 _HEAD: Final = b'{"syncrelay_ledger": 1}\n'
 
 
-class State(Enum):
-    """What became of a recording: its result is there, it is to be tried again, or its result was taken away."""
+class State(StrEnum):
+    """What became of a recording: it has a result, it failed and will be tried again, or its result was removed."""
 
     DONE = "done"
     FAILED = "failed"
     REMOVED = "removed"
 
 
+def _result_name(name: str) -> str:
+    if not is_result_name(name):
+        raise ValueError("is not the name of a result")
+    return name
+
+
+# Paths may hold bytes that are not UTF-8, as lone surrogates, which pydantic's own check of a str refuses.
+_Text = InstanceOf[str]
+
+
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A line of the ledger; the last one of a name counts.
+    """A line of the ledger; the last line of a name counts.
 
-    `recording` is what was read, `content` the hash of it, empty where it could not be read. `error` is why it failed.
+    `recording` are the words that it was opened with, `content` is the hash of its bytes, empty if they could not be
+    read, and `size` how many there are. `error` says why it failed.
     """
 
-    name: str
+    name: Annotated[_Text, AfterValidator(_result_name)]
     state: State
-    recording: tuple[str, ...]
-    fingerprint: str
-    content: str = ""
-    size: int = 0
-    error: str = ""
-    facts: Mapping[str, JSON] = field(default_factory=dict)
-    files: Mapping[str, ResultFile] = field(default_factory=dict)
+    recording: tuple[_Text, ...]
+    fingerprint: _Text
+    content: _Text = ""
+    size: Annotated[int, Field(alias="bytes")] = 0
+    error: _Text = ""
+    facts: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, ResultFile] = field(default_factory=dict)
+
+
+_ENTRY: Final = TypeAdapter(Entry)
 
 
 class Ledger:
-    """The ledger of a folder, held by this process alone; a context manager that lets go of it.
+    """The ledger of a folder, locked for this process; a context manager that releases it.
 
-    The lock ends with the process, and workers that were forked do not hold it.
+    The lock ends with the process. Forked workers do not hold it.
     """
 
     def __init__(self, folder: Path) -> None:
-        """Open the ledger of a folder, which is made if it is not there.
+        """Open the ledger of a folder, and make both if they are not there.
 
-        Raises SyncRelayError where another command is at work in it, or it holds something else.
+        Raises SyncRelayError if another command is working in the folder, or it holds something else.
         """
         self.folder = folder
         self.entries: dict[str, Entry] = {}
-        """The last entry of each name; of its facts only PROBLEMS and NOTES, as there may be very many."""
+        """The last entry of each name, with PROBLEMS and NOTES as its only facts: there may be 100,000 entries."""
         self.unreadable = 0
-        """How many lines told nothing."""
+        """How many lines could not be read."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not (folder / LEDGER).exists() and any(folder.iterdir()):
@@ -89,8 +104,9 @@ class Ledger:
         self._file.close()
 
     def append(self, entry: Entry) -> None:
-        """Write a line, which outlasts a loss of power. Raises SyncRelayError where there is no space for it."""
-        line = json.dumps(_as_json(entry)).encode() + b"\n"
+        """Write a line and flush it to the disk. Raises SyncRelayError if there is no space for it."""
+        # What is empty is left out.
+        line = json.dumps(_ENTRY.dump_python(entry, by_alias=True, exclude_defaults=True)).encode() + b"\n"
         end = os.fstat(self._file.fileno()).st_size
         try:
             written = self._file.write(line)
@@ -105,7 +121,7 @@ class Ledger:
 
     def _lock(self) -> None:
         try:
-            # Not flock: that lock would pass on to forked workers, and outlast a command that is killed by as much.
+            # A lock of flock would be inherited by forked workers, and outlast a command that is killed.
             fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise SyncRelayError(f"{self.folder}: another command is at work in it: wait for it to end") from error
@@ -113,10 +129,11 @@ class Ledger:
             raise SyncRelayError(f"{self.folder}: cannot be locked: {error.strerror}: name another folder") from error
 
     def _read(self) -> None:
-        content = self._content()
-        kept = content.rfind(b"\n") + 1
-        if not kept and _HEAD.startswith(content):
-            # New, or of a command that was killed as it began.
+        self._file.seek(0)
+        content = self._file.readall()
+        whole_lines = content.rfind(b"\n") + 1
+        if not whole_lines and _HEAD.startswith(content):
+            # A new file, or one whose command was killed while it wrote the first line.
             self._file.truncate(0)
             self._file.write(_HEAD)
             os.fsync(self._file.fileno())
@@ -124,9 +141,9 @@ class Ledger:
             return
         if not content.startswith(_HEAD):
             raise SyncRelayError(f"{self.folder / LEDGER}: is not a ledger of this syncrelay: name another folder")
-        if kept < len(content):
-            self._file.truncate(kept)
-        for line in content[len(_HEAD) : kept].split(b"\n")[:-1]:
+        if whole_lines < len(content):
+            self._file.truncate(whole_lines)
+        for line in content[len(_HEAD) : whole_lines].split(b"\n")[:-1]:
             entry = _entry(line)
             if entry is None:
                 self.unreadable += 1
@@ -137,15 +154,11 @@ class Ledger:
         facts = {name: fact for name, fact in entry.facts.items() if name in (PROBLEMS, NOTES)}
         self.entries[entry.name] = replace(entry, facts=facts)
 
-    def _content(self) -> bytes:
-        self._file.seek(0)
-        return self._file.readall()
-
 
 def read_ledger(folder: Path) -> list[Entry]:
-    """Return the last entry of each recording in a folder, by their names, also while a command is at work in it.
+    """Return the last entry of each recording in a folder, sorted by name, also while a command is working in it.
 
-    Raises SyncRelayError where there is no ledger.
+    Raises SyncRelayError if there is no ledger.
     """
     try:
         content = (folder / LEDGER).read_bytes()
@@ -155,52 +168,9 @@ def read_ledger(folder: Path) -> list[Entry]:
     return [entries[name] for name in sorted(entries)]
 
 
-def _as_json(entry: Entry) -> dict[str, Any]:
-    """Return a line; what is empty is left out."""
-    line: dict[str, Any] = {
-        "name": entry.name,
-        "state": entry.state.value,
-        "recording": list(entry.recording),
-        "fingerprint": entry.fingerprint,
-        "content": entry.content,
-        "bytes": entry.size,
-        "error": entry.error,
-        "facts": dict(entry.facts),
-        "files": {name: {"bytes": file.size, "blake2b": file.hash} for name, file in entry.files.items()},
-    }
-    return {key: value for key, value in line.items() if value not in ("", 0, {})}
-
-
 def _entry(line: bytes) -> Entry | None:
-    """Read a line; None for one that a loss of power or an editor left without a meaning."""
+    """Read a line; None for one that a power failure or an editor damaged."""
     try:
-        found = json.loads(line)
-        entry = Entry(
-            name=found["name"],
-            state=State(found["state"]),
-            recording=tuple(found["recording"]),
-            fingerprint=found["fingerprint"],
-            content=found.get("content", ""),
-            size=found.get("bytes", 0),
-            error=found.get("error", ""),
-            facts=found.get("facts", {}),
-            files=dict(_files(found.get("files", {}))),
-        )
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return _ENTRY.validate_python(json.loads(line))
+    except (ValueError, RecursionError):
         return None
-    return entry if _is_in_order(entry) else None
-
-
-def _is_in_order(entry: Entry) -> bool:
-    texts = (entry.name, entry.fingerprint, entry.content, entry.error, *entry.recording)
-    return (
-        all(isinstance(text, str) for text in texts)
-        and is_result_name(entry.name)
-        and isinstance(entry.size, int)
-        and isinstance(entry.facts, dict)
-    )
-
-
-def _files(found: Mapping[str, Any]) -> Iterator[tuple[str, ResultFile]]:
-    for name, file in found.items():
-        yield name, ResultFile(file["bytes"], file["blake2b"])

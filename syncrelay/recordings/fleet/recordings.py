@@ -16,22 +16,22 @@ from syncrelay.urls import redacted
 
 _EXPECTED: Final = "expected files that end in .mcap, .db3 or .bag, compressed or not"
 _LIST: Final = "@"
-# Of UTF-8: with the hash behind it, a name stays below the 255 bytes that file systems allow.
+# In bytes of UTF-8: with the hash, a name stays below the 255 bytes that file systems allow.
 _LONGEST_STEM: Final = 100
 _HASH_BYTES: Final = 8
-# What reads a folder of Parquet files as one table skips names that begin with `_` or `.`.
+# Programs that read a folder of Parquet files as one table skip names that begin with `_` or `.`.
 _RESULT_NAME: Final = re.compile(rf"(?![._])[^/\0]*-[0-9a-f]{{{2 * _HASH_BYTES}}}", re.DOTALL)
 _MOST_LISTED_BYTES: Final = 100_000_000
 
 
 def find_sources(words: Sequence[str], *, into: Path) -> list[Source]:
-    """Return the recordings that words name, each once, but for those below a folder that results go into.
+    """Return the recordings that words name, each once, except results of an earlier command below `into`.
 
-    A word is a file, a folder, a pattern such as `day*/*.mcap` or `**/*.db3`, a URL, or `@FILE`, which has such words
-    on its lines. A rosbag2 folder is one recording; any other folder is searched for recordings to any depth. Raises
-    BagError for a word that names none.
+    A word is a file, a folder, a pattern such as `day*/*.mcap` or `**/*.db3`, a URL, or `@FILE`, a file with one such
+    word on each line. A rosbag2 folder is one recording; any other folder is searched to any depth. Raises BagError
+    for a word that names no recording.
     """
-    own = f"{os.path.abspath(into)}/"  # noqa: PTH100  as the places are made
+    own = f"{os.path.abspath(into)}/"  # noqa: PTH100  as in _places: links keep their names
     found: dict[str, Source] = {}
     for word in words:
         places = _listed(word[1:]) if word.startswith(_LIST) else _places(word)
@@ -43,17 +43,17 @@ def find_sources(words: Sequence[str], *, into: Path) -> list[Source]:
 
 
 def names_recordings(word: str) -> bool:
-    """Tell whether a word means recordings and no topic: what find_sources takes, and is there or looks like a file."""
+    """Tell whether a word names recordings, for find_sources, rather than a topic."""
     return word.startswith(_LIST) or is_url(word) or has_magic(word) or "." in word or os.path.lexists(word)
 
 
 def result_name(place: str) -> str:
-    """Return a name for the result of a recording by its absolute path or URL: a file name, always the same for it.
+    """Return the file name of a recording's result, which depends only on the recording's absolute path or URL.
 
-    It begins with the recording's own name, as far as any folder can hold that and without `_` in front, and ends with
-    a hash of the whole path: recordings of one name in several folders stay apart.
+    It begins with the recording's own name, shortened and without unusual characters, and ends with a hash of the
+    whole path, because recordings in several folders may have the same name.
     """
-    # Who signs a URL anew means the same recording.
+    # A URL that is signed again is the same recording.
     place = redacted(place)
     own = place.rstrip("/").rpartition("/")[2]
     stem = own.partition(".")[0] or own
@@ -63,12 +63,12 @@ def result_name(place: str) -> str:
 
 
 def is_result_name(name: str) -> bool:
-    """Tell whether this is a name that result_name gives."""
+    """Tell whether a name has the form that result_name gives."""
     return _RESULT_NAME.fullmatch(name) is not None
 
 
 def _listed(name: str) -> Iterator[str]:
-    """Yield the recordings of a list: one word a line, lines that begin with # are comments."""
+    """Yield the recordings of a list file: a word on each line; lines that begin with # are comments."""
     try:
         with Path(name).open("rb") as file:
             content = file.read(_MOST_LISTED_BYTES + 1)
@@ -96,7 +96,7 @@ def _places(word: str) -> list[str]:
 
 
 def _matching(pattern: str) -> list[Path]:
-    # As a shell does it: Path.glob takes no absolute pattern, and hidden files.
+    # Path.glob refuses absolute patterns, and finds hidden files, which a shell does not.
     matches = [Path(each) for each in sorted(glob(pattern, recursive=True))]  # noqa: PTH207
     found = [path for match in matches for path in (_inside(match) if match.is_dir() else _if_recording(match))]
     if not found:
@@ -111,7 +111,7 @@ def _named(path: Path) -> list[Path]:
     if not path.is_dir():
         if not path.exists():
             raise BagError(f"{path}: no such file or folder")
-        # Whatever it is called: it is told by its content.
+        # Its content shows what it is, not its name.
         return [path]
     found = list(_inside(path))
     if not found:
@@ -120,7 +120,7 @@ def _named(path: Path) -> list[Path]:
 
 
 def _inside(folder: Path) -> Iterator[Path]:
-    """Yield the recordings of a folder: itself, or the files and folders in it that are."""
+    """Yield the folder if it is one recording, otherwise the recordings in it."""
     entries = sorted(folder.iterdir())
     files = [entry for entry in entries if not entry.is_dir()]
     recordings = [path for file in files for path in _if_recording(file)]
@@ -129,13 +129,13 @@ def _inside(folder: Path) -> Iterator[Path]:
         return
     yield from recordings
     for entry in entries:
-        # A link to a folder above would have no end.
+        # A link to a parent folder would never end.
         if entry.is_dir() and not entry.is_symlink() and not entry.name.startswith("."):
             yield from _inside(entry)
 
 
 def _is_rosbag2(folder: Path, files: Sequence[Path], recordings: Sequence[Path]) -> bool:
-    """Tell a recording of rosbag2, which a crash may have left without its metadata, from loose ones."""
+    """Tell whether a folder is one rosbag2 recording; after a crash of the recorder it may lack its metadata."""
     split = re.compile(re.escape(folder.name) + r"_\d+\..*", re.DOTALL)
     return any(file.name == METADATA for file in files) or all(split.fullmatch(file.name) for file in recordings)
 

@@ -1,6 +1,7 @@
-"""Which robot made a recording, by the folders that it lies in."""
+"""Which robot made a recording, by the folders in its path."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from typing import Final, Self
@@ -10,22 +11,22 @@ from syncrelay.errors import UsageError
 _ROBOT: Final = "{robot}"
 _TOKENS: Final = re.compile(r"(\{[^{}/]*\}|\*\*|\*|\?)")
 _ABSOLUTE: Final = re.compile(r"/|[a-z][a-z0-9+.-]+://", re.IGNORECASE)
-_MEANINGS: Final = {"**": ".*", "*": "[^/]*", "?": "[^/]"}
+_MEANINGS: Final = {_ROBOT: "(?P<robot>[^/]+?)", "**": ".*", "*": "[^/]*", "?": "[^/]"}
 
 
 @dataclass(frozen=True, slots=True)
 class RobotPattern:
-    """Where in the path of a recording its robot stands, such as `{robot}/{day}/*.mcap`."""
+    """Where the robot's name is in the path of a recording, such as `{robot}/{day}/*.mcap`."""
 
     written: str
     _compiled: re.Pattern[str]
 
     @classmethod
     def parse(cls, written: str) -> Self:
-        """Read a pattern for the end of a path, or for all of one that begins with `/` or `s3://`.
+        """Read a pattern for the end of a path, or for a whole path if it begins with `/` or `s3://`.
 
-        `{robot}` is a folder's or file's name, or a part of it, as any other word in braces is; `*`, `?` and `**` are
-        as a shell has them. Raises UsageError where the robot is missing, or there twice.
+        `{robot}` and other words in braces stand for the name of a folder or file, or a part of it; `*`, `?` and `**`
+        are as in a shell. Raises UsageError unless the robot is there once.
         """
         tokens = _TOKENS.split(written.rstrip("/"))
         if tokens.count(_ROBOT) != 1:
@@ -34,30 +35,24 @@ class RobotPattern:
         return cls(written, re.compile(begin + "".join(map(_regex, tokens)), re.DOTALL))
 
     def robot_of(self, place: str) -> str | None:
-        """Return the robot that a path or URL names; None where it does not fit the pattern."""
+        """Return the robot in a path or URL; None if the pattern does not match."""
         found = self._compiled.fullmatch(place.rstrip("/"))
         return found["robot"] if found else None
 
 
+def robots_of(places: Sequence[str], pattern: RobotPattern | None) -> list[str | None]:
+    """Return the robot of each path or URL.
+
+    Without a pattern it is the first folder in which the paths differ; None for what lies directly in their common one.
+    """
+    if pattern is not None:
+        return [pattern.robot_of(place) for place in places]
+    folders = [place.rstrip("/").split("/")[:-1] for place in places]
+    common = len([*takewhile(lambda level: len({*level}) == 1, zip(*folders, strict=False))])
+    return [each[common] if len(each) > common else None for each in folders]
+
+
 def _regex(token: str) -> str:
-    if token == _ROBOT:
-        return "(?P<robot>[^/]+?)"
-    if token.startswith("{") and token.endswith("}"):
-        return "[^/]+?"
-    return _MEANINGS.get(token) or re.escape(token)
-
-
-def folders_of(place: str) -> tuple[str, ...]:
-    """Return the names of the folders that a path or URL lies in."""
-    return tuple(place.rstrip("/").split("/")[:-1])
-
-
-def common_folders(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the folders that both lie in."""
-    same = takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False))
-    return tuple(folder for folder, _ in same)
-
-
-def folder_below(common: tuple[str, ...], folders: tuple[str, ...]) -> str | None:
-    """Return the first folder below the common ones; None for what lies in these themselves."""
-    return folders[len(common)] if len(folders) > len(common) else None
+    if token in _MEANINGS:
+        return _MEANINGS[token]
+    return "[^/]+?" if token.startswith("{") and token.endswith("}") else re.escape(token)

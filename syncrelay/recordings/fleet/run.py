@@ -88,32 +88,27 @@ class Run:
         source, outcome = finished.job.source, finished.outcome
         match outcome:
             case Done():
-                self._ledger.append(self._done(source, outcome))
+                entry = Entry(
+                    name=source.name,
+                    state=State.DONE,
+                    recording=source.shown,
+                    fingerprint=self._fingerprint,
+                    content=outcome.content.hash,
+                    size=outcome.content.size,
+                    facts=dict(outcome.facts),
+                    files=dict(outcome.files),
+                )
+                self._ledger.append(entry)
                 _put_in_place(outcome.folder, self._ledger.folder / source.name)
             case Failed() if not outcome.ends_all and (outcome.content or finished.job.done is None):
                 self._take_away(source.name)
-                entry = self._failed(source, outcome)
+                failed = (source.name, State.FAILED, source.shown, self._fingerprint, outcome.content)
+                entry = Entry(*failed, error=outcome.why)
                 if self._ledger.entries.get(source.name) != entry:
                     self._ledger.append(entry)
             case Failed() | Kept():
                 # A recording that cannot be reached now keeps the result that it has.
                 pass
-
-    def _done(self, source: Source, done: Done) -> Entry:
-        return Entry(
-            name=source.name,
-            state=State.DONE,
-            recording=source.shown,
-            fingerprint=self._fingerprint,
-            content=done.content.hash,
-            size=done.content.size,
-            facts=done.facts,
-            files=done.files,
-        )
-
-    def _failed(self, source: Source, failed: Failed) -> Entry:
-        why = failed.why
-        return Entry(source.name, State.FAILED, source.shown, self._fingerprint, failed.content, error=why)
 
     def _take_over(self, names: set[str], others: Others) -> None:
         """Refuse results that another command gave, or remove those of them that this one will not replace."""

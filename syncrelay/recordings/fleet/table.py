@@ -14,7 +14,7 @@ from syncrelay.output_files import written_whole
 from syncrelay.printable import printable
 from syncrelay.recordings.fleet.facts import FleetRow
 from syncrelay.recordings.fleet.ledger import Entry, State, read_ledger
-from syncrelay.recordings.fleet.robots import RobotPattern, common_folders, folder_below, folders_of
+from syncrelay.recordings.fleet.robots import RobotPattern, robots_of
 
 FACTS: Final = "facts.jsonl"
 """The file with a recording's rows in the folder of its result."""
@@ -62,18 +62,10 @@ def write_rows(path: Path, rows: Iterable[BaseModel], model: type[BaseModel]) ->
 
 
 def fleet_rows(folder: Path, pattern: RobotPattern | None) -> Iterator[FleetRow]:
-    """Yield the rows of all recordings that a folder has results of, and of those that failed, by the results' names.
-
-    Without a pattern, a robot is the first folder below the one that all recordings lie in.
-    """
+    """Yield the rows of all recordings in a folder of results, failed ones too, sorted by the results' names."""
     entries = [entry for entry in read_ledger(folder) if entry.state is not State.REMOVED]
-    common: tuple[str, ...] | None = None
-    for entry in entries:
-        folders = folders_of(entry.recording[0])
-        common = folders if common is None else common_folders(common, folders)
-    for entry in entries:
-        place = entry.recording[0]
-        robot = pattern.robot_of(place) if pattern else folder_below(common or (), folders_of(place))
+    robots = robots_of([entry.recording[0] for entry in entries], pattern)
+    for entry, robot in zip(entries, robots, strict=True):
         for row in _rows_of(folder, entry):
             yield row.model_copy(update={"robot": robot and printable(robot), "size_bytes": entry.size or None})
 

@@ -1,4 +1,4 @@
-"""What is done to each recording of many, and to which: the interface between a command and the fleet."""
+"""What is done to each recording of many: the interface between a command and the fleet, and fingerprints of it."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -15,21 +15,22 @@ JSON: TypeAlias = "dict[str, JSON] | list[JSON] | str | int | float | bool | Non
 """What json.dumps takes."""
 
 PROBLEMS: Final = "problems"
-"""The fact that lists, in sentences, what is wrong with a recording that was done all the same; the exit code is 1."""
+"""The fact with what is wrong with a recording, a sentence each. It was done all the same; the exit code is 1."""
 
 NOTES: Final = "notes"
-"""The fact that lists, in sentences, what its user should know of a recording that was done, and that is not wrong."""
+"""The fact with what the user should know about a recording that was done, a sentence each. Nothing is wrong."""
 
-# Options that decide no set: what of them does is resolved, and beside them.
+# Options of groups and inputs that do not change which sets there are. `topics`, `trigger` and `restamp` count as
+# resolved by the file, see _of_sets.
 _NOT_OF_SETS: Final = frozenset({"topics", "trigger", "restamp", "output_prefix", "lazy", "manifest"})
 _NOT_OF_INPUTS: Final = frozenset({"output", "qos"})
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A recording: what open_recording takes, and a name for its result that no other path has and any folder can hold.
+    """A recording: the absolute paths or URLs that open_recording takes, and the name of its result.
 
-    `words` are absolute paths, or URLs.
+    No other recording has this name, and any file system can hold it.
     """
 
     name: str
@@ -37,7 +38,7 @@ class Source:
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """The words as people and ledgers may see them: URLs without logins and signatures."""
+        """The words for people and for the ledger: URLs without logins and signatures."""
         return tuple(map(redacted, self.words))
 
 
@@ -45,27 +46,27 @@ class Task(Protocol):
     """What is done to each recording. A frozen value that can be pickled: it goes to other processes and machines."""
 
     def fingerprint(self) -> str:
-        """Return what decides the result of a recording, as fingerprint_of gives it."""
+        """Return what decides the result of a recording, see fingerprint_of."""
         ...
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """Write the results of a recording into an empty folder, and return facts about it for the ledger.
 
-        The same recording gives the same files, byte for byte. Raises SyncRelayError where the recording is at fault.
+        The same recording gives the same files, byte for byte. Raises SyncRelayError if the recording is at fault.
         """
         ...
 
 
 def what_decides_sets(groups: Iterable[GroupConfig]) -> str:
-    """Return what of groups decides which sets a recording gives them: all their values but those named here.
+    """Return all that decides which sets groups make of a recording.
 
-    How a file is written is none of it: comments, order, units, where a value comes from.
+    How the file is written makes no difference: comments, order, units, environment variables.
     """
     return _as_text(_of_sets(group) for group in groups)
 
 
 def what_decides_outputs(groups: Iterable[GroupConfig]) -> str:
-    """Return what of groups decides the topics that a relay publishes of a recording: their sets, names and QoS."""
+    """Return all that decides what a relay publishes for a recording: its sets, and the outputs' names and QoS."""
     return _as_text(
         [
             _of_sets(group),
@@ -91,15 +92,15 @@ def _as_text(values: Iterable[object]) -> str:
 
 
 def fingerprint_of(command: str, *, config: str, options: Mapping[str, JSON]) -> str:
-    """Return a line of what decides a command's result: its name, syncrelay's version, the file's values, its options.
+    """Return a line of words that decide a command's result: its name, syncrelay's version, hashes of file and options.
 
-    `config` is what one of the functions above gives, `options` what else changes the result: not where it goes, nor
-    how fast. Two lines are equal if all of these are; the words of a line tell which one differs.
+    `config` is from one of the functions above; `options` are those that change the result, not where it goes or how
+    fast. The words in which two lines differ say what is different.
     """
     written = json.dumps(options, sort_keys=True)
     return f"{command} version:{own_version()} config:{short_hash(config)} options:{short_hash(written)}"
 
 
 def short_hash(text: str) -> str:
-    """Return a hash of a text that people can compare by eye."""
+    """Return a hash of a text that is short enough for people to compare."""
     return blake2b(text.encode(errors="surrogateescape"), digest_size=8).hexdigest()
