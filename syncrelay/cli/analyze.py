@@ -96,8 +96,11 @@ def _analyze_many(
     parser: Parser, arguments: Namespace, bags: "Sequence[str]", text: str | None, topics: tuple[str, ...]
 ) -> int:
     """Leave an analysis of each recording in a folder, and a table of all of them where there are groups."""
-    from syncrelay.cli.fleet import do_on_many, put_facts
+    from syncrelay.cli.fleet import do_on_many
+    from syncrelay.config.wording import counted
     from syncrelay.recordings.fleet.robots import RobotPattern
+    from syncrelay.recordings.fleet.summary import Summary
+    from syncrelay.recordings.fleet.table import TABLE, fleet_rows, write_table
     from syncrelay.recordings.fleet.tasks import AnalyzeTask
 
     if arguments.write or arguments.html:
@@ -110,9 +113,17 @@ def _analyze_many(
     if not has_groups:
         return do_on_many(task, bags, arguments)
     pattern = None if arguments.robot is None else RobotPattern.parse(arguments.robot)
+    folder, summary = Path(arguments.into), Summary()
 
     def finish(*_: object) -> int:
-        return put_facts(Path(arguments.into), pattern, is_json=arguments.json)
+        for row in write_table(folder, fleet_rows(folder, pattern)):
+            summary.take(row)
+            if arguments.json:
+                put(row.model_dump_json())
+        for line in () if arguments.json else summary.lines():
+            put(line)
+        remark(f"wrote {folder / TABLE}: {counted(summary.rows, 'row')}; docs/howto/fleet_report.md has ten queries")
+        return DONE
 
     return do_on_many(task, bags, arguments, finish=finish)
 

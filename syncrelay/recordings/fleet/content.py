@@ -1,7 +1,7 @@
-"""What is in files: the hash of a recording's content, by which the ledger knows it, and those of results."""
+"""Hashes of the content of recordings and of result files, by which the ledger recognizes them."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from hashlib import blake2b, file_digest
@@ -21,9 +21,9 @@ _DIGEST_BYTES: Final = 20
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What a recording holds, as a hash, and how many bytes.
+    """The hash of a recording's content, and its size in bytes.
 
-    `marks` change when its files do: they tell whether a recording was still being written.
+    `marks` are sizes, times and inodes of its files: they change while a recording is still being written.
     """
 
     hash: str
@@ -40,7 +40,7 @@ class ResultFile:
 
 
 def content_of(words: Sequence[str]) -> Content:
-    """Read all bytes of a recording's files, and of URLs what their servers tell; raises BagError where it cannot."""
+    """Read all bytes of a recording's files; for URLs, ask their servers. Raises BagError if that is not possible."""
     parts = [_of_url(word) if is_url(word) else _of_files(word) for word in words]
     hashes = [part.hash for part in parts]
     return Content(
@@ -51,12 +51,12 @@ def content_of(words: Sequence[str]) -> Content:
 
 
 def marks_of(words: Sequence[str]) -> tuple[tuple[int, ...], ...]:
-    """Return the marks that content_of gives, without reading a file."""
+    """Return the marks of a recording, see Content, without reading its files."""
     return tuple(mark for word in words if not is_url(word) for mark in _marks(local_files(word)))
 
 
 def size_of(words: Sequence[str]) -> int:
-    """Return how many bytes the files of a recording have as far as that can be told without reading: of URLs, none."""
+    """Return the size of a recording's files in bytes; 0 for URLs, and if it cannot be told without reading."""
     try:
         return sum(mark[0] for mark in marks_of(words))
     except BagError:
@@ -64,7 +64,7 @@ def size_of(words: Sequence[str]) -> int:
 
 
 def results_in(folder: Path) -> dict[str, ResultFile]:
-    """Return the files of a result by their paths in its folder, and have them outlast a loss of power."""
+    """Flush a result to the disk, and return its files by their paths in its folder."""
     found = {}
     for path in sorted(folder.rglob("*")):
         if path.is_dir():
@@ -78,18 +78,17 @@ def results_in(folder: Path) -> dict[str, ResultFile]:
     return found
 
 
-def are_intact(folder: Path, files: Iterable[tuple[str, ResultFile]]) -> bool:
-    """Tell whether the files of a result are all there, as they were written, and no others."""
+def are_intact(folder: Path, files: Mapping[str, ResultFile]) -> bool:
+    """Tell whether a folder holds exactly these files of a result, as they were written."""
     try:
         names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
-        expected = dict(files)
-        return names == expected.keys() and all(_is_intact(folder / name, file) for name, file in expected.items())
+        return names == files.keys() and all(_is_intact(folder / name, file) for name, file in files.items())
     except OSError:
         return False
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the names in a folder outlast a loss of power."""
+    """Flush the names in a folder to the disk (fsync)."""
     number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(number)
@@ -105,7 +104,7 @@ def _is_intact(path: Path, file: ResultFile) -> bool:
 
 
 def _of_url(word: str) -> Content:
-    """Return what changes when the content behind a URL does, as its server tells it, and its size; nothing is read."""
+    """Return the ETag or date that a server gives for a URL, and the size; nothing is read."""
     parts = []
     for url in files_of(word):
         with closing(RemoteFile(url)) as file:
@@ -123,7 +122,7 @@ def _of_files(word: str) -> Content:
     files = local_files(word)
     marks = _marks(files)
     hashes = [_hash(path) for path in files]
-    # The parts of a split recording are told apart, and put in order, by their names.
+    # The order of the parts of a split recording is that of their names.
     named = [f"{path.name} {each}" for path, each in zip(files, hashes, strict=True)]
     return Content(hashes[0] if len(hashes) == 1 else _of_several(named), sum(mark[0] for mark in marks), marks)
 

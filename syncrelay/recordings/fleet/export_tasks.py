@@ -18,11 +18,11 @@ from syncrelay.recordings.datasets.lerobot import join_episodes, lerobot_of, wri
 from syncrelay.recordings.datasets.parquet import write_parquet
 from syncrelay.recordings.datasets.reading import SetsOf
 from syncrelay.recordings.datasets.tables import Content
+from syncrelay.recordings.fleet.job import SCRATCH
 from syncrelay.recordings.fleet.ledger import State
 from syncrelay.recordings.fleet.run import Run
 from syncrelay.recordings.fleet.task import JSON, Source, fingerprint_of, what_decides_sets
 from syncrelay.recordings.fleet.tasks import about, counts_of, few_sets
-from syncrelay.recordings.fleet.work import SCRATCH
 
 EPISODES: Final = ".episodes"
 """The folder in OUT with each recording's episode, so that only what is missing is done again."""

@@ -15,6 +15,9 @@ from syncrelay.printable import printable
 from syncrelay.recordings.analysis import Analysis, Change, GroupAnalysis
 from syncrelay.recordings.analysis.topics import TopicFigures, figures_of
 
+FACTS: Final = "facts.jsonl"
+"""The file with a recording's rows in the folder of its result."""
+
 _MS: Final = 1_000_000
 _SECOND: Final = 1_000_000_000
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)

@@ -1,7 +1,7 @@
-"""This machine's cores: a forked process for each recording, so many at a time.
+"""An engine on this machine's cores: a forked process for each recording, as many at a time as there are jobs.
 
-Modules are imported before, once. A process ends with its recording: its memory is free then, and what breaks it, such
-as the kernel when memory runs out, breaks nothing else.
+All modules are imported before the fork. A process ends with its recording: that frees its memory, and if the kernel
+kills it because memory runs out, the other recordings are not affected.
 """
 
 import os
@@ -16,44 +16,51 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from syncrelay.recordings.bag.definitions import jazzy_definition
-from syncrelay.recordings.fleet.engine import TICK_S, TRIES, Finished, given_up, took_too_long
-from syncrelay.recordings.fleet.work import Failed, Job, Outcome, end_with_parent, perform
+from syncrelay.recordings.fleet.job import TICK_S, TRIES, Failed, Finished, Job, Outcome, given_up, took_too_long
+from syncrelay.recordings.fleet.work import end_with_parent, perform
 
 LEAST_MEMORY: Final = 1_000_000_000
 """What a worker may take in bytes, however many work at a time."""
 
+_STOPS: Final = frozenset({signal.SIGINT, signal.SIGTERM})
+
 
 @dataclass(frozen=True, slots=True)
 class _Worker:
-    """A process at work on a job, for the nth time, and the file in memory that it writes the outcome into."""
+    """A process that tries a job for the nth time, and the file in memory that it writes the outcome to."""
 
     job: Job
     attempt: int
     pid: int
-    told: int
+    outcome: int
 
 
 class LocalEngine:
-    """Forks a process for each job; see Engine. For a process that has started no thread of its own."""
+    """Forks a process for each job, see Engine. Only for a process that has started no thread of its own."""
 
     def __init__(self, *, jobs: int, memory: int | None = None) -> None:
-        """Work on so many jobs at a time, each of which may take so many bytes: its share of the machine's."""
+        """Work on so many jobs at a time. Each may take so many bytes, by default its share of the machine's memory."""
         self._jobs = jobs
         self._memory = max(LEAST_MEMORY, machine_memory() // jobs) if memory is None else memory
 
-    def run(self, jobs: Iterable[Job | None]) -> Generator[Finished | None, None, None]:
+    def run(self, jobs: Iterable[Job]) -> Generator[Finished | None, None, None]:
         """See Engine."""
-        # ROS types are loaded at their first use, which takes longer than a short recording: here, once for all.
+        # ROS types are loaded at their first use, which takes longer than a short recording: once here, for all.
         jazzy_definition("std_msgs/msg/Header")
         waiting = iter(jobs)
         running: dict[int, _Worker] = {}
         ended = select.poll()
 
         def begin(job: Job, attempt: int) -> None:
-            worker = self._fork(job, attempt)
-            number = os.pidfd_open(worker.pid)
-            running[number] = worker
-            ended.register(number, select.POLLIN)
+            # A signal between the fork and the entry in `running` would leave a worker that nobody ends.
+            former = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
+            try:
+                worker = self._fork(job, attempt)
+                number = os.pidfd_open(worker.pid)
+                running[number] = worker
+                ended.register(number, select.POLLIN)
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, former)
 
         try:
             while True:
@@ -78,23 +85,23 @@ class LocalEngine:
                 os.kill(worker.pid, signal.SIGKILL)
             for number, worker in running.items():
                 os.waitpid(worker.pid, 0)
-                os.close(worker.told)
+                os.close(worker.outcome)
                 os.close(number)
 
     def _fork(self, job: Job, attempt: int) -> _Worker:
-        told = os.memfd_create("syncrelay-outcome")
+        outcome = os.memfd_create("syncrelay-outcome")
         parent = os.getpid()
         with warnings.catch_warnings():
-            # Of threads: those of numpy and pyarrow are idle, and made anew.
+            # About threads: those of numpy and pyarrow are idle, and are made anew in the child.
             warnings.simplefilter("ignore", DeprecationWarning)
             pid = os.fork()
         if not pid:
-            _work(job, parent, told, self._memory)
-        return _Worker(job, attempt, pid, told)
+            _work(job, parent, outcome, self._memory)
+        return _Worker(job, attempt, pid, outcome)
 
 
 def machine_memory() -> int:
-    """Return the bytes of memory that this machine, or the container that we are in, may use."""
+    """Return the bytes of memory of this machine, or of the container that this process runs in."""
     whole = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     try:
         limit = Path("/sys/fs/cgroup/memory.max").read_text()
@@ -103,18 +110,19 @@ def machine_memory() -> int:
     return min(whole, int(limit)) if limit.strip().isdigit() else whole
 
 
-def _work(job: Job, parent: int, told: int, memory: int) -> NoReturn:
-    """Do a job in a process that has just been forked, and end it without what the parent does as it ends."""
+def _work(job: Job, parent: int, outcome: int, memory: int) -> NoReturn:
+    """Do a job in a process that has just been forked, and end the process without the parent's clean-up."""
     code = 1
     try:
-        # Ctrl-C comes from the terminal to all of us: what it means, the parent says.
+        # A terminal sends Ctrl-C to all processes: the parent decides what it means.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         for number in (signal.SIGTERM, signal.SIGALRM):
             signal.signal(number, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
         end_with_parent()
         if os.getppid() == parent:
             resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
-            with os.fdopen(told, "wb") as file:
+            with os.fdopen(outcome, "wb") as file:
                 pickle.dump(perform(job), file)
             code = 0
     finally:
@@ -122,9 +130,9 @@ def _work(job: Job, parent: int, told: int, memory: int) -> NoReturn:
 
 
 def _outcome(worker: _Worker) -> Outcome | None:
-    """Return what a process that has ended told or why it was ended, None if it died."""
+    """Return the outcome of a process that has ended, None if it died."""
     _, status = os.waitpid(worker.pid, 0)
-    with os.fdopen(worker.told, "rb") as file:
+    with os.fdopen(worker.outcome, "rb") as file:
         if status == 0:
             file.seek(0)
             outcome: Outcome = pickle.load(file)  # noqa: S301  written by a process of ours

@@ -1,6 +1,6 @@
-"""A Ray cluster: the one that RAY_ADDRESS names, or one that is started here and ends with the run.
+"""An engine on a Ray cluster: the one at RAY_ADDRESS, or one that is started here and ends with the command.
 
-A recording is a Ray task. Ray places it, and begins it again where a worker or a whole node is lost.
+A recording is a Ray task. Ray places it, and begins it again if a worker or a whole node is lost.
 """
 
 import os
@@ -13,8 +13,8 @@ from contextlib import contextmanager, redirect_stdout
 from typing import Any, Final
 
 from syncrelay.errors import SyncRelayError
-from syncrelay.recordings.fleet.engine import TICK_S, TRIES, Finished, given_up
-from syncrelay.recordings.fleet.work import Failed, Job, Outcome, end_with_parent, perform
+from syncrelay.recordings.fleet.job import TICK_S, TRIES, Failed, Finished, Job, Outcome, given_up
+from syncrelay.recordings.fleet.work import end_with_parent, perform
 
 MEMORY: Final = 1_000_000_000
 """What each task declares to take, in bytes: Ray begins no more tasks on a node than fit."""
@@ -23,7 +23,7 @@ ADDRESS: Final = "RAY_ADDRESS"
 
 _PATIENCE_S: Final = 10
 
-# For each core, so that one that is done finds the next at hand.
+# Tasks for each core: one that is done finds the next one waiting.
 _AHEAD: Final = 2
 
 
@@ -31,9 +31,9 @@ class RayEngine:
     """Has a Ray cluster do jobs; see Engine."""
 
     def __init__(self, *, jobs: int) -> None:
-        """Start a cluster of so many cores, where there is none to connect to.
+        """Connect to a cluster, or start one of so many cores, when run() begins.
 
-        Raises SyncRelayError where Ray is not installed.
+        Raises SyncRelayError if Ray is not installed.
         """
         try:
             import ray  # noqa: PLC0415  of the extra `fleet`, and takes half a second
@@ -44,8 +44,8 @@ class RayEngine:
         self._ray: Any = ray
         self._jobs = jobs
 
-    def run(self, jobs: Iterable[Job | None]) -> Generator[Finished | None, None, None]:
-        """See Engine. Raises SyncRelayError where the cluster cannot be reached, or has no room for any task."""
+    def run(self, jobs: Iterable[Job]) -> Generator[Finished | None, None, None]:
+        """See Engine. Raises SyncRelayError if the cluster cannot be reached."""
         ray = self._ray
         waiting = iter(jobs)
         with self._connected():
@@ -53,7 +53,9 @@ class RayEngine:
             running: dict[Any, Job] = {}
             try:
                 while True:
-                    room = self._room() - len(running)
+                    # Nodes come and go, and each task that is handed over takes memory here.
+                    cores = int(ray.cluster_resources().get("CPU", 0))
+                    room = max(1, _AHEAD * cores) - len(running)
                     while room > 0 and (job := next(waiting, None)) is not None:
                         running[task.remote(job)] = job
                         room -= 1
@@ -68,10 +70,6 @@ class RayEngine:
                 for reference in running:
                     ray.cancel(reference, force=True)
 
-    def _room(self) -> int:
-        """Return how many tasks may be handed over: nodes come and go, and what is handed over takes memory here."""
-        return max(1, _AHEAD * int(self._ray.cluster_resources().get("CPU", 0)))
-
     def _finished(self, reference: Any, job: Job) -> Finished:
         try:
             return Finished(job, self._ray.get(reference))
@@ -79,14 +77,14 @@ class RayEngine:
             return Finished(job, Failed(str(error), is_bug=True))
         except self._ray.exceptions.RayError as error:
             job.remove_scratch()
-            # Ray does not tell what ended it.
+            # Ray does not say what ended it.
             why = f"its worker was lost ({type(error).__name__}), or took longer than --time-limit,"
             return Finished(job, Failed(given_up(job, why)))
 
     @contextmanager
     def _connected(self) -> Iterator[None]:
         ray = self._ray
-        # Nothing is told to anybody, and no port is opened for a page that nobody asked for.
+        # No usage statistics leave the machine, and no port is opened for a dashboard that nobody asked for.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
         address = os.environ.get(ADDRESS)
@@ -100,7 +98,7 @@ class RayEngine:
         except (ConnectionError, OSError, RuntimeError, ValueError) as error:
             where = f"the Ray cluster {address} of {ADDRESS} cannot be reached" if address else "Ray cannot be started"
             raise SyncRelayError(f"{where}: {error}") from error
-        # Ray prints what befalls a worker, and where data is expected.
+        # Ray prints to stdout what happens to workers; stdout is for data.
         with redirect_stdout(sys.stderr):
             try:
                 yield
@@ -110,13 +108,13 @@ class RayEngine:
 
 
 def _perform(job: Job) -> Outcome:
-    """Do a job in a Ray worker, which ends with its node: a run that is killed leaves none at work."""
+    """Do a job in a Ray worker, which is killed with its node: a command that is killed leaves no worker behind."""
     end_with_parent()
     return perform(job)
 
 
 def _require_listener(address: str) -> None:
-    """Raise OSError where nobody listens: Ray itself would try for very long, and hear no signal meanwhile."""
+    """Raise OSError if nobody listens: Ray itself would try for minutes, and ignore signals meanwhile."""
     host, _, port = address.rpartition("://")[2].rpartition(":")
     if host and port.isdigit():
         socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE_S).close()
@@ -124,7 +122,7 @@ def _require_listener(address: str) -> None:
 
 @contextmanager
 def _own_signals() -> Iterator[None]:
-    """Keep what SIGTERM does: Ray has it end the process, and its exit code is then Ray's."""
+    """Restore our handler of SIGTERM: Ray installs one that ends the process with an exit code of Ray's."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,13 +1,12 @@
-"""How far a run has come, how fast it goes, and how long it will still take, as far as that can be known."""
+"""How far a run has come, how fast it goes, and how long it will still take, as soon as that can be known."""
 
 from dataclasses import dataclass
 from typing import Final
 
 from syncrelay.config.wording import counted
-from syncrelay.recordings.fleet.engine import Finished
-from syncrelay.recordings.fleet.work import Failed, Job, Kept
+from syncrelay.recordings.fleet.job import Failed, Finished, Job, Kept
 
-# Before, a rate is that of a few recordings that happened to be first.
+# Before that, the rate is that of the few recordings that happen to be first.
 _LEAST_S: Final = 5
 _LEAST_RECORDINGS: Final = 4
 _LEAST_SHARE: Final = 0.02
@@ -18,21 +17,23 @@ _HOUR: Final = 3600
 
 @dataclass(slots=True)
 class Progress:
-    """Counts the recordings of a run as they end. Times are seconds of one clock; bytes are those of recordings."""
+    """Counts the recordings of a run as they end. Times are seconds of one clock."""
 
     jobs: tuple[Job, ...]
     begun: float
     done: int = 0
     kept: int = 0
     failed: int = 0
+    faulty: int = 0
+    """Recordings that were done although something is wrong with them."""
     _bytes_read: int = 0
-    """Of recordings that were not found done."""
+    """Size of the recordings that were done anew."""
     _bytes_left: int = 0
     _unknown_left: int = 0
-    """Recordings to come of which the size is not known."""
+    """Recordings left whose size is not known."""
 
     def __post_init__(self) -> None:
-        # What the ledger has is most likely there, and looked at much faster than done.
+        # A recording with an entry in the ledger is most likely kept, which takes little time.
         ahead = [job for job in self.jobs if job.done is None]
         self._bytes_left = sum(job.size for job in ahead)
         self._unknown_left = sum(not job.size for job in ahead)
@@ -43,18 +44,17 @@ class Progress:
         if job.done is None:
             self._bytes_left -= job.size
             self._unknown_left -= not job.size
-        match outcome:
-            case Kept():
-                self.kept += 1
-                return
-            case Failed():
-                self.failed += 1
-            case _:
-                self.done += 1
+        if isinstance(outcome, Kept):
+            self.kept += 1
+            return
+        if isinstance(outcome, Failed):
+            self.failed += 1
+        else:
+            self.done += 1
         self._bytes_read += job.size
 
     def line(self, now: float) -> str:
-        """Return the state as a line."""
+        """Return the state as a line, while the run goes on."""
         ended = self.done + self.kept + self.failed
         parts = [f"{ended} of {counted(len(self.jobs), 'recording')}"]
         if self.kept:
@@ -68,8 +68,16 @@ class Progress:
             parts.append(f"about {_duration(left)} left")
         return ", ".join(parts)
 
+    def summary(self) -> str:
+        """Return what came of the recordings, when the run has ended."""
+        missing = len(self.jobs) - self.done - self.kept - self.failed
+        counts = {"done": self.done, "done before": self.kept, "failed": self.failed, "not done": missing}
+        ended = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+        faulty = f"; {self.faulty} with problems" if self.faulty else ""
+        return f"{counted(len(self.jobs), 'recording')}: {ended}{faulty}"
+
     def _left(self, elapsed: float) -> float | None:
-        """Return how many seconds are left, None where nothing shows it yet."""
+        """Return how many seconds are left, None while that cannot be known."""
         whole = self._bytes_read + self._bytes_left
         few = self.done + self.failed < _LEAST_RECORDINGS or self._bytes_read < _LEAST_SHARE * whole
         if elapsed < _LEAST_S or few or self._unknown_left or not self._bytes_left:

@@ -12,12 +12,10 @@ from pydantic import BaseModel, ValidationError
 from syncrelay.errors import SyncRelayError
 from syncrelay.output_files import written_whole
 from syncrelay.printable import printable
-from syncrelay.recordings.fleet.facts import FleetRow
+from syncrelay.recordings.fleet.facts import FACTS, FleetRow
 from syncrelay.recordings.fleet.ledger import Entry, State, read_ledger
 from syncrelay.recordings.fleet.robots import RobotPattern, robots_of
 
-FACTS: Final = "facts.jsonl"
-"""The file with a recording's rows in the folder of its result."""
 TABLE: Final = "facts.parquet"
 """The file with the rows of all recordings in the folder of all results."""
 
@@ -48,16 +46,17 @@ def _arrow(kind: Any) -> pa.DataType:
     return pa.struct(list(schema_of(kind)))
 
 
-def write_rows(path: Path, rows: Iterable[BaseModel], model: type[BaseModel]) -> None:
-    """Write rows as a Parquet file, some at a time. Raises OutputError where it cannot be written."""
-    schema = schema_of(model)
-    with written_whole(path) as scratch, pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
-        batch: list[dict[str, Any]] = []
+def write_table(folder: Path, rows: Iterable[FleetRow]) -> Iterator[FleetRow]:
+    """Write rows as TABLE of a folder, some at a time, and yield each. Raises OutputError if it cannot be written."""
+    schema = schema_of(FleetRow)
+    batch: list[dict[str, Any]] = []
+    with written_whole(folder / TABLE) as scratch, pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
         for row in rows:
             batch.append(row.model_dump())
             if len(batch) == _AT_ONCE:
                 writer.write_table(pa.Table.from_pylist(batch, schema))
                 batch = []
+            yield row
         writer.write_table(pa.Table.from_pylist(batch, schema))
 
 

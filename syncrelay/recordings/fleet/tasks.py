@@ -20,8 +20,7 @@ from syncrelay.recordings.bag.replay import GroupResult
 from syncrelay.recordings.bag.replay import replay as replay_groups
 from syncrelay.recordings.bag.what_if import Disturbed
 from syncrelay.recordings.bag.writing import SetWriter
-from syncrelay.recordings.fleet.facts import rows_of
-from syncrelay.recordings.fleet.table import FACTS
+from syncrelay.recordings.fleet.facts import FACTS, rows_of
 from syncrelay.recordings.fleet.task import (
     JSON,
     NOTES,

@@ -60,9 +60,11 @@ import sys
 from argparse import Namespace
 from syncrelay.cli.boundary import guarded
 from syncrelay.cli.fleet import do_on_many
+from syncrelay.cli.stop import Termination
 from tests.recordings.fleet.tasks import Obedient
 options = Namespace(into="out", engine="ray", jobs=2, strict=False, overwrite=False, time_limit=None)
-sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[1:], options)))
+with Termination():
+    sys.exit(guarded(lambda: do_on_many(Obedient(), sys.argv[1:], options)))
 """
 
 

@@ -5,11 +5,10 @@ from pathlib import Path
 import pytest
 
 from syncrelay.recordings.fleet.content import Content
-from syncrelay.recordings.fleet.engine import Finished
+from syncrelay.recordings.fleet.job import Done, Failed, Finished, Job, Kept
 from syncrelay.recordings.fleet.ledger import Entry, State
 from syncrelay.recordings.fleet.progress import Progress
 from syncrelay.recordings.fleet.task import Source
-from syncrelay.recordings.fleet.work import Done, Failed, Job, Kept
 from tests.recordings.fleet.tasks import Obedient
 
 _DONE = Done(Content("", 0, ()), {}, {}, Path())

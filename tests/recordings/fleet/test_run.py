@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from syncrelay.errors import SyncRelayError
+from syncrelay.recordings.fleet.job import Done, Failed, Kept
 from syncrelay.recordings.fleet.ledger import State, read_ledger
 from syncrelay.recordings.fleet.local import LocalEngine
 from syncrelay.recordings.fleet.recordings import find_sources
 from syncrelay.recordings.fleet.run import Others, Run
-from syncrelay.recordings.fleet.work import Done, Failed, Kept, limit_of
 from tests.recordings.fleet.fleets import entries, result, tree
 from tests.recordings.fleet.tasks import Obedient, attempts_of
 
@@ -185,8 +185,8 @@ def test_a_large_recording_has_longer(bags):
     into = bags.parent / "out"
     with Run(Obedient(), find_sources([f"{bags}/a.mcap"], into=into), into=into, others=Others.REFUSED) as run:
         (job,) = run.jobs
-    assert [limit_of(job, size) / 10**9 for size in (0, 10**6, 10**9)] == [600, 610, 10_600]
-    assert limit_of(replace(job, time_limit=7), 10**9) == 7
+    assert [job.limit_of(size) / 10**9 for size in (0, 10**6, 10**9)] == [600, 610, 10_600]
+    assert replace(job, time_limit=7).limit_of(10**9) == 7
 
 
 def test_a_recording_that_is_still_written_is_not_done(bags):
