@@ -31,16 +31,9 @@ class RayEngine:
     """Has a Ray cluster do jobs; see Engine."""
 
     def __init__(self, *, jobs: int) -> None:
-        """Connect to a cluster, or start one of so many cores, when run() begins.
+        """Import Ray. When run() begins, it connects to a cluster, or starts one of so many cores."""
+        import ray  # noqa: PLC0415  of the extra `fleet`, and takes half a second
 
-        Raises SyncRelayError if Ray is not installed.
-        """
-        try:
-            import ray  # noqa: PLC0415  of the extra `fleet`, and takes half a second
-        except ImportError as error:
-            raise SyncRelayError(
-                "--engine ray needs Ray, which is not installed: pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
-            ) from error
         self._ray: Any = ray
         self._jobs = jobs
 
