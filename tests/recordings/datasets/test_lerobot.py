@@ -13,8 +13,7 @@ import pytest
 
 from syncrelay.config import load_text
 from syncrelay.errors import BagError, UsageError
-from syncrelay.recordings.datasets.lerobot import dataset as datasets
-from syncrelay.recordings.datasets.lerobot import write_lerobot
+from syncrelay.recordings.datasets.lerobot import layout, write_lerobot
 from syncrelay.recordings.datasets.lerobot.grid import Grid
 from syncrelay.recordings.datasets.lerobot.sets import INCOMPLETE, NO_IMAGE, NOT_FINITE
 from syncrelay.recordings.datasets.lerobot.stats import PictureStats, stats_of, together
@@ -155,7 +154,7 @@ def test_episodes_say_where_their_frames_and_videos_are(tmp_path):
 
 def test_files_of_a_kind_are_of_bounded_size(tmp_path, monkeypatch):
     # The size of one recording's, in the unit of megabytes.
-    monkeypatch.setattr(datasets, "_MOST_MB", {"data": 0.002, "episodes": 100, "video": 0.004})
+    monkeypatch.setattr(layout, "MOST_MB", {"data": 0.002, "episodes": 100, "video": 0.004})
     bags = [drive(tmp_path / f"{name}.mcap") for name in "abc"]
     written(tmp_path, *bags)
     rows = table(tmp_path, "meta/episodes").to_pylist()

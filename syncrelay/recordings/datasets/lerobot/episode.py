@@ -1,4 +1,4 @@
-"""A recording as an episode: its frames as a table and videos, beside what they are."""
+"""A recording as an episode: a table and videos of its frames, and a JSON file about them."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ from syncrelay.recordings.bag.bindings import GroupBinding, bind
 from syncrelay.recordings.bag.replay import Replay
 from syncrelay.recordings.datasets.lerobot.grid import Grid
 from syncrelay.recordings.datasets.lerobot.sets import INCOMPLETE, FrameSet, FrameSets
-from syncrelay.recordings.datasets.lerobot.stats import PictureStats, Stats, stats_of
+from syncrelay.recordings.datasets.lerobot.stats import PictureStats, as_lists, stats_of
 from syncrelay.recordings.datasets.lerobot.videos import VideoWriter
 from syncrelay.recordings.datasets.reading import SetsOf, require_complete
 from syncrelay.urls import redacted
@@ -36,7 +36,7 @@ def video_of(folder: Path, feature: str) -> Path:
 
 
 def lerobot_of(config: Config) -> LerobotConfig:
-    """Return what a file says of LeRobot; raises UsageError where it says nothing."""
+    """Return `export: lerobot:` of a file; raises UsageError where it has none."""
     if config.lerobot is None:
         raise UsageError(
             "the file does not say what becomes a LeRobotDataset: write fps, task and features below `export:`"
@@ -48,12 +48,12 @@ def lerobot_of(config: Config) -> LerobotConfig:
 def write_episode(name: str, words: Sequence[str], config: Config, folder: Path) -> dict[str, Any]:
     """Write the episode of a recording into an empty folder, to be joined with others; return facts about it.
 
-    `words` is what open_recording takes. The facts: how many frames there are, of which `held` show the set of the
-    frame before; how many sets were `left_out`, as others were nearer, and `unusable`, by why; and the longest time
-    between a frame and its set; and `problems`: a sentence for all that is missing or could not be read or decoded, and
-    for what leaves out most of the frames that there could be.
+    `words` is what open_recording takes. The facts: the number of `frames`, and of those that repeat the set of the
+    frame before (`held`); the number of sets that were `left_out` because others were nearer, and of those that were
+    `unusable`, by reason; the longest time between a frame and its set (`farthest_ns`); and `problems`: a sentence for
+    all that is missing or could not be read or decoded, and for what costs most of the possible frames.
 
-    Raises UsageError where the file says nothing of LeRobot, and BagError for a recording that cannot be an episode.
+    Raises UsageError where the file has no `export: lerobot:`, and BagError for a recording that cannot be an episode.
     """
     lerobot = lerobot_of(config)
     try:
@@ -62,7 +62,7 @@ def write_episode(name: str, words: Sequence[str], config: Config, folder: Path)
             require_complete([binding])
             return _write(lerobot, recording, binding, name, folder)
     except BagError as error:
-        # What is wrong with a topic is said without the recording.
+        # A sentence about a topic does not name the recording.
         text, shown = str(error), redacted(words[0])
         raise BagError(text if text.startswith(shown) else f"{shown}: {text}") from error
 
@@ -91,7 +91,7 @@ def _write(
 
 
 def _lost(few: str | None, sets: FrameSets) -> Iterator[str]:
-    """Say what leaves out most of the frames that there could be."""
+    """Yield a sentence for what costs most of the possible frames."""
     if few is not None:
         yield few
     spoilt = {why: count for why, count in sets.unusable.items() if count and why != INCOMPLETE}
@@ -101,7 +101,7 @@ def _lost(few: str | None, sets: FrameSets) -> Iterator[str]:
 
 
 class _Episode:
-    """Gathers frames: pictures are encoded as they come, vectors are kept."""
+    """Gathers frames. Pictures are encoded as they come, vectors are kept."""
 
     def __init__(self, config: LerobotConfig, sets: FrameSets, folder: Path, opened: ExitStack) -> None:
         self.grid: Final = Grid(fps=config.fps, max_gap_ns=config.max_gap_ns)
@@ -110,39 +110,38 @@ class _Episode:
         self._folder = folder
         self._pending: FrameSet | None = None
         self._tasks: list[str] = []
-        self._rows: list[list[np.ndarray[Any, Any]]] = [[] for _ in sets.vector_names]
-        self._pictures = [
-            (opened.enter_context(VideoWriter(video_of(folder, each), fps=config.fps)), PictureStats())
-            for each in sets.picture_names
-        ]
+        self._rows: dict[str, list[np.ndarray[Any, Any]]] = {name: [] for name in sets.vectors}
+        self._videos = {
+            name: (opened.enter_context(VideoWriter(video_of(folder, name), fps=config.fps)), PictureStats())
+            for name in sets.pictures
+        }
 
     def add(self, found: FrameSet) -> None:
+        """Add a set, which is later than those before."""
         self._show(self.grid.next_set(found.stamp))
         self._pending = found
 
     def end(self) -> None:
+        """Show the last set."""
         self._show(self.grid.end())
 
     def _show(self, times: int) -> None:
-        """Let the set that was held back be so many frames."""
+        """Show the pending set in so many frames."""
         if not times or self._pending is None:
             return
         self._tasks += [self._pending.task] * times
-        for rows, vector in zip(self._rows, self._pending.vectors, strict=True):
+        for rows, vector in zip(self._rows.values(), self._pending.vectors, strict=True):
             rows.extend([vector] * times)
-        for (video, stats), pixels in zip(self._pictures, self._pending.pictures, strict=True):
+        for (video, stats), pixels in zip(self._videos.values(), self._pending.pictures, strict=True):
             video.add(pixels, times)
             stats.add(pixels, times)
 
     def write_table(self) -> dict[str, Any]:
         """Write all but the videos, and return the facts."""
-        vectors = {name: np.stack(rows) for name, rows in zip(self._sets.vector_names, self._rows, strict=True)}
+        vectors = {name: np.stack(rows) for name, rows in self._rows.items()}
         stats = {name: stats_of(rows) for name, rows in vectors.items()}
-        stats |= {
-            name: pictures.stats() for name, (_, pictures) in zip(self._sets.picture_names, self._pictures, strict=True)
-        }
-        features = self._sets.features()
-        columns = {name: _column(vectors[name]) for name in features if name in vectors}
+        stats |= {name: pictures.stats() for name, (_, pictures) in self._videos.items()}
+        columns = {name: _column(rows) for name, rows in vectors.items()}
         columns[TASK] = pa.array(self._tasks, pa.string()).dictionary_encode()
         pq.write_table(pa.table(columns), self._folder / TABLE)
         facts = {
@@ -152,14 +151,9 @@ class _Episode:
             "unusable": {why: count for why, count in self._sets.unusable.items() if count},
             "farthest_ns": self.grid.farthest_ns,
         }
-        about = {"fps": self._config.fps, **facts, "features": features, "stats": as_lists(stats)}
+        about = {"fps": self._config.fps, **facts, "features": self._sets.features(), "stats": as_lists(stats)}
         (self._folder / ABOUT).write_text(json.dumps(about), encoding="utf-8")
         return facts
-
-
-def as_lists(stats: Mapping[str, Stats]) -> dict[str, dict[str, Any]]:
-    """Return statistics as JSON has them."""
-    return {name: {what: value.tolist() for what, value in each.items()} for name, each in stats.items()}
 
 
 def _column(rows: np.ndarray[Any, Any]) -> pa.Array:

@@ -1,4 +1,4 @@
-"""Which set is which frame: frames stand at fixed distances, and each is the set that is nearest to its time."""
+"""Frames at a fixed rate: each shows the set whose stamp is nearest to its time."""
 
 from typing import Final
 
@@ -9,10 +9,10 @@ _NS_PER_S: Final = NS_PER_UNIT["s"]
 
 
 class Grid:
-    """Frames at `fps` from the first set's stamp on, given to sets in the order of their stamps.
+    """Gives the frames at `fps`, from the first set's stamp on, to sets in the order of their stamps.
 
-    Nothing is interpolated. A set that several frames are nearest to is held; one that no frame is nearest to is left
-    out. Of two sets equally near, the earlier is taken.
+    Nothing is interpolated. A set that several frames are nearest to is repeated, one that no frame is nearest to is
+    left out. Of two sets that are equally near, a frame shows the earlier.
     """
 
     def __init__(self, *, fps: int, max_gap_ns: int) -> None:
@@ -21,56 +21,54 @@ class Grid:
         self._first: int | None = None
         self._last = 0
         self.frames = 0
-        """How many frames sets were given to so far."""
+        """How many frames there are so far."""
         self.held = 0
-        """How many of them show the set of the frame before."""
+        """How many frames repeat the set of the frame before."""
         self.left_out = 0
-        """How many sets are no frame."""
+        """How many sets no frame shows."""
         self.farthest_ns = 0
         """The longest time between a frame and its set."""
 
     def next_set(self, stamp: int) -> int:
-        """Return how many frames the set before takes, now that the next one is known; 0 for the first.
+        """Return how many frames show the set before this one; 0 for the first set.
 
-        Raises BagError where stamps fall, or rise by more than the gap that is allowed.
+        Raises BagError where stamps fall, or rise by more than the longest gap.
         """
         if self._first is None:
             self._first = self._last = stamp
             return 0
-        step = stamp - self._last
+        step, after = stamp - self._last, _seconds(self._last - self._first)
         if step < 0:
             raise BagError(
-                f"stamps of sets fall by {_seconds(-step)} after {_seconds(self._last - self._first)}: an episode is"
-                " one run of time, so cut the recording there"
+                f"stamps of sets fall by {_seconds(-step)} after {after}: an episode is one run of time, so cut the"
+                " recording there"
             )
         if step > self._max_gap:
             raise BagError(
-                f"no set for {_seconds(step)} after {_seconds(self._last - self._first)}, expected"
-                f" {_seconds(self._max_gap)} at most: cut the recording there, or write a longer `max_gap`"
+                f"no set for {_seconds(step)} after {after}, expected {_seconds(self._max_gap)} at most: cut the"
+                " recording there, or write a longer `max_gap`"
             )
-        # Twice the time from the first frame to the middle between the two sets.
-        taken = self._take((self._last + stamp - 2 * self._first) * self._fps)
+        count = self._frames_until((self._last + stamp - 2 * self._first) * self._fps)
         self._last = stamp
-        return taken
+        return count
 
     def end(self) -> int:
-        """Return how many frames the last set takes: those up to half a frame after it."""
+        """Return how many frames show the last set: those up to half a frame after it."""
         if self._first is None:
             return 0
-        return self._take(2 * (self._last - self._first) * self._fps + _NS_PER_S)
+        return self._frames_until(2 * (self._last - self._first) * self._fps + _NS_PER_S)
 
-    def _take(self, doubled: int) -> int:
-        """Give the set before all frames up to a time, which is doubled and in frames times nanoseconds."""
-        until = doubled // (2 * _NS_PER_S) + 1
-        count = max(0, until - self.frames)
-        if count:
-            elapsed = (self._last - (self._first or 0)) * self._fps
-            ends = (self.frames, self.frames + count - 1)
-            far = max(abs(number * _NS_PER_S - elapsed) for number in ends) // self._fps
-            self.farthest_ns = max(self.farthest_ns, far)
-            self.held += count - 1
-        else:
+    def _frames_until(self, doubled: int) -> int:
+        """Give the frames up to a time to the last set; `doubled` is twice the ns since the first set, times `fps`."""
+        count = max(0, doubled // (2 * _NS_PER_S) + 1 - self.frames)
+        if not count:
             self.left_out += 1
+            return 0
+        elapsed = (self._last - (self._first or 0)) * self._fps
+        ends = (self.frames, self.frames + count - 1)
+        farthest = max(abs(number * _NS_PER_S - elapsed) for number in ends) // self._fps
+        self.farthest_ns = max(self.farthest_ns, farthest)
+        self.held += count - 1
         self.frames += count
         return count
 

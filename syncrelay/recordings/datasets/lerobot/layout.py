@@ -1,17 +1,17 @@
-"""LeRobotDataset v3.0 on disk: names of its files, and those of its tables that readers take by more than columns.
-
-As lerobot 0.6.1 writes and reads it (lerobot/datasets/utils.py, dataset_metadata.py).
-"""
+"""LeRobotDataset v3.0 on disk, as lerobot 0.6.1 has it (lerobot/datasets/utils.py, dataset_metadata.py)."""
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Generic, TypeVar
 
 import pyarrow as pa
 
-VERSION: Final = "v3.0"
+Opened = TypeVar("Opened")
+Content = TypeVar("Content")
+
 INFO: Final = "meta/info.json"
 STATS: Final = "meta/stats.json"
 TASKS: Final = "meta/tasks.parquet"
@@ -20,9 +20,10 @@ DATA: Final = f"data/{_FILE}.parquet"
 EPISODES: Final = f"meta/episodes/{_FILE}.parquet"
 VIDEO: Final = f"videos/{{video_key}}/{_FILE}.mp4"
 
-FILES_OF_A_CHUNK: Final = 1000
-DATA_FILE_MB: Final = 100
-VIDEO_FILE_MB: Final = 200
+_FILES_OF_A_CHUNK: Final = 1000
+MOST_MB: Final = {"data": 100, "episodes": 100, "video": 200}
+"""How large a file of each kind may grow."""
+
 _MB: Final = 1024 * 1024
 
 COUNTERS: Final[Mapping[str, str]] = MappingProxyType(
@@ -37,46 +38,63 @@ COUNTERS: Final[Mapping[str, str]] = MappingProxyType(
 """Columns that every dataset has, with their types."""
 
 
-@dataclass(slots=True)
-class Rolling:
-    """Which file of a kind is written: the next one where it would grow beyond a size."""
+class RollingFiles(Generic[Opened, Content]):
+    """Files of one kind that are written one after another, each of bounded size."""
 
-    most_mb: int
-    chunk: int = 0
-    file: int = 0
-    size: int = 0
+    def __init__(
+        self,
+        folder: Path,
+        pattern: str,
+        most_mb: float,
+        opened: ExitStack,
+        open_file: Callable[[Path, Content], AbstractContextManager[Opened]],
+    ) -> None:
+        """`open_file` takes a path and the content that is written first; `opened` closes the last file."""
+        self._folder = folder
+        self._pattern = pattern
+        self._most = most_mb * _MB
+        self._open_file = open_file
+        self._current = opened.enter_context(ExitStack())
+        self._file: Opened | None = None
+        self._number = 0
+        self._size = 0
 
-    def would_roll(self, size: int) -> bool:
-        """Tell whether so many bytes more belong in the next file; an empty one takes any."""
-        return bool(self.size) and self.size + size >= self.most_mb * _MB
+    def place_for(self, size: int) -> dict[str, int]:
+        """Return the indices of the file that takes so many bytes more. An empty file takes any number of bytes."""
+        if self._size and self._size + size >= self._most:
+            self._current.close()
+            self._file = None
+            self._number += 1
+            self._size = 0
+        chunk, file = divmod(self._number, _FILES_OF_A_CHUNK)
+        return {"chunk_index": chunk, "file_index": file}
 
-    def roll(self) -> None:
-        """Go on with the next file."""
-        self.size = 0
-        self.file += 1
-        if self.file == FILES_OF_A_CHUNK:
-            self.chunk, self.file = self.chunk + 1, 0
-
-    def path(self, pattern: str, **names: str) -> str:
-        """Return the name of the file."""
-        return pattern.format(chunk_index=self.chunk, file_index=self.file, **names)
+    def file_for(self, content: Content, size: int) -> Opened:
+        """Return the open file that this content of so many bytes is to be written to."""
+        place = self.place_for(size)
+        if self._file is None:
+            path = self._folder / self._pattern.format(**place)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._current.enter_context(self._open_file(path, content))
+        self._size += size
+        return self._file
 
 
 def info(
     *, fps: int, features: Mapping[str, Any], episodes: int, frames: int, tasks: int, has_videos: bool
 ) -> dict[str, Any]:
-    """Return what meta/info.json says."""
+    """Return the content of meta/info.json."""
     counters = {name: {"dtype": kind, "shape": [1], "names": None} for name, kind in COUNTERS.items()}
     return {
-        "codebase_version": VERSION,
+        "codebase_version": "v3.0",
         "fps": fps,
         "features": {**features, **counters},
         "total_episodes": episodes,
         "total_frames": frames,
         "total_tasks": tasks,
-        "chunks_size": FILES_OF_A_CHUNK,
-        "data_files_size_in_mb": DATA_FILE_MB,
-        "video_files_size_in_mb": VIDEO_FILE_MB,
+        "chunks_size": _FILES_OF_A_CHUNK,
+        "data_files_size_in_mb": MOST_MB["data"],
+        "video_files_size_in_mb": MOST_MB["video"],
         "data_path": DATA,
         "video_path": VIDEO if has_videos else None,
         "robot_type": None,
@@ -85,19 +103,18 @@ def info(
 
 
 def tasks_table(tasks: Sequence[str]) -> pa.Table:
-    """Return the table of tasks, whose index pandas reads from the words."""
+    """Return the table of tasks. Its metadata makes pandas use the tasks' texts as the index, as LeRobot expects."""
     columns = {"task_index": pa.array(range(len(tasks)), pa.int64()), "task": pa.array(tasks, pa.string())}
-    told = {
+    kinds = {"task_index": ("int64", "int64"), "task": ("unicode", "object")}
+    metadata = {
         "index_columns": ["task"],
-        "column_indexes": [
-            {"name": None, "field_name": None, "pandas_type": "unicode", "numpy_type": "object", "metadata": None}
-        ],
-        "columns": [_pandas("task_index", "int64", "int64"), _pandas("task", "unicode", "object")],
+        "column_indexes": [{"name": None, "field_name": None, **_pandas_type("unicode", "object")}],
+        "columns": [{"name": name, "field_name": name, **_pandas_type(*kind)} for name, kind in kinds.items()],
         "creator": {"library": "pyarrow", "version": pa.__version__},
         "pandas_version": "2.2.0",
     }
-    return pa.table(columns).replace_schema_metadata({"pandas": json.dumps(told)})
+    return pa.table(columns).replace_schema_metadata({"pandas": json.dumps(metadata)})
 
 
-def _pandas(name: str, kind: str, numpy: str) -> dict[str, Any]:
-    return {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": numpy, "metadata": None}
+def _pandas_type(kind: str, numpy: str) -> dict[str, Any]:
+    return {"pandas_type": kind, "numpy_type": numpy, "metadata": None}

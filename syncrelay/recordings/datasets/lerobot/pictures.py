@@ -1,4 +1,4 @@
-"""Images of messages as RGB pixels, which are what LeRobot's videos hold."""
+"""Images of messages as RGB pixels, as LeRobot's videos hold them."""
 
 import io
 from collections.abc import Mapping
@@ -16,12 +16,12 @@ COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
 FIELDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({IMAGE: NEEDED, COMPRESSED: ("data",)})
 """The fields that are needed of each type that can become video."""
 
-# What cameras send: Pillow runs other programs for some of the others.
+# The formats that cameras send. For some of its other formats Pillow runs other programs.
 _FORMATS: Final = ("JPEG", "PNG", "WEBP", "TIFF")
 
 
 class PictureSource:
-    """The topic of a video; its images have one size."""
+    """The topic of a video. All its images must have one size."""
 
     def __init__(self, topic: str, type_name: str) -> None:
         """Raise BagError for a type that holds no images."""
@@ -35,8 +35,8 @@ class PictureSource:
     def pixels(self, message: pa.StructScalar) -> np.ndarray[Any, Any]:
         """Return [height, width, RGB] in uint8.
 
-        Raises FrameError for bytes that are no such image, BagError for what no video holds and for an image of
-        another size than those before it.
+        Raises FrameError for bytes that are not an image, and BagError for an image that a video cannot hold or whose
+        size differs from the first one's.
         """
         rgb = np.ascontiguousarray(self._read(message))
         height, width, _ = rgb.shape
@@ -59,7 +59,8 @@ class PictureSource:
         pixels = pixels_of({**image, "data": message["data"].as_buffer()}, self.topic)
         if pixels.dtype.itemsize > 1:
             raise BagError(f"{self.topic}: images of encoding {encoding!r} have 16 bits a pixel, a video holds 8")
-        return np.stack([pixels] * 3, axis=-1) if pixels.ndim < 3 else pixels[..., :3]  # noqa: PLR2004  gray has two
+        is_grey = len(pixels.shape) == len(("height", "width"))
+        return np.stack([pixels] * 3, axis=-1) if is_grey else pixels[..., :3]
 
     def _compressed(self, message: pa.StructScalar) -> np.ndarray[Any, Any]:
         from PIL import Image, UnidentifiedImageError  # noqa: PLC0415  needed here alone

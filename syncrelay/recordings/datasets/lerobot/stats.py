@@ -1,7 +1,7 @@
-"""Statistics of features, which policies normalize by: of one episode, and of all together.
+"""Statistics of features, by which policies are normalized: of an episode and of the dataset.
 
-As LeRobot 0.6 has them: min, max, mean, std, count and five quantiles, a number for each value of a vector and for each
-colour of a video. Of all episodes, quantiles are the means of the episodes', weighted by their frames.
+They are those of LeRobot 0.6: min, max, mean, std, count and five quantiles, for each value of a vector and each colour
+of a video. The quantiles of the dataset are means of the episodes' quantiles, weighted by frames.
 """
 
 from collections.abc import Mapping
@@ -11,13 +11,13 @@ import numpy as np
 
 Numbers: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 Stats: TypeAlias = dict[str, Numbers]
-"""Of one feature, by LeRobot's names of what is told."""
+"""The statistics of one feature, by LeRobot's names."""
 
 _QUANTILES: Final[Mapping[str, float]] = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 _COUNT: Final = "count"
-# From this size on, about so many pixels of the longer side are looked at.
+# Of pictures from this size on, about so many pixels of the longer side are used.
 _LARGE: Final = 300
-_LOOKED_AT: Final = 150
+_SAMPLED: Final = 150
 _LEVELS: Final = 256
 _COLOURS: Final = 3
 
@@ -38,23 +38,23 @@ def stats_of(rows: Numbers) -> Stats:
 
 
 class PictureStats:
-    """The statistics of a video's colours, from 0 to 1: of every frame, at some of its pixels."""
+    """The statistics of a video's colours, from 0 to 1, of some pixels of every frame."""
 
     def __init__(self) -> None:
         self._levels = np.zeros((_COLOURS, _LEVELS), np.int64)
         self._frames = 0
 
     def add(self, pixels: Numbers, times: int) -> None:
-        """Take a picture [height, width, RGB] that so many frames show."""
+        """Add a picture [height, width, RGB] that so many frames show."""
         longer = max(pixels.shape[:2])
-        step = 1 if longer < _LARGE else longer // _LOOKED_AT
+        step = 1 if longer < _LARGE else longer // _SAMPLED
         seen = pixels[::step, ::step].reshape(-1, _COLOURS)
         for colour in range(_COLOURS):
             self._levels[colour] += times * np.bincount(seen[:, colour], minlength=_LEVELS)
         self._frames += times
 
     def stats(self) -> Stats:
-        """Return the statistics of what was added."""
+        """Return the statistics of the pictures so far."""
         levels = np.arange(_LEVELS) / (_LEVELS - 1)
         passed = self._levels.cumsum(axis=1)
         total = passed[:, -1:]
@@ -72,7 +72,7 @@ class PictureStats:
 
 
 def together(some: Stats, more: Stats) -> Stats:
-    """Return the statistics of a feature in some episodes and in more."""
+    """Return the statistics of a feature in two parts of a dataset together."""
     counts = (int(some[_COUNT][0]), int(more[_COUNT][0]))
     total = sum(counts)
 
@@ -90,3 +90,8 @@ def together(some: Stats, more: Stats) -> Stats:
         _COUNT: np.array([total]),
         **{name: weighted(some[name], more[name]) for name in _QUANTILES},
     }
+
+
+def as_lists(stats: Mapping[str, Stats]) -> dict[str, dict[str, Any]]:
+    """Return the statistics of features as JSON has them."""
+    return {name: {what: value.tolist() for what, value in each.items()} for name, each in stats.items()}

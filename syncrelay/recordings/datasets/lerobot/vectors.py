@@ -1,7 +1,7 @@
-"""Numbers of messages as rows of vectors: what `TOPIC:FIELD` names, flat, each value with a name."""
+"""Numbers of messages as rows of a vector: all numbers of a field, flat, each with a name."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import pyarrow as pa
@@ -10,16 +10,18 @@ import pyarrow.compute as pc
 from syncrelay.config import ExportSource
 from syncrelay.errors import BagError
 
-JOINTS: Final = "sensor_msgs/msg/JointState"
 NAME: Final = "name"
-"""The field that says whose each of its values is."""
+"""The field of a JointState that names the joint of each value."""
 
+_JOINTS: Final = "sensor_msgs/msg/JointState"
 _BY_JOINT: Final = ("position", "velocity", "effort")
+
+Rows: TypeAlias = np.ndarray[Any, Any]
 
 
 def has_joint_names(type_name: str, field: str) -> bool:
     """Tell whether a field's values are of joints that the message names."""
-    return type_name == JOINTS and field in _BY_JOINT
+    return type_name == _JOINTS and field in _BY_JOINT
 
 
 def field_of(messages: pa.StructArray, source: ExportSource) -> pa.Array:
@@ -32,15 +34,8 @@ def field_of(messages: pa.StructArray, source: ExportSource) -> pa.Array:
     return found
 
 
-class _Leaf(NamedTuple):
-    """Values of a field, a row a message, and what stands behind the field's own name for each."""
-
-    values: np.ndarray[Any, Any]
-    suffixes: tuple[str, ...]
-
-
 class VectorSource:
-    """A source of a vector: gives rows of one width, whose values have the same names in every row."""
+    """A field that is a vector or a part of one. All its rows have the same width and the same names."""
 
     def __init__(self, source: ExportSource, type_name: str) -> None:
         self.source: Final = source
@@ -50,38 +45,36 @@ class VectorSource:
         self._has_joints = has_joint_names(type_name, self._field)
         self._joints: list[str] = []
 
-    def rows(self, messages: pa.StructArray) -> np.ndarray[Any, Any]:
+    def rows(self, messages: pa.StructArray) -> Rows:
         """Return the values of messages, none of which is null, as [message, value] in float64.
 
-        Raises BagError for what is no numbers, and where a message has others than those before it.
+        Raises BagError for a field that is not numbers, and where a message has other values than those before it.
         """
-        found = field_of(messages, self.source)
-        leaves = list(self._leaves(found, ""))
-        values = np.concatenate([leaf.values for leaf in leaves], axis=1)
-        suffixes = tuple(suffix for leaf in leaves for suffix in leaf.suffixes)
+        columns = dict(self._columns(field_of(messages, self.source), self._field))
+        values = np.stack([*columns.values()], axis=1)
         if self._has_joints:
-            return self._by_joint(values, pc.struct_field(messages, NAME))
-        self._expect(tuple(f"{self._field}{suffix}" for suffix in suffixes), values.shape[1])
+            return self._by_joint(values, pc.struct_field(messages, NAME).to_pylist())
+        self._expect(tuple(columns))
         return values
 
-    def _leaves(self, found: pa.Array, suffix: str) -> Iterator[_Leaf]:
+    def _columns(self, found: pa.Array, name: str) -> Iterator[tuple[str, Rows]]:
+        """Yield each number of a field with its name, for all messages."""
         kind = found.type
         if pa.types.is_struct(kind) and kind.num_fields:
-            for index, field in enumerate(kind):
-                yield from self._leaves(pc.struct_field(found, index), f"{suffix}.{field.name}")
+            for field in kind:
+                yield from self._columns(pc.struct_field(found, field.name), f"{name}.{field.name}")
         elif pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
-            values = self._numbers(found.flatten())
-            width = self._width(found)
-            yield _Leaf(values.reshape(len(found), width), tuple(f"{suffix}.{place}" for place in range(width)))
+            values = self._numbers(found.flatten()).reshape(len(found), self._width(found))
+            yield from ((f"{name}.{place}", column) for place, column in enumerate(values.T))
         else:
-            yield _Leaf(self._numbers(found).reshape(len(found), 1), (suffix,))
+            yield name, self._numbers(found)
 
-    def _numbers(self, values: pa.Array) -> np.ndarray[Any, Any]:
+    def _numbers(self, values: pa.Array) -> Rows:
         kind = values.type
         if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
             what = "a list of messages" if pa.types.is_struct(kind) else str(kind)
             raise BagError(f"{self.source} is {what}, expected numbers")
-        found: np.ndarray[Any, Any] = values.to_numpy(zero_copy_only=False).astype(np.float64)
+        found: Rows = values.to_numpy(zero_copy_only=False).astype(np.float64)
         return found
 
     def _width(self, lists: pa.Array) -> int:
@@ -92,33 +85,33 @@ class VectorSource:
             raise BagError(f"{self.source} has no values, expected one or more in every message")
         return int(widths[0])
 
-    def _expect(self, names: tuple[str, ...], width: int) -> None:
+    def _expect(self, names: tuple[str, ...]) -> None:
         if not self.names:
             self.names = names
-        elif width != len(self.names):
-            raise self._other_width(len(self.names), width)
+        elif len(names) != len(self.names):
+            raise self._other_width(len(self.names), len(names))
 
-    def _by_joint(self, values: np.ndarray[Any, Any], named: pa.ListArray) -> np.ndarray[Any, Any]:
+    def _by_joint(self, values: Rows, named: Sequence[list[str]]) -> Rows:
         """Return values in the order of the first message's joints, whatever their order in others."""
-        rows = named.to_pylist()
+        width = values.shape[1]
         if not self._joints:
-            # Some drivers name none.
-            self._joints = rows[0] or [f"joint{number}" for number in range(values.shape[1])]
-        self._expect(tuple(f"{joint}.{self._field}" for joint in self._joints), values.shape[1])
-        if len(self._joints) != values.shape[1]:
-            raise BagError(f"{self.source} has {values.shape[1]} values for {len(self._joints)} names")
+            # Some drivers do not name the joints.
+            self._joints = named[0] or [f"joint{number}" for number in range(width)]
+        if self.names and width != len(self.names):
+            raise self._other_width(len(self.names), width)
+        if len(self._joints) != width:
+            raise BagError(f"{self.source} has {width} values for {len(self._joints)} names")
+        self.names = tuple(f"{joint}.{self._field}" for joint in self._joints)
         places = {joint: place for place, joint in enumerate(self._joints)}
-        ordered = values
-        for number, joints in enumerate(rows):
+        for number, joints in enumerate(named):
             if joints and joints != self._joints:
                 if len(joints) != len(places) or set(joints) != places.keys():
                     raise BagError(
                         f"{self.source} is of {', '.join(joints)} in one message and of {', '.join(self._joints)} in"
                         " another: every frame needs the same joints"
                     )
-                ordered = values.copy() if ordered is values else ordered
-                ordered[number, [places[joint] for joint in joints]] = values[number]
-        return ordered
+                values[number, [places[joint] for joint in joints]] = values[number].copy()
+        return values
 
     def _other_width(self, one: int, other: int) -> BagError:
         return BagError(
@@ -127,7 +120,7 @@ class VectorSource:
 
 
 def joined_names(sources: Sequence[VectorSource]) -> list[str]:
-    """Return a vector's names: fields and what is below them; with topics where two would be the same."""
+    """Return the names of a vector's values: their fields', with the topic before them where two would be the same."""
     names = [name for source in sources for name in source.names]
     if len(set(names)) == len(names):
         return names

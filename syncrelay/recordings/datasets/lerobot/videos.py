@@ -1,4 +1,4 @@
-"""Videos of a fixed rate: pictures encoded one by one, and finished videos joined without encoding them again."""
+"""Videos of a fixed rate: pictures are encoded one by one, and videos joined without encoding them again."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -12,20 +12,20 @@ from av.error import FFmpegError
 from syncrelay.errors import BagError
 
 CODEC: Final = "libx264"
-# As LeRobot: each second frame is whole, so that any frame is found by decoding two at most.
+# Each second frame is a key frame, as in LeRobot: to show any frame, at most two are decoded.
 _KEYFRAMES: Final = 2
 _QUALITY: Final = 23
 _PRESET: Final = "veryfast"
 _OPTIONS: Final = MappingProxyType(
-    # No frame refers to a later one: frame n of the file is frame n of the data. And macroblock trees, of little use
-    # where each second frame is whole, give other bytes in one of fifty runs.
+    # Without B-frames, frame n of the file is frame n of the data. Macroblock trees are of little use with so many key
+    # frames, and in one of fifty runs they give other bytes.
     {"g": str(_KEYFRAMES), "crf": str(_QUALITY), "preset": _PRESET, "bf": "0", "mbtree": "0"}
 )
 _PIXELS: Final = "yuv420p"
 
 
 class VideoWriter:
-    """Encodes pictures of one size; a context manager."""
+    """Encodes pictures of one size. A context manager."""
 
     def __init__(self, path: Path, *, fps: int) -> None:
         self._path = path
@@ -51,7 +51,7 @@ class VideoWriter:
             if self._container is None:
                 self._open(*pixels.shape[:2])
             for _ in range(times):
-                # Of its own for each frame: the encoder may keep it.
+                # A new one for each frame: the encoder may keep it.
                 frame = av.VideoFrame.from_ndarray(pixels, format="rgb24")
                 frame.pts, frame.time_base = self._frames, Fraction(1, self._fps)
                 self._container.mux(self._stream.encode(frame))
@@ -65,12 +65,12 @@ class VideoWriter:
         self._stream = self._container.add_stream(CODEC, self._fps, options=dict(_OPTIONS))
         self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, _PIXELS
         self._stream.time_base = Fraction(1, self._fps)
-        # With more, the bytes depend on their number.
+        # With more threads the bytes depend on their number.
         self._stream.codec_context.thread_count = 1
 
 
 def described(shape: list[int], *, fps: int) -> dict[str, Any]:
-    """Return what `info` of a video's feature says."""
+    """Return `info` of a video's feature in meta/info.json."""
     height, width, channels = shape
     return {
         "video.height": height,
@@ -91,17 +91,14 @@ def described(shape: list[int], *, fps: int) -> dict[str, Any]:
 
 
 class JoinedVideo:
-    """A file that videos of one rate, size and encoder are appended to; a context manager."""
+    """A file that videos of one rate, size and encoder are appended to. A context manager."""
 
     def __init__(self, path: Path, *, fps: int) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
         self._container = av.open(str(path), "w")
         self._stream: Any = None
         self._fps = fps
         self.frames = 0
         """How many frames it has."""
-        self.size = 0
-        """How many bytes were appended."""
 
     def __enter__(self) -> Self:
         return self
@@ -117,10 +114,9 @@ class JoinedVideo:
                 self._stream = self._container.add_stream_from_template(stream)
             after = round(Fraction(self.frames, self._fps) / stream.time_base)
             for packet in video.demux(stream):
-                # The last one is empty.
+                # The last packet only ends the stream.
                 if packet.dts is not None:
                     packet.pts, packet.dts = packet.pts + after, packet.dts + after
                     packet.stream = self._stream
                     self._container.mux(packet)
         self.frames += frames
-        self.size += path.stat().st_size
