@@ -43,7 +43,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     config = load(*arguments.files)
     title, status = ", ".join(map(shown_name, arguments.files)), None
     if arguments.url is not None:
-        status = find_one(arguments.url, otherwise="  Without --url, the files alone are drawn.").state
+        status = find_one(arguments.url, otherwise="  Without --url, the files alone are drawn.").status
         _remark_on_others(config, status)
         title = f"{title}, as {status.relay.node} runs it"
     draw = as_text if arguments.format == "text" else as_mermaid

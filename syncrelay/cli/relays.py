@@ -47,7 +47,7 @@ def _others(found: Search) -> str:
 
 def _several(relays: Sequence[Answer]) -> str:
     lines = "".join(
-        f"\n  --url {each.url}   {each.state.relay.node}: {', '.join(group.name for group in each.state.groups)}"
+        f"\n  --url {each.url}   {each.status.relay.node}: {', '.join(group.name for group in each.status.groups)}"
         for each in relays
     )
     return f"{len(relays)} relays answer; choose one{lines}"

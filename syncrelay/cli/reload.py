@@ -61,7 +61,7 @@ def _relay(url: str) -> "Relay":
     from syncrelay.top.client import NoAnswerError, OtherServerError, ask
 
     try:
-        return ask(url).state.relay
+        return ask(url).status.relay
     except (NoAnswerError, OtherServerError) as error:
         raise SyncRelayError(f"the relay at {url} is gone: {error}") from error
 

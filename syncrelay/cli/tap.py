@@ -107,8 +107,8 @@ def _say_lost(told: "Told") -> None:
 
 def _require_names(relay: "Answer", groups: Collection[str], inputs: Collection[str]) -> None:
     """Refuse what the relay does not have; one that is just starting may not have told yet. Raises UsageError."""
-    chosen = [group for group in relay.state.groups if not groups or group.name in groups]
-    _require(groups, [group.name for group in relay.state.groups], "group")
+    chosen = [group for group in relay.status.groups if not groups or group.name in groups]
+    _require(groups, [group.name for group in relay.status.groups], "group")
     _require(inputs, dict.fromkeys(each.topic for group in chosen for each in group.inputs), "input")
 
 

@@ -1,4 +1,4 @@
-"""Asks relays for their state over HTTP, and finds out where relays are."""
+"""Asks relays for their status over HTTP, and finds relays."""
 
 import socket
 from collections.abc import Iterator, Sequence
@@ -19,9 +19,9 @@ from syncrelay.status.document import NotAStatusError, Status, read_status
 from syncrelay.status.hosts import REFUSAL
 
 _TIMEOUT_S: Final = 2.0
-# A relay that is just starting, or a machine under load, takes longer to be found than to be asked again.
+# A relay that is starting, or a machine under load, takes longer for the first answer.
 _SEARCH_TIMEOUT_S: Final = 5.0
-# A large state takes its time on a slow network. What comes byte by byte, or never ends, is no state.
+# Enough for a large status over a slow network; bounds what comes byte by byte or never ends.
 _WHOLE_S: Final = 10.0
 _MOST_BYTES: Final = 64_000_000
 _MOST_WORDS: Final = 500
@@ -33,7 +33,7 @@ class NoAnswerError(SyncRelayError):
 
 
 class NobodyListensError(NoAnswerError):
-    """There is a machine, and no server at the port."""
+    """The machine is there, but nothing listens at the port."""
 
 
 class OtherServerError(SyncRelayError):
@@ -42,26 +42,26 @@ class OtherServerError(SyncRelayError):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a relay says of itself: the document as it came, and what it holds."""
+    """The status of a relay, and the document that it came in."""
 
     url: str
     document: bytes
-    state: Status
+    status: Status
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """What was found: relays, and in words what else there was at the places where they are looked for."""
+    """The relays that were found, and a sentence for each other place where something answers or fails."""
 
     relays: tuple[Answer, ...]
     others: tuple[str, ...]
 
 
 def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -> Answer:
-    """Get the state of the relay at a base URL such as http://robot:9464.
+    """Get the status of the relay at a base URL such as http://robot:9464.
 
-    Raises NoAnswerError where nothing more comes for `timeout_s`, or not all of it in `whole_s`, and OtherServerError
-    where something else answers.
+    Raises NoAnswerError if nothing arrives for `timeout_s`, or not everything within `whole_s`, and OtherServerError if
+    something else answers.
     """
     with closing(connection_to(url, timeout_s)) as connection:
         body = get(connection, f"{urlsplit(url).path}/status", whole_s=whole_s)
@@ -74,13 +74,13 @@ def ask(url: str, *, timeout_s: float = _TIMEOUT_S, whole_s: float = _WHOLE_S) -
 
 
 def connection_to(url: str, timeout_s: float = _TIMEOUT_S) -> HTTPConnection:
-    """Return a connection that is made when it is first used. No proxy that the environment names is asked."""
+    """Return a connection that is made when it is first used. Proxies of the environment are not used."""
     parts = urlsplit(url)
     return (HTTPSConnection if parts.scheme == "https" else HTTPConnection)(parts.netloc, timeout=timeout_s)
 
 
 def get(connection: HTTPConnection, target: str, *, whole_s: float = _WHOLE_S) -> bytes:
-    """Get what is at a path. Raises as `ask` does; what had been said over the connection may be why."""
+    """Get what is at a path. Raises as `ask` does, also where the server closed a connection that idled."""
     try:
         if connection.sock is None:
             connection.connect()
@@ -100,7 +100,7 @@ def get(connection: HTTPConnection, target: str, *, whole_s: float = _WHOLE_S) -
 def _body(response: HTTPResponse) -> bytes:
     most = _MOST_BYTES if response.status == HTTPStatus.OK else _MOST_WORDS
     body = response.read(most)
-    # Of a given number of bytes http.client says nothing where fewer come.
+    # http.client does not report that read(n) came short.
     if response.length and len(body) < most:
         raise IncompleteRead(body, response.length)
     return body
@@ -108,7 +108,7 @@ def _body(response: HTTPResponse) -> bytes:
 
 @contextmanager
 def _ended_after(connected: socket.socket, whole_s: float) -> Iterator[None]:
-    """Cut off what is said over a connection for too long, however steadily. Raises NoAnswerError then."""
+    """Shut a connection down after `whole_s`, however steadily data arrives. Raises NoAnswerError then."""
     is_over = Event()
 
     def end() -> None:
@@ -135,7 +135,7 @@ def _refused(answer: str, body: bytes) -> str:
 
 
 def search(urls: Sequence[str], *, timeout_s: float = _SEARCH_TIMEOUT_S, whole_s: float = _WHOLE_S) -> Search:
-    """Ask all at once. Of several, those where nobody listens are not worth a word."""
+    """Ask all URLs at once. Among several, those where nothing listens are not reported."""
 
     def answer_or_error(url: str) -> Answer | SyncRelayError:
         try:
@@ -145,18 +145,18 @@ def search(urls: Sequence[str], *, timeout_s: float = _SEARCH_TIMEOUT_S, whole_s
 
     with ThreadPoolExecutor(min(len(urls), _AT_ONCE)) as pool:
         answers = list(pool.map(answer_or_error, urls))
-    told = [
+    others = [
         f"{url}: {answer}"
         for url, answer in zip(urls, answers, strict=True)
         if not isinstance(answer, Answer) and (len(urls) == 1 or not isinstance(answer, NobodyListensError))
     ]
-    return Search(tuple(answer for answer in answers if isinstance(answer, Answer)), tuple(told))
+    return Search(tuple(answer for answer in answers if isinstance(answer, Answer)), tuple(others))
 
 
 def base_urls(named: str | None) -> list[str]:
-    """Return where to look: on this machine wherever relays listen, on one that is named at the ports they take alone.
+    """Return the base URLs to ask: those that this machine's relays announce, or the usual ports of a named host.
 
-    `named` is a host, host:port or URL; with a port it is the only place. Raises UsageError where it is none of them.
+    `named` is a host, host:port or URL; with a port it is the only place. Raises UsageError if it is none of them.
     """
     if named is None:
         return _on_this_machine()
@@ -169,20 +169,16 @@ def base_urls(named: str | None) -> list[str]:
         raise UsageError(f"--url {named}: expected a host, host:port or http://host:port")
     path = parts.path.rstrip("/").removesuffix("/status")
     if port is None and parts.scheme == "http" and not path:
-        return _at_usual_ports(f"[{host}]" if ":" in host else host)
+        return [f"http://{f'[{host}]' if ':' in host else host}:{port}" for port in DEFAULT_PORTS]
     return [f"{parts.scheme}://{parts.netloc}{path}"]
 
 
 def _on_this_machine() -> list[str]:
-    """Return where relays announce that they answer, and where one does that cannot be heard: in a container, say."""
+    """Return where relays announce themselves, and the usual ports: announcements do not leave a container."""
     places = set(announced())
     everywhere = {place.port for place in places if place.is_everywhere}
-    unheard = {Place(port, DEFAULT_HOST) for port in DEFAULT_PORTS if port not in everywhere}
-    return list(dict.fromkeys(place.url for place in sorted(places | unheard)))
-
-
-def _at_usual_ports(host: str) -> list[str]:
-    return [f"http://{host}:{port}" for port in DEFAULT_PORTS]
+    unannounced = {Place(port, DEFAULT_HOST) for port in DEFAULT_PORTS if port not in everywhere}
+    return list(dict.fromkeys(place.url for place in sorted(places | unannounced)))
 
 
 def _no_answer(error: Exception, timeout_s: float) -> NoAnswerError:

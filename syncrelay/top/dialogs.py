@@ -52,8 +52,8 @@ class RelaysScreen(Screen[None]):
 
 
 def _relay(answer: Answer) -> Text:
-    names = ", ".join(group.name for group in answer.state.groups)
-    return line((answer.state.relay.node, "bold"), f"  {answer.url}  groups: {names}")
+    names = ", ".join(group.name for group in answer.status.groups)
+    return line((answer.status.relay.node, "bold"), f"  {answer.url}  groups: {names}")
 
 
 class KeysScreen(ModalScreen[None]):

@@ -1,4 +1,4 @@
-"""What there is to see of one group, in blocks of lines: figures, findings, inputs, recent sets, connections."""
+"""One group in blocks of lines: figures, findings, inputs, recent sets, connections."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Final
@@ -6,7 +6,7 @@ from typing import Final
 from rich.text import Text
 
 from syncrelay.explain import RecentDrop, RecentSet
-from syncrelay.status.document import Endpoint, Finding, Group, Input, Percentiles
+from syncrelay.status.document import Endpoint, Finding, Group, Input
 from syncrelay.top import phrases
 from syncrelay.top.names import fitted, fitted_names, short_names
 from syncrelay.top.pieces import STYLES, bar, line, sparkline, wrapped
@@ -29,13 +29,13 @@ _FIGURE: Final = 10
 _LEAST_TOPIC, _LEAST_NOTES = 16, 22
 LANE_LABEL: Final = 13
 _NS_PER_MS: Final = 1_000_000
-# On a wider strip the recent outcomes of a fast input would not reach back to its begin.
+# The recent messages of a fast input would not fill a wider strip.
 _WIDEST_STRIP: Final = 160
-_LINES_OF_SPARKS: Final = 44
+_PERCENTILES: Final = 44
 
 
 def title(group: Group, width: int) -> Text:
-    """Draw the group's name and what the file says of it, as a rule across the screen."""
+    """Draw the group's name and options, as a rule across the screen."""
     text = f"── {group.name}: {phrases.options(group)} "
     return line((text + "─" * max(0, width - len(text)), "bold"))
 
@@ -44,16 +44,18 @@ def figures(group: Group, width: int) -> Iterator[Text]:
     """Draw how many sets leave, their spans and their latencies."""
     yield rate_line(group, width)
     if group.last_sets:
-        room = max(10, width - _LABEL - _LINES_OF_SPARKS)
-        spans = [each.span_ms for each in group.last_sets]
-        latencies = [each.latency_ms for each in group.last_sets]
-        yield line((f"{'span':<{_LABEL}}", "bold"), sparkline(spans, room), " ", _percentiles(group.span_ms))
-        yield line((f"{'latency':<{_LABEL}}", "bold"), sparkline(latencies, room), " ", _percentiles(group.latency_ms))
+        room = max(10, width - _LABEL - _PERCENTILES)
+        for name, values, sample in (
+            ("span", [each.span_ms for each in group.last_sets], group.span_ms),
+            ("latency", [each.latency_ms for each in group.last_sets], group.latency_ms),
+        ):
+            shown = phrases.percentiles(sample) if sample else ""
+            yield line((f"{name:<{_LABEL}}", "bold"), sparkline(values, room), " ", shown)
     yield from offsets(group, width)
 
 
 def rate_line(group: Group, width: int) -> Text:
-    """Draw how many of the possible sets leave."""
+    """Draw which share of the possible sets leaves."""
     share = phrases.share_of_possible(group)
     before = f"{phrases.sets_of_possible(group)} possible a second "
     behind = f"{share:.0%}, {phrases.last_set(group)}"
@@ -63,33 +65,22 @@ def rate_line(group: Group, width: int) -> Text:
 
 
 def offsets(group: Group, width: int) -> Iterator[Text]:
-    """Say what the file's offsets do, if it has some."""
+    """Say how the file's offsets change the spans, if it has some."""
     if effect := phrases.offsets(group):
         yield from wrapped(effect, width, first=line((f"{'offset':<{_LABEL}}", "bold")))
 
 
-def _percentiles(sample: Percentiles | None) -> str:
-    if sample is None:
-        return ""
-    values = (("p50", sample.p50), ("p95", sample.p95), ("max", sample.max))
-    return ", ".join(f"{name} {phrases.duration(value)}" for name, value in values)
-
-
 def findings(group: Group, width: int) -> Iterator[Text]:
-    """Say what was found, what explains most first, and what to do about it."""
+    """Draw the findings, the one that explains most first, each with what to do about it."""
+    arrow = line(" " * (_LABEL - 2), ("→ ", "bold"))
     for finding in group.findings:
-        yield from _finding(finding, width)
-
-
-def _finding(finding: Finding, width: int) -> Iterator[Text]:
-    level = line((f"{phrases.LEVELS[finding.severity]:<{_LABEL}}", STYLES[finding.severity]))
-    yield from wrapped(finding.text, width, first=level)
-    if finding.suggestion:
-        yield from wrapped(finding.suggestion, width, first=line(" " * (_LABEL - 2), ("→ ", "bold")), style="italic")
+        level = line((f"{finding.severity.name:<{_LABEL}}", STYLES[finding.severity]))
+        yield from wrapped(finding.text, width, first=level)
+        yield from wrapped(finding.suggestion or "", width, first=arrow, style="italic")
 
 
 def inputs(group: Group, width: int) -> Iterator[Text]:
-    """Draw a line for each input, and one above that names the columns."""
+    """Draw a line for each input below a heading."""
     longest = max(len(each.topic) for each in group.inputs)
     room = max(_LEAST_TOPIC, min(longest, width - 3 * _FIGURE - _LEAST_NOTES - 1))
     names = fitted_names([each.topic for each in group.inputs], room)
@@ -124,19 +115,20 @@ def recent_sets(group: Group, width: int) -> Iterator[Text]:
     yield from lanes(group, recent, window)
     shown = [each for each in recent if window.column(newest_stamp([each])) is not None]
     drops = [each for each in shown if isinstance(each, RecentDrop)]
-    sets = [line(*_letters(), " sets")] if len(drops) < len(shown) else []
+    letters = [(letter, letter_style(number)) for number, letter in enumerate("ABC")]
+    sets = [line(*letters, " sets")] if len(drops) < len(shown) else []
     yield from side_by_side([*sets, *marks({mark_of(each) for each in drops})], width)
     yield line((f"a column is {phrases.duration(window.column_ns / _NS_PER_MS)}, the newest is on the right", "dim"))
 
 
 def as_matched(group: Group) -> tuple[RecentSet | RecentDrop, ...]:
-    """Return what left last with the stamps by which it was matched, offsets added."""
+    """Return the last sets and drops with the stamps that were matched: offsets added."""
     shifts = [round(each.offset_ms * _NS_PER_MS) for each in group.inputs]
     return tuple(outcome.shifted(shifts) for outcome in group.recent)
 
 
 def lanes(group: Group, recent: Sequence[RecentSet | RecentDrop], axis: Axis) -> Iterator[Text]:
-    """Draw a lane for each input, what left recently on it, and the spans of the sets below."""
+    """Draw a lane for each input with its recent messages, and below them the spans of the sets."""
     drawn = strip(Lanes(len(group.inputs), group.sets, tuple(recent)), axis)
     for index, name in enumerate(short_names([each.topic for each in group.inputs])):
         shift = f" {group.inputs[index].offset_ms:+g} ms" if group.inputs[index].offset_ms else ""
@@ -144,10 +136,6 @@ def lanes(group: Group, recent: Sequence[RecentSet | RecentDrop], axis: Axis) ->
         yield line((label, "bold"), (" ▏", "dim"), drawn[2 * index])
         below = "span in ms" if index == len(group.inputs) - 1 else ""
         yield line((below.rjust(LANE_LABEL), "dim"), (" ▏", "dim"), drawn[2 * index + 1])
-
-
-def _letters() -> list[tuple[str, str]]:
-    return [(letter, letter_style(number)) for number, letter in enumerate("ABC")]
 
 
 def marks(shown: Collection[Mark]) -> Iterator[Text]:
@@ -171,7 +159,7 @@ def side_by_side(texts: Iterable[Text], width: int) -> Iterator[Text]:
 
 
 def connections(group: Group, width: int) -> Iterator[Text]:
-    """Say of each input in full who publishes it, who gets its output, and what became of its messages."""
+    """Say in full who publishes each input, who subscribes to its output, and what became of its messages."""
     for each in group.inputs:
         offset = f", offset {phrases.duration(each.offset_ms)}" if each.offset_ms else ""
         required = "" if each.required else ", optional"

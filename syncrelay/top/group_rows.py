@@ -1,4 +1,4 @@
-"""The list of groups: a line each, and one above that names the columns."""
+"""The list of groups: a line for each, below a heading."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,8 +19,7 @@ _FIGURE: Final = 10
 _SPARKLINE: Final = 20
 _FIXED: Final = _LEVEL + _SETS + 2 * _FIGURE
 _SORTED: Final = "▾"
-# What there should be left for the reason, in words, before names may grow, latencies stand and sparklines are drawn
-# beside it.
+# Room for the reason in words; the names, latencies and sparklines get what is left beside it.
 _REASON: Final = 18
 _SENTENCE: Final = 40
 _LEAST_NAME: Final = 10
@@ -29,7 +28,7 @@ _LAST: Final = "FINDING or SPANS"
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """How wide what varies is; no latency, no sparklines where their width is 0."""
+    """The widths that vary; 0 leaves the latency or the sparklines out."""
 
     name: int
     latency: int
@@ -38,7 +37,7 @@ class Columns:
 
 
 def columns_of(groups: Sequence[Group], width: int) -> Columns:
-    """Divide a line between the names, which are short, and the reasons, which are not."""
+    """Divide a line of this width between names, figures and reasons."""
     longest = max((len(group.name) for group in groups), default=0)
     latency = _FIGURE if width >= _FIXED + _LEAST_NAME + _REASON else 0
     fixed = _FIXED - _FIGURE + latency
@@ -49,7 +48,7 @@ def columns_of(groups: Sequence[Group], width: int) -> Columns:
 
 
 def heading(columns: Columns, order: Order) -> Text:
-    """Name the columns; the one that groups are sorted by is marked."""
+    """Draw the names of the columns; the one that groups are sorted by is marked."""
     name = "GROUP" + _SORTED * (order is Order.NAME)
     level = "STATE" + _SORTED * (order is Order.WORST)
     drawn = f"{'SPANS':<{columns.sparkline + 2}}{'LATENCIES':<{columns.sparkline + 2}}" if columns.sparkline else ""
@@ -61,27 +60,20 @@ def heading(columns: Columns, order: Order) -> Text:
 
 def row(group: Group, columns: Columns) -> Text:
     """Draw a group."""
+    drawn = [each.span_ms for each in group.last_sets], [each.latency_ms for each in group.last_sets]
     return line(
         (f"{fitted(group.name, columns.name - 1):<{columns.name}}", "bold"),
-        (f"{phrases.LEVELS[group.level]:<{_LEVEL}}", STYLES[group.level]),
+        (f"{group.level.name:<{_LEVEL}}", STYLES[group.level]),
         f"{phrases.sets_of_possible(group):<{_SETS}}",
         f"{phrases.duration(group.span_ms.p95 if group.span_ms else None):<{_FIGURE}}",
         f"{phrases.duration(group.latency_ms.p95 if group.latency_ms else None):<{_FIGURE}}" if columns.latency else "",
-        *_drawn(group, columns),
+        *(f"{sparkline(values, columns.sparkline)}  " for values in drawn if columns.sparkline),
         _reason(group, columns),
     )
 
 
-def _drawn(group: Group, columns: Columns) -> list[str]:
-    if not columns.sparkline:
-        return []
-    spans = sparkline([each.span_ms for each in group.last_sets], columns.sparkline)
-    latencies = sparkline([each.latency_ms for each in group.last_sets], columns.sparkline)
-    return [f"{spans}  ", f"{latencies}  "]
-
-
 def _reason(group: Group, columns: Columns) -> Text:
-    """Say what is wrong, in words of its code where there is no room for the sentence; draw spans where all is well."""
+    """Say what is wrong, by its code where there is no room for the sentence; draw spans where all is well."""
     finding = group.explanation
     if columns.sparkline:
         text = finding.text if finding else ""

@@ -8,7 +8,7 @@ _ELLIPSIS: Final = "…"
 
 
 def short_names(topics: Sequence[str]) -> list[str]:
-    """Name topics by the first part that tells them apart: /demo/camera/image_raw is `camera` beside /demo/imu/data."""
+    """Name topics by the first part that differs in all: /demo/camera/image_raw is `camera` beside /demo/imu/data."""
     parts = [topic.strip("/").split("/") for topic in topics]
     for candidates in zip(*parts, strict=False):
         if len(set(candidates)) == len(topics):
@@ -17,7 +17,7 @@ def short_names(topics: Sequence[str]) -> list[str]:
 
 
 def fitted_names(topics: Sequence[str], width: int) -> list[str]:
-    """Fit topics to a width: where they are longer, without the parts that all begin and end with.
+    """Shorten topics that are longer than a width: leave out the parts that all begin and end with.
 
     /robot/camera_1/image and /robot/camera_2/image are `…/camera_1/…` and `…/camera_2/…`.
     """
@@ -25,7 +25,7 @@ def fitted_names(topics: Sequence[str], width: int) -> list[str]:
         return list(topics)
     parts = [topic.split("/") for topic in topics]
     before = _n_common(parts)
-    # One part has to be left of the shortest.
+    # At least one part of the shortest topic stays.
     most_behind = min(map(len, parts)) - before - 1
     behind = min(_n_common([each[::-1] for each in parts]), most_behind)
     if len(topics) == 1 or most_behind < 0:
@@ -34,7 +34,7 @@ def fitted_names(topics: Sequence[str], width: int) -> list[str]:
 
 
 def fitted(name: str, width: int) -> str:
-    """Cut a name in its middle to a width if it is longer: of topics, the ends differ."""
+    """Cut a name in its middle to a width if it is longer, as the ends of topics tell more."""
     if len(name) <= width:
         return name
     tail = (width - 1) * 2 // 3

@@ -1,26 +1,19 @@
-"""What a state's figures are in words, for the screen and for plain text alike."""
+"""Figures of a status in words, for the screen and for plain text."""
 
 from collections.abc import Mapping
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.status import Level, Phase
-from syncrelay.status.document import Group, Input, Relay
+from syncrelay.status import Phase
+from syncrelay.status.document import Group, Input, Percentiles, Relay
 
 _NS_PER_MS: Final = 1_000_000
 _NS_PER_S: Final = 1_000_000_000
 _LONG_MS: Final = 100_000_000
 _YEAR_MS: Final = 31_557_600_000
-# Of what is looked at once a second.
+# A relay is asked once a second.
 _JUST_NOW_MS: Final = 1_500
 NONE: Final = "-"
-
-LEVELS: Final[Mapping[Level, str]] = {
-    Level.OK: "OK",
-    Level.WARN: "WARN",
-    Level.ERROR: "ERROR",
-    Level.STALE: "STALE",
-}
 
 
 def duration(milliseconds: float | None) -> str:
@@ -29,7 +22,7 @@ def duration(milliseconds: float | None) -> str:
         return NONE
     if abs(milliseconds) < _LONG_MS:
         return words.duration(milliseconds * _NS_PER_MS)
-    # As those of a stamp that was never set: since 1970.
+    # The lag of stamps that were never set goes back to 1970.
     return f"{milliseconds / _YEAR_MS:.2g} years"
 
 
@@ -43,6 +36,12 @@ def ago(milliseconds: float) -> str:
 def seconds(count: float) -> str:
     """Return how long something lasts."""
     return words.seconds(count * _NS_PER_S)
+
+
+def percentiles(sample: Percentiles) -> str:
+    """Return `p50 5 ms, p95 7 ms, max 8 ms`."""
+    values = (("p50", sample.p50), ("p95", sample.p95), ("max", sample.max))
+    return ", ".join(f"{name} {duration(value)}" for name, value in values)
 
 
 def rate(hertz: float) -> str:
@@ -68,7 +67,7 @@ def last_set(group: Group) -> str:
 
 
 def options(group: Group) -> str:
-    """Say what the file says of a group."""
+    """Return the policy and the options of a group."""
     tolerance = [f"{group.tolerance.key} {duration(group.tolerance.ms)}"] if group.tolerance else []
     waits = [] if group.max_wait_ms is None else [f"max_wait {duration(group.max_wait_ms)}"]
     return ", ".join([group.policy, *tolerance, f"queue_size {group.queue_size}", *waits])
@@ -80,12 +79,12 @@ def phase(relay: Relay) -> str:
 
 
 def place(relay: Relay, url: str) -> str:
-    """Say where a relay answers; of one that only observes, and answers nobody, which file it tries."""
+    """Say where a relay answers; `observe` answers nobody, so say which file it tries."""
     return f"with {relay.config}" if relay.phase is Phase.OBSERVING else f"at {url}"
 
 
 def offsets(group: Group) -> str | None:
-    """Say what the file's offsets do to the spans; None without offsets or sets."""
+    """Say how the file's offsets change the spans; None without offsets or sets."""
     if group.span_without_offsets_ms is None or group.span_ms is None:
         return None
     given = ", ".join(f"{each.offset_ms:+g} ms on {each.topic}" for each in group.inputs if each.offset_ms)

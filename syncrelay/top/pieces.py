@@ -18,7 +18,7 @@ STYLES: Final[Mapping[Level, str]] = {
 
 
 def sparkline(values: Sequence[float], width: int) -> str:
-    """Draw the last values as a character each, from nothing to the greatest of them; padded to the width."""
+    """Draw each of the last values as a bar from 0 to the largest of them, padded to the width."""
     shown = values[-width:]
     top = max(shown, default=0)
     heights = (round(value / top * (len(_HEIGHTS) - 1)) if top else 0 for value in shown)
@@ -26,18 +26,18 @@ def sparkline(values: Sequence[float], width: int) -> str:
 
 
 def bar(share: float, width: int) -> Text:
-    """Draw a share of 1; what fills it is another character than what does not."""
+    """Draw a share of 1, readable without colour."""
     filled = round(share * width)
     return Text.assemble(("━" * filled, "bold"), ("╌" * (width - filled), "dim"))
 
 
 def line(*parts: str | Text | tuple[str, str]) -> Text:
-    """Return a line of parts."""
+    """Join texts, and pairs of a text and its style, to one line."""
     return Text.assemble(*parts, no_wrap=True, overflow="ellipsis")
 
 
 def wrapped(text: str, width: int, *, first: Text, style: str = "") -> Iterator[Text]:
-    """Wrap a text below its first words, which begin with `first`."""
+    """Wrap a text behind `first`, and indent the further lines by its width."""
     indent = first.cell_len
     for number, words in enumerate(wrap(text, max(10, width - indent), break_on_hyphens=False)):
         yield line(first if number == 0 else " " * indent, (words, style))

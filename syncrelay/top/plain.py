@@ -1,4 +1,4 @@
-"""The state of a relay as plain text, for logs and where there is no terminal."""
+"""The status of a relay as plain text: `top --once`, the service ~/status, what `observe` prints."""
 
 from collections.abc import Iterator
 from textwrap import wrap
@@ -12,21 +12,25 @@ WIDTH = 80
 
 
 def plain_text(answer: Answer) -> str:
-    """Say all of it in lines of at most WIDTH columns, but for names and words that are longer."""
-    return "\n".join(_lines(answer))
+    """Return all of a status in lines of at most WIDTH columns; only words that are longer stick out."""
+    relay = answer.status.relay
+    lines = wrapped(f"{relay.node} {phrases.place(relay, answer.url)}: {_of_relay(relay)}")
+    for group in answer.status.groups:
+        lines += ["", *group_lines(group)]
+    return "\n".join(lines)
 
 
-def summary(state: Status) -> str:
-    """Say most of it: a line for the relay, and one for each group with what explains most."""
-    return "\n".join([f"{state.relay.node}: {_of_relay(state.relay)}", *map(_summary_of, state.groups)])
+def summary(status: Status) -> str:
+    """Return a line for the relay, and one for each group with the finding that explains most."""
+    return "\n".join([f"{status.relay.node}: {_of_relay(status.relay)}", *map(_summary_of, status.groups)])
 
 
 def _summary_of(group: Group) -> str:
     finding = group.explanation
     if finding is None:
         return _of_group(group)
-    # That a group is well is said in its figures.
-    state = _of_group(group) if finding.severity is not Level.OK else f"{group.name}: {phrases.LEVELS[group.level]}"
+    # The finding `healthy` repeats the figures.
+    state = _of_group(group) if finding.severity is not Level.OK else f"{group.name}: {group.level.name}"
     return "; ".join(filter(None, [state, finding.text, finding.suggestion]))
 
 
@@ -40,19 +44,11 @@ def _of_relay(relay: Relay) -> str:
 
 def _of_group(group: Group) -> str:
     rate = f"{phrases.sets_of_possible(group)} possible sets a second, {phrases.last_set(group)}"
-    return f"{group.name}: {phrases.LEVELS[group.level]}, {rate}"
-
-
-def _lines(answer: Answer) -> Iterator[str]:
-    relay = answer.state.relay
-    yield from wrapped(f"{relay.node} {phrases.place(relay, answer.url)}: {_of_relay(relay)}")
-    for group in answer.state.groups:
-        yield ""
-        yield from group_lines(group)
+    return f"{group.name}: {group.level.name}, {rate}"
 
 
 def group_lines(group: Group, *, width: int = WIDTH) -> Iterator[str]:
-    """Say all of a group in lines of at most so many columns."""
+    """Yield all of a group in lines of at most `width` columns."""
     for text, indent in _of_group_in_full(group):
         yield from wrapped(text, indent=indent, width=width)
 
@@ -63,8 +59,7 @@ def _of_group_in_full(group: Group) -> Iterator[tuple[str, str]]:
     yield phrases.options(group), "  "
     for name, sample in (("span", group.span_ms), ("latency", group.latency_ms)):
         if sample is not None:
-            values = (("p50", sample.p50), ("p95", sample.p95), ("max", sample.max))
-            yield f"{name}: {', '.join(f'{key} {phrases.duration(value)}' for key, value in values)}", "  "
+            yield f"{name}: {phrases.percentiles(sample)}", "  "
     if effect := phrases.offsets(group):
         yield f"offset: {effect}", "  "
     for finding in group.findings:
@@ -74,7 +69,7 @@ def _of_group_in_full(group: Group) -> Iterator[tuple[str, str]]:
 
 
 def _finding(finding: Finding) -> Iterator[tuple[str, str]]:
-    level = "" if finding.severity is Level.OK else f"{phrases.LEVELS[finding.severity]}: "
+    level = "" if finding.severity is Level.OK else f"{finding.severity.name}: "
     yield f"{level}{finding.text}", "  "
     if finding.suggestion:
         yield f"fix: {finding.suggestion}", "    "
@@ -96,7 +91,7 @@ def _input(each: Input, problem: Finding | None) -> Iterator[tuple[str, str]]:
 
 
 def wrapped(text: str, *, indent: str = "", width: int = WIDTH) -> list[str]:
-    """Return a text as lines of at most so many columns, but for words that are longer."""
+    """Return a text as lines of at most `width` columns; only words that are longer stick out."""
     return wrap(
         text,
         width,

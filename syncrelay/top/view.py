@@ -1,4 +1,4 @@
-"""What a screen shows at one moment: the last state of a relay, and how it stands with the relay since."""
+"""What a screen shows at one moment: the last status of a relay, and whether the relay still answers."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -23,14 +23,14 @@ class Order(Enum):
     NAME = "name"
 
     def following(self) -> "Order":
-        """Return the next one, the first after the last."""
+        """Return the next order, the first after the last."""
         orders = list(Order)
         return orders[(orders.index(self) + 1) % len(orders)]
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The last answer; `trouble` says why there is no newer one, `quiet_s` for how long."""
+    """The last answer; `trouble` says why none came since, for `quiet_s` seconds."""
 
     answer: Answer
     trouble: str | None = None
@@ -39,32 +39,30 @@ class View:
 
     @property
     def is_stale(self) -> bool:
-        """Whether what is shown may not be so any more."""
+        """Whether what is shown may be outdated."""
         return self.trouble is not None
 
     def group(self, name: str) -> Group | None:
-        """Return a group by its name, None where it is gone."""
-        return next((group for group in self.answer.state.groups if group.name == name), None)
+        """Return the group of a name, None where the relay has none."""
+        return next((group for group in self.answer.status.groups if group.name == name), None)
 
     def groups(self, order: Order) -> list[Group]:
-        """Return the groups in an order; those that are equal in it stay as in the file."""
-        groups = list(self.answer.state.groups)
-        match order:
-            case Order.FILE:
-                return groups
-            case Order.WORST:
-                return sorted(groups, key=lambda group: _WORST_FIRST.index(group.level))
-            case Order.NAME:
-                return sorted(groups, key=lambda group: group.name)
+        """Return the groups in an order; equal ones stay as in the file."""
+        groups = list(self.answer.status.groups)
+        if order is Order.WORST:
+            groups.sort(key=lambda group: _WORST_FIRST.index(group.level))
+        elif order is Order.NAME:
+            groups.sort(key=lambda group: group.name)
+        return groups
 
 
 def title(view: View, width: int) -> list[Text]:
-    """Draw which relay it is and how it fares; more lines say what a managed node needs, or that it is stale."""
-    relay = view.answer.state.relay
-    fares = f"{phrases.phase(relay)}, up {phrases.seconds(relay.uptime_s)}"
+    """Draw the relay's name and state; more lines say what a managed node needs, or that the view is stale."""
+    relay = view.answer.status.relay
+    state = f"{phrases.phase(relay)}, up {phrases.seconds(relay.uptime_s)}"
     name = Text.assemble((relay.node, "bold"), f" {phrases.place(relay, view.answer.url.removeprefix('http://'))}")
-    name.truncate(max(0, width - len(fares) - 2), overflow="ellipsis", pad=True)
-    lines = [line(name, "  ", (fares, "" if relay.ready else STYLES[Level.WARN]))]
+    name.truncate(max(0, width - len(state) - 2), overflow="ellipsis", pad=True)
+    lines = [line(name, "  ", (state, "" if relay.ready else STYLES[Level.WARN]))]
     if (needed := advice(relay.phase, relay.node)) is not None:
         lines += wrapped(needed, width, first=Text(""), style=STYLES[Level.WARN])
     if view.trouble is not None:

@@ -28,8 +28,12 @@ def test_a_state_comes_back_as_it_was_told():
     with serving(told) as server:
         answer = ask(server.url)
     assert answer.document == server.body
-    (report,), (group,) = told.groups, answer.state.groups
-    assert (answer.state.relay.node, answer.state.relay.ready, answer.state.relay.uptime_s) == ("/syncrelay", True, 30)
+    (report,), (group,) = told.groups, answer.status.groups
+    assert (answer.status.relay.node, answer.status.relay.ready, answer.status.relay.uptime_s) == (
+        "/syncrelay",
+        True,
+        30,
+    )
     assert (group.name, group.level, group.sets) == ("front", Level.OK, report.facts.figures.sets)
     assert group.recent == report.recent
     assert [each.topic for each in group.inputs] == ["/camera/image_raw", "/lidar/points"]
@@ -44,12 +48,12 @@ def test_a_state_comes_back_as_it_was_told():
 @pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)
 def test_every_state_is_understood(state):
     with serving(state()) as server:
-        assert ask(server.url).state.groups
+        assert ask(server.url).status.groups
 
 
 def test_the_first_of_the_worst_findings_explains_a_group():
     with serving(states.rig()) as server:
-        groups = ask(server.url).state.groups
+        groups = ask(server.url).status.groups
     explanations = [group.explanation.code for group in groups if group.explanation]
     assert explanations == ["healthy", "other_clock", "short_queue", "no_publisher"]
 
@@ -59,7 +63,7 @@ def test_an_input_tells_its_offset_and_a_strange_key_is_left_aside():
     group["topics"][0]["offset"] = "-12ms"
     with serving(states.simulated(states.file(front=group), {})) as server:
         server.body = server.body.replace(b'"relay": {', b'"key_of_tomorrow": 1, "relay": {', 1)
-        (shown,) = ask(server.url).state.groups
+        (shown,) = ask(server.url).status.groups
     assert [each.offset_ms for each in shown.inputs] == [-12, 0]
 
 
