@@ -25,9 +25,9 @@ from syncrelay.recordings.fleet.task import JSON, Source, fingerprint_of, what_d
 from syncrelay.recordings.fleet.tasks import about, counts_of, few_sets
 
 EPISODES: Final = ".episodes"
-"""The folder in OUT with each recording's episode, so that only what is missing is done again."""
+"""The folder in OUT that keeps the episode of each recording, so that only what is missing is done again."""
 
-# What readers look at first is there last, and goes first.
+# Readers look at the last of these first: it is removed first, and put in place last.
 _PARTS: Final = ("data", "videos", "meta")
 
 
@@ -37,30 +37,21 @@ class ParquetTask:
 
     config: Config
     content: Content
-    decided_by: str
+    fingerprint: str
 
     @classmethod
     def of(cls, config: Config, content: Content) -> Self:
         """Return the task of a file."""
-        fields: dict[str, JSON] = {topic: list(paths) for topic, paths in content.fields.items()}
-        groups: list[JSON] = [group.name for group in config.groups]
         options: dict[str, JSON] = {
             "format": "parquet",
-            "groups": groups,
-            "fields": fields,
+            "groups": [group.name for group in config.groups],
+            "fields": {topic: list(paths) for topic, paths in content.fields.items()},
             "images": dict(content.images),
             "other_images": content.other_images,
             "raw": content.raw,
         }
-        return cls(
-            config,
-            content,
-            fingerprint_of("export", config=what_decides_sets(config.groups), options=options),
-        )
-
-    def fingerprint(self) -> str:
-        """See Task."""
-        return self.decided_by
+        fingerprint = fingerprint_of("export", config=what_decides_sets(config.groups), options=options)
+        return cls(config, content, fingerprint)
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
@@ -79,19 +70,15 @@ class LerobotTask:
     """Writes a recording as an episode; see Task. Facts are those of write_episode."""
 
     config: Config
-    decided_by: str
+    fingerprint: str
 
     @classmethod
     def of(cls, config: Config) -> Self:
-        """Return the task of a file; raises UsageError where it says nothing of LeRobot."""
+        """Return the task of a file; raises UsageError if it says nothing about LeRobot."""
         lerobot = lerobot_of(config)
         chosen = [group for group in config.groups if group.name == lerobot.group]
         options: dict[str, JSON] = {"format": "lerobot", "lerobot": repr(lerobot)}
         return cls(config, fingerprint_of("export", config=what_decides_sets(chosen), options=options))
-
-    def fingerprint(self) -> str:
-        """See Task."""
-        return self.decided_by
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
@@ -100,7 +87,7 @@ class LerobotTask:
 
 
 def require_own(out: Path) -> None:
-    """Raise SyncRelayError where a folder holds anything but a former dataset of ours."""
+    """Raise SyncRelayError if a folder holds anything but an earlier dataset of ours."""
     try:
         is_other = out.exists() and not (out / EPISODES).is_dir() and any(out.iterdir())
     except OSError as error:
@@ -112,20 +99,17 @@ def require_own(out: Path) -> None:
 def join(run: Run, sources: Sequence[Source], out: Path) -> dict[str, Any]:
     """Put the dataset of all episodes in place, in the order of the recordings, and return what it has.
 
-    Raises SyncRelayError where no recording gave an episode.
+    Raises SyncRelayError if no recording gave an episode.
     """
     entries = {job.source.name: run.entry(job) for job in run.jobs}
+    ordered = [entries[source.name] for source in sources]
+    done = [entry.name for entry in ordered if entry is not None and entry.state is State.DONE]
     into = out / EPISODES
-    done = [
-        entry
-        for entry in (entries[source.name] for source in sources)
-        if entry is not None and entry.state is State.DONE
-    ]
     if not done:
         raise SyncRelayError(f"{out}: no recording gave an episode, so there is no dataset")
     scratch = into / SCRATCH / f"dataset.{uuid4().hex}"
     scratch.mkdir(parents=True)
-    facts = join_episodes({entry.name: into / entry.name for entry in done}, scratch)
+    facts = join_episodes({name: into / name for name in done}, scratch)
     for part in reversed(_PARTS):
         shutil.rmtree(out / part, ignore_errors=True)
     for part in _PARTS:

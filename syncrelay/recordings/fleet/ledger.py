@@ -3,6 +3,7 @@
 import fcntl
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from io import FileIO
@@ -143,8 +144,7 @@ class Ledger:
             raise SyncRelayError(f"{self.folder / LEDGER}: is not a ledger of this syncrelay: name another folder")
         if whole_lines < len(content):
             self._file.truncate(whole_lines)
-        for line in content[len(_HEAD) : whole_lines].split(b"\n")[:-1]:
-            entry = _entry(line)
+        for entry in _entries(content[:whole_lines]):
             if entry is None:
                 self.unreadable += 1
             else:
@@ -164,13 +164,14 @@ def read_ledger(folder: Path) -> list[Entry]:
         content = (folder / LEDGER).read_bytes()
     except OSError as error:
         raise SyncRelayError(f"{folder}: its {LEDGER} cannot be read: {error.strerror}") from error
-    entries = {entry.name: entry for line in content.split(b"\n")[1:-1] if (entry := _entry(line)) is not None}
+    entries = {entry.name: entry for entry in _entries(content) if entry is not None}
     return [entries[name] for name in sorted(entries)]
 
 
-def _entry(line: bytes) -> Entry | None:
-    """Read a line; None for one that a power failure or an editor damaged."""
-    try:
-        return _ENTRY.validate_python(json.loads(line))
-    except (ValueError, RecursionError):
-        return None
+def _entries(content: bytes) -> Iterator[Entry | None]:
+    """Yield the whole lines after the first; None stands for a line that a power failure or an editor damaged."""
+    for line in content.split(b"\n")[1:-1]:
+        try:
+            yield _ENTRY.validate_python(json.loads(line))
+        except (ValueError, RecursionError):
+            yield None

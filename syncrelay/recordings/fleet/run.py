@@ -34,7 +34,7 @@ class Run:
 
         Raises SyncRelayError if the folder cannot be used, or holds other results that are not to be replaced.
         """
-        self._fingerprint = task.fingerprint()
+        self._fingerprint = task.fingerprint
         self._ledger = Ledger(into)
         self.unreadable = self._ledger.unreadable
         """How many lines of the ledger could not be read; these recordings are done again."""

@@ -45,8 +45,9 @@ class Source:
 class Task(Protocol):
     """What is done to each recording. A frozen value that can be pickled: it goes to other processes and machines."""
 
+    @property
     def fingerprint(self) -> str:
-        """Return what decides the result of a recording, see fingerprint_of."""
+        """What decides the result of a recording, see fingerprint_of."""
         ...
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:

@@ -46,19 +46,14 @@ class ReplayTask:
     config: Config
     what_if: tuple[Fault, ...]
     seed: int
-    decided_by: str
+    fingerprint: str
 
     @classmethod
     def of(cls, config: Config, what_if: tuple[Fault, ...], seed: int) -> Self:
-        """Return the task of a file, with faults laid over each recording whose chance is that of `seed`."""
+        """Return the task of a file. Faults that are random are drawn with `seed`."""
         options: dict[str, JSON] = {"what_if": [fault.written for fault in what_if], "seed": seed if what_if else 0}
-        return cls(
-            config, what_if, seed, fingerprint_of("replay", config=what_decides_outputs(config.groups), options=options)
-        )
-
-    def fingerprint(self) -> str:
-        """See Task."""
-        return self.decided_by
+        fingerprint = fingerprint_of("replay", config=what_decides_outputs(config.groups), options=options)
+        return cls(config, what_if, seed, fingerprint)
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
@@ -86,7 +81,7 @@ class AnalyzeTask:
     text: str | None
     topics: tuple[str, ...]
     file_hash: str | None
-    decided_by: str
+    fingerprint: str
 
     @classmethod
     def of(cls, *, file: str | None, text: str | None, topics: tuple[str, ...]) -> Self:
@@ -95,10 +90,6 @@ class AnalyzeTask:
         config = what_decides_sets(groups) if groups else ""
         fingerprint = fingerprint_of("analyze", config=config, options={"topics": list(topics)})
         return cls(file, text, topics, short_hash(config) if config else None, fingerprint)
-
-    def fingerprint(self) -> str:
-        """See Task."""
-        return self.decided_by
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
@@ -112,7 +103,8 @@ class AnalyzeTask:
                 if self.text is None:
                     analysis = settled(analysis)
                 document = as_json(source.shown[0], analysis)
-                groups: list[JSON] = [
+                facts = about(recording, bindings)
+                facts["groups"] = [
                     {
                         "name": each.group.name,
                         "sets": len(each.evaluation.sets),
@@ -120,21 +112,16 @@ class AnalyzeTask:
                     }
                     for each in analysis.groups
                 ]
-                facts = {**about(recording, bindings), "groups": groups}
-                rows = rows_of(
-                    analysis,
-                    recording=source.shown[0],
-                    problems=problems_of(recording, bindings),
-                    file=self.file,
-                    file_hash=self.file_hash,
-                )
+                problems = problems_of(recording, bindings)
+                about_file = {"file": self.file, "file_hash": self.file_hash}
+                rows = rows_of(analysis, recording=source.shown[0], problems=problems, **about_file)
                 (folder / FACTS).write_text("".join(f"{row.model_dump_json()}\n" for row in rows), encoding="utf-8")
         (folder / ANALYSIS).write_text(f"{json.dumps(document, indent=2)}\n")
         return facts
 
 
 def about(recording: Recording, bindings: Sequence[GroupBinding], *, more: Sequence[str] = ()) -> dict[str, JSON]:
-    """Return when a recording was made, and what is wrong with it: what it lacks, `more`, what could not be read."""
+    """Return the facts of any recording: when it begins and ends, and its problems, with `more` of them."""
     problems: list[JSON] = [*problems_of(recording, bindings), *more]
     facts: dict[str, JSON] = {"begin": recording.begin, "end": recording.end}
     return {**facts, PROBLEMS: problems} if problems else facts
@@ -147,7 +134,7 @@ def problems_of(recording: Recording, bindings: Sequence[GroupBinding]) -> list[
 
 
 def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Sequence[GroupResult]) -> dict[str, JSON]:
-    """Return notes: of each group that is complete and gave few of the possible sets, what costs the others."""
+    """Return a note for each complete group that gave few of its possible sets: what costs the others."""
     found = [
         why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
         for binding, result in zip(bindings, results, strict=True)
@@ -158,7 +145,7 @@ def few_sets(recording: Recording, bindings: Sequence[GroupBinding], results: Se
 
 
 def counts_of(result: GroupResult) -> dict[str, JSON]:
-    """Return what became of the messages of a group, in the words of an analysis."""
+    """Return the sets of a group and what became of its messages, under the keys that an analysis has."""
     inputs: list[JSON] = [
         {
             "topic": each.topic,

@@ -17,6 +17,7 @@ class Obedient:
 
     option: int = 0
 
+    @property
     def fingerprint(self) -> str:
         return fingerprint_of("copy", config="", options={"option": self.option})
 
