@@ -12,7 +12,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Where an image sets it, each process that the tests start would compile all modules of this tree again: 0.06 to 0.2 s.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-fast test-kilted test-container test-workspace test-fleet test-lerobot test-release faults soak lint schema reference docs bench wheel release clean
+.PHONY: demo test test-fast test-kilted test-container test-workspace test-fleet test-lerobot test-release test-bare faults soak lint schema reference docs bench wheel release clean
 
 demo: $(VENV)/demo
 	$(BIN)/syncrelay demo --seconds 10
@@ -45,6 +45,13 @@ test-workspace: $(VENV)/test $(VENV)/colcon/done
 # Makes a release in a clone of this one, from whatever is committed.
 test-release: $(VENV)/test
 	SYNCRELAY_RELEASE=1 $(BIN)/python -m pytest -s tests/test_release.py $(ARGS)
+
+# What `pip install .` alone gives, in a venv that has nothing else: every command runs, or says which extra to install.
+test-bare: $(VENV)/test
+	rm -rf $(VENV)/bare
+	$(BIN)/python -m venv $(VENV)/bare
+	$(VENV)/bare/bin/python -m pip install -q $(CONSTRAINTS) .
+	SYNCRELAY_BARE=$(abspath $(VENV)/bare/bin/python) $(BIN)/python -m pytest tests/cli/test_extras.py $(ARGS)
 
 # Many recordings on Ray clusters, each in namespaces of its own, and from servers of object storage on this machine.
 # SYNCRELAY_FAULTS=long takes 1,000 recordings. Not in CI: what it installs takes two minutes.
@@ -108,7 +115,7 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV) || { apt-get update && apt-get install -y python3-venv && $(PYTHON) -m venv $(VENV); }
 
 $(VENV)/demo: $(BIN)/python $(BUILT_OF)
-	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),top]'
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[$(ROS),top,recordings]'
 	touch $@
 
 $(VENV)/test: $(BIN)/python $(BUILT_OF)
