@@ -63,7 +63,6 @@ _MAINS: Final = {
 _OF_NODES: Final = (
     "rclpy.executors",
     "syncrelay.cli.run",
-    "syncrelay.cli.services",
     "syncrelay.explain.summary",
     "syncrelay.config",
     "syncrelay.logs",

@@ -10,7 +10,6 @@ import signal
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,7 +23,7 @@ from syncrelay.cli.commands import COMMANDS
 from syncrelay.cli.parser import IMAGE_FORMATS, ROS_ARGS, Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
-from syncrelay.yaml_files import yaml_files
+from syncrelay.yaml_files import group_names, yaml_files
 
 _PROGRAM: Final = "syncrelay"
 # Of processor time: a recording without an index, or compressed as a whole, may take long to open.
@@ -158,41 +157,6 @@ def _groups(_typed: str, arguments: Namespace) -> Iterator[str]:
                 if path.is_file():
                     with path.open("rb") as file:
                         yield from group_names(file.read(_MOST_BYTES))
-
-
-def group_names(text: bytes) -> Iterator[str]:
-    """Give the keys below `groups` of a YAML text, up to its first fault."""
-    import yaml
-
-    # The open mappings and lists, each with the last of its scalars, and whether a mapping expects a key next.
-    opened: list[_Opened] = []
-    with suppress(yaml.YAMLError):
-        for event in yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-            if isinstance(event, yaml.NodeEvent) and opened:
-                key = opened[-1].take(event.value if isinstance(event, yaml.ScalarEvent) else "")
-                if key not in ("", "<<") and [each.key for each in opened[:-1]] == ["groups"]:
-                    yield key
-            if isinstance(event, yaml.CollectionStartEvent):
-                opened.append(_Opened(isinstance(event, yaml.MappingStartEvent)))
-            elif isinstance(event, yaml.CollectionEndEvent):
-                opened.pop()
-
-
-@dataclass(slots=True)
-class _Opened:
-    """A mapping or a list whose end has not come: its last key, and whether a key is next."""
-
-    is_mapping: bool
-    key: str = ""
-    expects_key: bool = True
-
-    def take(self, text: str) -> str:
-        """Take what comes next in it; return it if it is a key."""
-        is_key = self.is_mapping and self.expects_key
-        self.expects_key = not self.expects_key
-        if is_key:
-            self.key = text
-        return text if is_key else ""
 
 
 def _recordings_and_topics(typed: str, arguments: Namespace) -> Iterator[str]:

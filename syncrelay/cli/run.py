@@ -4,6 +4,7 @@ import os
 import traceback
 from argparse import Namespace
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from syncrelay import own_version
 from syncrelay.cli.boundary import DONE, EXIT_CODES, put
-from syncrelay.cli.config_files import ConfigFiles, Reading
 from syncrelay.cli.healthcheck import VARIABLE, Heartbeat
 from syncrelay.cli.parser import Parser, folded
 from syncrelay.cli.stop import StopRequest
@@ -20,6 +20,7 @@ from syncrelay.errors import ListenError, ReloadError, SyncRelayError, UsageErro
 
 if TYPE_CHECKING:
     from syncrelay.config import Config, Listen
+    from syncrelay.config.rereading import ConfigFiles, Reading
     from syncrelay.ros.relay import Relay
     from syncrelay.status.server import Server
 
@@ -107,6 +108,7 @@ def run(
     cannot be used.
     """
     with resting_collector():
+        from syncrelay.config.rereading import ConfigFiles
         from syncrelay.logs import LOGGER, configure
         from syncrelay.ros.environment import require_rclpy
 
@@ -116,18 +118,20 @@ def run(
     config = loaded(config_paths, groups)
     require_rclpy()
     with resting_collector():
-        from syncrelay.cli.services import services
         from syncrelay.explain.summary import log_summary
         from syncrelay.ros.relay import Relay
 
     def managed(relay: Relay) -> Callable[..., Any]:
-        from syncrelay.cli.managed import Managed
         from syncrelay.ros.lifecycle import ManagedNode
+        from syncrelay.ros.managed import Managed
 
         def require(config: "Config") -> None:
             _require_groups(groups, config, config_paths)
 
-        return partial(ManagedNode, transitions=Managed(relay, paths=config_paths, require=require, stop=stop))
+        return partial(
+            ManagedNode,
+            transitions=Managed(relay, paths=config_paths, require=require, is_stopped=lambda: stop.requested),
+        )
 
     stop.defer()
     with (
@@ -153,7 +157,14 @@ def run(
                 server.place.url,
             )
         if config.node.services:
-            relay.offer(services(relay, files))
+            relay.offer(
+                {
+                    "reload": files.read_again,
+                    "status": lambda: _status(relay),
+                    "pause": lambda: relay.call(relay.pause),
+                    "resume": lambda: relay.call(relay.resume),
+                }
+            )
         _relay_until(stop, relay, files, lambda read: _reload(relay, read, config_paths, groups))
         log_summary(relay.drain())
     return 0
@@ -176,7 +187,17 @@ def loaded(config_paths: Sequence[str], groups: Sequence[str]) -> "Config":
     return config
 
 
-def _relay_until(stop: StopRequest, relay: "Relay", files: ConfigFiles, reload: Callable[[Reading], None]) -> None:
+def _status(relay: "Relay") -> Future[str]:
+    # Imported when it is first asked for, which may be never.
+    from syncrelay.status import status_of
+    from syncrelay.top.plain import summary
+
+    told: Future[str] = Future()
+    told.set_result(summary(status_of(relay.state())))
+    return told
+
+
+def _relay_until(stop: StopRequest, relay: "Relay", files: "ConfigFiles", reload: "Callable[[Reading], None]") -> None:
     while not stop.requested:
         relay.step()
         if stop.take_reload():
@@ -185,7 +206,7 @@ def _relay_until(stop: StopRequest, relay: "Relay", files: ConfigFiles, reload: 
             reload(read)
 
 
-def _reload(relay: "Relay", read: Reading, config_paths: Sequence[str], groups: Sequence[str]) -> None:
+def _reload(relay: "Relay", read: "Reading", config_paths: Sequence[str], groups: Sequence[str]) -> None:
     """Take on the files as they were read again; whatever is wrong with them, the relay keeps its configuration."""
     from syncrelay.logs import LOGGER
 

@@ -13,7 +13,8 @@ import pytest
 from syncrelay.cli import completion
 from syncrelay.cli import run as relay
 from syncrelay.cli.commands import COMMANDS
-from syncrelay.cli.completion import COMPLETERS, group_names
+from syncrelay.cli.completion import COMPLETERS
+from syncrelay.yaml_files import group_names
 from tests.cli.command import ROOT, run, run_python
 from tests.cli.shells import Shell
 from tests.recordings.bag.making import rig, write_mcap, write_rosbag2

@@ -1,10 +1,7 @@
 """What `observe` ends with, by the reports of its groups."""
 
-import pytest
-
-from syncrelay.cli.boundary import AT_FAULT, DONE
-from syncrelay.cli.observe import conclude
 from syncrelay.explain import GroupReport, judge
+from syncrelay.top.observed import unhealthy
 from tests.cli.command import GOOD, run
 from tests.explain.support.groups import NOW, S, a_group, an_input
 
@@ -13,27 +10,18 @@ def _report(facts) -> GroupReport:
     return GroupReport(facts, judge(facts))
 
 
-def test_where_all_groups_are_healthy_the_code_is_0_and_nothing_decided_it(capsys: pytest.CaptureFixture[str]):
-    assert conclude([_report(a_group())], 10) == DONE
-    assert capsys.readouterr().out == ""
+def test_healthy_groups_are_no_fault():
+    assert unhealthy([_report(a_group())], 10) == []
 
 
-def test_a_look_that_is_too_short_says_what_decided(capsys: pytest.CaptureFixture[str]):
-    assert conclude([_report(a_group(figures={"last_set": None, "sets": 0, "began": NOW - S}))], 1.2) == AT_FAULT
-    assert capsys.readouterr().out.splitlines()[-1] == (
-        "exit code 1: front produced no set in 1 s, which is too short to tell why: observe it for longer"
-    )
-
-
-def test_findings_of_a_group_decide_and_are_counted(capsys: pytest.CaptureFixture[str]):
+def test_what_decides_against_a_group_is_said_and_counted():
+    too_short = _report(a_group(figures={"last_set": None, "sets": 0, "began": NOW - S}))
     lonely = _report(a_group(an_input(publishers=()), an_input("/lidar", publishers=())))
-    assert conclude([_report(a_group()), lonely], 10) == AT_FAULT
-    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: front has 1 warning"
-
-
-def test_a_group_of_which_there_is_no_report_is_not_healthy(capsys: pytest.CaptureFixture[str]):
-    assert conclude([_report(a_group())], 10, unjudged=["rear"]) == AT_FAULT
-    assert capsys.readouterr().out.splitlines()[-1] == "exit code 1: rear could not be evaluated: see the log"
+    assert unhealthy([_report(a_group()), lonely, too_short], 1.2, unjudged=["rear"]) == [
+        "front has 1 warning",
+        "front produced no set in 1 s, which is too short to tell why: observe it for longer",
+        "rear could not be evaluated: see the log",
+    ]
 
 
 def test_a_file_that_is_there_is_not_written_again_and_nobody_waits_to_hear_it(tmp_path):

@@ -142,8 +142,8 @@ def _parts(times: range) -> list[range]:
 
 # However long a busy machine takes for the other calls meanwhile.
 _PATIENT = """
-from syncrelay.cli import config_files
-config_files._PIPE_S, config_files._PATIENCE_S = 15.0, 60.0
+from syncrelay.config import rereading
+rereading._PIPE_S, rereading._PATIENCE_S = 15.0, 60.0
 """
 
 

@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Final, NamedTuple, Self
+from typing import Final, NamedTuple, Self
 
+from syncrelay.config.load import Config, load
+from syncrelay.config.problems import ConfigError, Problem
 from syncrelay.yaml_files import yaml_files
-
-if TYPE_CHECKING:
-    from syncrelay.config import Config
 
 # `syncrelay reload` waits for 10 s.
 _PATIENCE_S: Final = 6.0
@@ -25,13 +24,13 @@ _SETTLED_S: Final = 3.0
 class Reading(NamedTuple):
     """What came of reading the files: a Config, or what it raised. `asked` wait to be told what it led to, in words."""
 
-    config: "Future[Config]"
-    asked: "tuple[Future[str], ...]"
+    config: Future[Config]
+    asked: tuple[Future[str], ...]
 
 
 class _Request(NamedTuple):
     since: float
-    told: "Future[str]"
+    told: Future[str]
 
 
 class ConfigFiles:
@@ -67,7 +66,7 @@ class ConfigFiles:
         """Call `done`, on the thread that reads, when there is something to take."""
         self._done = done
 
-    def read_again(self) -> "Future[str]":
+    def read_again(self) -> Future[str]:
         """Read the files, on the thread that reads. Any thread.
 
         The future is for who takes what is read from now on, to tell what it led to.
@@ -102,8 +101,6 @@ class ConfigFiles:
                 self._read_now()
 
     def _read_now(self) -> None:
-        from syncrelay.config import load
-
         with self._lock:
             # Who asks while it is being read wants to know what the files are then.
             asked = list(self._waiting)
@@ -132,7 +129,7 @@ class ConfigFiles:
         self._known = marks
         return True
 
-    def _marks(self) -> "dict[str, tuple[int, int, int] | None]":
+    def _marks(self) -> dict[str, tuple[int, int, int] | None]:
         return {file: _mark(Path(file)) for path in self._paths for file in _files(path)}
 
 
@@ -153,9 +150,7 @@ def _mark(path: Path) -> tuple[int, int, int] | None:
     return status.st_ino, status.st_mtime_ns, status.st_size
 
 
-def _failed(paths: Sequence[str]) -> "Future[Config]":
-    from syncrelay.config import ConfigError, Problem
-
+def _failed(paths: Sequence[str]) -> Future[Config]:
     failed: Future[Config] = Future()
     text = f"could not be read within {_PATIENCE_S:g} s"
     failed.set_exception(ConfigError([Problem(", ".join(paths), "", text, "unreadable")]))

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING, Final
 
-from syncrelay.cli.config_files import ConfigFiles
-from syncrelay.cli.stop import StopRequest
+from syncrelay.config import Config
+from syncrelay.config.rereading import ConfigFiles
 from syncrelay.config.wording import counted
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain.summary import log_summary
@@ -14,7 +14,6 @@ from syncrelay.logs import LOGGER
 from syncrelay.status import Phase
 
 if TYPE_CHECKING:
-    from syncrelay.config import Config
     from syncrelay.ros.relay import Relay
 
 # A request to end is seen this soon while a file is being read.
@@ -24,16 +23,22 @@ _LOOK_S: Final = 0.1
 class Managed:
     """Carries out the transitions of a relay's node, on the relay's main thread; see ros.lifecycle.Transitions.
 
-    `require` raises a SyncRelayError for a file that was read and lacks what the command line asks for.
+    `require` raises a SyncRelayError for a file that lacks what the command line asks for; `is_stopped` tells whether
+    the process is to end.
     """
 
     def __init__(
-        self, relay: "Relay", *, paths: Sequence[str], require: "Callable[[Config], None]", stop: StopRequest
+        self,
+        relay: "Relay",
+        *,
+        paths: Sequence[str],
+        require: Callable[[Config], None],
+        is_stopped: Callable[[], bool],
     ) -> None:
         self._relay = relay
         self._paths = paths
         self._require = require
-        self._stop = stop
+        self._is_stopped = is_stopped
 
     def configure(self) -> None:
         """Read the files and prepare their groups."""
@@ -79,14 +84,14 @@ class Managed:
     def _forget(self, phase: Phase) -> None:
         self._relay.call(lambda: self._relay.forget_groups(phase)).result()
 
-    def _read(self) -> "Config":
+    def _read(self) -> Config:
         """Read the files; raises ConfigError, and CancelledError where the end comes first."""
         is_read = threading.Event()
         with ConfigFiles(self._paths, watched=False) as files:
             files.call_when_read(is_read.set)
             files.read_again()
             while (read := files.take()) is None:
-                if self._stop.requested:
+                if self._is_stopped():
                     raise CancelledError
                 is_read.wait(_LOOK_S)
             return read.config.result()

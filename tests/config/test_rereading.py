@@ -11,10 +11,8 @@ from pathlib import Path
 
 import pytest
 
-import syncrelay.config
-from syncrelay.cli import config_files
-from syncrelay.cli.config_files import ConfigFiles, Reading
-from syncrelay.config import Config, ConfigError
+from syncrelay.config import Config, ConfigError, rereading
+from syncrelay.config.rereading import ConfigFiles, Reading
 from tests.cli.command import GOOD
 from tests.ros.processes import wait_until
 
@@ -30,20 +28,20 @@ def path(tmp_path: Path) -> Path:
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have no busy machine make anything seem to hang."""
-    monkeypatch.setattr(config_files, "_PATIENCE_S", 600.0)
-    monkeypatch.setattr(config_files, "_PIPE_S", 600.0)
+    monkeypatch.setattr(rereading, "_PATIENCE_S", 600.0)
+    monkeypatch.setattr(rereading, "_PIPE_S", 600.0)
 
 
 @pytest.fixture
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have what changed be read at the first look."""
-    monkeypatch.setattr(config_files, "_SETTLED_S", 0.0)
+    monkeypatch.setattr(rereading, "_SETTLED_S", 0.0)
 
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have what hangs told soon, and a pipe still be waited for."""
-    monkeypatch.setattr(config_files, "_PATIENCE_S", 0.05)
+    monkeypatch.setattr(rereading, "_PATIENCE_S", 0.05)
 
 
 @pytest.fixture
@@ -109,7 +107,7 @@ def test_what_reading_raises_is_raised_where_the_file_is_wanted(files: ConfigFil
     def fail(*_paths: str, **_options: object) -> None:
         raise ZeroDivisionError("a bug of ours")
 
-    monkeypatch.setattr(syncrelay.config, "load", fail)
+    monkeypatch.setattr(rereading, "load", fail)
     files.read_again()
     with pytest.raises(ZeroDivisionError, match="a bug of ours"):
         taken(files).result()
@@ -220,7 +218,7 @@ def test_a_watched_file_is_read_when_it_is_whole_again_and_once_for_each_version
 
 @pytest.mark.usefixtures("soon")
 def test_a_pipe_moved_over_a_watched_file_is_told_and_then_what_replaces_it_is_read(path: Path, monkeypatch):
-    monkeypatch.setattr(config_files, "_PIPE_S", 0.05)
+    monkeypatch.setattr(rereading, "_PIPE_S", 0.05)
     with ConfigFiles([str(path)], watched=True) as files:
         fifo_over(path)
         with pytest.raises(ConfigError, match="is it a pipe that nobody writes to, or closes"):
