@@ -11,6 +11,9 @@ from syncrelay.recording_files import scheme_of
 SERVERS: Final = ("http", "https")
 """Schemes of servers, which list no folders and take no files."""
 
+LOCAL: Final = ("file", "local")
+"""Schemes of files of this machine."""
+
 REPLACED: Final = "was replaced or removed while it was being read: read it again"
 """What is wrong with a file that is not the one that was opened."""
 
@@ -86,7 +89,7 @@ def file_system(url: str) -> tuple[Any, str]:
     except ImportError as error:
         raise UnavailableError(
             f"{redacted(url)}: what reads and writes {scheme_of(url)}:// URLs is not installed: "
-            "pip install 'FOLDER-OF-SYNCRELAY[fleet]'"
+            "pip install 'syncrelay[fleet]' (in a clone: pip install '.[fleet]')"
         ) from error
     if scheme_of(url) == "s3":
         # botocore tries again too, as AWS_MAX_ATTEMPTS says: three loops in one another would hardly end.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.fleet_options import add_fleet_options, require_into
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
-from syncrelay.cli.parser import Parser, output
+from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 
@@ -36,12 +36,8 @@ def parser() -> Parser:
         "more", metavar="BAG|TOPIC", nargs="*", help="more recordings; topics to match, if there is no file yet"
     )
     parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
-    parser.add_argument(
-        "--write", metavar="NEW", type=output, help="write the file with the suggested values; keeps its comments"
-    )
-    parser.add_argument(
-        "--html", metavar="REPORT", type=output, help="write a report with charts: one HTML file, opens offline"
-    )
+    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
+    parser.add_argument("--html", metavar="REPORT", help="write a report with charts: one HTML file, opens offline")
     parser.add_argument(
         "--json",
         action="store_true",
@@ -98,6 +94,7 @@ def _analyze_many(
     """Leave an analysis of each recording in a folder, and a table of all of them where there are groups."""
     from syncrelay.cli.fleet import do_on_many
     from syncrelay.config.wording import counted
+    from syncrelay.output_files import local_path
     from syncrelay.recordings.fleet.robots import RobotPattern
     from syncrelay.recordings.fleet.summary import Summary
     from syncrelay.recordings.fleet.table import TABLE, fleet_rows, write_table
@@ -113,7 +110,8 @@ def _analyze_many(
     if not has_groups:
         return do_on_many(task, bags, arguments)
     pattern = None if arguments.robot is None else RobotPattern.parse(arguments.robot)
-    folder, summary = Path(arguments.into), Summary()
+    # do_on_many refuses a store.
+    folder, summary = local_path(arguments.into) or Path(), Summary()
 
     def finish(*_: object) -> int:
         for row in write_table(folder, fleet_rows(folder, pattern)):

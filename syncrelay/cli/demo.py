@@ -8,12 +8,11 @@ from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.commands import is_installed, line_to_install
-from syncrelay.cli.parser import Parser, output, positive
+from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 
@@ -51,7 +50,6 @@ def parser() -> Parser:
     parser.add_argument(
         "--record",
         metavar="OUT",
-        type=output,
         help="write what the sensors send in N seconds (30) as a recording, at once and without ROS: OUT.mcap, or OUT"
         " as a rosbag2 folder",
     )
@@ -221,7 +219,7 @@ def record(name: str, seconds: float, seed: int) -> int:
             yield shot.sent + _ON_THE_WAY, name, patch_stamp(frames[shot.number % len(frames)], shot.stamp)
 
     counts = dict.fromkeys(SENSORS, 0)
-    with McapOutput(Path(name)) as recording:
+    with McapOutput(name) as recording:
         outputs = {}
         for sensor_name, sensor in SENSORS.items():
             profile = Profile(depth=5, reliability="reliable" if sensor.reliable else "best_effort")

@@ -3,7 +3,6 @@
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
@@ -106,10 +105,15 @@ def _export_lerobot(config: "Config", arguments: Namespace) -> int:
     """Write a LeRobotDataset of all recordings into the folder of the arguments, from an episode of each."""
     from syncrelay.cli.fleet import do_on_many
     from syncrelay.config.wording import counted
+    from syncrelay.output_files import local_path
     from syncrelay.recordings.fleet.export_tasks import EPISODES, LerobotTask, join, require_own
+    from syncrelay.urls import redacted
 
     task = LerobotTask.of(config)
-    out = Path(arguments.into).absolute()
+    path = local_path(arguments.into)
+    if path is None:
+        raise UsageError(f"{redacted(arguments.into)}: episodes are joined on this machine: name a folder of it")
+    out = path.absolute()
     require_own(out)
 
     def finish(run: "Run", sources: "Sequence[Source]") -> int:

@@ -5,21 +5,25 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, OUR_BUG, put, remark, say
 from syncrelay.cli.stop import Terminated
 from syncrelay.config.wording import counted
-from syncrelay.errors import SyncRelayError
+from syncrelay.errors import SyncRelayError, UsageError
+from syncrelay.output_files import local_path
 from syncrelay.printable import printable
 from syncrelay.recordings.fleet.job import Engine, Failed, Finished
 from syncrelay.recordings.fleet.local import LocalEngine
 from syncrelay.recordings.fleet.progress import Progress
 from syncrelay.recordings.fleet.recordings import find_sources
 from syncrelay.recordings.fleet.run import Others, Run
+from syncrelay.recordings.fleet.store import ResultStore
 from syncrelay.recordings.fleet.task import NOTES, PROBLEMS, Source, Task
+from syncrelay.urls import redacted
 
 _EVERY_S: Final = 10.0
 _CLEARED: Final = "\r\033[K"
@@ -35,17 +39,26 @@ def do_on_many(task: Task, words: Sequence[str], arguments: Namespace, *, finish
     the summary on stdout. Returns the exit code: 1 if a recording is at fault. Raises SyncRelayError if a word names no
     recording, or the folder cannot be used; with --strict also for the first recording that is at fault.
     """
-    into = Path(os.path.abspath(arguments.into))  # noqa: PTH100  a link keeps its name
-    sources = find_sources(words, into=into)
-    others = Others.REPLACED if arguments.overwrite else Others.REFUSED
-    with Run(task, sources, into=into, others=others, time_limit=arguments.time_limit) as run:
+    path, named = local_path(arguments.into), redacted(arguments.into)
+    if path is None and finish is not None:
+        raise UsageError(f"{named}: this command reads its results again: name a folder of this machine")
+    with ExitStack() as opened:
+        store = None if path is not None else ResultStore(arguments.into.rstrip("/"))
+        if path is None:
+            path = Path(opened.enter_context(TemporaryDirectory(prefix="syncrelay-")))
+        into = Path(os.path.abspath(path))  # noqa: PTH100  a link keeps its name
+        sources = find_sources(words, into=into if store is None else store.url)
+        others = Others.REPLACED if arguments.overwrite else Others.REFUSED
+        run = opened.enter_context(
+            Run(task, sources, into=into, others=others, time_limit=arguments.time_limit, store=store)
+        )
         if run.unreadable:
             lines = counted(run.unreadable, "line")
-            remark(f"{into}: {lines} of its ledger cannot be read; those recordings are done again")
+            remark(f"{named}: {lines} of its ledger cannot be read; those recordings are done again")
         progress = Progress(run.jobs, time.monotonic())
         try:
             code = _go(run, progress, arguments)
-            summary = printable(f"{arguments.into}: {progress.summary()}")
+            summary = printable(f"{named}: {progress.summary()}")
             if finish is None:
                 put(summary)
                 return code

@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 
-from syncrelay.cli.parser import Parser, count, duration, output
+from syncrelay.cli.parser import Parser, count, duration
 
 
 def add_fleet_options(parser: Parser, *into: str) -> None:
@@ -15,7 +15,6 @@ def add_fleet_options(parser: Parser, *into: str) -> None:
         *(into or ("--into",)),
         dest="into",
         metavar="FOLDER",
-        type=output,
         help="do each recording by itself, unless its result is in FOLDER already; BAG may be a pattern, a folder, a"
         " URL, or @FILE that lists them",
     )

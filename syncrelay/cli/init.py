@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import DONE, put, remark, say
 from syncrelay.cli.new_file import write_new
-from syncrelay.cli.parser import Parser, output, positive
+from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.errors import NothingToMatchError
 from syncrelay.printable import printable
@@ -34,7 +34,7 @@ def parser() -> Parser:
     source.add_argument("--from-bag", metavar="BAG", help="a recording, as for replay; needs no ROS")
     source.add_argument("--from-graph", action="store_true", help="listen to what is being published now")
     parser.add_argument("--seconds", metavar="N", type=positive, help="with --from-graph: listen for N s (10)")
-    parser.add_argument("-o", "--output", metavar="NEW", type=output, help="write the file here instead of printing it")
+    parser.add_argument("-o", "--output", metavar="NEW", help="write the file here instead of printing it")
     return parser
 
 

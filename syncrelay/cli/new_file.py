@@ -1,11 +1,10 @@
 """Files that a command writes, and never over something of the user's."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import remark
-from syncrelay.errors import OutputError
-from syncrelay.output_files import require_new, written_whole
+from syncrelay.output_files import begins_with, require_new, written_whole
+from syncrelay.urls import redacted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,8 +16,8 @@ _HEAD: Final = 500
 
 def write_new(name: str, text: str) -> None:
     """Write a file that is not there yet, and say so; raises OutputError for one that is, or cannot be written."""
-    require_new(Path(name))
-    _write(Path(name), text)
+    require_new(name)
+    _write(name, text)
 
 
 def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
@@ -33,21 +32,12 @@ def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
 
 def write_again(name: str, text: str, *, mark: str) -> None:
     """Write a file as write_new does, but also over one that has a mark near its begin: a former one of the kind."""
-    path = Path(name)
-    if not (path.is_file() and _bears(path, mark)):
-        require_new(path)
-    _write(path, text)
+    if mark.encode() not in begins_with(name, _HEAD):
+        require_new(name)
+    _write(name, text)
 
 
-def _write(path: Path, text: str) -> None:
-    with written_whole(path) as scratch:
+def _write(name: str, text: str) -> None:
+    with written_whole(name) as scratch:
         scratch.write_text(text, encoding="utf-8")
-    remark(f"wrote {path}")
-
-
-def _bears(path: Path, mark: str) -> bool:
-    try:
-        with path.open("rb") as file:
-            return mark.encode() in file.read(_HEAD)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be read: {error.strerror}") from error
+    remark(f"wrote {redacted(name)}")

@@ -7,13 +7,12 @@ import sys
 import time
 from argparse import Namespace
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Final
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say
 from syncrelay.cli.new_file import write_suggested
-from syncrelay.cli.parser import Parser, output, positive
+from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 from syncrelay.collector import resting_collector
 from syncrelay.errors import UsageError
@@ -52,9 +51,7 @@ def parser() -> Parser:
     )
     parser.add_argument("--seconds", metavar="N", type=positive, help="end after N s, and print text only")
     parser.add_argument("--json", action="store_true", help="print JSON at the end, for programs")
-    parser.add_argument(
-        "--write", metavar="NEW", type=output, help="write the file with the suggested values; keeps its comments"
-    )
+    parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")
     parser.add_argument("--ros-args", action="store_true", help="ROS arguments as the relay gets them, such as remaps")
     return parser
 
@@ -69,7 +66,7 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     if arguments.write is not None:
         if len(arguments.config) > 1:
             parser.error(_ONE_FILE)
-        require_new(Path(arguments.write))
+        require_new(arguments.write)
     from syncrelay.cli.run import loaded
     from syncrelay.logs import configure
     from syncrelay.ros.environment import require_rclpy

@@ -9,7 +9,7 @@ from textwrap import fill
 from typing import Any, Final, NoReturn
 
 from syncrelay.errors import UsageError
-from syncrelay.recording_files import holds_recording, scheme_of
+from syncrelay.recording_files import holds_recording
 from syncrelay.yaml_files import yaml_files
 
 ROS_ARGS: Final = "--ros-args"
@@ -170,12 +170,3 @@ def duration(text: str) -> int:
     if length <= 0:
         raise argparse.ArgumentTypeError(f"expected a duration above 0, found {text}")
     return length
-
-
-def output(text: str) -> str:
-    """Read the name of a file or a folder that is written."""
-    if scheme := scheme_of(text):
-        raise argparse.ArgumentTypeError(
-            f"expected a file or a folder of this machine, found a URL ({scheme}://): write it here, and copy it there"
-        )
-    return text

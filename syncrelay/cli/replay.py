@@ -3,14 +3,14 @@
 from argparse import Namespace
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, say
 from syncrelay.cli.fleet_options import add_fleet_options, require_into
-from syncrelay.cli.parser import Parser, output, seed
+from syncrelay.cli.parser import Parser, seed
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
+from syncrelay.urls import redacted
 
 if TYPE_CHECKING:
     from syncrelay.recordings.bag.bindings import GroupBinding
@@ -46,7 +46,6 @@ def parser() -> Parser:
         "-o",
         "--output",
         metavar="OUT",
-        type=output,
         help="write the sets as a recording: OUT.mcap, or OUT as a rosbag2 folder",
     )
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
@@ -129,7 +128,7 @@ def _replay(arguments: Namespace, what_if: "tuple[Fault, ...]") -> int:
                 without_faults = replay_groups(plain, bindings)
     if written is not None:
         sets = sum(result.sets for result in results)
-        remark(f"wrote {arguments.output}: {counted(written.messages, 'message')} of {counted(sets, 'set')}")
+        remark(f"wrote {redacted(arguments.output)}: {counted(written.messages, 'message')} of {counted(sets, 'set')}")
     tell = say if arguments.json or arguments.drops else put
     for result, binding in zip(results, bindings, strict=True):
         group = binding.group
@@ -187,7 +186,7 @@ def _written(output: str | None, bindings: "Sequence[GroupBinding]", opened: Exi
     from syncrelay.recordings.bag.writing import SetWriter
 
     channels = (channel for binding in bindings for each in binding.inputs for channel in each.channels)
-    recording = opened.enter_context(McapOutput(Path(output)))
+    recording = opened.enter_context(McapOutput(output))
     if any(channel.encoding is Encoding.ROS1 for channel in channels):
         remark("this is a ROS 1 recording: its messages are written as ROS 2 CDR, without header.seq")
     writer = SetWriter(recording)

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, Final, Self
 import yaml
 from mcap.writer import Writer
 
-from syncrelay.output_files import cannot_be_written, require_new, written_whole
+from syncrelay.output_files import cannot_be_written, local_path, require_new, written_whole
 from syncrelay.recordings.bag.qos import Profile, write_profile
 from syncrelay.recordings.bag.recording import Definition, Encoding
 
@@ -34,17 +34,21 @@ class Output:
 class McapOutput:
     """Writes CDR messages; a context manager after which the recording is there, or after an error is not."""
 
-    def __init__(self, path: Path) -> None:
-        """Begin a file, if the name ends in .mcap, or a folder; raises OutputError where it exists or can't be made."""
+    def __init__(self, place: Path | str) -> None:
+        """Begin a file, if the name ends in .mcap, or a folder, at a path or a URL.
+
+        Raises OutputError where it exists or can't be made.
+        """
+        is_file = str(place).endswith(MCAP_SUFFIX)
         with ExitStack() as opened:
-            if path.suffix != MCAP_SUFFIX:
+            if not is_file and (path := local_path(place)) is not None:
                 _make_parents(path)
-            require_new(path)
-            scratch = opened.enter_context(written_whole(path))
-            self._folder = None if path.suffix == MCAP_SUFFIX else scratch
+            require_new(place)
+            scratch = opened.enter_context(written_whole(place))
+            self._folder = None if is_file else scratch
             if self._folder is not None:
                 self._folder.mkdir()
-            self._path = scratch if self._folder is None else scratch / f"{path.name}_0{MCAP_SUFFIX}"
+            self._path = scratch if is_file else scratch / f"{scratch.name}_0{MCAP_SUFFIX}"
             self._file = self._path.open("xb")
             opened.callback(_close, self._file)
             self._writer = Writer(self._file)

@@ -26,7 +26,7 @@ from syncrelay.recordings.bag.listing import files_meant, told_of
 from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
 from syncrelay.recordings.bag.remote_file import RemoteFile
 from syncrelay.recordings.bag.sources import LocalFile, NoIndexError
-from syncrelay.urls import file_system, redacted
+from syncrelay.urls import LOCAL, file_system, redacted
 
 Tell: TypeAlias = Callable[[str], object]
 """Takes a sentence that is worth a remark and is no fault."""
@@ -49,7 +49,6 @@ _DECOMPRESSORS: Final[Mapping[bytes, Callable[[Path], Any]]] = {
 }
 _LONGEST_MAGIC: Final = 16
 _PIECE: Final = 1_000_000
-_LOCAL: Final = ("file", "local")
 
 
 def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Recording:
@@ -157,7 +156,7 @@ def _counts(told: Sequence[Mapping[str, int]]) -> Mapping[str, int]:
 
 def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> Recording:
     """Open a file behind a URL by ranges if that is possible, and else copy it here, once."""
-    if scheme_of(url) in _LOCAL:
+    if scheme_of(url) in LOCAL:
         return _open(Path(file_system(url)[1]), url, opened, faults)
     remote = RemoteFile(url)
     opened.callback(remote.close)

@@ -5,7 +5,6 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from functools import partial
 from pathlib import Path
 from threading import Thread
 from typing import Any, Final, TypeAlias
@@ -185,7 +184,7 @@ class RemoteFile:
 def _fetcher(files: Any, path: str, about: Mapping[str, Any], url: str) -> Fetch:
     """Return what fetches parts of a file, of the version that was opened where its store can tell versions apart."""
     if "generation" in about:
-        return partial(files.cat_file, path, generation=about["generation"])
+        return lambda begin, end: bytes(files.cat_file(path, start=begin, end=end, generation=about["generation"]))
     pinned: dict[str, Any] = {}
     if scheme_of(url) in SERVERS:
         # Ranges are those of the file and not of a compressed form of it.
@@ -198,7 +197,10 @@ def _fetcher(files: Any, path: str, about: Mapping[str, Any], url: str) -> Fetch
     file = tried(url, lambda: files.open(path, "rb", cache_type="none", **pinned))
     # Files of S3 and of servers; what is in memory has no cache, and needs none.
     cache = getattr(file, "cache", None)
-    return partial(files.cat_file, path) if cache is None else cache.fetcher
+    if cache is None:
+        return lambda begin, end: bytes(files.cat_file(path, start=begin, end=end))
+    fetch: Fetch = cache.fetcher
+    return fetch
 
 
 def _identity(about: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ from uuid import uuid4
 
 from syncrelay.recordings.fleet.content import Content, ResultFile
 from syncrelay.recordings.fleet.ledger import Entry
+from syncrelay.recordings.fleet.store import ResultStore
 from syncrelay.recordings.fleet.task import JSON, Source, Task
 
 SCRATCH: Final = ".partial"
@@ -41,6 +42,8 @@ class Job:
     size: int
     version: str
     time_limit: int | None = None
+    store: ResultStore | None = None
+    """Where the result is uploaded to; `into` then holds only what is not finished."""
 
     def limit_of(self, size: int) -> int:
         """Return how many nanoseconds the job may take if the recording has so many bytes."""
@@ -59,7 +62,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A finished result, flushed to the disk, in a scratch folder from which it is to be put in place."""
+    """A finished result: uploaded, or flushed to the disk in a scratch folder from which it is to be put in place."""
 
     content: Content
     facts: Mapping[str, JSON]

@@ -24,14 +24,15 @@ _RESULT_NAME: Final = re.compile(rf"(?![._])[^/\0]*-[0-9a-f]{{{2 * _HASH_BYTES}}
 _MOST_LISTED_BYTES: Final = 100_000_000
 
 
-def find_sources(words: Sequence[str], *, into: Path) -> list[Source]:
+def find_sources(words: Sequence[str], *, into: Path | str) -> list[Source]:
     """Return the recordings that words name, each once, except results of an earlier command below `into`.
 
     A word is a file, a folder, a pattern such as `day*/*.mcap` or `**/*.db3`, a URL, or `@FILE`, a file with one such
     word on each line. A rosbag2 folder is one recording; any other folder is searched to any depth. Raises BagError
     for a word that names no recording.
     """
-    own = f"{os.path.abspath(into)}/"  # noqa: PTH100  as in _places: links keep their names
+    folder = str(into)
+    own = f"{folder if is_url(folder) else os.path.abspath(folder)}/"  # noqa: PTH100  as in _places: links keep their names
     found: dict[str, Source] = {}
     for word in words:
         places = _listed(word[1:]) if word.startswith(_LIST) else _places(word)

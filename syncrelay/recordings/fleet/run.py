@@ -14,7 +14,9 @@ from syncrelay.output_files import cannot_be_written
 from syncrelay.recordings.fleet.content import size_of, sync_folder
 from syncrelay.recordings.fleet.job import SCRATCH, Done, Engine, Failed, Finished, Job
 from syncrelay.recordings.fleet.ledger import Entry, Ledger, State
+from syncrelay.recordings.fleet.store import ResultStore
 from syncrelay.recordings.fleet.task import Source, Task
+from syncrelay.urls import redacted
 
 
 class Others(Enum):
@@ -28,13 +30,23 @@ class Run:
     """A task on recordings, into a folder that only this process writes to; a context manager."""
 
     def __init__(
-        self, task: Task, sources: Sequence[Source], *, into: Path, others: Others, time_limit: int | None = None
+        self,
+        task: Task,
+        sources: Sequence[Source],
+        *,
+        into: Path,
+        others: Others,
+        time_limit: int | None = None,
+        store: ResultStore | None = None,
     ) -> None:
-        """Open the folder and remove what a killed run left in it. `time_limit` is that of each Job.
+        """Open the folder and remove what a killed run left in it. `time_limit` and `store` are those of each Job.
 
         Raises SyncRelayError if the folder cannot be used, or holds other results that are not to be replaced.
         """
         self._fingerprint = task.fingerprint
+        self._store = store
+        if store is not None:
+            store.fetch_ledger(into)
         self._ledger = Ledger(into)
         self.unreadable = self._ledger.unreadable
         """How many lines of the ledger could not be read; these recordings are done again."""
@@ -48,7 +60,7 @@ class Run:
         for source in sources:
             entry = self._ledger.entries.get(source.name)
             done = entry if entry is not None and self._is_ours(entry) else None
-            jobs.append(Job(source, task, into, done, size_of(source.words), version, time_limit))
+            jobs.append(Job(source, task, into, done, size_of(source.words), version, time_limit, store))
         # The largest first, so that none of them is begun when all others are done.
         self.jobs: Final = tuple(sorted(jobs, key=lambda job: -job.size))
         """All recordings, in the order in which they are begun."""
@@ -59,6 +71,8 @@ class Run:
     def __exit__(self, *_error: object) -> None:
         shutil.rmtree(self._ledger.folder / SCRATCH, ignore_errors=True)
         self._ledger.__exit__(None, None, None)
+        if self._store is not None:
+            self._store.save_ledger(self._ledger.folder, is_last=True)
 
     def go(self, engine: Engine) -> Generator[Finished | None, None, None]:
         """Yield each recording once its result is in place and in the ledger, and None as the engine does.
@@ -80,7 +94,6 @@ class Run:
 
     def _take(self, finished: Finished) -> None:
         source, outcome = finished.job.source, finished.outcome
-        place = self._ledger.folder / source.name
         if isinstance(outcome, Done):
             entry = Entry(
                 name=source.name,
@@ -93,11 +106,14 @@ class Run:
                 files=dict(outcome.files),
             )
             self._ledger.append(entry)
-            _put_in_place(outcome.folder, place)
+            if self._store is None:
+                _put_in_place(outcome.folder, self._ledger.folder / source.name)
+            else:
+                self._store.save_ledger(self._ledger.folder, is_last=False)
         elif isinstance(outcome, Failed) and not outcome.ends_all and (outcome.content or finished.job.done is None):
             # A recording that cannot be reached now (it has no content) keeps the result that it has. Otherwise the
             # former result would pass for one of what the recording is now.
-            shutil.rmtree(place, ignore_errors=True)
+            self._remove(source.name)
             key = (source.name, State.FAILED, source.shown, self._fingerprint, outcome.content)
             entry = Entry(*key, error=outcome.why)
             if self._ledger.entries.get(source.name) != entry:
@@ -108,14 +124,21 @@ class Run:
         entries = self._ledger.entries.values()
         foreign = [entry for entry in entries if entry.state is State.DONE and not self._is_ours(entry)]
         if foreign and others is Others.REFUSED:
-            raise SyncRelayError(_refusal(self._ledger.folder, foreign[0].fingerprint, self._fingerprint))
+            place = str(self._ledger.folder) if self._store is None else redacted(self._store.url)
+            raise SyncRelayError(_refusal(place, foreign[0].fingerprint, self._fingerprint))
         for entry in foreign:
             if entry.name not in names:
                 self._ledger.append(Entry(entry.name, State.REMOVED, entry.recording, entry.fingerprint))
-                shutil.rmtree(self._ledger.folder / entry.name, ignore_errors=True)
+                self._remove(entry.name)
+
+    def _remove(self, name: str) -> None:
+        if self._store is None:
+            shutil.rmtree(self._ledger.folder / name, ignore_errors=True)
+        else:
+            self._store.remove(name)
 
 
-def _refusal(folder: Path, theirs: str, ours: str) -> str:
+def _refusal(folder: str, theirs: str, ours: str) -> str:
     """Return what is different about the results in a folder, from two lines of fingerprint_of."""
     (command, *its), (own, *mine) = theirs.split() or [""], ours.split()
     parts = {

@@ -13,7 +13,7 @@ from syncrelay import own_version
 from syncrelay.errors import NO_SPACE, BagError, OutputError, SyncRelayError
 from syncrelay.recordings.fleet.content import Content, are_intact, content_of, marks_of, results_in
 from syncrelay.recordings.fleet.job import Done, Failed, Job, Kept, Outcome
-from syncrelay.recordings.fleet.ledger import LEDGER
+from syncrelay.recordings.fleet.ledger import LEDGER, Entry
 
 _NS_PER_SECOND: Final = 1_000_000_000
 _PR_SET_PDEATHSIG: Final = 1
@@ -50,8 +50,7 @@ def _performed(job: Job) -> Outcome:
         content = found.hash
         # The size of what is behind a URL is known only now.
         _end_after(job.limit_of(found.size))
-        done = job.done
-        if done is not None and done.content == content and are_intact(job.into / job.source.name, done.files):
+        if job.done is not None and job.done.content == content and _is_there(job, job.done):
             return Kept()
         return _done(job, found, folder)
     except SyncRelayError as error:
@@ -72,13 +71,22 @@ def _done(job: Job, content: Content, folder: Path) -> Done:
     facts = job.task.run(job.source, folder)
     if marks_of(job.source.words) != content.marks:
         raise BagError(f"{job.source.shown[0]}: was changed while it was read: is it still being recorded?")
-    return Done(content, facts, results_in(folder), folder)
+    files = results_in(folder)
+    if job.store is not None:
+        job.store.put(job.source.name, folder)
+        shutil.rmtree(folder)
+    return Done(content, facts, files, folder)
+
+
+def _is_there(job: Job, done: Entry) -> bool:
+    name = job.source.name
+    return are_intact(job.into / name, done.files) if job.store is None else job.store.has(name, done.files)
 
 
 def _why_unfit(job: Job) -> str | None:
     """Return why this machine cannot do any job of the command, which may run on another one."""
     if own_version() != job.version:
         return f"{socket.gethostname()} has syncrelay {own_version()}, expected {job.version}: install the same version"
-    if not (job.into / LEDGER).exists():
+    if job.store is None and not (job.into / LEDGER).exists():
         return f"{job.into}: is not seen from {socket.gethostname()}: name a folder that all machines share"
     return None

@@ -361,7 +361,7 @@ def test_a_recording_is_read_from_whatever_fsspec_knows(kind, tmp_path):
 
 def test_where_the_library_is_missing_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "aiohttp", None)
-    with pytest.raises(UnavailableError, match=r"https:// URLs is not installed: pip install '.*\[fleet\]'"):
+    with pytest.raises(UnavailableError, match=r"https:// URLs is not installed: pip install 'syncrelay\[fleet\]'"):
         open_recording(["https://host/rig.mcap"])
 
 

@@ -209,6 +209,27 @@ def test_many_are_done_by_workers_once_and_again_only_when_they_change(command, 
     assert _KEY not in (folder / "out" / "_ledger.jsonl").read_text()
 
 
+_ROWS = """
+import fsspec, pyarrow.dataset
+print(pyarrow.dataset.dataset("fleet/tables", filesystem=fsspec.filesystem("s3")).count_rows())
+"""
+
+
+def test_results_are_written_to_a_bucket_and_read_back(folder, relay):  # noqa: ARG001  the bucket
+    write_mcap(folder / "rig.mcap", rig())
+    for name in ("sets.mcap", "sets"):
+        done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", f"s3://fleet/out/{name}", folder=folder)
+        assert done.returncode == 0, done.stderr
+        far = run("analyze", f"s3://fleet/out/{name}", "--json", folder=folder)
+        assert {each["messages"] for each in json.loads(far.stdout)["topics"]} == {39}, far.stdout
+    words = ["export", "rig.mcap", "--config", "f.yaml", "-o", "s3://fleet/tables"]
+    assert run(*words, folder=folder).stdout == "s3://fleet/tables: 1 recording: 1 done\n"
+    assert run(*words, folder=folder).stdout == "s3://fleet/tables: 1 recording: 1 done before\n"
+    assert run_python("-c", _ROWS, folder=folder).stdout == "39\n"
+    done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", "s3://no-such-bucket/out.mcap", folder=folder)
+    assert (done.returncode, "there is no bucket no-such-bucket" in done.stderr) == (1, True)
+
+
 def test_google_cloud_storage_gives_the_same_sets(folder, monkeypatch):
     pytest.importorskip("gcsfs", reason="the extra `fleet` is not installed")
     emulator = pytest.importorskip(

@@ -1,0 +1,164 @@
+"""What commands write behind URLs, in a process whose fsspec knows one more store: a folder, as if it were far away."""
+
+import json
+from pathlib import Path
+
+import pyarrow.dataset
+import pytest
+
+from tests.cli.command import run, run_python
+from tests.recordings.bag.making import rig, write_mcap
+from tests.ros.cdr_messages import VECTOR
+
+pytest.importorskip("fsspec", reason="the extra `fleet` is not installed")
+pytestmark = pytest.mark.process
+
+_CONFIG = f"""\
+version: 1
+groups:
+  rig:
+    policy: approximate_time
+    slop: 10ms
+    topics:
+      - {{topic: /camera, type: {VECTOR}}}
+      - {{topic: /lidar, type: {VECTOR}}}
+"""
+# As a bucket: it has no folders of its own, and `wrong` files are refused so often.
+_STORE = """
+import shutil, sys
+import fsspec
+from fsspec.implementations.local import LocalFileSystem
+
+root, wrong = sys.argv[1], int(sys.argv[2])
+
+class Store(LocalFileSystem):
+    protocol = "store"
+
+    @classmethod
+    def _strip_protocol(cls, path):
+        path = str(path)
+        path = path.removeprefix("store://").rstrip("/")
+        return path if path.startswith(root) else f"{root}/{path}".rstrip("/")
+
+    def unstrip_protocol(self, name):
+        return "store://" + self._strip_protocol(name)[len(root) + 1:]
+
+    def put_file(self, source, target, **options):
+        global wrong
+        if wrong and not target.endswith("_ledger.jsonl"):
+            wrong -= 1
+            raise ConnectionResetError(104, "Connection reset by peer")
+        shutil.copy(source, target)
+
+fsspec.register_implementation("store", Store)
+from syncrelay import urls
+urls._FIRST_WAIT = 0.01
+from syncrelay.cli import main
+sys.exit(main(sys.argv[3:]))
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "f.yaml").write_text(_CONFIG)
+    (tmp_path / "store").mkdir()
+    write_mcap(tmp_path / "rig.mcap", rig())
+    return tmp_path
+
+
+def stored(folder: Path, *words: str, wrong: int = 0):
+    """Run syncrelay where store:// is the folder `store`, which refuses the first files."""
+    return run_python("-c", _STORE, str(folder / "store"), str(wrong), *words, folder=folder)
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.mark.parametrize("name", ["out.mcap", "out"])
+def test_a_replay_is_written_to_a_store_as_to_a_disk(name, folder):
+    words = ["replay", "rig.mcap", "--config", "f.yaml", "-o"]
+    far = stored(folder, *words, f"store://day/{name}", wrong=2)
+    assert far.returncode == 0, far.stderr
+    assert f"wrote store://day/{name}: " in far.stderr
+    assert run(*words, name, folder=folder).returncode == 0
+    assert names(folder / "store" / "day") == [
+        str(path.relative_to(folder)) for path in sorted([folder / name, *(folder / name).rglob("*")]) if path.is_file()
+    ]
+    for path in names(folder / "store" / "day"):
+        assert (folder / "store" / "day" / path).read_bytes() == (folder / path).read_bytes()
+    again = stored(folder, *words, f"store://day/{name}")
+    assert (again.returncode, "already exists and is not overwritten" in again.stderr) == (1, True)
+
+
+def test_what_a_store_refuses_ends_the_command_and_leaves_nothing_behind(folder):
+    words = ["replay", "rig.mcap", "--config", "f.yaml", "-o", "store://day/out"]
+    done = stored(folder, *words, wrong=100)
+    assert done.returncode == 1
+    assert "store://day/out: the store cannot be reached: Connection reset by peer (5 attempts)" in done.stderr
+    assert names(folder / "store") == []
+    assert not [path for path in folder.iterdir() if path.name.startswith(".syncrelay")]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["replay", "rig.mcap", "--config", "f.yaml", "-o", "https://me:hush@host/out.mcap"],
+        ["analyze", "rig.mcap", "--config", "f.yaml", "--html", "https://me:hush@host/report.html"],
+        ["export", "rig.mcap", "--config", "f.yaml", "-o", "https://me:hush@host/out"],
+    ],
+)
+def test_a_server_takes_no_files_and_that_is_said(words, folder):
+    done = run(*words, folder=folder)
+    assert done.returncode == 1
+    assert "a server takes no files: expected a path, s3://, gs:// or another store" in done.stderr
+    assert "hush" not in done.stderr
+
+
+def test_an_analysis_is_written_to_a_store_and_over_its_own_report_alone(folder):
+    words = ["analyze", "rig.mcap", "--config", "f.yaml", "--html", "store://day/report.html"]
+    for _ in range(2):
+        assert stored(folder, *words).returncode == 0
+    report = folder / "store" / "day" / "report.html"
+    assert b"<html" in report.read_bytes()[:500]
+    report.write_text("mine")
+    assert "already exists" in stored(folder, *words).stderr
+    assert report.read_text() == "mine"
+
+
+@pytest.mark.parametrize("options", [["export", "-o"], ["export", "--format", "mcap", "-o"], ["replay", "--into"]])
+def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(options, folder):
+    (folder / "day").mkdir()
+    for name in ("a", "b"):
+        write_mcap(folder / "day" / f"{name}.mcap", rig())
+    command, *options = options
+    words = [command, "day", "--config", "f.yaml", "--jobs", "2", *options]
+    done = stored(folder, *words, "store://results/of day", wrong=1)
+    assert (done.returncode, done.stdout) == (0, "store://results/of day: 2 recordings: 2 done\n"), done.stderr
+    into = folder / "store" / "results" / "of day"
+    assert run(*words, "here", folder=folder).returncode == 0
+    assert names(into) == names(folder / "here")
+    entries = [json.loads(line) for line in (into / "_ledger.jsonl").read_text().splitlines()[1:]]
+    assert [entry["state"] for entry in entries] == ["done", "done"]
+    if "mcap" not in options and command == "export":
+        tables = [pyarrow.dataset.dataset(where).to_table().num_rows for where in (str(into), str(folder / "here"))]
+        assert tables[0] == tables[1] > 70
+
+    assert stored(folder, *words, "store://results/of day").stdout.endswith("2 done before\n")
+    next(into.glob("b-*/*")).unlink()
+    assert stored(folder, *words, "store://results/of day").stdout.endswith("1 done, 1 done before\n")
+    (folder / "day" / "b.mcap").write_bytes(b"none any more")
+    assert stored(folder, *words, "store://results/of day").returncode == 1
+    assert [name for name in names(into) if name.startswith("b-")] == []
+    assert "--overwrite" in stored(folder, *words, "store://results/of day", "--group", "rig", "--raw").stderr or (
+        command == "replay" or "mcap" in options
+    )
+
+
+def test_a_store_with_other_files_is_no_place_for_results(folder):
+    (folder / "store" / "mine").mkdir()
+    (folder / "store" / "mine" / "notes").write_text("")
+    done = stored(folder, "export", "rig.mcap", "--config", "f.yaml", "-o", "store://mine/")
+    assert (done.returncode, "holds files and no _ledger.jsonl" in done.stderr) == (1, True)
+    done = stored(folder, "analyze", "rig.mcap", "--config", "f.yaml", "--into", "store://new")
+    assert (done.returncode, "name a folder of this machine" in done.stderr) == (2, True)
