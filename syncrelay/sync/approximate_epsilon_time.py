@@ -50,13 +50,12 @@ class ApproximateEpsilonTime(Policy):
             self._take_oldest(outcomes)
         if len(queue.stamps) > self._queue_size:
             self._losses.lose(place, queue.stamps[0])
-            outcomes += [Drop(lost, DropReason.OVERFLOW) for lost in queue.take(1)]
+            outcomes += queue.drop(1, DropReason.OVERFLOW)
         return outcomes
 
     def flush(self, reason: DropReason) -> list[Drop]:
         self._losses.forget()
-        gone = [queue.take(len(queue.stamps)) for queue in self._queues]
-        return [Drop(message, reason) for messages in gone for message in messages]
+        return [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
 
     def buffered(self, place: int) -> int:
         return len(self._queues[place].stamps)

@@ -1,11 +1,11 @@
-"""What each input's stamps say of a message that arrives: late, of another time, or of use."""
+"""Whether a message that arrives is late, of the time before a jump, or of use: by the stamps of its input."""
 
 from collections.abc import Sequence
 
 from syncrelay.sync.messages import Message
 
 JUMP_NS = 1_000_000_000
-"""A stamp that falls by more than this on one input is a looped recording or a reset clock, not lateness."""
+"""If a stamp falls by more than this, a recording was looped or a clock was reset; the message is not just late."""
 
 _UNSEEN = 0
 _NOT_YET = 1 << 62
@@ -13,12 +13,12 @@ _NEVER = -(1 << 62)
 
 
 class Arrivals:
-    """The newest stamp that came in and the newest that went into a set, of each input.
+    """The newest stamp that arrived and the newest that went into a set, of each input.
 
-    A message newer than `newest` of its input is of use, and whoever sees that sets it; of any other this
-    class decides. Where one input jumped back, the others may still send what belongs to the time before:
-    stamps that go on, by no more than a second, where theirs had been, and are ahead by more than a second of
-    the one that jumped.
+    A message that is newer than `newest` of its input is of use; the caller checks that and updates `newest`. This
+    class decides about all others. After one input has jumped back, the others may still send messages of the time
+    before: their stamps continue where their input was, by no more than a second, and are more than a second ahead of
+    the input that jumped.
     """
 
     __slots__ = ("_before", "_given", "_jumped", "_offsets", "newest")
@@ -37,24 +37,24 @@ class Arrivals:
         self._given[:] = [_NEVER] * len(self._offsets)
 
     def give(self, messages: Sequence[Message | None]) -> None:
-        """Note the newest stamp that each input has given to a set."""
+        """Note the stamps of the messages that went into a set."""
         given = self._given
         for message in messages:
             if message is not None and message.stamp > given[message.input]:
                 given[message.input] = message.stamp
 
     def is_late(self, index: int, stamp: int, *, or_equal: bool) -> bool:
-        """Whether a set of this input's messages would go back; of equal stamps only if they mean the same."""
+        """Whether a set with this stamp would be older than one that left. `or_equal`: equal stamps are late, too."""
         given = self._given[index]
         return stamp < given or (or_equal and stamp == given)
 
     def has_fallen(self, index: int, stamp: int) -> bool:
-        """Whether this stamp begins a new time."""
+        """Whether the stamp is of a new time, after a jump back."""
         newest = self.newest[index]
         return newest != _UNSEEN and stamp < newest - JUMP_NS
 
     def jump(self, index: int) -> None:
-        """Start afresh because this input has fallen; the others may have something of the old time left."""
+        """Start afresh because this input has jumped back. The others may still send messages of the time before."""
         before = [old if newest == _NOT_YET else newest for old, newest in zip(self._before, self.newest, strict=True)]
         self.forget()
         self._jumped = index

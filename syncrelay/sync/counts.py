@@ -1,4 +1,4 @@
-"""Where every message of an input went: fed = matched + dropped + buffered, at any moment."""
+"""What became of every message: fed = matched + dropped + buffered, for each input, at any moment."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,9 @@ from syncrelay.sync.messages import DropReason, Match, Outcome
 class InputCounts:
     """Messages of one input since the group was made. `dropped` holds only reasons that occurred.
 
-    `needed_queue` is the greatest length that this input's queue should have had when a message of another input
-    found that what it needed had overflowed; None if that never happened. Lengths above 1000 don't count: they
-    come of stamps of another clock, and no queue is the answer.
+    `needed_queue` is the length at which this input's queue would have held every message that a message of another
+    input needed and that had overflowed; None if that never happened. Lengths above 1000 are ignored: they come from
+    stamps of another clock, which no queue makes good.
     """
 
     fed: int
@@ -24,14 +24,14 @@ class InputCounts:
 
 
 class Ledger:
-    """Counts what comes in and what leaves. A message that `repeats` in sets is counted once."""
+    """Counts what arrives and what leaves. A message that is in several sets (`repeats`) is counted once."""
 
     __slots__ = ("_absent", "_dropped", "_last", "_repeats", "fed", "sets")
 
     def __init__(self, n_inputs: int, *, repeats: bool) -> None:
         self.fed = [0] * n_inputs
         self.sets = 0
-        # Sets without a message of this input, or with one that was counted: most sets are whole, and need no count.
+        # Sets without a new message of this input. Counting these is cheaper than counting matched messages.
         self._absent = [0] * n_inputs
         self._dropped: list[dict[DropReason, int]] = [defaultdict(int) for _ in self.fed]
         self._repeats = repeats
@@ -50,11 +50,11 @@ class Ledger:
                 self._dropped[outcome.message.input][outcome.reason] += 1
 
     def forget(self) -> None:
-        """Take what comes from now on for new, whatever its stamps."""
+        """Count every message from now on as new, whatever its stamp."""
         self._last = [None] * len(self.fed)
 
     def counts(self, buffered: Sequence[int], needed_queues: Sequence[int | None]) -> tuple[InputCounts, ...]:
-        """Give the counts of each input, with what its buffers hold now."""
+        """Return the counts of each input, given what its buffers hold now."""
         rows = zip(self.fed, self._absent, self._dropped, buffered, needed_queues, strict=True)
         return tuple(
             InputCounts(fed, self.sets - absent, dict(dropped), held, needed)

@@ -9,15 +9,15 @@ from syncrelay.sync.policy import Policy, check_sizes
 from syncrelay.sync.queues import Losses
 
 _LOST_QUEUES = 10
-"""How many queues' worth of lost keys are remembered, to tell how long a queue was needed."""
+"""Lost keys are remembered for as many messages as this many queues hold."""
 
 
 class EqualKey(Policy):
     """Messages of equal `key` on all inputs are a set, and leave when the last of them is there.
 
-    Stamps only put the messages of one input in order, those of one stamp by arrival; they may be unset. When a
-    set leaves, what is older on its inputs is superseded, so sets never go back. A message of a key that its
-    input still has queued replaces that one.
+    Stamps only order the messages of one input; messages of equal stamps keep the order of arrival, and stamps may be
+    unset. When a set leaves, older messages of its inputs are superseded, so sets never go back. A message whose key is
+    still queued on its input replaces the queued one.
 
         left  |ab.c.
         right |...BC

@@ -1,4 +1,4 @@
-"""A group: what all policies share."""
+"""A group at work: what all policies share."""
 
 from collections.abc import Sequence
 from typing import Generic
@@ -13,23 +13,21 @@ from syncrelay.sync.thinning import Thinning
 
 
 class SyncGroup(Generic[T]):
-    """Runs one policy: feeds it what may be used, lets go what has waited enough, counts where all went.
+    """Runs one policy: feeds it the messages that are of use, lets sets leave in time, and counts every message.
 
-    Messages go in and come out with the stamps they carry; an input's offset counts for matching only.
-    - A message older than what its input last gave to a set, or of the same stamp, is `late`.
-    - A stamp more than a second below its input's newest flushes the group, which then knows nothing of the
-      time before (`time_jump`); what other inputs still send of that time is dropped for the same reason.
-    - Inputs that are not `required` never change which messages of the required ones go together. A set
-      leaves when it has what it can have of them, or `max_wait_ns` after it was complete but for them.
-    - `max_wait_ns` after its first complete set came together, the best one so far leaves. Without it, sets
-      wait as long as the policy would have them wait, and every input is required but with latest_time, whose
-      sets don't wait for others.
-    - Where a clock triggers, `now` is that clock's: in nanoseconds since the epoch that stamps count from. The set of
-      a tick leaves `max_wait_ns` after the tick (0 without it), of what was added before: what is on its way longer
-      comes too late for it.
-    - `restamp` gives sets a common stamp, of what they came in with. `every` and `min_set_period_ns` thin them.
+    Messages leave with the stamps that they came with. An input's offset is added for matching only.
+    - A message is `late` if it is older than the last message of its input that went into a set, or of the same stamp.
+    - A stamp more than a second below its input's newest flushes the group (`time_jump`), which forgets the time
+      before. What other inputs still send of that time is dropped for the same reason.
+    - Inputs that are not `required` never change which messages of the required ones are a set. A set leaves when no
+      better message of them can come, or `max_wait_ns` after its required messages were all there.
+    - `max_wait_ns` after a first complete set was there, the best set so far leaves. Without it, a set waits as long as
+      the policy has it wait, and only latest_time, whose sets do not wait for others, may have optional inputs.
+    - Where a clock triggers, `now` is the time of that clock, in nanoseconds since the epoch of the stamps. The set of
+      a tick leaves `max_wait_ns` after the tick (0 without it), with the messages that were added before.
+    - `restamp` gives the messages of a set a common stamp. `every` and `min_set_period_ns` thin sets.
 
-    `add` lets go first what was due before it: calling `expire` more often changes nothing.
+    `add` first lets leave what was due before it, so calling `expire` more often changes nothing.
     """
 
     __slots__ = (
@@ -57,7 +55,7 @@ class SyncGroup(Generic[T]):
         every: int = 1,
         min_set_period_ns: int | None = None,
     ) -> None:
-        """Run a policy that nothing was fed to.
+        """Run a policy that has not been fed anything.
 
         `required` (default: all), and `offsets_ns`, which is added to the stamps for matching, have a value for each
         input. Durations are in nanoseconds. Raises ValueError for what is not so, or cannot be.
@@ -103,7 +101,7 @@ class SyncGroup(Generic[T]):
         return self._ledger.sets
 
     def add(self, message: Message[T], *, now: int) -> Sequence[Outcome[T]]:
-        """Take a message that arrives at `now`; give what leaves because of it, in order."""
+        """Take a message that arrives at `now`; return what leaves because of it, in order."""
         index = message.input
         stamp = message.stamp
         self._ledger.fed[index] += 1
@@ -125,36 +123,36 @@ class SyncGroup(Generic[T]):
         return drop
 
     def next_deadline(self) -> int | None:
-        """When `expire` will have something to do, in the time of `now`; None: not before the next message."""
+        """Return the `now` at which `expire` has something to do; None if not before the next message."""
         return self._matching.next_deadline()
 
     def expire(self, *, now: int) -> Sequence[Outcome[T]]:
-        """Give what leaves because it has waited long enough."""
+        """Return what leaves because it has waited long enough."""
         outcomes = self._matching.due(now)
         return self._leave(outcomes, now) if outcomes else outcomes
 
     def pass_over(self, *, now: int) -> None:
-        """Let time pass without sets that only the clock triggers: nobody wanted them."""
+        """Let time pass without the sets that a clock would trigger, as nobody wants them."""
         self._matching.pass_over(now)
 
     def flush(self, reason: DropReason) -> Sequence[Drop[T]]:
-        """Drop all that is buffered and start afresh. The counts go on."""
+        """Drop everything that is buffered and start afresh. The counts go on."""
         drops = self._empty(reason)
         self._arrivals.forget()
         self._ledger.note(drops)
         return drops
 
     def let_go(self, reason: DropReason) -> Sequence[Drop[T]]:
-        """Drop what waits for others, and forget nothing else: what comes next leads to no set older than those before.
+        """Drop what waits for other messages. Later sets are not older than those before, as nothing else is forgotten.
 
-        The latest messages that serve trigger after trigger stay.
+        The latest messages of inputs whose messages can be in many sets stay.
         """
         drops = self._matching.let_go(reason)
         self._ledger.note(drops)
         return drops
 
     def counts(self) -> tuple[InputCounts, ...]:
-        """Where the messages of each input went since the group was made."""
+        """Return what became of the messages of each input since the group was made."""
         inputs = range(len(self._offsets))
         buffered = [self._matching.buffered(index) for index in inputs]
         if self._thinning is not None:
@@ -162,7 +160,7 @@ class SyncGroup(Generic[T]):
         return self._ledger.counts(buffered, [self._matching.needed_queue(index) for index in inputs])
 
     def _take_behind(self, message: Message) -> Sequence[Outcome]:
-        """Take a message that is not newer than all before: unset, late, out of order or of another time."""
+        """Take a message that is not newer than all before: unstamped, late, out of order or after a jump."""
         index, stamp = message.input, message.stamp
         if stamp == 0:
             if self._by_stamp:
@@ -187,7 +185,7 @@ class SyncGroup(Generic[T]):
         return drops
 
     def _leave(self, outcomes: Sequence[Outcome], now: int) -> Sequence[Outcome]:
-        """Note what was given to sets, also to those that are thinned; thin, restamp and count what leaves."""
+        """Note which messages went into sets, also into thinned ones; then thin, restamp and count what leaves."""
         for outcome in outcomes:
             if isinstance(outcome, Match):
                 self._arrivals.give(outcome.messages)
@@ -213,7 +211,7 @@ class SyncGroup(Generic[T]):
         return left
 
     def _moment(self, match: Match, now: int) -> int:
-        """Give a stamp that rises from set to set: the tick, or the latest of the required inputs, `now` if none."""
+        """Return a stamp that rises from set to set: the tick, or the latest of the required inputs, or `now`."""
         if match.tick is not None:
             return match.tick
         stamps = [

@@ -11,9 +11,9 @@ from syncrelay.sync.queues import LONGEST_QUEUE, StampQueue
 from syncrelay.sync.ticks import Ticks
 
 REST_NS = 10_000_000_000
-"""After so long in which no message came, ticks pass without sets until one comes."""
+"""When no message has come for this long, ticks give no sets until one comes."""
 
-# A clock that falls by more starts again; one that falls by less was corrected, and no tick comes twice.
+# A clock that falls by more was reset. One that falls by less was corrected, and no tick comes twice.
 _FALL_NS = 1_000_000_000
 
 
@@ -33,17 +33,17 @@ class LatestAtTicks(Policy):
 
     Ticks are at columns 5, 10 and 15. c came when its tick had left.
 
-    A tick leaves when `advance` reaches it, with what was fed by then; whoever calls that decides how long messages
-    may be on their way. What came in time decides alone: calling `advance` more often changes nothing, and a recording
-    gives the sets that were given live. A tick at which a required input has nothing young enough gives no set, and
-    none is made up for later.
+    The set of a tick leaves when `advance` reaches the tick, with the messages that were fed by then. So the caller
+    decides how long messages may be on their way. Calling `advance` more often changes nothing, and a recording gives
+    the sets that were given live. A tick at which a required input has no message that is young enough gives no set,
+    and the set is not made up for later.
 
-    Ticks rest when nothing has come on any input for REST_NS: sensors that died don't give sets for ever, and a
-    machine that was suspended does not give those of the night all at once when it wakes. No work is done for a tick
-    that gives no set.
+    Ticks give no sets once no input has sent anything for REST_NS. So sensors that died do not give sets for ever, and
+    a machine that was suspended overnight does not give the sets of the night when it wakes. Ticks that give no set
+    cost nothing.
 
-    A message is superseded when a newer one serves every tick to come in its place and it never did; expired when it
-    is too old for any tick to come.
+    A message that has been in no set is superseded when a newer one is better for every tick to come, and expired when
+    it is too old for every tick to come.
     """
 
     __slots__ = (
@@ -54,7 +54,6 @@ class LatestAtTicks(Policy):
         "_queue_size",
         "_queues",
         "_required",
-        "_served",
         "_until",
         "n_inputs",
         "ticks",
@@ -82,9 +81,8 @@ class LatestAtTicks(Policy):
         self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
         self._queues = [StampQueue() for _ in needed]
-        self._served = [False] * n_inputs
         self._needed: list[int | None] = [None] * n_inputs
-        # The last tick that has passed, the time reached, and that at which the last message was fed.
+        # The last tick that has passed, the time that was reached, and the time when the last message was fed.
         self._passed = -1
         self._until = 0
         self._fed_until = -REST_NS
@@ -102,14 +100,14 @@ class LatestAtTicks(Policy):
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         queue = self._queues[place]
         self._fed_until = self._until
-        if self._served[place] and stamp <= queue.stamps[0]:
+        if queue.is_served and stamp <= queue.stamps[0]:
             return (Drop(message, DropReason.LATE),)
         replaced = queue.insert(stamp, message)
         outcomes: list[Outcome] = [] if replaced is None else [Drop(replaced, DropReason.DUPLICATE)]
         outcomes += self._drop_useless(place, stamp)
         if len(queue.stamps) > self._queue_size:
             self._note_needed(place)
-            outcomes += self._drop_oldest(place, 1, DropReason.OVERFLOW)
+            outcomes += queue.drop(1, DropReason.OVERFLOW)
         return outcomes
 
     def advance(self, until: int) -> Sequence[Outcome]:
@@ -131,21 +129,15 @@ class LatestAtTicks(Policy):
         self._passed = max(self._passed, self.ticks.last_until(until))
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        # The ticks that have passed have passed.
-        drops = []
-        for place, queue in enumerate(self._queues):
-            drops += self._drop_oldest(place, len(queue.stamps), reason)
-        return drops
+        # No tick comes again.
+        return [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
 
     def let_go(self, reason: DropReason) -> list[Drop]:
         """Drop all but the latest message of every input."""
-        drops = []
-        for place, queue in enumerate(self._queues):
-            drops += self._drop_oldest(place, max(0, len(queue.stamps) - 1), reason)
-        return drops
+        return [drop for queue in self._queues for drop in queue.drop(max(0, len(queue.stamps) - 1), reason)]
 
     def buffered(self, place: int) -> int:
-        return len(self._queues[place].stamps) - self._served[place]
+        return self._queues[place].unmatched
 
     def needed_queue(self, place: int) -> int | None:
         return self._needed[place]
@@ -157,7 +149,7 @@ class LatestAtTicks(Policy):
         self._until = until
 
     def _next_possible(self) -> int | None:
-        """Give the first tick after those that have passed at which every required input has a message."""
+        """Return the next tick at which every required input has a message."""
         tick = self._passed + 1
         last = self.ticks.last_until(self._fed_until + REST_NS)
         while tick <= last:
@@ -174,7 +166,7 @@ class LatestAtTicks(Policy):
         return None
 
     def _first_served(self, place: int, tick: int) -> int | None:
-        """Give this tick if one of an input's messages serves it, else the first later one not before the next."""
+        """Return this tick if a message of the input serves it, else the first tick that the next message can serve."""
         stamps = self._queues[place].stamps
         position = bisect_right(stamps, self.ticks.at(tick))
         if self._is_young(place, position - 1, self.ticks.at(tick)):
@@ -190,28 +182,28 @@ class LatestAtTicks(Policy):
         for place, queue in enumerate(self._queues):
             position = bisect_right(queue.stamps, time) - 1
             if self._is_young(place, position, time):
-                outcomes += self._drop_oldest(place, position, DropReason.SUPERSEDED)
+                outcomes += queue.drop(position, DropReason.SUPERSEDED)
                 members.append(queue.messages[0])
-                self._served[place] = True
+                queue.is_served = True
             else:
-                outcomes += self._drop_oldest(place, position + 1, DropReason.EXPIRED)
+                outcomes += queue.drop(position + 1, DropReason.EXPIRED)
                 members.append(None)
         outcomes.append(Match(tuple(members), tick=time))
 
     def _drop_useless(self, place: int, stamp: int) -> list[Drop]:
-        """Drop what no tick to come can need now that a message of this stamp is there, be it that one.
+        """Drop what no tick to come can need now that a message of this stamp is there; it may be that one.
 
-        Of the messages between two ticks only the last is: a queue holds as many as there are ticks in its time.
+        Of the messages between two ticks only the last is needed, so a queue needs one place for each tick.
         """
         queue, next_time = self._queues[place], self.ticks.at(self._passed + 1)
         max_age = self._max_ages[place]
         drops = []
         if max_age is not None:
             expired = bisect_left(queue.stamps, next_time - max_age)
-            drops = self._drop_oldest(place, expired, DropReason.EXPIRED)
+            drops = queue.drop(expired, DropReason.EXPIRED)
         if stamp <= next_time:
             superseded = bisect_right(queue.stamps, next_time) - 1
-            return [*drops, *self._drop_oldest(place, superseded, DropReason.SUPERSEDED)]
+            return [*drops, *queue.drop(superseded, DropReason.SUPERSEDED)]
         tick, position = self.ticks.first_from(stamp), bisect_left(queue.stamps, stamp)
         if position + 1 < len(queue.stamps) and queue.stamps[position + 1] <= self.ticks.at(tick):
             return [*drops, Drop(queue.remove(position), DropReason.SUPERSEDED)]
@@ -220,16 +212,8 @@ class LatestAtTicks(Policy):
         return drops
 
     def _note_needed(self, place: int) -> None:
-        """See that a queue is full, which one is not that has room for a message of every tick that is waited for."""
+        """Note that a queue is full. One with a place for every tick that is waited for would not be."""
         newest = self._queues[place].stamps[-1]
         length = self.ticks.first_from(newest) - self._passed + 1
         if (self._needed[place] or 0) < length <= LONGEST_QUEUE:
             self._needed[place] = length
-
-    def _drop_oldest(self, place: int, count: int, reason: DropReason) -> list[Drop]:
-        """Remove the oldest; the first may have served in a set, and then leaves matched."""
-        taken = self._queues[place].take(count)
-        if taken and self._served[place]:
-            self._served[place] = False
-            del taken[0]
-        return [Drop(message, reason) for message in taken]

@@ -1,4 +1,4 @@
-"""latest_time: at each message of one input, the latest of every other."""
+"""latest_time: a set for each message of one input, with the latest message of every other."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from syncrelay.sync.queues import Losses, StampQueue
 
 
 def check_max_ages(max_ages_ns: Sequence[int | None] | None, n_inputs: int) -> tuple[int | None, ...]:
-    """Return the largest age of each input's messages, None for any; raises ValueError for what is none."""
+    """Return the largest age of each input's messages, None for any; raises ValueError for a negative age."""
     ages = (None,) * n_inputs if max_ages_ns is None else tuple(max_ages_ns)
     if len(ages) != n_inputs or any(age is not None and age < 0 for age in ages):
         raise ValueError(f"max_ages_ns {ages} must be {n_inputs} numbers, 0 or more, or None")
@@ -19,7 +19,7 @@ def check_max_ages(max_ages_ns: Sequence[int | None] | None, n_inputs: int) -> t
 
 
 class _Lookup(NamedTuple):
-    """What an input has for a trigger: a place in its queue, or none, and whether one may still come."""
+    """The message that an input has for a trigger, as its place in the queue, and whether one may still come."""
 
     position: int | None
     may_come: bool
@@ -52,7 +52,6 @@ class LatestTime(Policy):
         "_queue_size",
         "_queues",
         "_required",
-        "_served",
         "_trigger",
         "n_inputs",
         "waits_ended",
@@ -80,7 +79,6 @@ class LatestTime(Policy):
         self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
         self._queues = [StampQueue() for _ in needed]
-        self._served = [False] * n_inputs
         self._losses = Losses(n_inputs)
         self.waits_started = 0
         self.waits_ended = 0
@@ -97,7 +95,7 @@ class LatestTime(Policy):
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         queue = self._queues[place]
-        if self._served[place] and stamp <= queue.stamps[0]:
+        if queue.is_served and stamp <= queue.stamps[0]:
             return (Drop(message, DropReason.LATE),)
         outcomes: list[Outcome] = []
         replaced = queue.insert(stamp, message)
@@ -110,7 +108,7 @@ class LatestTime(Policy):
             self._losses.lose(place, queue.stamps[0])
             if place == self._trigger:
                 self.waits_ended += 1
-            outcomes += self._drop_oldest(place, 1, DropReason.OVERFLOW)
+            outcomes += queue.drop(1, DropReason.OVERFLOW)
         return outcomes
 
     def release_oldest(self) -> Sequence[Outcome]:
@@ -119,9 +117,7 @@ class LatestTime(Policy):
         return outcomes
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        drops = []
-        for place, queue in enumerate(self._queues):
-            drops += self._drop_oldest(place, len(queue.stamps), reason)
+        drops = [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
         self._losses.forget()
         self.waits_ended = self.waits_started
         return drops
@@ -131,12 +127,12 @@ class LatestTime(Policy):
         drops = []
         for place, queue in enumerate(self._queues):
             kept = int(place != self._trigger)
-            drops += self._drop_oldest(place, max(0, len(queue.stamps) - kept), reason)
+            drops += queue.drop(max(0, len(queue.stamps) - kept), reason)
         self.waits_ended = self.waits_started
         return drops
 
     def buffered(self, place: int) -> int:
-        return len(self._queues[place].stamps) - self._served[place]
+        return self._queues[place].unmatched
 
     def needed_queue(self, place: int) -> int | None:
         return self._losses.needed[place]
@@ -177,17 +173,18 @@ class LatestTime(Policy):
                 outcomes += self._drop_expired(place, stamp)
                 members.append(None)
                 continue
-            outcomes += self._drop_oldest(place, position, DropReason.SUPERSEDED)
-            members.append(self._queues[place].messages[0])
-            self._served[place] = True
+            queue = self._queues[place]
+            outcomes += queue.drop(position, DropReason.SUPERSEDED)
+            members.append(queue.messages[0])
+            queue.is_served = True
         outcomes.append(Match(tuple(members)))
         self._queues[self._trigger].take(1)
-        self._served[self._trigger] = False
+        self._queues[self._trigger].is_served = False
         self.waits_ended += 1
 
     def _drop_trigger(self, reason: DropReason) -> list[Drop]:
         stamp = self._queues[self._trigger].stamps[0]
-        drops = self._drop_oldest(self._trigger, 1, reason)
+        drops = self._queues[self._trigger].drop(1, reason)
         self.waits_ended += 1
         for place in range(self.n_inputs):
             drops += self._drop_expired(place, stamp)
@@ -199,12 +196,4 @@ class LatestTime(Policy):
         if max_age is None:
             return []
         count = bisect_left(self._queues[place].stamps, stamp - max_age)
-        return self._drop_oldest(place, count, DropReason.EXPIRED)
-
-    def _drop_oldest(self, place: int, count: int, reason: DropReason) -> list[Drop]:
-        """Remove the oldest; the first may have served in a set, and then leaves matched."""
-        taken = self._queues[place].take(count)
-        if taken and self._served[place]:
-            self._served[place] = False
-            del taken[0]
-        return [Drop(message, reason) for message in taken]
+        return self._queues[place].drop(count, DropReason.EXPIRED)

@@ -1,7 +1,7 @@
 """A policy at work in a group: at once, with a limit to what may wait, or by the clock."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from syncrelay.sync.arrivals import Arrivals
@@ -10,45 +10,47 @@ from syncrelay.sync.policy import Policy
 
 
 class Matching(Protocol):
-    """Feeds a policy."""
+    """Feeds a policy the messages of a group, and lets sets leave in time. By default sets leave when they are made."""
 
     __slots__ = ()
 
-    def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
-        """Take a message of an input to be matched at `stamp`, at the time of the last `due`; give what leaves."""
-        ...
+    _policy: Policy
+
+    feed: Callable[[int, int, Message], Sequence[Outcome]]
+    """Takes an input, the stamp to match by and a message, at the time of the last `due`; returns what leaves."""
 
     def due(self, now: int) -> Sequence[Outcome]:
-        """Give what has waited long enough."""
-        ...
+        """Return what has waited long enough."""
+        del now
+        return ()
 
     def next_deadline(self) -> int | None:
-        """When something will have waited long enough, if nothing else comes."""
-        ...
+        """Return when something will have waited long enough, if no message comes before."""
+        return None
 
     def pass_over(self, now: int) -> None:
         """Let time pass without the sets that only the clock would have given."""
-        ...
+        del now
 
     def flush(self, reason: DropReason) -> list[Drop]:
         """Drop all that is buffered, and be as new."""
-        ...
+        return self._policy.flush(reason)
 
     def let_go(self, reason: DropReason) -> list[Drop]:
         """Drop what waits for others; see Policy."""
-        ...
+        return self._policy.let_go(reason)
 
     def buffered(self, index: int) -> int:
-        """How many messages of this input are buffered and have been in no set."""
-        ...
+        """Return how many messages of this input are buffered and have been in no set."""
+        return self._policy.buffered(index)
 
     def needed_queue(self, index: int) -> int | None:
         """See Policy."""
-        ...
+        return self._policy.needed_queue(index)
 
 
-class Unlimited:
-    """A set waits as long as the policy has it wait: no input may be optional that it would wait for."""
+class Unlimited(Matching):
+    """A set waits as long as the policy has it wait, so it must not wait for an optional input."""
 
     __slots__ = ("_policy", "feed")
 
@@ -56,45 +58,21 @@ class Unlimited:
         self._policy, stage = policy.for_required(required)
         if stage.inputs:
             raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
-        # The policy's own: every message would pay for a call between.
+        # The policy's own method: a method between would be called for every message.
         self.feed = self._policy.feed
-
-    def due(self, now: int) -> Sequence[Outcome]:
-        del now
-        return ()
-
-    def next_deadline(self) -> int | None:
-        return None
-
-    def pass_over(self, now: int) -> None:
-        del now
-
-    def flush(self, reason: DropReason) -> list[Drop]:
-        return self._policy.flush(reason)
-
-    def let_go(self, reason: DropReason) -> list[Drop]:
-        return self._policy.let_go(reason)
-
-    def buffered(self, index: int) -> int:
-        return self._policy.buffered(index)
-
-    def needed_queue(self, index: int) -> int | None:
-        return self._policy.needed_queue(index)
 
 
 class ByClock(Matching):
-    """A policy that makes its sets as time passes: those of a time leave `max_wait_ns` after it."""
+    """A policy that makes its sets as time passes: the set of a time leaves `max_wait_ns` after it."""
 
-    __slots__ = ("_max_wait", "_policy")
+    __slots__ = ("_max_wait", "_policy", "feed")
 
     def __init__(self, policy: Policy, *, required: Sequence[bool], max_wait_ns: int) -> None:
         self._policy, stage = policy.for_required(required)
         if stage.inputs:
             raise ValueError("a policy that is by the clock deals with optional inputs itself")
         self._max_wait = max_wait_ns
-
-    def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
-        return self._policy.feed(index, stamp, message)
+        self.feed = self._policy.feed
 
     def due(self, now: int) -> Sequence[Outcome]:
         return self._policy.advance(now - self._max_wait)
@@ -106,24 +84,12 @@ class ByClock(Matching):
     def pass_over(self, now: int) -> None:
         self._policy.pass_over(now - self._max_wait)
 
-    def flush(self, reason: DropReason) -> list[Drop]:
-        return self._policy.flush(reason)
-
-    def let_go(self, reason: DropReason) -> list[Drop]:
-        return self._policy.let_go(reason)
-
-    def buffered(self, index: int) -> int:
-        return self._policy.buffered(index)
-
-    def needed_queue(self, index: int) -> int | None:
-        return self._policy.needed_queue(index)
-
 
 class Limited(Matching):
     """A set waits no longer than `max_wait_ns` from when its required messages are all there.
 
-    Waits count from the `now` at which the message that began them was fed. Where `now` falls, they count from
-    there: no set waits longer because of it.
+    A wait counts from the `now` at which the message that began it was fed. Where `now` falls, all waits count from
+    the new `now`, so that no set waits longer.
     """
 
     __slots__ = (
@@ -137,6 +103,7 @@ class Limited(Matching):
         "_stage",
         "_waits_ended",
         "_waits_started",
+        "feed",
     )
 
     def __init__(
@@ -157,8 +124,9 @@ class Limited(Matching):
         self._now = 0
         self._since: deque[int] = deque()
         self._waits_started = self._waits_ended = 0
+        self.feed = self._fed
 
-    def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
+    def _fed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
         place = self._places.get(index)
         if place is None:
             outcomes = self._stage.put(index, stamp, message)
@@ -180,14 +148,11 @@ class Limited(Matching):
         return outcomes
 
     def next_deadline(self) -> int | None:
-        # What is in the stage left the policy before anything that still waits there, and began no later.
+        # The sets in the stage left the policy before anything that still waits in it, and began to wait no later.
         since = self._stage.oldest_since
         if since is None and self._since:
             since = self._since[0]
         return None if since is None else since + self._max_wait
-
-    def pass_over(self, now: int) -> None:
-        del now
 
     def flush(self, reason: DropReason) -> list[Drop]:
         drops = self._policy.flush(reason) + self._stage.flush(reason)
@@ -208,21 +173,21 @@ class Limited(Matching):
         return None if place is None else self._policy.needed_queue(place)
 
     def _join(self, outcomes: Sequence[Outcome], now: int) -> list[Outcome]:
-        """Let the optional inputs join the sets of the policy."""
+        """Hand the sets of the policy to the stage, where messages of the optional inputs join them."""
         since = self._note_waits(now)
         joined: list[Outcome] = []
         for outcome in outcomes:
             if isinstance(outcome, Drop):
                 joined.append(outcome)
                 continue
-            # They may wait here: what would take their inputs back is late already.
+            # Sets may wait in the stage. A message that is older than theirs is late already.
             self._arrivals.give(outcome.messages)
             joined += self._stage.hold(*self._widened(outcome), since)
             since = now
         return joined
 
     def _widened(self, match: Match) -> tuple[tuple[Message | None, ...], int, int]:
-        """Give a set a place for every input, with the least and the greatest stamp it is matched by."""
+        """Return a set with a place for every input, and the least and the greatest stamp that it was matched by."""
         messages: list[Message | None] = [None] * len(self._offsets)
         stamps = []
         for message in match.messages:
@@ -232,7 +197,7 @@ class Limited(Matching):
         return tuple(messages), min(stamps), max(stamps)
 
     def _note_waits(self, now: int) -> int:
-        """See what waits began and ended; give when the first that ended had begun, `now` if none did."""
+        """Note which waits began and ended. Return when the first one that ended had begun, `now` if none ended."""
         policy = self._policy
         self._since.extend([now] * (policy.waits_started - self._waits_started))
         ended = policy.waits_ended - self._waits_ended

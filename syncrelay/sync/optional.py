@@ -1,4 +1,4 @@
-"""Where sets of the required inputs wait for a message of the optional ones."""
+"""The stage where sets of the required inputs wait for messages of the optional ones, by stamps."""
 
 from bisect import bisect_left, bisect_right
 from collections import deque
@@ -11,7 +11,7 @@ from syncrelay.sync.queues import StampQueue
 
 
 class _Waiting(NamedTuple):
-    """A set of the required inputs: None at the optional ones, the span of its stamps, when its wait began."""
+    """A set of the required inputs: None for the optional ones, its least and greatest stamp, when its wait began."""
 
     messages: tuple[Message | None, ...]
     low: int
@@ -20,12 +20,11 @@ class _Waiting(NamedTuple):
 
 
 class OptionalInputs(OptionalStage):
-    """Adds to each set, of each optional input, the message nearest to its middle that keeps it within slop.
+    """Adds to each set, for each optional input, the message nearest to the middle of the set, within slop.
 
-    Sets come and leave in one order, whatever the optional inputs do; at once where there are none. A set
-    leaves as soon as no message that may still come, each input in stamp order, would be nearer; or when it is
-    told to. A message goes to the nearer of two sets that wait. It is superseded when its input gave a newer
-    one to a set, too far when it lies too far back for any set to come.
+    Sets leave in the order they come; at once if there are no optional inputs. A set leaves when no later message of
+    any optional input can be nearer, or when `leave` is called. A message goes to the nearer of two sets that wait. It
+    is superseded when a newer one of its input went into a set, and too far when it is too old for every set to come.
     """
 
     __slots__ = ("_least_steps", "_newest", "_queue_size", "_queues", "_slop", "_waiting", "inputs")
@@ -108,7 +107,7 @@ class OptionalInputs(OptionalStage):
         return outcomes
 
     def _is_decided(self, index: int) -> bool:
-        """Whether nothing that this input may still send is better for the oldest set than what it has."""
+        """Whether no later message of this input can be better for the oldest set than the best one so far."""
         newest = self._newest.get(index)
         if newest is None:
             return False
@@ -122,7 +121,7 @@ class OptionalInputs(OptionalStage):
         return next_stamp >= mirrored
 
     def _nearest(self, waiting: _Waiting, stamps: list[int], low: int, high: int) -> int | None:
-        """Give the place of the stamp nearest to the set's middle, the older of two, that spans within slop."""
+        """Return the place of the stamp nearest to the set's middle within slop; of two equally near, the older."""
         first = bisect_left(stamps, high - self._slop)
         end = bisect_right(stamps, self._last_fitting(waiting, low))
         if first >= end:
@@ -134,7 +133,7 @@ class OptionalInputs(OptionalStage):
         return after if abs(is_after) < abs(is_before) else before
 
     def _last_fitting(self, waiting: _Waiting, low: int) -> int:
-        """Give the last stamp within slop of `low` that is not nearer to the next set that waits."""
+        """Return the last stamp within slop of `low` that is not nearer to the next waiting set."""
         last = low + self._slop
         if len(self._waiting) > 1:
             following = self._waiting[1]

@@ -1,4 +1,4 @@
-"""Where sets of equal keys wait for the messages of their key on the optional inputs."""
+"""The stage where sets of required inputs wait for messages of the optional ones, by keys."""
 
 from collections import deque
 from collections.abc import Hashable, Sequence
@@ -15,11 +15,11 @@ class _Waiting(NamedTuple):
 
 
 class OptionalKeys(OptionalStage):
-    """Adds to each set, of each optional input, the message of its key.
+    """Adds to each set, for each optional input, the message of its key.
 
-    Sets come and leave in one order. A set leaves as soon as each optional input has shown its key or that of a
-    later set that waits; or when it is told to. What an input gave before a message that leaves in a set, or
-    of an older stamp, is superseded.
+    Sets leave in the order they come. A set leaves when each optional input has sent its key or that of a later set
+    that waits, or when `leave` is called. When a message leaves in a set, those of its input that came before it or
+    have an older stamp are superseded.
     """
 
     __slots__ = ("_queue_size", "_queues", "_waiting", "inputs")
@@ -90,7 +90,7 @@ class OptionalKeys(OptionalStage):
 
 
 def _take_with_older(queue: dict[Hashable, Message], member: Message) -> list[Message]:
-    """Remove a message and all before it in arrival or stamp; give those before."""
+    """Remove a message and all that came before it or have an older stamp; return those."""
     keys = list(queue)
     position = keys.index(member.key)
     older = keys[:position] + [key for key in keys[position:] if queue[key].stamp < member.stamp]

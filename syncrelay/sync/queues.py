@@ -1,25 +1,34 @@
-"""Queues in stamp order, and what is known of a queue that was too short."""
+"""Queues in stamp order, and how long a queue that was too short should have been."""
 
 from bisect import bisect_left, bisect_right, insort
 from collections.abc import Sequence
 
-from syncrelay.sync.messages import Message
+from syncrelay.sync.messages import Drop, DropReason, Message
 
 LONGEST_QUEUE = 1000
-"""What would take more than this comes of stamps of another clock, and no queue is the answer."""
+"""A longer queue is never suggested: only stamps of another clock would need it."""
 
 
 class StampQueue:
-    """Messages of one input in stamp order, each stamp once. `stamps` and `messages` run in parallel."""
+    """Messages of one input in stamp order, each stamp once. `stamps` and `messages` run in parallel.
 
-    __slots__ = ("messages", "stamps")
+    `is_served` says that the first message has been in a set: when it is removed, it leaves matched.
+    """
+
+    __slots__ = ("is_served", "messages", "stamps")
 
     def __init__(self) -> None:
         self.stamps: list[int] = []
         self.messages: list[Message] = []
+        self.is_served = False
+
+    @property
+    def unmatched(self) -> int:
+        """How many messages have been in no set."""
+        return len(self.stamps) - self.is_served
 
     def insert(self, stamp: int, message: Message) -> Message | None:
-        """Put a message in its place; give the one of the same stamp that it replaces, if there is one."""
+        """Put a message in its place; return the one of the same stamp that it replaces, if there is one."""
         stamps = self.stamps
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
@@ -35,22 +44,30 @@ class StampQueue:
         return None
 
     def remove(self, position: int) -> Message:
-        """Remove one message and give it."""
+        """Remove one message and return it."""
         del self.stamps[position]
         return self.messages.pop(position)
 
     def take(self, count: int) -> list[Message]:
-        """Remove the oldest `count` messages and give them."""
+        """Remove the oldest `count` messages and return them."""
         taken = self.messages[:count]
         del self.messages[:count]
         del self.stamps[:count]
         return taken
 
+    def drop(self, count: int, reason: DropReason) -> list[Drop]:
+        """Remove the oldest `count` messages; return the drops of those that have been in no set."""
+        taken = self.take(count)
+        if taken and self.is_served:
+            self.is_served = False
+            del taken[0]
+        return [Drop(message, reason) for message in taken]
+
 
 class Losses:
-    """What queues lost by overflow, and how long they should have been.
+    """The messages that queues lost by overflow, and how long the queues should have been.
 
-    `needed` is the greatest length for each place, of those up to LONGEST_QUEUE.
+    `needed` is the greatest such length for each place, up to LONGEST_QUEUE.
     """
 
     __slots__ = ("_lost", "needed")
@@ -60,7 +77,7 @@ class Losses:
         self.needed: list[int | None] = [None] * n_inputs
 
     def forget(self) -> None:
-        """Start afresh, but keep what was needed."""
+        """Forget the lost messages, but keep what was needed."""
         self._lost = [[] for _ in self._lost]
 
     def lose(self, place: int, stamp: int) -> None:
@@ -73,8 +90,8 @@ class Losses:
     def miss(self, place: int, stamps: Sequence[int], wanted: int, *, before: int, after: int) -> None:
         """Note that a message of stamp `wanted` found only newer ones in this queue, `stamps`.
 
-        Nothing comes of it unless the queue lost one that was older by no more than `before`, or newer by no more than
-        `after`. The length is that of a queue that would still hold it, and one more: a set may wait for the next.
+        This matters if the queue lost one that was older by no more than `before`, or newer by no more than `after`.
+        The length is that of a queue that would still hold it, plus one: a set may wait for the next message.
         """
         lost = self._lost[place]
         position = bisect_right(lost, wanted)

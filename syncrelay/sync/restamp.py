@@ -6,7 +6,7 @@ from syncrelay.sync.messages import Match
 
 
 class Restamp(Enum):
-    """Which stamp all messages of a set get: the smallest or the largest of those that came in, or the clock's tick."""
+    """The common stamp of a set: the earliest or the latest that its messages came with, or the clock's tick."""
 
     EARLIEST = "earliest"
     LATEST = "latest"
@@ -14,10 +14,10 @@ class Restamp(Enum):
 
 
 def common_stamp(match: Match, restamp: Restamp | int) -> int:
-    """Give the stamp in nanoseconds, by the stamps as they came in.
+    """Return the common stamp in nanoseconds.
 
-    An int names an input; where that optional input is missing, the earliest stamp stands in. TICK is for sets that a
-    clock triggered.
+    An int names an input whose stamp is taken; where the set lacks that input, the earliest stamp is. TICK is for sets
+    that a clock triggered.
     """
     messages = match.messages
     if restamp is Restamp.LATEST:

@@ -1,19 +1,18 @@
-"""Thinning: which sets leave when not all may."""
+"""Thinning: which sets pass when not all may."""
 
 from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 
 _EARLY = 4
-"""A set that comes up to a fourth of a period early counts for the period it is early for."""
+"""A set that is early by up to a fourth of a period counts for the period that it is early for."""
 
 
 class Thinning:
-    """Lets every `every`th set pass, the first first, and of those one in each period of `min_set_period_ns`.
+    """Lets the first of every `every` sets pass, and of those at most one in each period of `min_set_period_ns`.
 
-    Periods are counted from the first set on, so that what passes is spread evenly and a source that jitters
-    at just the greatest rate passes whole. At most one set a period passes: over any time no more than
-    that time holds periods, and two.
+    Periods count from the first set, so that sets pass evenly, and all sets of a source pass whose rate is the greatest
+    and jitters. In any length of time, at most two sets more pass than it has periods.
     """
 
     __slots__ = ("_every", "_first", "_period", "_seen", "_slot", "_withheld")
@@ -27,7 +26,7 @@ class Thinning:
         self._reset()
 
     def thin(self, match: Match, stamp: int) -> Sequence[Outcome]:
-        """Give the set, of this stamp, if it passes, else the drops it comes to."""
+        """Return the set, of this stamp, if it passes; otherwise the drops of its messages."""
         if self._passes(stamp):
             return (match,) if self._withheld is None else (*self._withheld.note_passed(match), match)
         if self._withheld is not None:
@@ -35,7 +34,7 @@ class Thinning:
         return [Drop(message, DropReason.THINNED) for message in match.messages if message is not None]
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop what is withheld, and be as new: the next set is the first."""
+        """Drop the withheld messages, and be as new: the next set is the first."""
         self._reset()
         return [] if self._withheld is None else self._withheld.flush(reason)
 
@@ -64,9 +63,9 @@ class Thinning:
 
 
 class Withheld:
-    """Messages that so far were only in sets that did not pass, where a message may be in many sets.
+    """Messages that have only been in sets that did not pass, of a policy whose messages may be in many sets.
 
-    The newest of each input is kept, as it may yet be in a set that passes; thinned when it can't any more.
+    The newest of each input is kept, as it may still be in a set that passes, and is dropped once it cannot be.
     """
 
     __slots__ = ("_messages", "_passed")
@@ -76,7 +75,7 @@ class Withheld:
         self._passed: list[int | None] = [None] * n_inputs
 
     def note_passed(self, match: Match) -> list[Drop]:
-        """See a set that passed; give what will not be in any other."""
+        """Note a set that passed; return the drops of messages that will be in no other."""
         stopped = self._messages
         self._messages = [None] * len(stopped)
         for index, message in enumerate(match.messages):
@@ -85,7 +84,7 @@ class Withheld:
         return _not_in(stopped, match.messages)
 
     def note_stopped(self, match: Match) -> list[Drop]:
-        """See a set that did not pass; give what will not be in any other."""
+        """Note a set that did not pass; return the drops of messages that will be in no other."""
         stopped = self._messages
         self._messages = [
             None if message is None or message.stamp == passed else message
@@ -94,14 +93,14 @@ class Withheld:
         return _not_in(stopped, self._messages)
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop all, and be as new."""
+        """Drop everything, and be as new."""
         drops = [Drop(message, reason) for message in self._messages if message is not None]
         self._messages = [None] * len(self._messages)
         self._passed = [None] * len(self._messages)
         return drops
 
     def buffered(self, index: int) -> int:
-        """How many messages of this input are in here."""
+        """Return how many messages of this input are withheld."""
         return int(self._messages[index] is not None)
 
 

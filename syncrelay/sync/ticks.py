@@ -1,4 +1,4 @@
-"""The grid on which a clock triggers: its ticks, in whole nanoseconds, without drift."""
+"""The ticks of a clock that triggers sets, in whole nanoseconds, without drift."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,8 @@ _NS_PER_SECOND = 1_000_000_000
 class Ticks:
     """Ticks at `numerator` / `denominator` Hz. Tick k is at k * 10**9 * denominator // numerator nanoseconds.
 
-    They are counted from the epoch, not from when anybody began: whoever has the time has the ticks, be it the relay
-    that runs, one that was started later, or a replay. k * period with a rounded period would drift: at 30 Hz by a
-    whole tick in 39 days.
+    They count from the epoch, so that the running relay, one that is started later and a replay have the same ticks.
+    Multiples of a rounded period would drift: at 30 Hz by a whole tick in 39 days.
     """
 
     numerator: int
@@ -23,24 +22,24 @@ class Ticks:
 
     @property
     def hz(self) -> float:
-        """How many there are a second."""
+        """How many ticks there are a second."""
         return self.numerator / self.denominator
 
     @property
     def period_ns(self) -> int:
-        """The time between two, rounded up."""
+        """The time between two ticks, rounded up."""
         return -(-_NS_PER_SECOND * self.denominator // self.numerator)
 
     def at(self, index: int) -> int:
-        """When a tick is."""
+        """Return the time of a tick."""
         return index * _NS_PER_SECOND * self.denominator // self.numerator
 
     def last_until(self, time: int) -> int:
-        """The index of the last tick that is not after a time."""
+        """Return the index of the last tick that is not after a time."""
         return -(-(time + 1) * self.numerator // (_NS_PER_SECOND * self.denominator)) - 1
 
     def first_from(self, time: int) -> int:
-        """The index of the first tick that is not before a time."""
+        """Return the index of the first tick that is not before a time."""
         return self.last_until(time - 1) + 1
 
     def __str__(self) -> str:
