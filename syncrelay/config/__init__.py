@@ -3,18 +3,11 @@
 from syncrelay.config.export import ExportFeature, ExportSource, LerobotConfig
 from syncrelay.config.listen import Listen
 from syncrelay.config.load import Config, load, load_text
-from syncrelay.config.models import (
-    DiagnosticsConfig,
-    Distance,
-    NodeConfig,
-    StampField,
-    StampSource,
-    Tolerance,
-    Transport,
-)
+from syncrelay.config.models import Distance, StampField, StampSource, Tolerance
 from syncrelay.config.problems import ConfigError, Problem, Severity, Span, render, where
 from syncrelay.config.qos import AUTO, QosOverrides, QosPreset
 from syncrelay.config.resolved import GroupConfig, TopicConfig
+from syncrelay.config.sections import DiagnosticsConfig, NodeConfig, Transport
 
 __all__ = [
     "AUTO",

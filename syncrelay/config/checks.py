@@ -3,15 +3,16 @@
 from collections.abc import Iterator, Sequence
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode, SequenceNode
+from syncrelay.config.installed import installed_policies
 from syncrelay.config.keys import MOST
-from syncrelay.config.models import NodeConfig
+from syncrelay.config.models import Distance
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Problem, Severity
 from syncrelay.config.resolved import GroupConfig
+from syncrelay.config.sections import NodeConfig
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
 from syncrelay.config.wording import all_of, or_nearest, quoted
 
-_OF_WAITS = ("queue_size", "max_wait", "trigger")
 # Beside those of the ticks that have come: what was held for the tick before, and what is for the next.
 _HELD_BESIDE = 2
 # The longest of what every node offers below its name.
@@ -28,6 +29,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
         yield document.problem(("groups",), "expected one group or more, found none", code="too_few")
     for group in groups:
         yield from _too_few(group, document)
+        yield from _other_policy(group, document)
         yield from _restamp(group, document)
         yield from _trigger(group, document)
         yield from _clock(group, document)
@@ -58,9 +60,16 @@ def _too_few(group: GroupConfig, document: Document) -> Iterator[Problem]:
         yield document.problem(path, text, code="too_few", span=document.key_span(path))
 
 
+def _other_policy(group: GroupConfig, document: Document) -> Iterator[Problem]:
+    """Yield a policy that a package offers too, and does not get to replace."""
+    other = installed_policies().refused.get(group.options.policy or "")
+    if other is not None:
+        yield document.problem((*group.path, "policy"), other, code="policy", severity=Severity.WARNING)
+
+
 def _restamp(group: GroupConfig, document: Document) -> Iterator[Problem]:
     restamp, path = group.options.restamp, (*group.path, "restamp")
-    if restamp == "trigger" and group.restamp is None and "trigger" not in type(group.options).model_fields:
+    if restamp == "trigger" and group.restamp is None and group.options.trigger_key is None:
         text = f"{group.options.policy} has no trigger: expected none, earliest, latest or an input of this group"
         yield document.problem(path, text, code="bad_value")
     elif restamp not in _RESTAMP_WORDS and group.restamp is None:
@@ -86,9 +95,10 @@ def _unwritten_types(group: GroupConfig, document: Document) -> Iterator[Problem
 
 
 def _trigger(group: GroupConfig, document: Document) -> Iterator[Problem]:
-    named, path = group.options.trigger_topic, (*group.path, "trigger")
-    if named is None:
+    named, key = group.options.trigger_topic, group.options.trigger_key
+    if named is None or key is None:
         return
+    path = (*group.path, key)
     at = None if group.trigger is None else (*group.path, "topics", group.trigger, "max_age")
     if at is not None and document.has(at):
         text = f"{quoted(named)} triggers every set, so its messages have no age: `max_age` belongs to the others"
@@ -104,18 +114,18 @@ def _trigger(group: GroupConfig, document: Document) -> Iterator[Problem]:
 def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
     """Yield a queue that overflows while sets wait: it holds one message for each tick, and the latest before them."""
     ticks, max_wait, size = group.ticks, group.options.max_wait, group.options.queue_size
-    if ticks is None or max_wait is None or {(*group.path, key) for key in _OF_WAITS} & document.faulty:
+    trigger = (*group.path, group.options.trigger_key or "")
+    queue, wait = ((*group.path, key) for key in ("queue_size", "max_wait"))
+    if ticks is None or max_wait is None or {trigger, queue, wait} & document.faulty:
         return
     needed = -(-max_wait // ticks.period_ns) + _HELD_BESIDE
     if needed > size:
         text = (
-            f"queue_size {document.filled_in((*group.path, 'queue_size')) or size} is too short for this max_wait at"
-            f" {document.filled_in((*group.path, 'trigger')) or ticks}: up to {needed} messages of an input wait for"
+            f"queue_size {document.filled_in(queue) or size} is too short for this max_wait at"
+            f" {document.filled_in(trigger) or ticks}: up to {needed} messages of an input wait for"
             f" their ticks, write {'`queue_size: ' + str(needed) + '`' if needed <= MOST else 'a shorter max_wait'}"
         )
-        path = (*group.path, "queue_size")
-        at = path if document.has(path) else (*group.path, "max_wait")
-        yield document.problem(at, text, code="conflict")
+        yield document.problem(queue if document.has(queue) else wait, text, code="conflict")
 
 
 def _times_of_arrival(group: GroupConfig, document: Document) -> Iterator[Problem]:
@@ -165,11 +175,14 @@ def _optional_inputs(group: GroupConfig, document: Document) -> Iterator[Problem
 
 def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:
     """Yield a slop of whole seconds that is written without a unit: milliseconds are what people mean."""
-    path = (*group.path, "slop")
+    tolerance = group.options.tolerance
+    if tolerance is None or group.options.distance is not Distance.SPAN:
+        return
+    path = (*group.path, tolerance.key)
     node = document.find(path)
-    slop = node.value if isinstance(node, ScalarNode) else None
-    if isinstance(slop, int | float) and not isinstance(slop, bool) and 1 <= slop <= _LONGEST_S:
-        number = f"{slop:.15g}"
+    span = node.value if isinstance(node, ScalarNode) else None
+    if isinstance(span, int | float) and not isinstance(span, bool) and 1 <= span <= _LONGEST_S:
+        number = f"{span:.15g}"
         text = (
             f"{number} without a unit means {number} s: write {number}ms if you mean milliseconds, otherwise {number}s"
         )

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Discriminator, Field, Tag, WithJsonSchema
 
 from syncrelay.config.keys import NOT_NULL, Duration, FieldPath, Keys, TopicName, tag_of_mapping
-from syncrelay.config.models import NodeConfig
 from syncrelay.config.names import check_field_path, check_topic_name
+from syncrelay.config.sections import NodeConfig
 from syncrelay.config.wording import describe
 
 ACTION: Final = "action"

@@ -7,9 +7,9 @@ from typing import Final
 from syncrelay.config.document import Document, SequenceNode
 from syncrelay.config.export import ACTION, ExportKeys, ExportSource, LerobotKeys, TaskTopic, sources_of
 from syncrelay.config.interfaces import PRIMITIVES, Interfaces
-from syncrelay.config.models import NodeConfig
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.resolved import GroupConfig, TopicConfig
+from syncrelay.config.sections import NodeConfig
 from syncrelay.config.wording import all_of, one_of, or_nearest, quoted
 
 IMAGES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")

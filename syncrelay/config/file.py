@@ -1,21 +1,22 @@
 """The whole file as a model: for the policies that there are, and in a form for files with faults."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from operator import or_
 from types import GenericAlias
-from typing import Annotated, Any, Final, Literal, TypeVar, get_args
+from typing import Annotated, Any, Final, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Discriminator, Field, Tag, create_model
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, create_model
 from pydantic.fields import FieldInfo
 
-from syncrelay.config import policies
 from syncrelay.config.export import ExportKeys, LerobotKeys
+from syncrelay.config.installed import NOT_SHARED, Policies, installed_policies, shared_keys, topic_model
 from syncrelay.config.keys import NOT_NULL, Keys
-from syncrelay.config.models import DiagnosticsConfig, Group, MetricsConfig, NodeConfig, Topic, Topics
+from syncrelay.config.models import Group, Topic, Topics
 from syncrelay.config.names import check_group_name
+from syncrelay.config.sections import DiagnosticsConfig, MetricsConfig, NodeConfig
 from syncrelay.config.wording import describe
 
 AnyKeys = TypeVar("AnyKeys", bound=Keys)
@@ -75,28 +76,24 @@ class FileFormat:
 
 
 def file_format() -> FileFormat:
-    """Return the models of a file with all policies."""
-    return _format_of(policies.GROUP_MODELS)
+    """Return the models of a file with all policies that are installed."""
+    return _format_of(installed_policies())
 
 
 def partial_format() -> type[FileKeys]:
     """Return the model of a file in which no key is needed."""
-    return _partial_format_of(policies.GROUP_MODELS)
+    return _partial_format_of(installed_policies())
 
 
 @cache
-def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
-    groups: dict[str, type[Group]] = {}
-    for model in models:
-        (policy,) = get_args(model.model_fields["policy"].annotation)
-        if groups.setdefault(policy, model) is not model:
-            raise TypeError(f"{groups[policy].__name__} and {model.__name__} are both the policy {policy}")
-    topics = {policy: _topic_model(model) for policy, model in groups.items()}
-    names: Any = Literal[tuple(groups)]
-    every_key = _every_key((Group, *models))
-    keys: dict[str, Any] = {name: _loose(every_key[name], None) for name in every_key if name not in _OWN}
+def _format_of(installed: Policies) -> FileFormat:
+    groups = dict(installed.models)
+    topics = {policy: topic_model(model) for policy, model in groups.items()}
+    names: Any = Annotated[Literal[tuple(groups)], BeforeValidator(partial(_refuse_policy, installed.refused))]
+    every_key = shared_keys((Group, *groups.values()))
+    keys: dict[str, Any] = {name: _loose(every_key[name], None) for name in every_key if name not in NOT_SHARED}
     about = "How the messages of a group are matched."
-    any_topic = create_model("TopicOfAnyPolicy", __base__=Topic, **_fields(_every_key((Topic, *topics.values()))))
+    any_topic = create_model("TopicOfAnyPolicy", __base__=Topic, **_fields(shared_keys((Topic, *topics.values()))))
     any_group = create_model(
         "GroupOfAnyPolicy",
         __base__=Group,
@@ -114,8 +111,10 @@ def _format_of(models: tuple[type[Group], ...]) -> FileFormat:
     return FileFormat(groups, topics, any_group, any_topic, defaults, _file(defaults, _by_policy(groups, any_group)))
 
 
-# What `defaults` can't hold, or holds in its own way.
-_OWN: Final = ("policy", "topics")
+def _refuse_policy(refused: Mapping[str, str], name: Any) -> Any:
+    if isinstance(name, str) and name in refused:
+        raise ValueError(refused[name])
+    return name
 
 
 def _file(defaults: type[Keys], group: Any) -> type[FileKeys]:
@@ -134,29 +133,6 @@ def _file(defaults: type[Keys], group: Any) -> type[FileKeys]:
         defaults=(defaults, Field(default=None, description=about_defaults)),
         groups=(_dict_of(Annotated[str, AfterValidator(check_group_name)], group), about_groups),
     )
-
-
-def _topic_model(group: type[Group]) -> type[Topic]:
-    model: type[Topic] = get_args(group.model_fields["topics"].annotation)[0]
-    return model
-
-
-def _every_key(models: Iterable[type[BaseModel]]) -> dict[str, FieldInfo]:
-    """Return all keys of some models. Raises TypeError where two have one of the same name and different types.
-
-    `defaults` holds one value for the groups of all policies.
-    """
-    keys: dict[str, FieldInfo] = {}
-    owners: dict[str, str] = {}
-    for model in models:
-        for name, info in model.model_fields.items():
-            key, owner = keys.setdefault(name, info), owners.setdefault(name, model.__name__)
-            if name not in _OWN and (key.annotation, key.metadata) != (info.annotation, info.metadata):
-                raise TypeError(
-                    f"the key `{name}` of {model.__name__} has another type than that of {owner}: rename one of them,"
-                    " as `defaults` holds one value for both"
-                )
-    return keys
 
 
 def _fields(keys: Mapping[str, FieldInfo]) -> dict[str, Any]:
@@ -201,8 +177,8 @@ def _partial(model: type[AnyKeys], **fields: Any) -> type[AnyKeys]:
 
 
 @cache
-def _partial_format_of(models: tuple[type[Group], ...]) -> type[FileKeys]:
-    form = _format_of(models)
+def _partial_format_of(installed: Policies) -> type[FileKeys]:
+    form = _format_of(installed)
     by_policy = {policy: _partial_group(model) for policy, model in form.groups.items()}
     group = _by_policy(by_policy, _partial_group(form.any_group))
     return _partial(FileKeys, defaults=(Any, None), groups=(_dict_of(str, group), {}), export=(_partial_export(), None))
@@ -214,4 +190,4 @@ def _partial_export() -> Any:
 
 
 def _partial_group(model: type[Group]) -> type[Group]:
-    return _partial(model, topics=(_tuple_of(_partial(_topic_model(model))), ()))
+    return _partial(model, topics=(_tuple_of(_partial(topic_model(model))), ()))

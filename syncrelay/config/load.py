@@ -8,6 +8,7 @@ from functools import partial
 from typing import Final
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from syncrelay.config.checks import check_groups, check_node
 from syncrelay.config.defaults import merged_documents, merged_files, with_defaults
@@ -17,12 +18,12 @@ from syncrelay.config.export_checks import check_export
 from syncrelay.config.file import FileKeys, file_format
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.listen import Listen
-from syncrelay.config.models import DiagnosticsConfig, NodeConfig
 from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.partial import partial_file
 from syncrelay.config.problems import ConfigError, Path, Problem, Severity
 from syncrelay.config.relay_form import RelayForm
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
+from syncrelay.config.sections import DiagnosticsConfig, NodeConfig
 from syncrelay.config.source import PATIENCE_S, Patience, Source, check_text, listed, read_source
 from syncrelay.config.translate import translate
 from syncrelay.config.typechecks import check_types
@@ -159,7 +160,15 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
         return _Part(document, file_format().file.model_validate(keys), problems)
     except ValidationError as error:
         faults = error.errors(include_url=False)
-        return _Part(*partial_file(document, faults), problems + translate(faults, document, RelayForm()))
+        return _Part(*partial_file(document, faults), problems + translate(_known(faults), document, RelayForm()))
+
+
+def _known(faults: Sequence[ErrorDetails]) -> list[ErrorDetails]:
+    """Leave out unknown keys of groups whose policy is refused: they may be those of its broken package."""
+    refused = {
+        fault["loc"][:2] for fault in faults if fault["type"] == "value_error" and fault["loc"][3:] == ("policy",)
+    }
+    return [fault for fault in faults if fault["type"] != "extra_forbidden" or fault["loc"][:2] not in refused]
 
 
 def _types(groups: Sequence[GroupConfig], document: Document, interfaces: Interfaces | None) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""What a file may say. The JSON Schema and the errors come from these models and nowhere else."""
+"""The keys of groups and topics. The JSON Schema and the errors come from such models and nowhere else."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,113 +12,18 @@ from syncrelay.config.keys import (
     NOT_NULL,
     Duration,
     FieldPath,
-    Host,
     Keys,
-    ListenAddress,
-    Namespace,
-    NodeName,
     OutputPrefix,
     Rate,
-    ShortDuration,
     SignedDuration,
     TopicName,
     TypeName,
     tag_of_mapping,
 )
-from syncrelay.config.names import expand
 from syncrelay.config.qos import AUTO, Qos
+from syncrelay.config.sections import NodeConfig
 from syncrelay.config.wording import describe
 from syncrelay.sync import Policy, Ticks
-
-Transport: TypeAlias = Literal["default", "large_messages"]
-
-
-class NodeConfig(Keys):
-    """The ROS node. Remaps and parameters after --ros-args take precedence."""
-
-    name: NodeName = Field(
-        default="syncrelay", description="Name of the node. Default: syncrelay.", examples=["syncrelay"]
-    )
-    namespace: Namespace = Field(
-        default="",
-        description="Namespace of the node, for relative and `~/` topic names. Default: empty, the root.",
-        examples=["/robot1"],
-    )
-    use_sim_time: bool = Field(
-        default=False,
-        description="Take the time from /clock, as with a simulation or a bag played with --clock. Default: false.",
-    )
-    transport: Transport = Field(
-        default="default",
-        description=(
-            "How Fast DDS carries messages of this node. `large_messages` uses shared memory for images and clouds"
-            " larger than 0.5 MB; publishers and subscribers need it too, see configs/large_messages.xml. Transports"
-            " set in the environment take precedence. Default: default."
-        ),
-        examples=["default", "large_messages"],
-    )
-    lifecycle: bool = Field(
-        default=False,
-        description=(
-            "Make it a managed node: it starts unconfigured, and `ros2 lifecycle set`, a launch file or nav2's"
-            " lifecycle manager configures and activates it. Default: false, it starts active."
-        ),
-    )
-    services: bool = Field(
-        default=True,
-        description=(
-            "Offer the services ~/reload, ~/status, ~/pause and ~/resume, which anyone on the ROS graph can call."
-            " Default: true."
-        ),
-    )
-
-    coalesce: ShortDuration = Field(
-        default=0,
-        description=(
-            "How long the relay waits for others when a message comes, to take them all in one go. It may save CPU"
-            " where many inputs come shortly after each other, and adds as much latency. At most 100ms. A number is"
-            " seconds, a string has a unit (ns, us, ms, s, min). Default: 0, no wait."
-        ),
-        examples=["300us"],
-    )
-
-    def absolute(self, name: str) -> str:
-        """Return the absolute name of a topic that the file names, before any remapping."""
-        return expand(name, node=self.name, namespace=self.namespace)
-
-
-class MetricsConfig(Keys):
-    """HTTP for programs and people: /status, which `syncrelay top` shows, /metrics, /livez and /readyz."""
-
-    listen: Annotated[ListenAddress | None, NOT_NULL] = Field(
-        default=None,
-        description=(
-            "Where to listen, HOST:PORT; 0.0.0.0 is every interface, port 0 any free one."
-            " Default: the first free port of 127.0.0.1:9464 to 9473."
-        ),
-        examples=["127.0.0.1:9464"],
-    )
-    hosts: tuple[Host, ...] = Field(
-        default=(),
-        description=(
-            "Other host names that requests may use, such as that of a Kubernetes service: a page in a browser cannot"
-            " read the status under any other name. Names of this machine need not be listed; nor need addresses, where"
-            " `listen` is open to other machines. Default: none."
-        ),
-        examples=[["robot.lab.example"]],
-    )
-
-
-class DiagnosticsConfig(Keys):
-    """What is published about the relay: /diagnostics once a second, with a status for each group."""
-
-    scalars: bool = Field(
-        default=False,
-        description=(
-            "Publish figures of each group as std_msgs/msg/Float64 too, for plotting: ~/GROUP/sets_hz, ~/GROUP/span_ms"
-            " and ~/GROUP/latency_ms. Default: false."
-        ),
-    )
 
 
 class StampField(Keys):
@@ -308,6 +213,9 @@ class Group(Keys):
     patient_policy: ClassVar[str | None] = None
     """The policy that takes the same keys and waits for messages that come too late for this one."""
 
+    trigger_key: ClassVar[str | None] = None
+    """The key that names the input, or the rate of the clock, that makes the sets; None where all inputs are alike."""
+
     matched_by: ClassVar[tuple[str, ...]] = ()
     """Keys that say which messages belong together; none where it is how near their stamps are."""
 
@@ -385,13 +293,19 @@ class Group(Keys):
 
     @property
     def trigger_topic(self) -> str | None:
-        """The input whose every message makes a set; None where all inputs are alike."""
-        return None
+        """The input whose every message makes a set; None where all inputs are alike, or a clock makes the sets."""
+        trigger = self._trigger
+        return trigger if isinstance(trigger, str) else None
 
     @property
     def ticks(self) -> Ticks | None:
         """The ticks of the clock that makes the sets; None where messages do."""
-        return None
+        trigger = self._trigger
+        return trigger if isinstance(trigger, Ticks) else None
+
+    @property
+    def _trigger(self) -> object:
+        return None if self.trigger_key is None else getattr(self, self.trigger_key)
 
     def tolerance_of(self, _topic: Topic) -> Tolerance | None:
         """Return how far a topic's stamps may be from those of its set; None where any distance will do."""

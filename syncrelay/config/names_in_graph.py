@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.config.document import Document
-from syncrelay.config.models import DiagnosticsConfig, NodeConfig
 from syncrelay.config.names import LONGEST_TOPIC
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.resolved import GroupConfig, TopicConfig
+from syncrelay.config.sections import DiagnosticsConfig, NodeConfig
 from syncrelay.config.wording import quoted
 
 DIAGNOSTICS: Final = "/diagnostics"

@@ -1,4 +1,4 @@
-"""The keys of a group, one model per policy: it makes the engine's policy from them, and says what is special about it.
+"""The policies of syncrelay: a model of the keys of each, which makes the engine's policy and says what is special.
 
 To add a policy, see docs/architecture.md.
 """
@@ -129,6 +129,7 @@ class LatestTimeGroup(Group):
     repeats = LatestTime.repeats
     distance = Distance.AGE
     waits_for_optional = False
+    trigger_key = "trigger"
     matched_by = ("trigger", "max_age")
 
     policy: Literal["latest_time"] = Field(
@@ -160,16 +161,6 @@ class LatestTimeGroup(Group):
         """Return the topic's own `max_age`, else the group's."""
         own = topic.max_age if isinstance(topic, AgedTopic) else None
         return self.tolerance if own is None else Tolerance("max_age", own)
-
-    @property
-    def trigger_topic(self) -> str | None:
-        """The trigger, where it is an input."""
-        return self.trigger if isinstance(self.trigger, str) else None
-
-    @property
-    def ticks(self) -> Ticks | None:
-        """The trigger, where it is a clock."""
-        return self.trigger if isinstance(self.trigger, Ticks) else None
 
     def build_policy(self, inputs: Inputs) -> LatestTime | LatestAtTicks:
         """Return a new policy of the engine."""
@@ -222,4 +213,4 @@ GROUP_MODELS: Final[tuple[type[Group], ...]] = (
     LatestTimeGroup,
     EqualKeyGroup,
 )
-"""Every policy, in the order in which people read of them."""
+"""In the order in which people read of them. Those of other packages come through `installed.py`."""

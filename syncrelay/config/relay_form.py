@@ -7,9 +7,10 @@ from pydantic import BaseModel
 
 from syncrelay.config.export import ExportKeys, LerobotKeys, TaskTopic
 from syncrelay.config.file import file_format
-from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
+from syncrelay.config.models import StampField
 from syncrelay.config.problems import Path
 from syncrelay.config.qos import QosOverrides
+from syncrelay.config.sections import DiagnosticsConfig, MetricsConfig, NodeConfig
 from syncrelay.config.translate import Location
 from syncrelay.config.wording import all_of, one_of
 

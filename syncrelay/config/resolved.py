@@ -5,19 +5,11 @@ from dataclasses import dataclass, replace
 
 from syncrelay.config.file import FileKeys
 from syncrelay.config.listen import DEFAULT_HOST, DEFAULT_PORTS, Listen, parse_listen
-from syncrelay.config.models import (
-    Group,
-    Inputs,
-    MetricsConfig,
-    NodeConfig,
-    PacedTopic,
-    StampSource,
-    Tolerance,
-    Topic,
-)
+from syncrelay.config.models import Group, Inputs, PacedTopic, StampSource, Tolerance, Topic
 from syncrelay.config.names import default_output
 from syncrelay.config.problems import Path
 from syncrelay.config.qos import QosOverrides, QosPreset
+from syncrelay.config.sections import MetricsConfig, NodeConfig
 from syncrelay.sync import Restamp, SyncGroup, Ticks
 
 

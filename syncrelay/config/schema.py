@@ -4,11 +4,11 @@ pydantic's own schema is of a later draft, picks a group's model by OpenAPI's `d
 `defaults`, which may hold what a group then lacks, nor variables, which may stand where a number is expected.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
 from syncrelay.config.document import EXTENSION
-from syncrelay.config.file import FileFormat, file_format
+from syncrelay.config.file import file_format
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -36,19 +36,25 @@ def json_schema() -> Schema:
     form = file_format()
     generated = form.file.model_json_schema(ref_template=REF + "{model}")
     models: dict[str, Schema] = generated.pop("$defs")
-    needed = {policy: _take_required(models[model.__name__]) for policy, model in form.groups.items()}
-    _take_required(models[form.any_group.__name__])
-    generated["properties"]["groups"]["additionalProperties"] = {"$ref": f"{REF}Group"}
+    groups = generated["properties"]["groups"]
+    # In the order of the union. Where two packages name a class alike, pydantic calls both by longer names.
+    refs: list[str] = [each["$ref"] for each in groups["additionalProperties"]["oneOf"]]
+    required = [_take_required(models[ref.removeprefix(REF)]) for ref in refs]
+    groups["additionalProperties"] = {"$ref": f"{REF}Group"}
     return {
         "$schema": DRAFT,
         "$id": ID,
         "title": "syncrelay file",
         **of_mapping(generated),
         "if": {"not": {"required": ["defaults"]}},
-        "then": {"properties": {"groups": {"additionalProperties": {"allOf": list(_without_defaults(needed))}}}},
+        "then": {
+            "properties": {
+                "groups": {"additionalProperties": {"allOf": list(_without_defaults(form.groups, required))}}
+            }
+        },
         "definitions": {
             **{name: of_mapping(model) for name, model in models.items()},
-            "Group": _by_policy(form),
+            "Group": _by_policy(form.groups, refs),
             "Variable": VARIABLE,
         },
     }
@@ -61,17 +67,18 @@ def _take_required(group: Schema) -> list[str]:
     return [key for key in required if key not in ("policy", "topics")]
 
 
-def _by_policy(form: FileFormat) -> Schema:
+def _by_policy(policies: Iterable[str], refs: Sequence[str]) -> Schema:
     """Return a group: by its policy's keys, or by those of all policies where it names none that is known."""
-    schema: Schema = {"$ref": REF + form.any_group.__name__}
-    for policy, model in reversed(form.groups.items()):
-        schema = {"if": _has_policy(policy), "then": {"$ref": REF + model.__name__}, "else": schema}
+    *own, of_any = refs
+    schema: Schema = {"$ref": of_any}
+    for policy, ref in reversed([*zip(policies, own, strict=True)]):
+        schema = {"if": _has_policy(policy), "then": {"$ref": ref}, "else": schema}
     return schema
 
 
-def _without_defaults(needed: Mapping[str, list[str]]) -> Iterator[Schema]:
+def _without_defaults(policies: Iterable[str], required: Sequence[list[str]]) -> Iterator[Schema]:
     yield {"required": ["policy"]}
-    for policy, keys in needed.items():
+    for policy, keys in zip(policies, required, strict=False):
         if keys:
             yield {"if": _has_policy(policy), "then": {"required": keys}}
 

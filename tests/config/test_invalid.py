@@ -1,4 +1,7 @@
-"""Every file in invalid/ begins with a comment that holds the errors it gives, in full."""
+"""Every file in invalid/ begins with a comment that holds the errors it gives, in full.
+
+`{policies}` stands for the names of all policies.
+"""
 
 from itertools import takewhile
 from pathlib import Path
@@ -6,13 +9,15 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import ConfigError, load
+from syncrelay.config.installed import installed_policies
+from syncrelay.config.wording import one_of
 
 FOLDER = Path(__file__).parent / "invalid"
 
 
 def expected_errors(file: Path) -> str:
     comment = takewhile(lambda line: line.startswith("#"), file.read_text(encoding="utf-8").splitlines())
-    return "\n".join(line[2:] for line in comment)
+    return "\n".join(line[2:] for line in comment).replace("{policies}", one_of(installed_policies().models))
 
 
 @pytest.mark.parametrize("file", sorted(FOLDER.glob("*.yaml")), ids=lambda file: file.stem)

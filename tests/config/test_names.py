@@ -2,13 +2,13 @@ import random
 
 import pytest
 
-from syncrelay.config.models import NodeConfig
 from syncrelay.config.names import (
     check_group_name,
     check_output_prefix,
     check_topic_name,
     default_output,
 )
+from syncrelay.config.sections import NodeConfig
 
 
 def accepts(check, name):

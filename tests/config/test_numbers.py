@@ -8,8 +8,9 @@ import pytest
 
 from syncrelay.config import ConfigError, load_text
 from syncrelay.config.file import FileKeys, file_format
-from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
+from syncrelay.config.models import StampField
 from syncrelay.config.qos import QosOverrides
+from syncrelay.config.sections import DiagnosticsConfig, MetricsConfig, NodeConfig
 
 # As YAML reads them: larger than a double can be, longer than a duration, and what no text of digits can write.
 _WITHOUT_END = {

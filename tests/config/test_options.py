@@ -9,8 +9,9 @@ import pytest
 from syncrelay.config import Config, load_text
 from syncrelay.config.export import ExportKeys, LerobotKeys, TaskTopic
 from syncrelay.config.file import file_format
-from syncrelay.config.models import DiagnosticsConfig, MetricsConfig, NodeConfig, StampField
+from syncrelay.config.models import StampField
 from syncrelay.config.qos import QosOverrides
+from syncrelay.config.sections import DiagnosticsConfig, MetricsConfig, NodeConfig
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.sync import Match, Message, Outcome
 

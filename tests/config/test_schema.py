@@ -10,9 +10,10 @@ import yaml
 from jsonschema import Draft7Validator
 
 from syncrelay.config.file import file_format
-from syncrelay.config.models import NodeConfig, StampField
+from syncrelay.config.models import StampField
 from syncrelay.config.qos import QosOverrides
 from syncrelay.config.schema import json_schema
+from syncrelay.config.sections import NodeConfig
 
 HERE = Path(__file__).parent
 FORMAT = file_format()

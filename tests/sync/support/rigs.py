@@ -1,23 +1,19 @@
-"""Hypothesis strategies for what may happen to a group: any policy, any options, any disorder."""
+"""Hypothesis strategies for what may happen to a group: any policy, any options, any disorder.
 
+The policies are made from their models, as those of a file are: one that is added there is tested here.
+"""
+
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from hypothesis import strategies as st
 
-from syncrelay.sync import (
-    ApproximateEpsilonTime,
-    ApproximateTime,
-    ApproximateTimeEager,
-    DropReason,
-    EqualKey,
-    ExactTime,
-    LatestAtTicks,
-    LatestTime,
-    Message,
-    Restamp,
-    SyncGroup,
-    Ticks,
-)
+from syncrelay.config.installed import policy_name, topic_model
+from syncrelay.config.models import Inputs
+from syncrelay.config.policies import GROUP_MODELS
+from syncrelay.config.sections import NodeConfig
+from syncrelay.config.units import parse_duration
+from syncrelay.sync import DropReason, LatestAtTicks, Message, Restamp, SyncGroup, Ticks
 
 TICK = 10_000_000
 START = 10**12
@@ -49,33 +45,50 @@ class Options:
         return [None if age is None else age * TICK for age in self.max_ages or (self.slop,) * self.n_inputs]
 
 
-POLICIES = {
-    "exact_time": lambda sizes, _: ExactTime(**sizes),
-    "approximate_time": lambda sizes, options: ApproximateTime(
-        **sizes,
-        slop_ns=options.slop * TICK,
-        age_penalty=options.age_penalty,
-        min_periods_ns=[period * TICK for period in options.min_periods] or None,
-    ),
-    "approximate_time_eager": lambda sizes, options: ApproximateTimeEager(**sizes, slop_ns=options.slop * TICK),
-    "approximate_epsilon_time": lambda sizes, options: ApproximateEpsilonTime(**sizes, epsilon_ns=options.slop * TICK),
-    "latest_time": lambda sizes, options: LatestTime(
-        **sizes, trigger=options.required.index(True), max_ages_ns=options.max_ages_ns
-    ),
-    "equal_key": lambda sizes, _: EqualKey(**sizes),
-}
+POLICIES = {policy_name(model): model for model in GROUP_MODELS}
+"""The models of all policies, by their names."""
 # Sets leave as time passes: what is promised of the others as a message comes is not promised of it.
 BY_CLOCK = {
-    "latest_at_ticks": lambda sizes, options: LatestAtTicks(
-        **sizes, ticks=Ticks(10**9, 3 * TICK), max_ages_ns=options.max_ages_ns
+    "latest_at_ticks": lambda options: LatestAtTicks(
+        n_inputs=options.n_inputs,
+        queue_size=options.queue_size,
+        ticks=Ticks(10**9, 3 * TICK),
+        max_ages_ns=options.max_ages_ns,
     )
 }
-BY_STAMP = [name for name in POLICIES if name != "equal_key"]
-ONCE = [name for name in POLICIES if name != "latest_time"]
+BY_STAMP = [name for name, model in POLICIES.items() if model.by_stamp]
+ONCE = [name for name, model in POLICIES.items() if not model.repeats]
 
 
 def make_policy(name, options):
-    return {**POLICIES, **BY_CLOCK}[name]({"n_inputs": options.n_inputs, "queue_size": options.queue_size}, options)
+    if name in BY_CLOCK:
+        return BY_CLOCK[name](options)
+    model = POLICIES[name]
+    of_group = {"age_penalty": options.age_penalty, "queue_size": options.queue_size}
+    keys = {key: value for key, value in of_group.items() if key in model.model_fields}
+    needed = {key for key, field in model.model_fields.items() if field.is_required()} - {"policy", "topics"}
+    keys |= {key: _needed(key, model, options) for key in needed}
+    group = model.model_validate({"policy": name, "topics": tuple(_topics(model, options)), **keys})
+    return group.build_policy(Inputs.of(group.topics, NodeConfig()))
+
+
+def _needed(key, model, options):
+    """A value for a key without a default: the first required input, the drawn slop for a duration, else an example."""
+    example = model.model_fields[key].examples[0]
+    if key == model.trigger_key:
+        return f"/input_{options.required.index(True)}"
+    with suppress(ValueError):
+        parse_duration(example)
+        return f"{options.slop * TICK}ns"
+    return example
+
+
+def _topics(model, options):
+    of_topics = {"min_period": [each * TICK for each in options.min_periods], "max_age": options.max_ages_ns}
+    known = topic_model(model).model_fields
+    for index in range(options.n_inputs):
+        values = {key: each[index] for key, each in of_topics.items() if key in known and each}
+        yield {"topic": f"/input_{index}", **{key: f"{value}ns" for key, value in values.items() if value is not None}}
 
 
 def make_group(name, options):
