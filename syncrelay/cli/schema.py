@@ -3,7 +3,7 @@
 import json
 from argparse import Namespace
 
-from syncrelay.cli.boundary import DONE, put
+from syncrelay.cli.boundary import DONE, put, remark
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
 
@@ -26,8 +26,11 @@ def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 
         schema = cases_schema()
     else:
+        from syncrelay.config.installed import installed_policies
         from syncrelay.config.schema import json_schema
 
         schema = json_schema()
+        for why in installed_policies().refused.values():
+            remark(why)
     put(json.dumps(schema, indent=2, ensure_ascii=False))
     return DONE

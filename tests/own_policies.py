@@ -1,0 +1,54 @@
+"""Packages with policies: the one of docs/howto/own_policy.md, built and installed, and ones that are broken."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from unittest.mock import patch
+
+from syncrelay.config.installed import installed_policies
+
+_PAGE = Path(__file__).parents[1] / "docs" / "howto" / "own_policy.md"
+
+
+def installed_example(folder: Path) -> Path:
+    """Build and install the package of the page, and return the folder to put on sys.path."""
+    source, target = folder / "led-by", folder / "target"
+    (source / "led_by").mkdir(parents=True)
+    page = _PAGE.read_text()
+    (toml,) = re.findall(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    (source / "pyproject.toml").write_text(toml)
+    for name, text in re.findall(r"^```python\n# (led_by/\w+\.py)\n(.*?)^```", page, re.DOTALL | re.MULTILINE):
+        (source / name).write_text(text)
+    pip = [sys.executable, "-m", "pip", "install", "--no-index", "--no-deps", "--no-build-isolation"]
+    done = subprocess.run([*pip, "--target", target, source], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return target
+
+
+def offer(folder: Path, distribution: str, policies: Mapping[str, str], *, text: str = "") -> None:
+    """Write into a folder what an installed distribution is: a module of this text, and its entry points by name."""
+    module = distribution.replace("-", "_")
+    (folder / f"{module}.py").write_text(text)
+    told = folder / f"{module}-1.0.dist-info"
+    told.mkdir()
+    (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: 1.0\n")
+    entries = "".join(f"{name} = {module}:{of}\n" for name, of in policies.items())
+    (told / "entry_points.txt").write_text(f"[syncrelay.policies]\n{entries}")
+
+
+@contextmanager
+def on_path(folder: Path) -> Iterator[None]:
+    """Have what is installed in a folder in this process too."""
+    before = set(sys.modules)
+    with patch.object(sys, "path", [str(folder), *sys.path]):
+        installed_policies.cache_clear()
+        try:
+            yield
+        finally:
+            for name in set(sys.modules) - before:
+                if str(getattr(sys.modules[name], "__file__", "")).startswith(str(folder)):
+                    del sys.modules[name]
+            installed_policies.cache_clear()

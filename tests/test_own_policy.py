@@ -1,0 +1,287 @@
+"""A policy that a package brings is known everywhere, and a package that is broken harms nobody but who asks for it."""
+
+import json
+import random
+import re
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+from jsonschema import Draft7Validator
+
+from syncrelay.config import ConfigError, load_text
+from syncrelay.config.installed import installed_policies
+from syncrelay.config.models import Group
+from syncrelay.config.policies import GROUP_MODELS
+from syncrelay.explain import Code
+from syncrelay.recordings.analysis import GroupAnalysis, analyze
+from syncrelay.recordings.bag import open_recording
+from syncrelay.recordings.bag.bindings import bind
+from tests.cli.command import run, run_here, run_python
+from tests.faults.extent import chosen
+from tests.own_policies import installed_example, offer, on_path
+from tests.recordings.bag.making import write_mcap
+from tests.ros import relaying
+from tests.ros.cdr_messages import VECTOR, stamps_of
+from tests.ros.configs import LOSSLESS, config, inputs
+from tests.ros.frames import Frame
+from tests.ros.reloaded import ReloadedFile
+from tests.ros.stage import Stage
+from tests.ros.status import findings, first_group, wait_for_finding
+from tests.ros.streams import MS, at, merged
+
+_TOPICS = ("/left", "/right")
+_TYPES = dict.fromkeys(_TOPICS, VECTOR)
+_OF_POLICIES = {"slop": "20ms", "trigger": _TOPICS[0], "key": "header.frame_id"}
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package of docs/howto/own_policy.md, installed in a folder."""
+    return installed_example(tmp_path_factory.mktemp("own_policy"))
+
+
+def _keys(**keys: Any) -> dict[str, Any]:
+    return {"policy": "led_by", "lead": "/left", "reach": "20ms", "topics": inputs(_TYPES, qos=LOSSLESS), **keys}
+
+
+def _beside(package: Path) -> dict[str, str]:
+    """An environment in which syncrelay and the package are installed."""
+    return {"PYTHONPATH": f"{Path(__file__).parents[1]}:{package}"}
+
+
+def test_its_keys_are_validated_with_suggestions(package: Path, tmp_path: Path):
+    groups = {
+        "good": _keys(),
+        "misspelt": {**_keys(), "reech": "20ms"},
+        "lost": _keys(lead="/lefty", output_prefix="/lost"),
+        "slow": _keys(reach=20, output_prefix="/slow"),
+        "other": _keys(policy="led_bye", output_prefix="/other"),
+    }
+    (tmp_path / "fusion.yaml").write_text(config(groups))
+    done = run("validate", "fusion.yaml", folder=tmp_path, environ=_beside(package))
+    heads = [line.split(" ", 1)[1] for line in done.stderr.splitlines() if line.startswith("fusion.yaml:")]
+    assert [head for head in heads if "installed here" not in head] == [
+        "groups.misspelt.reech: unknown key, did you mean `reach`?",
+        "groups.lost.lead: `/lefty` is not an input of this group, did you mean `/left`?",
+        "warning: groups.slow.reach: 20 without a unit means 20 s: write 20ms if you mean milliseconds, otherwise 20s",
+        "groups.other.policy: unknown value `led_bye`, did you mean `led_by`?",
+    ]
+    (tmp_path / "fusion.yaml").write_text(config({"good": _keys()}))
+    assert run("validate", "fusion.yaml", folder=tmp_path, environ=_beside(package)).returncode == 0
+    without = run("validate", "fusion.yaml", folder=tmp_path)
+    assert without.returncode == 1
+    assert re.search("groups.good.policy: expected exact_time, .*, found the string `led_by`", without.stderr)
+
+
+def test_editors_and_shells_complete_it(package: Path, tmp_path: Path):
+    schema = json.loads(run("schema", folder=tmp_path, environ=_beside(package)).stdout)
+    validator = Draft7Validator(schema)
+    assert schema["definitions"]["LedByGroup"]["properties"]["lead"]["examples"] == ["/camera/image_raw"]
+    assert validator.is_valid({"version": 1, "groups": {"fused": _keys()}})
+    assert not validator.is_valid({"version": 1, "groups": {"fused": _keys(slop="50ms")}})
+    (tmp_path / "fusion.yaml").write_text(config({"fused": _keys()}))
+    words = {"COMP_LINE": "syncrelay --config fusion.yaml --group ", "_ARGCOMPLETE": "1"}
+    words |= {"COMP_POINT": str(len(words["COMP_LINE"])), "_ARGCOMPLETE_STDOUT_FILENAME": "answer"}
+    done = run_python(
+        "-c",
+        "from syncrelay.cli.completion import complete; complete()",
+        folder=tmp_path,
+        environ={**_beside(package), **words},
+    )
+    assert (tmp_path / "answer").read_text().split() == ["fused"], done.stderr
+
+
+def _apart(by_ms: float, *, seed: int) -> list[Frame]:
+    """Two inputs of 10 Hz, of which the second is stamped so much later, 1 ms more or less."""
+    chance = random.Random(seed)
+    first = [100.0 * n for n in range(1, 61)]
+    return merged(at("/left", *first), at("/right", *(each + by_ms + chance.uniform(-1, 1) for each in first)))
+
+
+def _analyzed(frames: list[Frame], path: Path, **keys: str) -> GroupAnalysis:
+    text = config({"fused": _keys(**keys)})
+    with closing(open_recording([str(write_mcap(path, frames))])) as recording:
+        (group,) = analyze(recording, text, bind(load_text(text), recording)).groups
+    return group
+
+
+def test_a_recording_is_judged_by_it_and_its_own_key_is_suggested(package: Path, tmp_path: Path):
+    seed, draws = 28, chosen(short=3, long=40)
+    chance = random.Random(seed)
+    with on_path(package):
+        for n in range(draws):
+            by, is_too_wide = chance.choice([-1, 1]) * chance.uniform(5, 45), n % 3 < 2
+            # The one that is stamped earlier, and the later one, in turns.
+            lead = _TOPICS[(by < 0) ^ (n % 2)]
+            reach = chance.uniform(1, abs(by) - 3) if is_too_wide else chance.uniform(abs(by) + 3, 60)
+            drawn = (
+                f"draw {n} of {draws}, seed {seed}: /right {by:.1f} ms after /left, led by {lead}, reach {reach:.1f} ms"
+            )
+            group = _analyzed(_apart(by, seed=n), tmp_path / f"{n}.mcap", lead=lead, reach=f"{reach:.3f}ms")
+            assert group.suggestion.possible == 60, drawn
+            assert [each.finding.code for each in group.findings] == [Code.OVER_SLOP] * is_too_wide, drawn
+            for finding in (each.finding for each in group.findings):
+                span = re.match(r"the nearest sets span (\S+) ms to (\S+) ms, over reach ", finding.text)
+                assert span is not None, f"{drawn}: {finding.text}"
+                assert abs(by) - 1.1 <= float(span[1]) < float(span[2]) <= abs(by) + 1.1, f"{drawn}: {finding.text}"
+                wider = re.match(r"write `reach: (\S+)ms`", finding.suggestion or "")
+                assert wider is not None, f"{drawn}: {finding.suggestion}"
+                assert abs(by) + 1 <= float(wider[1]) <= 1.25 * abs(by) + 2, f"{drawn}: {finding.suggestion}"
+
+
+@pytest.mark.ros
+def test_a_relay_matches_by_it_says_what_is_wrong_and_takes_another_value(package: Path, stage: Stage):
+    stage.environment["PYTHONPATH"] += f":{package}"
+    file = ReloadedFile(stage, fused=_keys(reach="1ms"))
+    player = stage.player(_TYPES)
+    player.match()
+    far = merged(at("/left", *range(0, 6000, 100)), at("/right", *range(7, 6007, 100)))
+    player.start(far, speed=1)
+    found = wait_for_finding(file.relay, "over_slop", group="fused")
+    player.stop()
+    assert "over reach 1 ms" in found["text"]
+    file.reload(fused=_keys(reach="10ms"))
+    aligned = {"/fused/left": VECTOR, "/fused/right": VECTOR}
+    collector = stage.collector(aligned)
+    sets = (at("/left", offset) + at("/right", offset + 7) for offset in range(10_000, 100_000, 100))
+    _, out = relaying.one_set(player, collector, sets, list(aligned))
+    left, right = stamps_of(out)
+    assert right - left == 7 * MS
+    assert first_group(file.relay)["policy"] == "led_by"
+    assert "over_slop" not in findings(file.relay, "fused")
+
+
+_MODEL = """
+from typing import Literal
+from pydantic import Field
+from syncrelay.config.keys import Duration
+from syncrelay.config.models import Group, Topic, Topics
+from syncrelay.sync import ExactTime
+
+class Mine(Group):
+    policy: Literal["mine"] = Field(description="As exact_time.")
+    topics: tuple[Topic, ...] = Topics
+    def build_policy(self, inputs):
+        return ExactTime(n_inputs=len(self.topics), queue_size=self.queue_size)
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "of", "why"),
+    [
+        ("import no_such_module", "Mine", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("1 / 0", "Mine", "ZeroDivisionError: division by zero"),
+        ("", "Mine", "AttributeError: module 'robot_policies' has no attribute 'Mine'"),
+        ("Mine = 3", "Mine", "robot_policies:Mine is no subclass of syncrelay.config.models.Group"),
+        (_MODEL.replace('["mine"]', '["other"]'), "Mine", "`policy` of robot_policies:Mine has to be Literal['mine']"),
+        (_MODEL.replace("tuple[Topic, ...]", "list[int]"), "Mine", "`topics` of robot_policies:Mine has to be a tuple"),
+        (
+            _MODEL + '    trigger_key = "lead"',
+            "Mine",
+            "the trigger_key of robot_policies:Mine is `lead`, which",
+        ),
+        (_MODEL.replace("build_policy", "build"), "Mine", "robot_policies:Mine has no build_policy of its own"),
+        (_MODEL + "    slop: int = 3", "Mine", "the key `slop` of Mine has another type than that of Approximate"),
+        (_MODEL + '    gap: "Gap"', "Mine", "PydanticUserError: `Mine` is not fully defined"),
+    ],
+)
+def test_a_broken_package_is_an_error_of_the_files_that_use_it_alone(text: str, of: str, why: str, tmp_path: Path):
+    offer(tmp_path, "robot-policies", {"mine": of}, text=text)
+    with on_path(tmp_path):
+        assert load_text(_exact()).groups
+        with pytest.raises(ConfigError) as raised:
+            load_text(config({"fused": {"policy": "mine", "gap": "3ms", "topics": inputs(_TYPES)}}))
+        (problem,) = raised.value.problems
+        assert problem.text.splitlines()[0] in run_here("schema", folder=tmp_path).stderr
+    assert problem.path == "groups.fused.policy"
+    assert problem.text.startswith(f"the policy `mine` of robot-policies 1.0 cannot be used: {why}")
+
+
+def _exact() -> str:
+    return config({"fused": {"policy": "exact_time", "topics": inputs(_TYPES)}})
+
+
+def test_what_two_packages_offer_is_used_from_neither(tmp_path: Path):
+    for name in ("one-of-two", "other-of-two"):
+        offer(tmp_path, name, {"mine": "Mine"}, text=_MODEL)
+    with on_path(tmp_path):
+        assert load_text(_exact()).groups
+        with pytest.raises(ConfigError, match=r"`mine` is offered by one-of-two 1\.0 and other-of-two 1\.0: uninstall"):
+            load_text(config({"fused": {"policy": "mine", "topics": inputs(_TYPES)}}))
+
+
+def test_a_built_in_policy_is_not_replaced_and_a_warning_names_who_tries(tmp_path: Path):
+    offer(tmp_path, "robot-policies", {"exact_time": "Mine"}, text=_MODEL.replace("mine", "exact_time"))
+    with on_path(tmp_path):
+        read = load_text(_exact())
+    assert type(read.groups[0].options) is GROUP_MODELS[0]
+    (warning,) = [note for note in read.notes if note.code == "policy"]
+    assert warning.text.startswith("robot-policies 1.0 offers a policy of this name too, which is not used")
+
+
+def test_two_policies_with_one_class_name_are_both_in_the_schema(tmp_path: Path):
+    for name in ("mine", "yours"):
+        text = _MODEL.replace('"mine"', f'"{name}"') + f"    {name}_gap: Duration = 0\n"
+        offer(tmp_path, f"{name}-of-two", {name: "Mine"}, text=text)
+    (tmp_path / "work").mkdir()
+    done = run("schema", folder=tmp_path / "work", environ=_beside(tmp_path))
+    validator = Draft7Validator(json.loads(done.stdout))
+    for name in ("mine", "yours"):
+        for key in ("mine_gap", "yours_gap"):
+            group = {"policy": name, key: "3ms", "topics": inputs(_TYPES)}
+            assert validator.is_valid({"version": 1, "groups": {"fused": group}}) == key.startswith(name)
+
+
+# Types of keys as a module has them, each with a value as it is written and as it is read.
+_KINDS = (
+    ("Duration", "20ms", 20 * MS),
+    ("Annotated[int, Field(ge=1)]", 5, 5),
+    ("Annotated[int, Field(ge=2)]", 5, 5),
+    ("int", 5, 5),
+    ("str", "a", "a"),
+    ("bool", False, False),
+)
+# What every group has already, by its type above.
+_THERE = {"lazy": 5, "manifest": 5}
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> Iterator[Path]:
+    return (tmp_path / str(n) for n in range(10_000))
+
+
+def test_policies_may_share_a_key_of_one_type_and_none_of_two(folders: Iterator[Path]):
+    seed, draws = 2228, chosen(short=12, long=300)
+    chance = random.Random(seed)
+    for n, folder in zip(range(draws), folders, strict=False):
+        key, first = chance.choice(["window", "window", *_THERE]), chance.randrange(len(_KINDS))
+        first = chance.choice([first, _THERE.get(key, first)])
+        second = chance.choice([first, chance.randrange(len(_KINDS))])
+        drawn = f"draw {n} of {draws}, seed {seed}: `{key}` is {_KINDS[first][0]} and {_KINDS[second][0]}"
+        folder.mkdir()
+        for name, kind in (("one", first), ("other", second)):
+            text = _MODEL.replace('"mine"', f'"{name}"').replace("Literal\n", "Annotated, Literal\n")
+            offer(folder, name, {name: "Mine"}, text=f"{text}    {key}: {_KINDS[kind][0]} = Field(description='It.')\n")
+        with on_path(folder):
+            known = [name for name in ("one", "other") if name in installed_policies().models]
+            is_first, is_second = (_THERE.get(key, kind) == kind for kind in (first, second))
+            expected = ["one"] * is_first + ["other"] * (is_second and (first == second or not is_first))
+            assert known == expected, drawn
+            groups = {name: {"policy": name, "topics": inputs(_TYPES), "output_prefix": f"/{name}"} for name in known}
+            if known:
+                kind = first if "one" in known else second
+                read = load_text(config(groups, defaults={key: _KINDS[kind][1]}))
+                assert [getattr(each.options, key) for each in read.groups] == [_KINDS[kind][2]] * len(known), drawn
+
+
+@pytest.mark.parametrize("model", GROUP_MODELS, ids=lambda model: model.__name__)
+def test_what_the_options_say_of_a_policy_is_what_its_engine_does(model: type[Group]):
+    needed = {key: value for key, value in _OF_POLICIES.items() if key in model.model_fields}
+    (policy,) = get_args(model.model_fields["policy"].annotation)
+    (group,) = load_text(config({"fused": {"policy": policy, "topics": inputs(_TYPES), **needed}})).groups
+    engine = group.options.build_policy(group.inputs)
+    assert (group.options.by_stamp, group.options.repeats) == (engine.by_stamp, engine.repeats)
+    assert set(group.options.matched_by) <= model.model_fields.keys()
