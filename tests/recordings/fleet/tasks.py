@@ -26,7 +26,7 @@ class Obedient:
         with path.with_suffix(".attempts").open("a") as attempts:
             attempts.write(f"{os.getpid()}\n")
         text = path.read_text()
-        match text.split():
+        match text.partition("\n")[0].split():
             case ["die", times] if attempts_of(path) <= int(times):
                 (folder / "half").write_text("ha")
                 os.kill(os.getpid(), signal.SIGKILL)
@@ -43,7 +43,7 @@ class Obedient:
             case ["take", size]:
                 bytearray(int(size))
             case ["grow"]:
-                path.write_text("grow more")
+                path.write_text(f"{text} more")
         (folder / "below").mkdir()
         (folder / "below" / "copy").write_text(text)
         return {"letters": len(text)}

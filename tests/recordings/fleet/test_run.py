@@ -1,18 +1,20 @@
 """A task on recordings on this machine's cores: what becomes of each, and what stands in the folder at the end."""
 
+import random
+import shutil
 import signal
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import pytest
 
-from syncrelay.errors import SyncRelayError
 from syncrelay.recordings.fleet.job import Done, Failed, Kept
-from syncrelay.recordings.fleet.ledger import State, read_ledger
+from syncrelay.recordings.fleet.ledger import LEDGER
 from syncrelay.recordings.fleet.local import LocalEngine
 from syncrelay.recordings.fleet.recordings import find_sources
 from syncrelay.recordings.fleet.run import Others, Run
+from tests.faults.extent import chosen
 from tests.recordings.fleet.fleets import entries, result, tree
 from tests.recordings.fleet.tasks import Obedient, attempts_of
 
@@ -41,83 +43,92 @@ def _held():
     return int(line.split()[1]) * 1024
 
 
-def test_each_recording_gets_a_folder_and_a_line(bags):
-    assert {type(outcome) for outcome in go(bags).values()} == {Done}
-    out = bags.parent / "out"
-    assert (result(out, "a") / "below" / "copy").read_text() == "content of a"
-    assert {name: entry["facts"] for name, entry in entries(out).items()} == {name: {"letters": 12} for name in "abcd"}
+# What a recording's first line asks for; the outcome, what is said of it, and how often it is begun.
+_KINDS: Final[dict[str, tuple[type, str, int]]] = {
+    "copy": (Done, "", 1),
+    "die 1": (Done, "", 2),
+    "die 2": (Done, "", 3),
+    "die 3": (Failed, "its worker was killed 3 times: check whether there is enough memory", 3),
+    "refuse": (Failed, "is of no use", 1),
+    "break": (Failed, "ZeroDivisionError", 1),
+    "take 1000000000": (Failed, "takes more memory than a worker has: use fewer --jobs", 1),
+    "grow": (Failed, "was changed while it was read: is it still being recorded?", 1),
+}
+_CHANGES: Final = ("nothing", "nothing", "content", "content", "new", "removed", "damaged", "added", "folder")
+_DRAWN: Final = chosen(short=6, long=200)
 
 
-def test_two_workers_leave_what_one_leaves(bags):
-    go(bags, out="one", jobs=1)
-    go(bags, out="two", jobs=2)
-    assert tree(bags.parent / "one") == tree(bags.parent / "two")
+class Drawn:
+    """A folder of recordings that is run, changed and run again; how it was drawn says what becomes of each."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self.random = random.Random(seed)
+        self.bags, self.out = folder / "bags", folder / "out"
+        self.bags.mkdir(parents=True)
+        self.texts: dict[str, str] = {}
+        self.has_result: set[str] = set()
+        for name in "abcde":
+            self.draw(name)
+
+    def draw(self, name: str) -> None:
+        """Write a recording anew, which then has no result of its content."""
+        self.texts[name] = f"{self.random.choice(['copy', 'copy', *_KINDS])}\n{self.random.random()}"
+        self.has_result.discard(name)
+
+    def change(self) -> None:
+        for name in [*self.texts]:
+            change = self.random.choice(_CHANGES)
+            if change == "content":
+                self.draw(name)
+            elif change == "new":
+                self.draw(f"{name}{self.random.randrange(10**6)}")
+            elif change != "nothing" and name in self.has_result:
+                self.has_result.remove(name)
+                folder = result(self.out, name)
+                copy = folder / "below" / "copy"
+                match change:
+                    case "removed":
+                        copy.unlink()
+                    case "damaged":
+                        copy.write_text(copy.read_text().swapcase())
+                    case "added":
+                        (folder / "note").write_text("")
+                    case "folder":
+                        shutil.rmtree(folder)
+
+    def run(self, out: str = "out") -> None:
+        for former in self.bags.glob("*.attempts"):
+            former.unlink()
+        for name, text in self.texts.items():
+            (self.bags / f"{name}.mcap").write_text(text)
+        outcomes = go(self.bags, out=out, jobs=self.random.choice((1, 2, 3)))
+        assert outcomes.keys() == self.texts.keys()
+        for name, outcome in outcomes.items():
+            kind, said, tries = _KINDS[self.texts[name].partition("\n")[0]]
+            if out == "out" and name in self.has_result:
+                kind, tries = Kept, 0
+            assert isinstance(outcome, kind), (name, self.texts[name], outcome)
+            assert attempts_of(self.bags / f"{name}.mcap") == tries
+            if isinstance(outcome, Failed):
+                assert said in outcome.why
+                assert (outcome.is_bug, outcome.ends_all) == ("Zero" in said, False)
+            else:
+                self.has_result.add(name)
+                assert (result(self.bags.parent / out, name) / "below" / "copy").read_text() == self.texts[name]
 
 
-def test_the_same_run_again_does_nothing(bags):
-    go(bags)
-    before = (bags.parent / "out" / "_ledger.jsonl").read_bytes()
-    assert set(go(bags).values()) == {Kept()}
-    assert (bags.parent / "out" / "_ledger.jsonl").read_bytes() == before
-    assert {attempts_of(bags / f"{name}.mcap") for name in "abcd"} == {1}
-
-
-def _content_changed(bags, _out):
-    (bags / "b.mcap").write_text("content of B")
-
-
-def _result_removed(_bags, out):
-    (result(out, "b") / "below" / "copy").unlink()
-
-
-def _result_damaged(_bags, out):
-    (result(out, "b") / "below" / "copy").write_text("content of 8")
-
-
-def _result_added_to(_bags, out):
-    (result(out, "b") / "note").write_text("")
-
-
-def _whole_folder_removed(_bags, out):
-    result(out, "b").rename(out.parent / "elsewhere")
-
-
-@pytest.mark.parametrize(
-    "change", [_content_changed, _result_removed, _result_damaged, _result_added_to, _whole_folder_removed]
-)
-def test_only_what_is_missing_or_changed_is_done_again(change, bags):
-    go(bags)
-    change(bags, bags.parent / "out")
-    outcomes = go(bags)
-    assert [name for name, outcome in outcomes.items() if isinstance(outcome, Done)] == ["b"]
-    go(bags, out="anew")
-    assert tree(bags.parent / "out") == tree(bags.parent / "anew")
-
-
-def test_new_recordings_join_those_that_are_done(bags):
-    assert go(bags, only="[ab].mcap").keys() == {"a", "b"}
-    outcomes = go(bags)
-    assert {name for name, outcome in outcomes.items() if isinstance(outcome, Kept)} == {"a", "b"}
-
-
-def test_a_faulty_recording_is_told_and_tried_again_next_time(bags):
-    (bags / "b.mcap").write_text("refuse")
-    outcomes = go(bags)
-    assert outcomes["b"] == Failed("b.mcap: is of no use", outcomes["b"].content)
-    assert [type(outcomes[name]) for name in "acd"] == [Done] * 3
-    assert entries(bags.parent / "out")["b"]["error"] == "b.mcap: is of no use"
-    go(bags)
-    assert attempts_of(bags / "b.mcap") == 2
-    (bags / "b.mcap").write_text("mended")
-    assert isinstance(go(bags)["b"], Done)
-    assert {entry.state for entry in read_ledger(bags.parent / "out")} == {State.DONE}
-
-
-def test_a_recording_that_has_become_faulty_keeps_no_result_of_what_it_was(bags):
-    go(bags)
-    (bags / "b.mcap").write_text("refuse")
-    go(bags)
-    assert sorted(path.name[0] for path in (bags.parent / "out").iterdir()) == ["_", "a", "c", "d"]
+@pytest.mark.parametrize("seed", range(_DRAWN))
+def test_what_changed_is_done_again_and_the_folder_is_that_of_one_run(seed, tmp_path):
+    drawn = Drawn(tmp_path, seed)
+    drawn.run()
+    for _ in range(2):
+        drawn.change()
+        drawn.run()
+    before = tree(drawn.out), (drawn.out / LEDGER).read_bytes()
+    drawn.run()
+    assert (tree(drawn.out), (drawn.out / LEDGER).read_bytes()) == before
+    drawn.run("anew")
+    assert tree(tmp_path / "anew") == before[0]
 
 
 def test_a_recording_that_cannot_be_reached_keeps_its_result(bags):
@@ -131,40 +142,12 @@ def test_a_recording_that_cannot_be_reached_keeps_its_result(bags):
     assert set(go(bags).values()) == {Kept()}
 
 
-def test_a_bug_is_that_recordings_alone(bags):
-    (bags / "b.mcap").write_text("break")
-    outcomes = go(bags)
-    assert outcomes["b"].is_bug
-    assert "ZeroDivisionError" in outcomes["b"].why
-    assert [type(outcomes[name]) for name in "acd"] == [Done] * 3
-
-
 def test_a_full_disk_is_no_recordings_fault(bags):
     (bags / "b.mcap").write_text("fill")
     outcome = go(bags)["b"]
     assert outcome.ends_all
     assert "out: cannot be written: No space left on device" in outcome.why
     assert "b" not in entries(bags.parent / "out")
-
-
-@pytest.mark.parametrize(("deaths", "kind"), [(1, Done), (2, Done), (3, Failed)])
-def test_a_worker_that_dies_costs_its_own_recording_a_try(deaths, kind, bags):
-    (bags / "b.mcap").write_text(f"die {deaths}")
-    outcomes = go(bags)
-    assert isinstance(outcomes["b"], kind)
-    assert attempts_of(bags / "b.mcap") == min(3, deaths + 1)
-    assert [type(outcomes[name]) for name in "acd"] == [Done] * 3
-    assert {attempts_of(bags / f"{name}.mcap") for name in "acd"} == {1}
-    if kind is Failed:
-        assert "its worker was killed 3 times: check whether there is enough memory" in outcomes["b"].why
-
-
-def test_a_recording_that_takes_too_much_memory_fails_alone(bags):
-    (bags / "b.mcap").write_text("take 1000000000")
-    (bags / "c.mcap").write_text("take 10000000")
-    outcomes = go(bags)
-    assert "takes more memory than a worker has: use fewer --jobs" in outcomes["b"].why
-    assert [type(outcomes[name]) for name in "acd"] == [Done] * 3
 
 
 @pytest.mark.parametrize("ignored", [False, True])
@@ -189,19 +172,6 @@ def test_a_large_recording_has_longer(bags):
     assert replace(job, time_limit=7).limit_of(10**9) == 7
 
 
-def test_a_recording_that_is_still_written_is_not_done(bags):
-    (bags / "b.mcap").write_text("grow")
-    assert "was changed while it was read: is it still being recorded?" in go(bags)["b"].why
-
-
-def test_another_option_needs_leave_to_replace(bags):
-    go(bags)
-    before = tree(bags.parent / "out")
-    with pytest.raises(SyncRelayError, match=r"out: holds results of other options: name another folder, or .*--overw"):
-        go(bags, option=1)
-    assert tree(bags.parent / "out") == before
-
-
 def test_replacing_leaves_nothing_of_what_was_there(bags):
     go(bags)
     go(bags, option=1, others=Others.REPLACED, only="[ab].mcap")
@@ -212,25 +182,3 @@ def test_replacing_leaves_nothing_of_what_was_there(bags):
     assert {path.name[0] for path in out.iterdir()} == {"_", "a", "b"}
     # That it was replaced is done.
     assert set(go(bags, option=1, only="[ab].mcap").values()) == {Kept()}
-
-
-def test_what_a_killed_run_left_is_removed_at_the_next_start(bags):
-    go(bags, only="a.mcap")
-    left = bags.parent / "out" / ".partial" / "b-0.1"
-    left.mkdir(parents=True)
-    (left / "half").write_text("ha")
-    go(bags)
-    go(bags, out="anew")
-    assert tree(bags.parent / "out") == tree(bags.parent / "anew")
-
-
-def test_closing_a_run_ends_its_workers_and_the_next_goes_on(bags):
-    into = bags.parent / "out"
-    sources = find_sources([str(bags)], into=into)
-    with (
-        Run(Obedient(), sources, into=into, others=Others.REFUSED) as run,
-        closing(run.go(LocalEngine(jobs=1))) as ended,
-    ):
-        next(each for each in ended if each is not None)
-    outcomes = go(bags)
-    assert sum(isinstance(outcome, Kept) for outcome in outcomes.values()) == 1
