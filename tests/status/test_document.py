@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from syncrelay import own_version
-from syncrelay.explain import Endpoint, Mismatch
+from syncrelay.explain import Endpoint, Mismatch, explanation
 from syncrelay.status import Level, Phase, group_of, level, status_of
 from tests.status.support.states import BEGAN, MS, relay, started, working
 
@@ -46,6 +46,14 @@ def test_what_is_said_of_the_relay():
 def test_what_is_said_of_a_group():
     group = group_of(working()).as_dict()
     assert group.pop("inputs")
+    assert {each["code"]: each for each in group.pop("findings")}["healthy"] == {
+        "code": "healthy",
+        "severity": "ok",
+        "text": explanation(working().findings).text,
+        "suggestion": None,
+        "topic": None,
+        "topics": [],
+    }
     assert group == {
         "name": "front",
         "policy": "approximate_time",
@@ -62,16 +70,6 @@ def test_what_is_said_of_a_group():
         "latency_ms": {"p50": 2.0, "p95": 2.0, "max": 2.0},
         "nearest_ms": {"p50": 5.0, "p95": 5.0, "max": 5.0},
         "last_sets": [{"span_ms": 5.0, "latency_ms": 2.0}] * 30,
-        "findings": [
-            {
-                "code": "healthy",
-                "severity": "ok",
-                "text": working().findings[0].text,
-                "suggestion": None,
-                "topic": None,
-                "topics": [],
-            }
-        ],
         "recent": [{"set": [BEGAN, None]}, {"drop": {"input": 0, "stamp": BEGAN, "reason": "late", "unneeded": False}}],
     }
 

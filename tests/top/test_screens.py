@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from syncrelay.explain import explanation
 from syncrelay.status import Phase
 from syncrelay.top.app import EndedError, TopApp
 from syncrelay.top.client import ask
@@ -53,10 +54,9 @@ def test_groups_are_listed_with_state_rates_and_reason_and_the_selected_one_belo
     assert lines[4] == "  inertial  ERROR  0 of 10       -         -         short queue"
     assert lines[5] == "  radar     ERROR  0 of 0        -         -         no publisher"
     assert lines[6].startswith("── front: approximate_time, slop 20 ms, queue_size 10 ──")
-    assert _begins_with(f"OK       {state.groups[0].findings[0].text}", lines[7])
+    assert _begins_with(f"OK       {explanation(state.groups[0].findings).text}", lines[7])
     text = "\n".join(lines)
     assert "/camera/image_raw 30 Hz     27.5 ms   4.25 ms   200 not needed" in text
-    assert "▁" in next(line for line in lines if line.startswith("latency  "))
     assert "Open" in lines[-1]
     assert "Quit" in lines[-1]
 
@@ -142,6 +142,7 @@ def test_a_group_is_opened_with_figures_findings_inputs_the_strip_and_who_publis
     assert lines[2].endswith("100%, 300 sets, last just now")
     assert lines[3].startswith("span     ")
     assert lines[3].endswith("p50 5.77 ms, p95 9.73 ms, max 14 ms")
+    assert "▁" in next(line for line in lines if line.startswith("latency  "))
     camera = next(line for line in lines if line.startswith("       camera ▏"))
     lidar = next(line for line in lines if line.startswith("        lidar ▏"))
     assert camera.split("▏")[1].replace("·", "").split() == lidar.split("▏")[1].split()
