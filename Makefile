@@ -28,11 +28,11 @@ test-fast: $(VENV)/test
 		-m "not (ros or browser or process or peer or real_data or faults or long)" \
 		$(addprefix tests/,config dataflow explain recordings status sync) $(ARGS)
 
-# The relay on ROS 2 Kilted: the path through librcl proves itself, and messages are relayed over DDS. ARGS=tests/ros runs
+# The relay on ROS 2 Kilted: the compiled path proves itself, and messages are relayed over DDS. ARGS=tests/ros runs
 # all of these tests.
 test-kilted:
 	$(MAKE) test VENV=.venv-kilted ROS=kilted \
-		ARGS="$(or $(ARGS),tests/ros/test_librcl_backend.py tests/ros/test_policies.py tests/ros/test_node.py)"
+		ARGS="$(or $(ARGS),tests/ros/test_compiled_backend.py tests/ros/test_backends.py tests/ros/test_policies.py tests/ros/test_node.py)"
 
 # Builds docker/Dockerfile with a Docker engine of its own and tests the image; says so where there can be none.
 test-container: $(VENV)/test

@@ -66,7 +66,7 @@ _OF_NODES: Final = (
     "syncrelay.explain.summary",
     "syncrelay.config",
     "syncrelay.logs",
-    "syncrelay.ros.compiled.path",
+    "syncrelay.ros.compiled.backend",
     "syncrelay.ros.relay",
     "syncrelay.ros.rclpy_backend",
     "syncrelay.status.server",

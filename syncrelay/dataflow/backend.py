@@ -29,7 +29,6 @@ class BackendName(Enum):
     """The backends, by the names that users give them."""
 
     COMPILED = "compiled"
-    LIBRCL = "direct"
     RCLPY = "rclpy"
 
 
@@ -49,6 +48,10 @@ class Source(Protocol):
     def take(self) -> Payload | None:
         """Take its oldest message, so that one less is pending; None if there is none after all."""
         ...
+
+
+class RclCallError(Exception):
+    """A call that rcl refused, in its words."""
 
 
 class PublishError(Exception):

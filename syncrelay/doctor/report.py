@@ -10,7 +10,7 @@ from syncrelay.doctor.text import diagnosis_lines, observed_lines, verdict
 from syncrelay.printable import printable
 from syncrelay.status import group_of
 
-_THROUGH: Final = {"compiled": "librcl in compiled code", "direct": "librcl", "rclpy": "rclpy"}
+_THROUGH: Final = {"compiled": "librcl in compiled code", "rclpy": "rclpy"}
 
 
 def is_ok(examination: Examination) -> bool:

@@ -25,14 +25,14 @@ def check_start(started: StartResult, *, before: Sequence[Diagnosis]) -> Iterato
             "receive_path",
             started.path_fault,
             impact="the relay exits at once",
-            fix="unset SYNCRELAY_RECEIVE: the relay then takes the cheapest path that works here",
+            fix="unset SYNCRELAY_RECEIVE: the relay then takes the better path of those that work here",
         )
     elif started.path_fault:
         yield info(
             "receive_path",
-            f"messages take the path `{started.path}`: {started.path_fault}",
-            impact="the relay works, but each message costs more CPU",
-            fix="install syncrelay again; if this stays, please report it, with the first line of this output",
+            f"messages pass through {started.path}: {started.path_fault}",
+            impact=f"the relay works, but {started.path_cost}",
+            fix=started.path_advice,
         )
     if started.failed is Step.ARGUMENTS:
         fault, _, advice = started.fault.partition("\n")

@@ -1,75 +1,86 @@
-"""Which backend messages pass through: the cheapest that proves itself here, or the one that is asked for."""
+"""Which backend messages pass through: the compiled one where it proves itself, or the one that is asked for."""
 
 import logging
 from importlib.util import find_spec
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from syncrelay.dataflow.backend import BackendName, RclBackend
+from syncrelay.dataflow.backend import BackendName, RclBackend, RclCallError
 from syncrelay.errors import RosUnavailableError, UsageError
-from syncrelay.ros.librcl.backend import LibrclBackend
-from syncrelay.ros.librcl.check import LibrclUnusableError, checked_backend
 from syncrelay.ros.rclpy_backend import RclpyBackend
 
 VARIABLE: Final = "SYNCRELAY_RECEIVE"
-"""The environment variable that names the backend, a BackendName; without it the cheapest is taken."""
+"""The environment variable that names the backend, a BackendName."""
+RCLPY_COSTS: Final = "a message costs about 1.5 times the CPU, and one of 1 MB 2.5 times"
+"""Compared with the compiled path; docs/explanation/cost.md has the measurements."""
 
 _LOG = logging.getLogger("syncrelay")
-_NOT_BUILT: Final = "the compiled path was not built: install syncrelay again where there is a C compiler"
 _WORDS: Final = {
     BackendName.COMPILED: "messages pass through librcl, in compiled code",
-    BackendName.LIBRCL: "messages pass through librcl, without a copy in Python",
     BackendName.RCLPY: "messages pass through rclpy",
 }
 
 
-def choose_backend(asked: str | None, *, node: Any, context: Any) -> RclBackend:
-    """Return the backend that messages pass through in this process, and log which it is.
+class CompiledFault(NamedTuple):
+    """Why the compiled path is not used, and what to do about it."""
 
-    Raises UsageError for an unknown name, RosUnavailableError where one is asked for by name and cannot be used.
-    """
-    name = _name(asked) if asked else None
-    backend, fault = (RclpyBackend(context), "") if name is BackendName.RCLPY else _found(node, context, name)
-    words = _WORDS[backend.name]
-    if name is not None and name is not backend.name:
-        raise RosUnavailableError(f"{VARIABLE}={asked}: {fault or _NOT_BUILT}")
-    if name is not None:
-        _LOG.info("%s, as %s asks", words, VARIABLE)
-    elif fault:
-        _LOG.warning("%s, at a higher cost: %s", words, fault)
+    what: str
+    advice: str
+
+
+_NOT_BUILT: Final = CompiledFault(
+    "the compiled path was not built",
+    "install a C compiler (apt install gcc libc6-dev python3-dev) and then syncrelay again,"
+    " or install a release's wheel, which has it built",
+)
+
+
+def choose_backend(asked: str | None, *, node: Any, context: Any) -> RclBackend:
+    """Return the backend that messages pass through in this process, and log which it is. Raises as `find_backend`."""
+    backend, fault = find_backend(asked, node=node, context=context)
+    if asked:
+        _LOG.info("%s, as %s asks", _WORDS[backend.name], VARIABLE)
+    elif fault is not None:
+        _LOG.warning("%s, where %s: %s; %s", _WORDS[backend.name], RCLPY_COSTS, *fault)
     else:
-        _LOG.info("%s", words)
+        _LOG.info("%s", _WORDS[backend.name])
     return backend
 
 
-def find_backend(*, node: Any, context: Any) -> tuple[RclBackend, str]:
-    """Return the cheapest backend that works here, and what is wrong with a cheaper one, or nothing."""
-    return _found(node, context, None)
+def find_backend(asked: str | None, *, node: Any, context: Any) -> tuple[RclBackend, CompiledFault | None]:
+    """Return the backend that is asked for, or the best that works here and what is wrong with a better one.
+
+    Raises UsageError for an unknown name, RosUnavailableError where the compiled one is asked for and cannot be used.
+    """
+    name = _name(asked) if asked else None
+    fault = None
+    if name is not BackendName.RCLPY:
+        compiled = _compiled(node)
+        if not isinstance(compiled, CompiledFault):
+            return compiled, None
+        fault = compiled
+        if name is BackendName.COMPILED:
+            raise RosUnavailableError(f"{VARIABLE}={asked}: {fault.what}\n  {fault.advice}")
+    return RclpyBackend(context), fault
 
 
-def _found(node: Any, context: Any, name: BackendName | None) -> tuple[RclBackend, str]:
+def _compiled(node: Any) -> RclBackend | CompiledFault:
+    if find_spec("syncrelay.ros.compiled.path") is None:
+        return _NOT_BUILT
     try:
-        librcl = checked_backend(node)
-    except LibrclUnusableError as error:
-        return RclpyBackend(context), f"librcl is not as expected here ({error})"
-    # It needs a compiler where syncrelay is installed, and nothing is wrong without it.
-    if name is BackendName.LIBRCL or find_spec("syncrelay.ros.compiled.path") is None:
-        return librcl, ""
-    try:
-        return _compiled(librcl, node), ""
-    # Of another source it may lack a name that is asked for at the import.
-    except (LibrclUnusableError, ImportError, AttributeError) as error:
-        return librcl, f"the compiled path is not as expected here ({error})"
+        from syncrelay.ros.compiled.backend import proven_backend  # noqa: PLC0415  it may not be there
 
-
-def _compiled(librcl: LibrclBackend, node: Any) -> RclBackend:
-    from syncrelay.ros.compiled.check import compiled_backend  # noqa: PLC0415  it may not be there
-
-    return compiled_backend(librcl.rcl, node)
+        return proven_backend(node)
+    # Built from another source, it may lack a name that is imported from it.
+    except (OSError, ImportError, AttributeError, RclCallError) as error:
+        return CompiledFault(
+            f"the compiled path does not work here ({error})",
+            "install syncrelay again; if this stays, please report it, with the first line of `syncrelay doctor`",
+        )
 
 
 def _name(asked: str) -> BackendName:
     try:
         return BackendName(asked)
     except ValueError as error:
-        *others, last = [name.value for name in BackendName]
-        raise UsageError(f"{VARIABLE}={asked}: expected {', '.join(others)} or {last}") from error
+        valid = " or ".join(name.value for name in BackendName)
+        raise UsageError(f"{VARIABLE}={asked}: expected {valid}") from error

@@ -117,5 +117,13 @@ class Entities:
         self._holders.setdefault(name, {})[entity] = type_name
 
 
+def has_subscriber(publisher: Any) -> bool:
+    """Whether anyone subscribes to what a publisher publishes; False where rcl cannot tell."""
+    try:
+        return bool(publisher.handle.get_subscription_count())
+    except _rclpy.RCLError:
+        return False
+
+
 def never_called(_: bytes) -> None:
     """Fill the place of the callback that rclpy wants; the receive loop takes the messages instead."""

@@ -9,7 +9,7 @@ from typing import Any, Final
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.config import TopicConfig
-from syncrelay.dataflow.backend import RclBackend, Source
+from syncrelay.dataflow.backend import RclBackend, RclCallError, Source
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import TypeImportError
@@ -17,7 +17,6 @@ from syncrelay.explain import Endpoint, Refusal
 from syncrelay.ros import graph
 from syncrelay.ros.entities import Entities, RefusedError
 from syncrelay.ros.handlers import handler
-from syncrelay.ros.librcl.rcl import RclCallError
 from syncrelay.ros.outputs import InputBinding, Outputs
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.types import SettlingType, import_type, name_of

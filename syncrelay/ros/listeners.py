@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from syncrelay.dataflow.receive import ReceiveLoop
+from syncrelay.ros.entities import has_subscriber
 
 if TYPE_CHECKING:
     from syncrelay.dataflow.group import GroupRelay
@@ -29,7 +30,7 @@ class Listeners:
         Beside those of their outputs, subscribers of `more` of a group's publishers count.
         """
         now = time.monotonic()
-        unheard = [each for each in lazy if not any(map(_has_subscriber, (*each.publishers, *more(each.group))))]
+        unheard = [each for each in lazy if not any(map(has_subscriber, (*each.publishers, *more(each.group))))]
         self._unheard_since = {each.group: self._unheard_since.get(each.group, now) for each in unheard}
         for binding in lazy:
             group, since = binding.group, self._unheard_since.get(binding.group)
@@ -49,7 +50,3 @@ class Listeners:
         self._loop.call(turn).result()
         for each in binding.inputs:
             each.topic.try_again()
-
-
-def _has_subscriber(publisher: Any) -> bool:
-    return bool(publisher.get_subscription_count())

@@ -10,6 +10,7 @@ from syncrelay.cdr import patch_stamp
 from syncrelay.dataflow.backend import ALL, BackendName, Deliver, Inbox, PublishError, Ready
 from syncrelay.dataflow.flow import Flow
 from syncrelay.dataflow.inbox import PolledInbox
+from syncrelay.ros.entities import has_subscriber
 
 
 class RclpyPayload:
@@ -51,8 +52,7 @@ class RclpyOutlet:
     def __init__(self, publisher: Any) -> None:
         self.topic = publisher.topic_name
         self.sent = 0
-        self._publish = publisher.handle.publish_raw
-        self._count_subscriptions = publisher.handle.get_subscription_count
+        self._publisher = publisher
 
     def send(self, payload: RclpyPayload) -> None:
         """Publish a payload unchanged. Raises PublishError."""
@@ -65,17 +65,14 @@ class RclpyOutlet:
     def send_content(self, content: bytes) -> None:
         """Publish a message that was serialized here. Raises PublishError."""
         try:
-            self._publish(content)
+            self._publisher.handle.publish_raw(content)
         except _rclpy.RCLError as error:
             raise PublishError(str(error)) from error
         self.sent += 1
 
     def is_heard(self) -> bool:
         """Whether anyone subscribes; not where rcl cannot tell, of which `send` says why."""
-        try:
-            return bool(self._count_subscriptions())
-        except _rclpy.RCLError:
-            return False
+        return has_subscriber(self._publisher)
 
 
 class WaitSetWatch:

@@ -64,7 +64,7 @@ def test_where_all_is_well_it_says_so_and_exits_with_0(base):
         ({"ROS_LOG_DIR": "/proc/nowhere"}, "log_folder", "info", "/proc/nowhere (by ROS_LOG_DIR)"),
         ({"ROS_LOG_DIR": "", "ROS_HOME": "", "HOME": ""}, "log_folder", "info", "are all unset"),
         ({"SYNCRELAY_HEARTBEAT": "/nowhere/beat"}, "heartbeat", "error", "/nowhere/beat: No such file or directory"),
-        ({"SYNCRELAY_RECEIVE": "dds"}, "receive_path", "error", "=dds: expected compiled, direct or rclpy"),
+        ({"SYNCRELAY_RECEIVE": "direct"}, "receive_path", "error", "=direct: expected compiled or rclpy"),
         ({"RMW_IMPLEMENTATION": "rmw_nowhere_cpp"}, "middleware_not_there", "error", "asks for rmw_nowhere_cpp"),
     ],
 )
@@ -78,6 +78,15 @@ def test_a_variable_that_is_wrong_is_named(environ, code, severity, what, base):
 
 
 @pytest.mark.ros
+def test_without_the_compiled_path_it_says_what_that_costs_and_how_to_get_it(base, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text('import sys\nsys.modules["syncrelay.ros.compiled.path"] = None\n')
+    exit_code, found = examine({**base, "PYTHONPATH": f"{ROOT}:{tmp_path}"})
+    assert (exit_code, found["receive_path"]["severity"]) == (0, "info")
+    assert found["receive_path"]["what"] == "messages pass through rclpy: the compiled path was not built"
+    assert "a message costs about 1.5 times the CPU" in found["receive_path"]["impact"]
+    assert found["receive_path"]["fix"].startswith("install a C compiler")
+
+
 def test_a_profiles_file_that_is_no_xml_is_told_with_its_place(base, tmp_path):
     (tmp_path / "dds.xml").write_text("<dds>\n  <profiles>\n</dds>\n")
     _, found = examine({**base, "FASTRTPS_DEFAULT_PROFILES_FILE": str(tmp_path / "dds.xml")})

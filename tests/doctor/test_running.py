@@ -16,19 +16,19 @@ from syncrelay.doctor.start_check import StartResult
 
 
 def test_a_path_that_costs_more_is_an_info_with_its_reason():
-    (found,) = check_start(
-        StartResult(path="rclpy", path_fault="librcl is not as expected here (other fields)"), before=()
-    )
+    started = StartResult(path="rclpy", path_fault="why", path_cost="it costs more", path_advice="what to do")
+    (found,) = check_start(started, before=())
     assert (found.code, found.severity) == ("receive_path", Severity.INFO)
-    assert found.what == "messages take the path `rclpy`: librcl is not as expected here (other fields)"
-    assert list(check_start(StartResult(path="direct"), before=())) == []
+    assert found.what == "messages pass through rclpy: why"
+    assert (found.impact, found.fix) == ("the relay works, but it costs more", "what to do")
+    assert list(check_start(StartResult(path="compiled"), before=())) == []
     assert list(check_start(StartResult(path="rclpy"), before=())) == []
 
 
 def test_a_path_that_is_asked_for_and_cannot_be_had_is_an_error():
-    (found,) = check_start(StartResult(path_fault="SYNCRELAY_RECEIVE=dds: expected direct or rclpy"), before=())
+    (found,) = check_start(StartResult(path_fault="SYNCRELAY_RECEIVE=dds: expected compiled or rclpy"), before=())
     assert (found.code, found.severity) == ("receive_path", Severity.ERROR)
-    assert found.what == "SYNCRELAY_RECEIVE=dds: expected direct or rclpy"
+    assert found.what == "SYNCRELAY_RECEIVE=dds: expected compiled or rclpy"
     assert "unset SYNCRELAY_RECEIVE" in (found.fix or "")
 
 
@@ -37,7 +37,6 @@ def test_the_first_line_says_how_messages_pass_on_each_path(path):
     examined = Examination(look_at_installation({}), "rmw_fastrtps_cpp", 0, "SUBNET", (), None, path.value)
     words = {
         BackendName.COMPILED: "messages through librcl in compiled code",
-        BackendName.LIBRCL: "messages through librcl",
         BackendName.RCLPY: "messages through rclpy",
     }
     assert heading(examined).split(", ")[-1] == words[path]

@@ -16,16 +16,12 @@ from tests.ros.frames import Frame
 from tests.ros.processes import DEADLINE_S, Process, ros_environment
 from tests.ros.shared_memory import left_of
 
-
-def _usual_backend() -> str:
-    """The compiled path on Python 3.12, where it was built, and librcl from Python elsewhere: CI runs both."""
-    is_built = find_spec("syncrelay.ros.compiled.path") is not None
-    return "compiled" if is_built and sys.version_info >= (3, 12) else "direct"
-
-
-BACKEND = os.environ.get("SYNCRELAY_RECEIVE") or _usual_backend()
+IS_COMPILED = find_spec("syncrelay.ros.compiled.path") is not None
+"""Whether the compiled path was built here; tests/ros/test_compiled_build.py says where it must be."""
+BACKEND = os.environ.get("SYNCRELAY_RECEIVE") or ("compiled" if IS_COMPILED else "rclpy")
 """What messages pass through where a test does not say."""
-both_backends = pytest.mark.parametrize("backend", list(dict.fromkeys([BACKEND, "rclpy"])))
+BACKENDS = tuple(dict.fromkeys([BACKEND, "rclpy"]))
+both_backends = pytest.mark.parametrize("backend", BACKENDS)
 """For what must be so whichever backend messages pass through."""
 
 

@@ -15,7 +15,7 @@ from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint, Refusal
 from tests.ros.configs import config
 from tests.ros.processes import wait_until
-from tests.ros.stage import BACKEND
+from tests.ros.stage import BACKENDS
 
 rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
 entities = pytest.importorskip("syncrelay.ros.entities")
@@ -45,7 +45,7 @@ class _Refusing(entities.Entities):  # type: ignore[name-defined]  # of a module
         return super().publisher(message_type, topic, profile)
 
 
-@pytest.fixture(params=list(dict.fromkeys([BACKEND, "rclpy"])))
+@pytest.fixture(params=BACKENDS)
 def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
     """GroupBindings of a node of this process, with a loop that runs."""
     context = rclpy.context.Context()

@@ -17,8 +17,6 @@ _WITHOUT_IMPORT: Final = {
     "syncrelay.ros.environment": "asks whether rclpy can be imported at all",
     "syncrelay.ros.types": "imports message classes by name",
     "syncrelay.ros.leaving": "takes a node from librcl through ctypes",
-    "syncrelay.ros.librcl": "the package",
-    "syncrelay.ros.librcl.rcl": "calls librcl through ctypes",
 }
 
 
@@ -44,12 +42,12 @@ def _is_of_ros(module: str) -> bool:
 def test_every_module_of_ros_needs_ros():
     imported = {_name(path): set(_imported(path)) for path in sorted(_ROS.rglob("*.py"))}
     needs_ros = {name for name, modules in imported.items() if any(map(_is_of_ros, modules))}
-    needs_ros |= _WITHOUT_IMPORT.keys() - {"syncrelay.ros", "syncrelay.ros.librcl"}
+    needs_ros |= _WITHOUT_IMPORT.keys() - {"syncrelay.ros"}
     before: set[str] = set()
     while needs_ros != before:
         before = set(needs_ros)
         needs_ros |= {name for name, modules in imported.items() if modules & needs_ros}
-    assert imported.keys() - needs_ros == {"syncrelay.ros", "syncrelay.ros.compiled", "syncrelay.ros.librcl"}
+    assert imported.keys() - needs_ros == {"syncrelay.ros", "syncrelay.ros.compiled"}
     assert imported.keys() >= _WITHOUT_IMPORT.keys()
 
 

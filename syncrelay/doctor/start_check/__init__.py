@@ -45,8 +45,9 @@ class StartResult:
     """How it went. `failed` is the step that failed, None if all went well, and `fault` says why.
 
     `unusable` has the fault of every type that cannot be imported. `names` are the topics after all remaps. `path` is
-    how messages pass, a BackendName, and `path_fault` what is wrong with a way that costs less; where `path` is empty,
-    with the one that the environment asks for.
+    how messages pass, a BackendName; it is empty where the one that the environment asks for cannot be used, and
+    `path_fault` then says why. Otherwise `path_fault` is why they do not pass in compiled code, `path_cost` what that
+    costs, and `path_advice` what to do about it.
     """
 
     failed: Step | None = None
@@ -58,6 +59,8 @@ class StartResult:
     middleware: str = ""
     path: str = ""
     path_fault: str = ""
+    path_cost: str = ""
+    path_advice: str = ""
 
 
 def start_node(plan: Plan, environ: Mapping[str, str]) -> StartResult:
@@ -109,8 +112,7 @@ def _read(objects: Sequence[Mapping[str, Any]], code: int, stderr: str) -> Start
             said["names"],
             said["use_sim_time"],
             middleware,
-            said["path"],
-            said["path_fault"],
+            **said["path"],
         )
     step = Step(said.get("step", Step.IMPORT.value))
     if "fault" in said:

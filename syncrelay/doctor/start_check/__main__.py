@@ -63,7 +63,7 @@ def _start(plan: dict[str, Any]) -> None:
         full_name=node.get_fully_qualified_name(),
         names=names,
         use_sim_time=bool(node.get_parameter("use_sim_time").value),
-        **_path(node, context),
+        path=_path(node, context),
     )
     leave(node, context)
     if is_leaving():
@@ -71,18 +71,17 @@ def _start(plan: dict[str, Any]) -> None:
 
 
 def _path(node: Any, context: Any) -> dict[str, str]:
-    """Find how messages would pass, and what is wrong with a way that costs less or is asked for."""
-    from syncrelay.ros.backend_choice import VARIABLE, choose_backend, find_backend  # noqa: PLC0415  after require_rclpy
+    """Find how messages would pass, as the fields of StartResult."""
+    from syncrelay.ros.backend_choice import RCLPY_COSTS, VARIABLE, find_backend  # noqa: PLC0415  after require_rclpy
 
-    asked, fault = os.environ.get(VARIABLE), ""
     try:
-        if asked:
-            backend = choose_backend(asked, node=node, context=context)
-        else:
-            backend, fault = find_backend(node=node, context=context)
+        backend, fault = find_backend(os.environ.get(VARIABLE), node=node, context=context)
     except (UsageError, RosUnavailableError) as error:
-        return {"path": "", "path_fault": str(error)}
-    return {"path": backend.name.value, "path_fault": fault}
+        return {"path_fault": str(error)}
+    found = {"path": backend.name.value}
+    if fault is None:
+        return found
+    return found | {"path_fault": fault.what, "path_cost": RCLPY_COSTS, "path_advice": fault.advice}
 
 
 def _say(step: Step, **facts: Any) -> None:

@@ -1,26 +1,16 @@
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from syncrelay.dataflow.backend import Deliver as AnyDeliver
 from syncrelay.dataflow.flow import Flow as _Flow
 
 SOURCE: str
-SIZES: tuple[int, int, int]
 
 def stamp_of(content: bytes) -> int | None: ...
 
-class Functions:
-    def __init__(
-        self,
-        *,
-        take: int,
-        publish: int,
-        array_init: int,
-        array_fini: int,
-        set_on_new_message: int,
-        allocator: bytes,
-        require: Callable[[int, str], None],
-    ) -> None: ...
+class Librcl:
+    def __init__(self, addresses: Mapping[str, int]) -> None: ...
+    def add_graph_condition(self, node: int, wait_set: int) -> None: ...
 
 class Pool:
     made: int
@@ -38,9 +28,9 @@ class Source:
     waited: int
     pending: int
     pool: Pool
-    address: int
-    def __init__(self, functions: Functions, subscription: Any, deliver: AnyDeliver) -> None: ...
+    def __init__(self, librcl: Librcl, subscription: Any, deliver: AnyDeliver) -> None: ...
     def take(self) -> Payload | None: ...
+    def require_margin(self) -> None: ...
 
 class Inbox:
     failed: Mapping[Any, Exception]
@@ -57,9 +47,9 @@ class Inbox:
 class Outlet:
     topic: str
     sent: int
-    def __init__(self, functions: Functions, publisher: Any) -> None: ...
+    def __init__(self, librcl: Librcl, publisher: Any) -> None: ...
     def send(self, payload: Any) -> None: ...
     def send_stamped(self, payload: Any, stamp: int) -> None: ...
-    def _fail(self, code: int) -> None: ...
+    def send_content(self, content: bytes) -> None: ...
 
 class Flow(_Flow): ...

@@ -1,25 +1,27 @@
 # cython: language_level=3, boundscheck=False, wraparound=False
-"""The way of a message in machine code: the inbox, payloads, outlets and flow that the Python modules of these names
-describe, for librcl. dataflow/inbox.py, backlog.py and flow.py, and ros/librcl/ are what to read; this does the same.
+"""The path of a message in compiled code: messages are taken and published in librcl, without a copy in Python.
 
-It is built without ROS: whoever uses it hands over the addresses of librcl's functions, and proves at the start that
-they do what is expected (check.py).
+The inbox and the flow do what dataflow/inbox.py, backlog.py and flow.py do, which are easier to read; only the waiting
+differs. An rcl wait set is filled, attached to every reader and taken apart for each wait. Here DDS itself rings a bell
+when a message arrives, so a wait costs the same for any number of subscriptions.
+
+This module is built without ROS. backend.py hands over the addresses of librcl's functions, and proves at every start
+that they do what is expected here.
 """
 
 import time
 from collections import deque
 
-from syncrelay.dataflow.backend import PublishError
+from syncrelay.dataflow.backend import PublishError, RclCallError
 from syncrelay.dataflow.flow import RECENT, Watched
 from syncrelay.explain import RecentDrop
-from syncrelay.ros.librcl.rcl import RclCallError
 from syncrelay.sync import DropReason, Match, Message
 
 cimport cython
 from cpython.memoryview cimport PyMemoryView_FromMemory
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint32_t, uint64_t, uintptr_t
 from libc.stdlib cimport calloc, free
-from libc.string cimport memcpy
+from libc.string cimport memcmp, memcpy, memset
 
 
 cdef extern from *:
@@ -32,7 +34,7 @@ cdef extern from *:
     #include <time.h>
     #include <unistd.h>
 
-    /* Where the loop sleeps. What comes rings; only who rings while it sleeps pays for a system call. */
+    /* The receive loop sleeps on a bell. Ringing it is a system call only while the loop sleeps. */
     enum { AWAKE = 0, RUNG = 1, ASLEEP = 2 };
     typedef struct { uint32_t state; uint32_t woken; } sr_bell;
     /* What DDS reports of one subscription. */
@@ -114,7 +116,9 @@ cdef extern from *:
     int CLOCK_MONOTONIC
 
 
-# As in ros/librcl/rcl.py.
+# Structures of Jazzy, after rcutils/allocator.h, rcutils/types/uint8_array.h, rcutils/error_handling.h and rmw/types.h:
+# rcutils_allocator_t, rmw_serialized_message_t, rmw_gid_t, rmw_message_info_t (times in nanoseconds of the system clock)
+# and rcutils_error_string_t.
 ctypedef struct Allocator:
     void * allocate
     void * deallocate
@@ -140,12 +144,40 @@ ctypedef struct MessageInfo:
     Gid publisher_gid
     uint8_t from_intra_process
 
+ctypedef struct ErrorText:
+    char text[1024]
+
+cdef enum:
+    MARGIN = 256
+    UNTOUCHED = 0xA5
+
+# What librcl fills lies before a margin: that stays as it was, unless librcl's structure is larger than ours.
+ctypedef struct RoomyAllocator:
+    Allocator allocator
+    uint8_t margin[MARGIN]
+
+ctypedef struct RoomyMessage:
+    SerializedMessage message
+    uint8_t margin[MARGIN]
+
+ctypedef struct RoomyInfo:
+    MessageInfo info
+    uint8_t margin[MARGIN]
+
+
+cdef bint _is_untouched(const uint8_t * margin) noexcept nogil:
+    cdef int n
+    for n in range(MARGIN):
+        if margin[n] != UNTOUCHED:
+            return False
+    return True
+
+
 cdef extern from *:
     const char * SYNCRELAY_SOURCE
 
 # setup.py's fingerprint of this file.
 SOURCE = SYNCRELAY_SOURCE.decode()
-SIZES = (sizeof(Allocator), sizeof(SerializedMessage), sizeof(MessageInfo))
 
 cdef enum:
     NOTHING_TAKEN = 401
@@ -157,29 +189,72 @@ cdef int64_t SECOND = 1_000_000_000
 cdef uint64_t ALL = <uint64_t>1 << 62
 
 
-# Without the collector's part: no cycle goes through these three, and a memory that ends needs the others.
+ctypedef void (*OnNewMessage)(const void *, size_t) noexcept nogil
+
+# The garbage collector does not see these three: no cycle goes through them, and a message that ends needs the others.
 @cython.final
 @cython.no_gc
-cdef class Functions:
-    """librcl's functions by their addresses; `require` raises what a code of theirs says."""
+cdef class Librcl:
+    """The functions of librcl and librcutils that are called here, by name as addresses.
+
+    Raises RclCallError where they do not fill the structures as they are declared above.
+    """
 
     cdef int (*take)(const void *, SerializedMessage *, MessageInfo *, void *) noexcept nogil
     cdef int (*publish)(const void *, const SerializedMessage *, void *) noexcept nogil
     cdef int (*array_init)(SerializedMessage *, size_t, const Allocator *) noexcept nogil
     cdef int (*array_fini)(SerializedMessage *) noexcept nogil
-    cdef int (*set_on_new_message)(const void *, void (*)(const void *, size_t) noexcept nogil, const void *) noexcept nogil
+    cdef int (*set_on_new_message)(const void *, OnNewMessage, const void *) noexcept nogil
+    cdef void * (*graph_guard_condition)(const void *) noexcept nogil
+    cdef int (*add_guard_condition)(void *, const void *, void *) noexcept nogil
+    cdef ErrorText (*error_text)() noexcept nogil
+    cdef void (*reset_error)() noexcept nogil
     cdef Allocator allocator
-    cdef object require
 
-    def __init__(self, *, take, publish, array_init, array_fini, set_on_new_message, allocator, require):
-        self.take = <int (*)(const void *, SerializedMessage *, MessageInfo *, void *) noexcept nogil><uintptr_t>take
-        self.publish = <int (*)(const void *, const SerializedMessage *, void *) noexcept nogil><uintptr_t>publish
-        self.array_init = <int (*)(SerializedMessage *, size_t, const Allocator *) noexcept nogil><uintptr_t>array_init
-        self.array_fini = <int (*)(SerializedMessage *) noexcept nogil><uintptr_t>array_fini
-        self.set_on_new_message = <int (*)(const void *, void (*)(const void *, size_t) noexcept nogil, const void *) noexcept nogil><uintptr_t>set_on_new_message
-        cdef const uint8_t[::1] content = allocator
-        memcpy(&self.allocator, &content[0], sizeof(Allocator))
-        self.require = require
+    def __init__(self, addresses):
+        def address(name) -> int:
+            return addresses[name]
+
+        self.take = <int (*)(const void *, SerializedMessage *, MessageInfo *, void *) noexcept nogil><uintptr_t>address("rcl_take_serialized_message")
+        self.publish = <int (*)(const void *, const SerializedMessage *, void *) noexcept nogil><uintptr_t>address("rcl_publish_serialized_message")
+        self.array_init = <int (*)(SerializedMessage *, size_t, const Allocator *) noexcept nogil><uintptr_t>address("rcutils_uint8_array_init")
+        self.array_fini = <int (*)(SerializedMessage *) noexcept nogil><uintptr_t>address("rcutils_uint8_array_fini")
+        self.set_on_new_message = <int (*)(const void *, OnNewMessage, const void *) noexcept nogil><uintptr_t>address("rcl_subscription_set_on_new_message_callback")
+        self.graph_guard_condition = <void * (*)(const void *) noexcept nogil><uintptr_t>address("rcl_node_get_graph_guard_condition")
+        self.add_guard_condition = <int (*)(void *, const void *, void *) noexcept nogil><uintptr_t>address("rcl_wait_set_add_guard_condition")
+        self.error_text = <ErrorText (*)() noexcept nogil><uintptr_t>address("rcutils_get_error_string")
+        self.reset_error = <void (*)() noexcept nogil><uintptr_t>address("rcutils_reset_error")
+        self._prove((<RoomyAllocator (*)() noexcept nogil><uintptr_t>address("rcutils_get_default_allocator"))().allocator)
+
+    cdef int _prove(self, Allocator allocator) except -1:
+        cdef RoomyMessage roomy
+        cdef SerializedMessage * message = &roomy.message
+        memset(&roomy, UNTOUCHED, sizeof(RoomyMessage))
+        self.require(self.array_init(message, 17, &allocator), "rcutils_uint8_array_init")
+        if not _is_untouched(roomy.margin):
+            raise RclCallError("rmw_serialized_message_t is larger than expected")
+        if message.length != 0 or message.capacity != 17:
+            raise RclCallError("rmw_serialized_message_t has other fields than expected")
+        if memcmp(&message.allocator, &allocator, sizeof(Allocator)):
+            raise RclCallError("rcutils_allocator_t has other fields than expected")
+        self.require(self.array_fini(message), "rcutils_uint8_array_fini")
+        if message.buffer != NULL:
+            raise RclCallError("rmw_serialized_message_t keeps its buffer elsewhere")
+        self.allocator = allocator
+        return 0
+
+    cdef int require(self, int code, object what) except -1:
+        """Raise RclCallError, in librcl's words, unless a call returned that all is well."""
+        if code:
+            text = self.error_text().text.decode(errors="replace")
+            self.reset_error()
+            raise RclCallError(f"{what} failed with {code}: {text}")
+        return 0
+
+    def add_graph_condition(self, node, wait_set):
+        """Have an rcl wait set wait for changes of the graph, as a node sees them. Both are addresses."""
+        cdef void * condition = self.graph_guard_condition(<void *><uintptr_t>node)
+        self.require(self.add_guard_condition(<void *><uintptr_t>wait_set, condition, NULL), "rcl_wait_set_add_guard_condition")
 
 
 @cython.final
@@ -187,13 +262,13 @@ cdef class Functions:
 cdef class Pool:
     """Memories of one subscription, whose messages are of like size."""
 
-    cdef Functions functions
+    cdef Librcl librcl
     cdef SerializedMessage * spare[SPARE]
     cdef int n_spare
     cdef readonly int made, freed
 
-    def __init__(self, Functions functions):
-        self.functions = functions
+    def __init__(self, Librcl librcl):
+        self.librcl = librcl
 
     @property
     def lent(self):
@@ -207,7 +282,7 @@ cdef class Pool:
         cdef SerializedMessage * message = <SerializedMessage *>calloc(1, sizeof(SerializedMessage))
         if message == NULL:
             raise MemoryError
-        if self.functions.array_init(message, 0, &self.functions.allocator):
+        if self.librcl.array_init(message, 0, &self.librcl.allocator):
             free(message)
             raise MemoryError
         self.made += 1
@@ -222,7 +297,7 @@ cdef class Pool:
             self._free(message)
 
     cdef void _free(self, SerializedMessage * message) noexcept:
-        self.functions.array_fini(message)
+        self.librcl.array_fini(message)
         free(message)
 
     def __dealloc__(self):
@@ -258,20 +333,20 @@ cdef class Source:
     cdef public int64_t waited
     cdef public uint64_t pending
     cdef readonly Pool pool
-    cdef readonly object address
-    cdef Functions functions
+    cdef Librcl librcl
     cdef const void * subscription
     cdef object owner
+    cdef RoomyInfo info
     cdef sr_signal * signal
     cdef SerializedMessage * next
     cdef Payload held
     cdef object _deliver
     cdef Deliver _by_header
 
-    def __init__(self, Functions functions, subscription, deliver):
-        self.functions, self.owner, self.pool = functions, subscription, Pool(functions)
-        self.address = subscription.handle.pointer
-        self.subscription = <const void *><uintptr_t>self.address
+    def __init__(self, Librcl librcl, subscription, deliver):
+        self.librcl, self.owner, self.pool = librcl, subscription, Pool(librcl)
+        self.subscription = <const void *><uintptr_t>subscription.handle.pointer
+        memset(&self.info, UNTOUCHED, sizeof(RoomyInfo))
         self.next = self.pool.lend()
         self.deliver = deliver
 
@@ -289,22 +364,26 @@ cdef class Source:
         return self._take()
 
     cdef Payload _take(self):
-        cdef MessageInfo info
         cdef SerializedMessage * message = self.next
         cdef int code
         with nogil:
-            code = self.functions.take(self.subscription, message, &info, NULL)
+            code = self.librcl.take(self.subscription, message, &self.info.info, NULL)
         if code:
             if code != NOTHING_TAKEN:
-                self.functions.require(code, "rcl_take_serialized_message")
+                self.librcl.require(code, "rcl_take_serialized_message")
             # A full history has replaced some of those that were pending.
             self.pending = 0
             return None
         self.pending -= 1
         self.next = self.pool.lend()
         cdef Payload payload = Payload.__new__(Payload)
-        payload.pool, payload.message, payload.received = self.pool, message, info.received_timestamp
+        payload.pool, payload.message, payload.received = self.pool, message, self.info.info.received_timestamp
         return payload
+
+    def require_margin(self):
+        """Raise RclCallError where librcl wrote more of a message's information than MessageInfo has."""
+        if not _is_untouched(self.info.margin):
+            raise RclCallError("rmw_message_info_t is larger than expected")
 
     cdef int _give(self, Payload payload, int64_t until) except -1:
         if until - payload.received > self.waited:
@@ -325,17 +404,17 @@ cdef class Source:
         if self.signal == NULL:
             raise MemoryError
         self.signal.bell = bell
-        cdef int code = self.functions.set_on_new_message(self.subscription, sr_on_new_message, self.signal)
+        cdef int code = self.librcl.set_on_new_message(self.subscription, sr_on_new_message, self.signal)
         if code:
             free(self.signal)
             self.signal = NULL
-            self.functions.require(code, "rcl_subscription_set_on_new_message_callback")
+            self.librcl.require(code, "rcl_subscription_set_on_new_message_callback")
         self.pending = ALL
         return 0
 
     cdef bint _leave(self) noexcept:
         """Have no bell rung; whether that is certain. Else what DDS would write to stays."""
-        cdef int code = self.functions.set_on_new_message(self.subscription, NULL, NULL)
+        cdef int code = self.librcl.set_on_new_message(self.subscription, NULL, NULL)
         if not code:
             free(self.signal)
         self.signal = NULL
@@ -564,20 +643,26 @@ cdef class Outlet:
 
     cdef readonly object topic
     cdef public uint64_t sent
-    cdef Functions functions
+    cdef Librcl librcl
     cdef object owner
     cdef const void * publisher
 
-    def __init__(self, Functions functions, publisher):
-        self.functions, self.owner, self.topic = functions, publisher, publisher.topic_name
+    def __init__(self, Librcl librcl, publisher):
+        self.librcl, self.owner, self.topic = librcl, publisher, publisher.topic_name
         self.publisher = <const void *><uintptr_t>publisher.handle.pointer
 
     cdef int _send(self, Payload payload) except -1:
+        return self._publish(payload.message)
+
+    cdef int _publish(self, const SerializedMessage * message) except -1:
         cdef int code
         with nogil:
-            code = self.functions.publish(self.publisher, payload.message, NULL)
+            code = self.librcl.publish(self.publisher, message, NULL)
         if code:
-            self._fail(code)
+            try:
+                self.librcl.require(code, "rcl_publish_serialized_message")
+            except RclCallError as error:
+                raise PublishError(str(error)) from error
         self.sent += 1
         return 0
 
@@ -605,11 +690,12 @@ cdef class Outlet:
         """Publish a payload with this stamp, and put its own back: another set may hold it too."""
         self._send_stamped(payload, stamp)
 
-    def _fail(self, code):
-        try:
-            self.functions.require(code, "rcl_publish_serialized_message")
-        except RclCallError as error:
-            raise PublishError(str(error)) from error
+    def send_content(self, bytes content):
+        """Publish a message that was serialized here. Raises PublishError."""
+        cdef SerializedMessage message
+        message.buffer, message.length = <uint8_t *><char *>content, len(content)
+        message.capacity, message.allocator = message.length, self.librcl.allocator
+        self._publish(&message)
 
 
 cdef void _write(uint8_t * place, uint32_t seconds, uint32_t nanoseconds, bint is_little) noexcept nogil:

@@ -1,1 +1,0 @@
-"""The librcl backend: serialized messages taken and published without a copy in Python."""

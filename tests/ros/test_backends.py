@@ -1,0 +1,281 @@
+"""What each backend promises to the receive loop, over DDS within this process: both are held to the same."""
+
+import random
+import threading
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import pytest
+
+from syncrelay.cdr import LATEST_STAMP
+from syncrelay.dataflow.backend import ALL, BackendName, PublishError
+from syncrelay.errors import RosUnavailableError, UsageError
+from tests.ros.cdr_messages import padded, vector, with_stamp
+from tests.ros.processes import DEADLINE_S, wait_until
+from tests.ros.stage import BACKENDS
+from tests.ros.streams import BEGIN, MS
+
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from geometry_msgs.msg import Vector3Stamped
+from rclpy.qos import HistoryPolicy, QoSProfile
+
+from syncrelay.ros import backend_choice
+from syncrelay.ros.backend_choice import choose_backend
+from tests.ros.in_process import own_node
+
+pytestmark = pytest.mark.ros
+
+_KEEP_ALL = QoSProfile(history=HistoryPolicy.KEEP_ALL)
+_SECOND = 1_000_000_000
+# Longer than any test takes.
+_NEVER = 1_000 * _SECOND
+# How often to look for what comes in less than a millisecond, a thousand times over.
+_SOON_S = 0.0005
+
+
+@pytest.fixture(params=BACKENDS)
+def here(request, ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
+    """A node of this process, a backend on it, and topics."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with own_node(ros_domain) as own:
+        own.backend = choose_backend(request.param, node=own.node, context=own.context)
+        own.topics = [_topic(own.node, f"/t{n}") for n in range(3)]
+        yield own
+
+
+def _topic(node, name, profile=_KEEP_ALL):
+    """A topic with a subscription and a publisher."""
+    subscription = node.create_subscription(Vector3Stamped, name, print, profile, raw=True)
+    return SimpleNamespace(subscription=subscription, publisher=node.create_publisher(Vector3Stamped, name, profile))
+
+
+def _take(source):
+    """Its oldest message, whether it was reported or not."""
+    source.pending = ALL
+    return source.take()
+
+
+def test_a_message_comes_out_as_it_went_in(here):
+    source = here.backend.source(here.topics[0].subscription, print)
+    payload = vector(BEGIN, frame_id="a frame")
+    here.topics[0].publisher.publish(payload)
+    taken = _take(source)
+    assert bytes(taken.content()) == padded(payload)
+    assert taken.received > BEGIN
+    assert _take(source) is None
+
+
+@pytest.mark.parametrize("little_endian", [True, False])
+def test_a_payload_that_serves_two_sets_keeps_its_own_stamp(here, little_endian):
+    topic, chance = here.topics[0], random.Random(2)
+    source, outlet = here.backend.source(topic.subscription, print), here.backend.outlet(topic.publisher)
+    for stamp in [0, -1, LATEST_STAMP, *(chance.randrange(-(2**31) * _SECOND, LATEST_STAMP) for _ in range(50))]:
+        original = padded(vector(BEGIN, little_endian=little_endian))
+        topic.publisher.publish(original)
+        payload = _take(source)
+        outlet.send_stamped(payload, stamp)
+        outlet.send(payload)
+        assert bytes(_take(source).content()) == with_stamp(original, stamp)
+        assert bytes(_take(source).content()) == bytes(payload.content()) == original
+    with pytest.raises(ValueError, match="does not fit"):
+        outlet.send_stamped(payload, LATEST_STAMP + 1)
+    assert bytes(payload.content()) == original
+
+
+def test_what_is_serialized_here_is_published_and_counted(here):
+    topic = here.topics[0]
+    source, outlet = here.backend.source(topic.subscription, print), here.backend.outlet(topic.publisher)
+    contents = [padded(vector(BEGIN, frame_id="x" * length)) for length in (0, 1, 1000, 5)]
+    for content in contents:
+        outlet.send_content(content)
+    assert [bytes(_take(source).content()) for _ in contents] == contents
+    assert outlet.sent == 4
+    assert outlet.is_heard()
+
+
+def test_a_message_that_rcl_does_not_publish_says_why(here):
+    topic = here.topics[0]
+    source, outlet = here.backend.source(topic.subscription, print), here.backend.outlet(topic.publisher)
+    topic.publisher.publish(vector(BEGIN))
+    payload = _take(source)
+    # rcl's own: rclpy's would destroy the node too, since Kilted.
+    with here.context.handle:
+        here.context.handle.shutdown()
+    for send in (lambda: outlet.send(payload), lambda: outlet.send_content(vector(BEGIN))):
+        with pytest.raises(PublishError, match=r"rcl_publish_serialized_message failed with|context is invalid"):
+            send()
+    assert outlet.sent == 0
+    # This is asked in the group of the outlet, which goes on.
+    assert not outlet.is_heard()
+
+
+class _Thread(threading.Thread):
+    """Receives in an inbox until it is ended; whatever ends it is raised there."""
+
+    def __init__(self, inbox) -> None:
+        # Where a test fails, it must not keep Python from ending.
+        super().__init__(daemon=True)
+        self._inbox, self._ended = inbox, False
+        self.turns = 0
+
+    def run(self) -> None:
+        while not self._ended:
+            self._inbox.receive(_NEVER)
+            self.turns += 1
+
+    def end(self) -> None:
+        self._ended = True
+        self._inbox.wake()
+        self.join(DEADLINE_S)
+        assert not self.is_alive()
+
+
+def test_no_message_and_no_wake_is_missed(here):
+    came, chance = [], random.Random(3)
+    inbox = here.backend.inbox()
+    # Without the poll of every second, which would find what was missed.
+    if here.backend.name is BackendName.COMPILED:
+        inbox = type(inbox)(force_ns=_NEVER)
+    for topic in here.topics:
+        inbox.add(here.backend.source(topic.subscription, lambda payload: came.append(payload.received)))
+    # It never ends by itself: a wake that is missed is one that this test waits for in vain.
+    thread = _Thread(inbox)
+    thread.start()
+    for n in range(3000):
+        chance.choice(here.topics).publisher.publish(vector(BEGIN + n))
+        if n % 3 == 0:
+            wait_until(lambda n=n: len(came) == n + 1, "the message", poll_s=_SOON_S)
+        if n % 50 == 0:
+            turns = thread.turns
+            inbox.wake()
+            wait_until(lambda turns=turns: thread.turns > turns, "the wake", poll_s=_SOON_S)
+    wait_until(lambda: len(came) == 3000, "all messages")
+    thread.end()
+    inbox.close()
+
+
+def test_messages_of_several_topics_are_delivered_by_their_time_of_receipt(here):
+    came, chance, inbox = [], random.Random(4), here.backend.inbox()
+    for topic in here.topics:
+        inbox.add(here.backend.source(topic.subscription, lambda payload: came.append(payload.received)))
+    for n in range(2000):
+        chance.choice(here.topics).publisher.publish(vector(BEGIN + n))
+        if chance.random() < 0.01:
+            inbox.receive_once(0)
+    while len(came) < 2000:
+        inbox.deliver_all()
+    assert came == sorted(came)
+    inbox.close()
+
+
+def test_the_first_message_waits_for_those_that_come_with_it_where_the_file_says_so(here):
+    came: list[object] = []
+    inbox = here.backend.inbox(coalesce_ns=50 * MS)
+    source = here.backend.source(here.topics[0].subscription, came.append)
+    inbox.add(source)
+    inbox.receive_once(0)
+    here.topics[0].publisher.publish(vector(BEGIN))
+    while not came:
+        inbox.receive_once(_SECOND)
+    # However busy the machine is, never less.
+    assert source.waited > 40 * MS
+    inbox.close()
+
+
+def test_a_source_whose_messages_cannot_be_taken_in_is_named_and_the_others_go_on(here):
+    came: list[object] = []
+    inbox = here.backend.inbox()
+    failing = here.backend.source(here.topics[0].subscription, lambda _: dict[str, object]()["no such"])
+    sound = here.backend.source(here.topics[1].subscription, came.append)
+    for source in (failing, sound):
+        inbox.add(source)
+    for topic in here.topics[:2]:
+        topic.publisher.publish(vector(BEGIN))
+    while not (inbox.failed and came):
+        inbox.receive_once(_SECOND)
+    assert [(source, type(error)) for source, error in inbox.failed.items()] == [(failing, KeyError)]
+    inbox.remove(failing)
+    assert not inbox.failed
+    here.topics[1].publisher.publish(vector(BEGIN))
+    while len(came) < 2:
+        inbox.receive_once(_SECOND)
+    inbox.close()
+
+
+def test_sources_come_and_go_while_messages_come(here):
+    came, ended = [], threading.Event()
+    # What is never taken must not hold up the publishers.
+    topics = [_topic(here.node, f"/u{n}", QoSProfile(depth=100)) for n in range(3)]
+
+    def publish() -> None:
+        while not ended.is_set():
+            for topic in topics:
+                topic.publisher.publish(vector(BEGIN))
+
+    thread = threading.Thread(target=publish)
+    inbox = here.backend.inbox()
+    thread.start()
+    try:
+        for _ in range(300):
+            sources = [here.backend.source(topic.subscription, lambda _: came.append(1)) for topic in topics]
+            for source in sources:
+                inbox.add(source)
+            inbox.receive_once(_SECOND)
+            for source in sources:
+                inbox.remove(source)
+    finally:
+        ended.set()
+        thread.join(DEADLINE_S)
+    assert not thread.is_alive()
+    inbox.close()
+    assert came
+
+
+def test_a_source_may_be_removed_while_it_delivers(here):
+    came: list[object] = []
+    inbox = here.backend.inbox()
+
+    def deliver(payload) -> None:
+        came.append(payload)
+        inbox.remove(source)
+
+    source = here.backend.source(here.topics[0].subscription, deliver)
+    inbox.add(source)
+    for _ in range(3):
+        here.topics[0].publisher.publish(vector(BEGIN))
+    for _ in range(3):
+        inbox.receive_once(0)
+    assert len(came) == 1
+    inbox.close()
+
+
+def test_an_inbox_that_is_closed_delivers_nothing_more(here):
+    came: list[object] = []
+    inbox = here.backend.inbox()
+    inbox.add(here.backend.source(here.topics[0].subscription, came.append))
+    for _ in range(300):
+        here.topics[0].publisher.publish(vector(BEGIN))
+    inbox.receive_once(_SECOND)
+    delivered = len(came)
+    assert 0 < delivered < 300
+    inbox.close()
+    assert len(came) == delivered
+
+
+def test_the_backend_can_be_chosen(here, caplog):
+    caplog.set_level("INFO")
+    chosen = choose_backend("rclpy", node=here.node, context=here.context)
+    assert chosen.name is BackendName.RCLPY
+    assert "messages pass through rclpy, as SYNCRELAY_RECEIVE asks" in caplog.text
+    with pytest.raises(UsageError, match="SYNCRELAY_RECEIVE=direct: expected compiled or rclpy"):
+        choose_backend("direct", node=here.node, context=here.context)
+
+
+def test_without_the_compiled_path_the_log_says_what_that_costs_and_how_to_get_it(here, monkeypatch, caplog):
+    monkeypatch.setattr(backend_choice, "find_spec", lambda _: None)
+    assert choose_backend(None, node=here.node, context=here.context).name is BackendName.RCLPY
+    assert "messages pass through rclpy, where a message costs about 1.5 times the CPU" in caplog.text
+    assert "the compiled path was not built; install a C compiler" in caplog.text
+    with pytest.raises(RosUnavailableError, match="SYNCRELAY_RECEIVE=compiled: the compiled path was not built"):
+        choose_backend("compiled", node=here.node, context=here.context)
