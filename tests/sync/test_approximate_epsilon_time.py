@@ -39,49 +39,8 @@ test_drawn = policy_cases(
             -> r: a too_far, B too_far
             """,
         ),
-        "a queue above its size overflows": (
-            partial(epsilon_time, queue=2),
-            """
-            lidar  |abc
-            camera |..C
-            -> c: a overflow
-            -> C: bC
-            """,
-        ),
-        "an older message finds its place in the queue": (
-            partial(epsilon_time, epsilon=0),
-            """
-            lidar  |ab
-            camera |A.
-            arrive: b a A
-            -> A: aA
-            """,
-        ),
-        "a later message of a stamp that is queued replaces the one before": (
-            epsilon_time,
-            """
-            lidar  |a.
-            lidar  |b.
-            camera |.A
-            arrive: a b A
-            -> b: a duplicate
-            -> A: bA
-            """,
-        ),
     }
 )
-
-
-def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
-    policy = epsilon_time(queue=5)
-    for column in range(1, 21):
-        policy.add(Message(0, column * TICK_NS, None))
-    policy.add(Message(1, 8 * TICK_NS, None))
-    assert [policy.needed_queue(place) for place in (0, 1)] == [14, None]
-    longer = epsilon_time(queue=14)
-    for column in range(1, 21):
-        longer.add(Message(0, column * TICK_NS, None))
-    assert longer.add(Message(1, 8 * TICK_NS, None))
 
 
 def test_a_message_with_others_behind_it_does_not_ask_for_a_longer_queue():

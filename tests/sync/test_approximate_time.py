@@ -2,9 +2,9 @@ from functools import partial
 
 import pytest
 
-from syncrelay.sync import ApproximateTime, Match, Message
+from syncrelay.sync import ApproximateTime, Message
 from tests.sync.support.drawn import policy_cases
-from tests.sync.support.timeline import TICK_NS, play_policy
+from tests.sync.support.timeline import TICK_NS
 
 
 def approximate(inputs=2, queue=10, slop=20, periods=None, **options):
@@ -100,133 +100,8 @@ test_drawn = policy_cases(
             -> c: bB
             """,
         ),
-        "a queue above its size overflows": (
-            partial(approximate, queue=2),
-            """
-            lidar  |abcde
-            camera |....E
-            -> c: a overflow
-            -> d: b overflow
-            -> e: c overflow
-            -> E: d superseded, eE
-            """,
-        ),
-        "an overflow takes a message from the set that waits": (
-            partial(approximate, 3, queue=2),
-            """
-            lidar  |a.bcd..
-            camera |.X....Y
-            radar  |..R...S
-            -> R: a superseded
-            -> d: b overflow, X too_far
-            -> S: R superseded, c superseded
-            """,
-        ),
-        "an input that overflowed is no pivot until another one has the latest head": (
-            partial(approximate, 3, queue=3),
-            """
-            lidar  |a..bcde
-            camera |.X....Y
-            radar  |..R...
-            -> d: a overflow, X too_far
-            -> e: b overflow
-            """,
-        ),
-        "an older message finds its place in the queue": (
-            approximate,
-            """
-            lidar  |a.b.c.
-            camera |..B...
-            arrive: a c b B
-            -> B: a superseded, bB
-            """,
-        ),
-        "a message older than what was passed begins the search anew": (
-            three,
-            """
-            lidar  |a..b..c
-            camera |.....B.C
-            radar  |.....x..y
-            arrive: a x c B b C y
-            -> B: a superseded, cBx
-            """,
-        ),
-        "a later message of a stamp that is queued replaces the one before": (
-            approximate,
-            """
-            lidar  |a.....
-            lidar  |b.....
-            camera |A.....
-            arrive: a b A
-            -> b: a duplicate
-            -> A: bA
-            """,
-        ),
-        "a single input is a set by itself": (
-            partial(approximate, 1),
-            """
-            lidar |ab
-            -> a: a
-            -> b: b
-            """,
-        ),
     }
 )
-
-
-def test_an_overflow_is_excused_in_a_long_search_too_once_another_input_has_the_latest_head():
-    # Camera and radar take turns, so that each drop is a step of its own.
-    drawing = """
-        lidar  |..............ABCDEFGHIJK
-        camera |..c.e.g.i.......k........
-        radar  |.b.d.f.h..l.m............
-        imu    |..............n..........
-        arrive: A B C D E F G H I J K b c d e f g h i k l m n
-    """
-    (overflow, search), _ = play_policy(approximate(4, slop=8), drawing)
-    assert overflow == "K: A overflow"
-    # The lidar may not be the pivot before k is the latest; then l is no longer too far.
-    assert search == "n: " + "".join(f"{letter} too_far, " for letter in "bcdefghi") + "l superseded"
-
-
-def test_a_search_never_goes_back_to_what_it_has_passed():
-    # Long enough to pass many heads at once: those beyond the aim must stay, or they would be passed for ever.
-    policy = approximate(3, queue=10, slop=30)
-    arriving = [(0, 22), (1, 22), (0, 25), (0, 28), (1, 28), (0, 29), (0, 32), (0, 33), (1, 29), (1, 32)]
-    for place, stamp in arriving:
-        assert not policy.add(Message(place, stamp * TICK_NS, None))
-    dropped = [each.message for each in policy.add(Message(2, 34 * TICK_NS, None))]
-    assert [(each.input, each.stamp // TICK_NS) for each in dropped] == [
-        (0, 22),
-        (1, 22),
-        (0, 25),
-        (0, 28),
-        (1, 28),
-        (0, 29),
-        (1, 29),
-    ]
-
-
-def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
-    # Input 0 every tick, input 1 a message twelve ticks late; the queue of 5 has lost its partner.
-    policy = approximate(queue=5, slop=1)
-    for column in range(1, 21):
-        policy.add(Message(0, column * TICK_NS, None))
-    assert [policy.needed_queue(place) for place in (0, 1)] == [None, None]
-    policy.add(Message(1, 8 * TICK_NS, None))
-    # Ticks 8 to 20 are thirteen, and one more is on the safe side.
-    assert [policy.needed_queue(place) for place in (0, 1)] == [14, None]
-
-
-def test_a_queue_of_the_needed_length_matches():
-    policy = approximate(queue=14, slop=1)
-    for column in range(1, 21):
-        policy.add(Message(0, column * TICK_NS, None))
-    outcomes = policy.add(Message(1, 8 * TICK_NS, None))
-    assert [stamp for match in outcomes if isinstance(match, Match) for stamp in match.stamps] == [
-        8 * TICK_NS,
-        8 * TICK_NS,
-    ]
 
 
 def test_a_message_with_others_behind_it_does_not_ask_for_a_longer_queue():

@@ -42,24 +42,6 @@ test_drawn = policy_cases(
             -> A: aA
             """,
         ),
-        "the nearest message is taken, be it older": (
-            eager,
-            """
-            lidar  |.a..b...
-            camera |..A.....
-            arrive: a b A
-            -> A: aA
-            """,
-        ),
-        "the nearest message is taken, be it newer": (
-            eager,
-            """
-            lidar  |a..b....
-            camera |..A.....
-            arrive: a b A
-            -> A: a superseded, bA
-            """,
-        ),
         "of two that are as near, the older is taken": (
             eager,
             """
@@ -79,16 +61,6 @@ test_drawn = policy_cases(
             -> r: a superseded, A superseded, bBr
             """,
         ),
-        "the earliest is given up for a later one only if that makes the set tighter": (
-            three,
-            """
-            lidar  |.a.....b
-            camera |...A.B..
-            radar  |...r....
-            arrive: a A b B r
-            -> r: aAr
-            """,
-        ),
         "sets never go back: what is older than a set is superseded": (
             eager,
             """
@@ -106,79 +78,8 @@ test_drawn = policy_cases(
             -> B: a too_far, bB
             """,
         ),
-        "what is too far when it arrives goes by itself": (
-            eager,
-            """
-            lidar  |A....
-            camera |...bc
-            arrive: b c A
-            -> A: A too_far
-            """,
-        ),
-        "an overflow may show that something else is too far": (
-            partial(eager, 3, queue=2),
-            """
-            lidar  |..a....
-            camera |...bcde
-            radar  |.......
-            -> d: b overflow
-            -> e: c overflow, a too_far
-            """,
-        ),
-        "a set that leaves may show that something else is too far": (
-            partial(eager, 3),
-            """
-            lidar  |..ab.....
-            camera |..A.....B
-            radar  |..r......
-            arrive: a A b B r
-            -> r: aAr, b too_far
-            """,
-        ),
-        "two inputs show that a message is too far while a third has nothing": (
-            partial(eager, 3),
-            """
-            lidar  |ab.....
-            camera |...C...
-            radar  |.......
-            -> C: a too_far
-            """,
-        ),
-        "a later message of a stamp that is queued replaces the one before": (
-            eager,
-            """
-            lidar  |a.
-            lidar  |b.
-            camera |.A
-            camera |.B
-            arrive: a b A B
-            -> b: a duplicate
-            -> A: bA
-            """,
-        ),
-        "a single input is a set by itself": (
-            partial(eager, 1),
-            """
-            lidar |ab
-            -> a: a
-            -> b: b
-            """,
-        ),
     }
 )
-
-
-def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
-    policy = eager(queue=5)
-    for column in range(1, 21):
-        policy.add(Message(0, column * TICK_NS, None))
-    assert [policy.needed_queue(place) for place in (0, 1)] == [None, None]
-    policy.add(Message(1, 8 * TICK_NS, None))
-    assert [policy.needed_queue(place) for place in (0, 1)] == [14, None]
-    longer = eager(queue=14)
-    for column in range(1, 21):
-        longer.add(Message(0, column * TICK_NS, None))
-    assert longer.add(Message(1, 8 * TICK_NS, None))
 
 
 @pytest.mark.parametrize("column", [14, 15])

@@ -38,17 +38,6 @@ test_drawn = policy_cases(
             -> B: a superseded, bB
             """,
         ),
-        "also after a set has left": (
-            equal_key,
-            """
-            left  |a.cb..
-            right |.A..C.
-            keys: aA cC
-            arrive: a A b c C
-            -> A: aA
-            -> C: cC
-            """,
-        ),
         "messages of one stamp count by arrival": (
             equal_key,
             """
@@ -70,17 +59,6 @@ test_drawn = policy_cases(
             -> A: bA
             """,
         ),
-        "a queue above its size overflows, each input's own": (
-            partial(equal_key, queue_size=2),
-            """
-            left  |abcd.
-            right |....C
-            keys: cC
-            -> c: a overflow
-            -> d: b overflow
-            -> C: cC
-            """,
-        ),
     }
 )
 
@@ -95,18 +73,6 @@ def test_stamps_may_be_unset():
     assert drops == [Drop(first, DropReason.SUPERSEDED)]
     assert isinstance(match, Match)
     assert match.messages == (second, other)
-
-
-def test_the_queue_that_was_needed_is_told_exactly():
-    policy = equal_key(queue_size=3)
-    for number in range(10):
-        policy.add(Message(0, number, None, key=number))
-    policy.add(Message(1, 4, None, key=4))
-    assert [policy.needed_queue(place) for place in (0, 1)] == [6, None]
-    longer = equal_key(queue_size=6)
-    for number in range(10):
-        longer.add(Message(0, number, None, key=number))
-    assert longer.add(Message(1, 4, None, key=4))
 
 
 def test_the_greatest_queue_that_was_needed_is_told():

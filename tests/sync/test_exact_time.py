@@ -45,46 +45,8 @@ test_drawn = policy_cases(
             -> D: B overflow
             """,
         ),
-        "the oldest stamp overflows even if it arrives last": (
-            partial(exact, queue_size=2),
-            """
-            left  |.bc
-            right |A..
-            arrive: b c A
-            -> A: A overflow
-            """,
-        ),
-        "a later message of a stamp replaces the one before": (
-            exact,
-            """
-            left  |a
-            left  |b
-            right |A
-            arrive: a b A
-            -> b: a duplicate
-            -> A: bA
-            """,
-        ),
-        "a single input is a set by itself": (
-            partial(exact, n_inputs=1),
-            """
-            left |ab
-            -> a: a
-            -> b: b
-            """,
-        ),
     }
 )
-
-
-def test_the_queue_that_was_needed_is_told_when_a_partner_has_overflowed():
-    policy = exact(queue_size=3)
-    for stamp in range(1, 11):
-        policy.add(Message(0, stamp, None))
-    assert [policy.needed_queue(place) for place in (0, 1)] == [None, None]
-    policy.add(Message(1, 5, None))
-    # Stamps 5 to 10 are six, and one more is on the safe side.
-    assert [policy.needed_queue(place) for place in (0, 1)] == [7, None]
 
 
 @pytest.mark.parametrize(
@@ -96,13 +58,6 @@ def test_only_what_another_input_had_of_a_stamp_is_missed(index, stamp):
         policy.add(Message(0, lost_first, None))
     assert policy.add(Message(index, stamp, None)) == [Drop(Message(index, stamp, None), DropReason.OVERFLOW)]
     assert [policy.needed_queue(place) for place in (0, 1)] == [None, None]
-
-
-def test_a_queue_of_the_needed_length_would_have_matched():
-    policy = exact(queue_size=7)
-    for stamp in range(1, 11):
-        policy.add(Message(0, stamp, None))
-    assert len(policy.add(Message(1, 5, None))) > 0
 
 
 @pytest.mark.parametrize("sizes", [{"n_inputs": 0}, {"queue_size": 0}])

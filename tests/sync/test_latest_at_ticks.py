@@ -1,4 +1,3 @@
-from collections import Counter
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,7 +9,7 @@ from syncrelay.sync import Drop, DropReason, LatestAtTicks, LatestTime, Match, M
 from syncrelay.sync.latest_at_ticks import REST_NS
 from tests.sync.support.drawn import group_cases
 from tests.sync.support.grouped import grouped
-from tests.sync.support.rigs import START, TICK, Step, few, finish, run, steps, take
+from tests.sync.support.rigs import START, TICK, Step, few, run, steps, take
 from tests.sync.support.timeline import START_NS, TICK_NS
 
 
@@ -420,40 +419,6 @@ def test_sets_are_those_of_the_rule(drawn):
         assert [(match.tick, match.stamps) for match in left] == list(slow_sets(rig, taken))
 
 
-@given(drawn=rigs(queue=few(1, 4), every=few(1, 3)))
-def test_fed_is_matched_and_dropped_and_buffered_at_any_moment(drawn):
-    rig, taken = drawn
-    group = rig.group()
-    fed: Counter[int] = Counter()
-    matched: set[Message] = set()
-    dropped: Counter[tuple[int, DropReason]] = Counter()
-    for step in taken:
-        if step.message is not None:
-            fed[step.message.input] += 1
-        for outcome in take(group, step):
-            if isinstance(outcome, Match):
-                matched |= {each for each in outcome.messages if each is not None}
-            else:
-                dropped[outcome.message.input, outcome.reason] += 1
-        for index, counts in enumerate(group.counts()):
-            assert counts.fed == fed[index] == counts.matched + sum(counts.dropped.values()) + counts.buffered
-            assert counts.matched == sum(each.input == index for each in matched)
-            assert all(dropped[index, reason] == count for reason, count in counts.dropped.items())
-            # And what thinning may yet let pass.
-            assert counts.buffered <= rig.queue + 1
-    group.flush(DropReason.SHUTDOWN)
-    assert [counts.buffered for counts in group.counts()] == [0] * len(rig.required)
-
-
-@given(drawn=rigs(queue=few(1, 4), every=few(1, 3)))
-def test_each_message_leaves_in_sets_or_once_as_a_drop(drawn):
-    rig, taken = drawn
-    left = flat(finish(rig.group(), taken))
-    dropped = Counter(outcome.message for outcome in left if isinstance(outcome, Drop))
-    matched = {each for match in sets_of(left) for each in match.messages if each is not None}
-    assert dropped + Counter(matched) == Counter(step.message for step in taken if step.message is not None)
-
-
 @given(drawn=rigs(queue=few(1, 4)))
 def test_no_message_is_newer_than_its_tick_or_too_old_and_all_required_are_there(drawn):
     rig, taken = drawn
@@ -465,32 +430,6 @@ def test_no_message_is_newer_than_its_tick_or_too_old_and_all_required_are_there
                 age = match.tick - stamp - offset * TICK
                 assert age >= 0
                 assert max_age is None or age <= max_age * TICK
-
-
-@given(drawn=rigs(jumps=False, queue=few(1, 4)))
-def test_no_input_ever_goes_back(drawn):
-    rig, taken = drawn
-    left = sets_of(flat(run(rig.group(), taken)))
-    for index in range(len(rig.required)):
-        stamps = [match.stamps[index] for match in left if match.stamps[index] is not None]
-        assert stamps == sorted(stamps)
-
-
-@given(drawn=rigs(queue=few(1, 4), every=few(1, 3)), data=st.data())
-def test_calling_expire_more_often_changes_nothing(drawn, data):
-    rig, taken = drawn
-    seldom, often = rig.group(), rig.group()
-    clock = START
-    for step in taken:
-        before = clock
-        clock = max(clock, step.now)
-        expected = list(take(seldom, Step(clock, step.message)))
-        moments = sorted(data.draw(st.lists(st.integers(before, clock), max_size=4)))
-        found = [outcome for moment in moments for outcome in often.expire(now=moment)]
-        while (deadline := often.next_deadline()) is not None and deadline <= clock:
-            found += often.expire(now=deadline)
-        assert [*found, *take(often, Step(clock, step.message))] == expected
-        assert list(often.expire(now=clock)) == []
 
 
 @given(drawn=rigs(queue=few(1, 4)))

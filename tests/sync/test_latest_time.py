@@ -2,7 +2,7 @@ from functools import partial
 
 import pytest
 
-from syncrelay.sync import Drop, DropReason, LatestTime, Message
+from syncrelay.sync import DropReason, LatestTime, Message
 from tests.sync.support.drawn import policy_cases
 from tests.sync.support.timeline import TICK_NS, play_policy
 
@@ -25,15 +25,6 @@ test_drawn = policy_cases(
             -> c: cC
             """,
         ),
-        "a message of the trigger's own stamp is not newer": (
-            latest,
-            """
-            lidar |.a
-            odom  |AB
-            arrive: A B a
-            -> a: A superseded, aB
-            """,
-        ),
         "a slow input's message serves many sets": (
             partial(latest, age=None),
             """
@@ -51,16 +42,6 @@ test_drawn = policy_cases(
             lidar |...ab
             odom  |A....
             -> a: aA
-            """,
-        ),
-        "a greatest age of 0 asks for the trigger's own stamp": (
-            partial(latest, age=0),
-            """
-            lidar |.a.b.
-            odom  |A..B.
-            arrive: A a B b
-            -> B: a too_far, A expired
-            -> b: bB
             """,
         ),
         "a trigger waits for an input that has nothing for it yet": (
@@ -81,25 +62,6 @@ test_drawn = policy_cases(
             -> c: cA
             """,
         ),
-        "a message may serve several triggers that waited": (
-            latest,
-            """
-            lidar |.ab
-            odom  |A..
-            arrive: a b A
-            -> A: aA, bA
-            """,
-        ),
-        "a message of just the greatest age does not expire yet": (
-            partial(latest, 3),
-            """
-            lidar |....a..b
-            odom  |.A.....B
-            gps   |.....G..
-            -> G: a too_far
-            -> B: A superseded, bBG
-            """,
-        ),
         "what no trigger can use any more expires": (
             latest,
             """
@@ -117,55 +79,6 @@ test_drawn = policy_cases(
             -> a: aA-
             -> b: bAG
             -> c: cB-
-            """,
-        ),
-        "an optional input's message that is too old expires": (
-            partial(latest, 3, required=(True, True, False)),
-            """
-            lidar |.....a
-            odom  |....A.
-            gps   |G.....
-            -> a: G expired, aA-
-            """,
-        ),
-        "triggers that wait overflow": (
-            partial(latest, queue=2),
-            """
-            lidar |abcd
-            odom  |....
-            -> c: a overflow
-            -> d: b overflow
-            """,
-        ),
-        "what waits for a trigger overflows, but not what has served": (
-            partial(latest, queue=2, age=9),
-            """
-            lidar |.a....e
-            odom  |A.BCDE.
-            -> a: aA
-            -> D: B overflow
-            -> E: C overflow
-            -> e: D superseded, eE
-            """,
-        ),
-        "an older message finds its place": (
-            latest,
-            """
-            lidar |..a
-            odom  |AB.
-            arrive: B A a
-            -> a: A superseded, aB
-            """,
-        ),
-        "a later message of a stamp that is queued replaces the one before": (
-            latest,
-            """
-            lidar |.a
-            odom  |A.
-            odom  |B.
-            arrive: A B a
-            -> B: A duplicate
-            -> a: aB
             """,
         ),
         "what is not newer than a message that has served is late": (
@@ -221,35 +134,12 @@ def test_an_input_that_has_what_a_trigger_needs_needs_no_longer_queue(columns):
     assert [policy.needed_queue(place) for place in (0, 1, 2)] == [None, None, None]
 
 
-def test_the_queue_that_was_needed_is_told_when_what_would_have_served_has_overflowed():
-    def fill(policy):
-        for column in range(1, 21):
-            policy.add(Message(1, column * TICK_NS, None))
-        return policy.add(Message(0, 8 * TICK_NS, "late trigger"))
-
-    policy = latest(queue=5)
-    fill(policy)
-    assert [policy.needed_queue(place) for place in (0, 1)] == [None, 14]
-    (*_, match) = fill(latest(queue=14))
-    assert match.messages[1].stamp == 8 * TICK_NS
-
-
 def test_a_queue_that_lost_only_what_was_too_old_was_long_enough():
     policy = latest(queue=5, age=1)
     for column in (1, 2, 3, 11, 12, 13, 14, 15):
         policy.add(Message(1, column * TICK_NS, None))
     policy.add(Message(0, 8 * TICK_NS, None))
     assert policy.needed_queue(1) is None
-
-
-def test_a_flush_drops_what_has_not_served():
-    policy = latest(age=None)
-    served, waiting = Message(1, 1, "served"), Message(1, 9, "waiting")
-    for message in (served, Message(0, 2, "trigger"), waiting):
-        policy.add(message)
-    assert [policy.buffered(place) for place in (0, 1)] == [0, 1]
-    assert policy.flush(DropReason.SHUTDOWN) == [Drop(waiting, DropReason.SHUTDOWN)]
-    assert policy.add(served) == [], "nothing of before is known"
 
 
 @pytest.mark.parametrize(
