@@ -15,7 +15,7 @@ from syncrelay.sync.messages import DropReason
 
 if TYPE_CHECKING:
     from syncrelay.top.client import Answer
-    from syncrelay.top.tap import Told
+    from syncrelay.top.tap import TapAnswer
 
 # Each time costs the relay most of a millisecond, whatever it has to tell.
 _ASKS_EVERY_S: Final = 0.25
@@ -95,14 +95,14 @@ def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     return DONE
 
 
-def _say_lost(told: "Told") -> None:
+def _say_lost(answer: "TapAnswer") -> None:
     from syncrelay.config.wording import counted
 
-    if told.lost is None:
+    if answer.lost is None:
         remark("sets and drops may be missing here: the relay was not asked for long, or has started anew")
-    elif told.lost:
+    elif answer.lost:
         # Which of them were wanted is not known any more.
-        remark(f"lost {counted(told.lost, 'line')}: sets and drops of all groups left faster than they were read")
+        remark(f"lost {counted(answer.lost, 'line')}: sets and drops of all groups left faster than they were read")
 
 
 def _require_names(relay: "Answer", groups: Collection[str], inputs: Collection[str]) -> None:

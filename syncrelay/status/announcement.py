@@ -1,8 +1,8 @@
-"""Which addresses the relays of this machine answer at, whatever their ports, users and containers.
+"""Announces the address of a relay to this machine, and finds those of all its relays.
 
-Each holds a name in the kernel's abstract namespace of sockets for as long as it answers. The name goes with the
-process, however that ends; every user can read all names; and a network namespace has its own, as it has its own
-addresses, so that whoever reads a name can reach what it names.
+A relay binds a name in the kernel's abstract namespace of sockets while it answers. The name disappears with the
+process, however it ends, and every user can read all names. Each network namespace has names of its own, so a reader
+can reach every address that it finds.
 """
 
 import re
@@ -16,7 +16,7 @@ from typing import Final
 _PREFIX: Final = "syncrelay-status/"
 _TABLE: Final = Path("/proc/net/unix")
 _ROW = re.compile(rf" @{_PREFIX}(?P<host>\[[0-9a-f:.]+\]|[0-9.]+):(?P<port>[0-9]{{1,5}})$".encode(), re.MULTILINE)
-# Anyone may hold names; a machine has not so many relays.
+# Any process can bind such names, so the number that is read is bounded.
 _MOST: Final = 200
 _PORTS: Final = range(1, 65_536)
 _LOOPBACK_OF: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104  what a file may say
@@ -24,7 +24,7 @@ _LOOPBACK_OF: Final = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104  what 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Place:
-    """An address that a server is bound to, in which 0.0.0.0 and :: are all of the machine."""
+    """The address that a server is bound to; 0.0.0.0 and :: stand for all addresses of the machine."""
 
     port: int
     host: str
@@ -34,7 +34,7 @@ class Place:
 
     @property
     def url(self) -> str:
-        """The base URL by which this machine reaches it."""
+        """Its base URL on this machine."""
         return f"http://{Place(self.port, _LOOPBACK_OF.get(self.host, self.host))}"
 
     @property
@@ -44,7 +44,7 @@ class Place:
 
 
 def announce(place: Place) -> AbstractContextManager[object]:
-    """Return what announces a server until it is left. Where sockets cannot have names it announces nothing."""
+    """Return a context that announces a server; it announces nothing where sockets cannot have names."""
     try:
         holder = socket.socket(socket.AF_UNIX)
     except OSError:
@@ -55,7 +55,7 @@ def announce(place: Place) -> AbstractContextManager[object]:
 
 
 def announced() -> tuple[Place, ...]:
-    """Return where servers of this machine say that they answer, by port; what is there is not known before asked."""
+    """Return the announced addresses by port. Any process can announce one, so ask what is there."""
     try:
         return places_in(_TABLE.read_bytes())
     except OSError:
@@ -63,7 +63,7 @@ def announced() -> tuple[Place, ...]:
 
 
 def places_in(table: bytes) -> tuple[Place, ...]:
-    """Return the places that the kernel's table of names holds, by port. Anyone may hold a name that is none."""
+    """Return the addresses in the kernel's table of names, by port, without malformed ones."""
     found = {_place(row["host"].decode(), int(row["port"])) for row in _ROW.finditer(table)}
     return tuple(sorted(place for place in found if place is not None)[:_MOST])
 

@@ -1,4 +1,4 @@
-"""How each fate of a message looks: a shape and a name for a colour, so that colour alone never tells them apart."""
+"""How a matched message and each kind of drop is drawn: a shape of its own, so that colour is not needed."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -11,15 +11,14 @@ UNNEEDED: Final = "unneeded"
 
 @dataclass(frozen=True, slots=True)
 class Fate:
-    """A fate, its word, and its shape as an SVG path within 5 units around the origin, filled or stroked.
-
-    Its colour is the style sheet's `--NAME`.
-    """
+    """What became of a message. Its colour is the style sheet's `--NAME`."""
 
     name: str
     word: str
     path: str
+    """Its shape as an SVG path within 5 units of the origin."""
     is_filled: bool
+    """Whether the shape is filled; else it is stroked."""
 
 
 _SHAPES: Final = {
@@ -42,6 +41,6 @@ FATES: Final = (
     Fate(UNNEEDED, "not needed", "M-1.5 0A1.5 1.5 0 1 0 1.5 0A1.5 1.5 0 1 0-1.5 0", is_filled=True),
     *(Fate(reason.value, reason.value, path, is_filled) for reason, (path, is_filled) in _SHAPES.items()),
 )
-"""All fates. A message's code is its fate's place here."""
+"""All fates, in the order of their codes."""
 
 CODES: Final = {fate.name: code for code, fate in enumerate(FATES)}

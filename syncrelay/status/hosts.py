@@ -1,7 +1,7 @@
-"""By which names the relay is asked: a page in a browser must not read its state under a name of its own.
+"""Refuses requests by a host name that is not the relay's, so that no web page reads its status (DNS rebinding).
 
-Who serves a page may have the name of its server lead to 127.0.0.1, or to the robot, once it is loaded (DNS
-rebinding): to the browser what answers there is the page's own server. Its requests still carry that name.
+Once a page is loaded, its server can have its own name resolve to 127.0.0.1 or to the robot. The browser then takes
+the relay for the page's own server and lets the page read it. The requests still carry that name.
 """
 
 import re
@@ -19,23 +19,23 @@ REFUSAL: Final = "this relay does not answer to "
 """What the answer to a request by another name begins with."""
 
 _AUTHORITY = re.compile(r"(?P<host>\[[^\[\]]*\]|[^:\[\]]*)(:[0-9]{0,5})?")
-# It had no `Host` yet, and no browser speaks it; probes do.
+# HTTP/1.0 has no `Host`. Probes use it, browsers do not.
 _WITHOUT_HOST: Final = "HTTP/1.0"
 
 
 @dataclass(frozen=True, slots=True)
 class Hosts:
-    """Names and addresses, as parse_host returns them, and how far any address is one of them."""
+    """The names that are answered to, as parse_host returns them; if `is_open`, so is any address."""
 
     named: frozenset[str]
     is_open: bool
 
     @classmethod
     def of(cls, listen: Listen, bound: str) -> Self:
-        """Return those of a server at the address `bound` that the file's `listen` led to.
+        """Return the names of a server that is bound to an address, as the file's `listen` says.
 
-        Beyond this machine it goes by the machine's name, and by any address: which ones a router or a container
-        engine gives it is not known here, and no page can have one lead elsewhere.
+        If other machines can reach it, it also answers to the machine's name and to any address: a router or a
+        container engine may give it addresses that are not known here, and a page cannot redirect an address.
         """
         is_open = not ip_address(parse_host(bound)).is_loopback
         own = _of_this_machine() if is_open else ()
@@ -51,22 +51,22 @@ class Hosts:
         return self.is_open or address.is_loopback
 
     def refusal(self, environ: Mapping[str, Any]) -> tuple[str, str] | None:
-        """Return the HTTP status and the sentence for a WSGI request that is not to be answered."""
+        """Return the HTTP status and the sentence for a WSGI request that must be refused, else None."""
         try:
-            asked = _asked(environ)
+            named = _hosts_named(environ)
         except ValueError:
             return "400 Bad Request", "expected one `Host` header with a name or an address, and optionally a port"
-        strange = next((host for host in asked if host not in self), None)
+        strange = next((host for host in named if host not in self), None)
         if strange is None:
             return None
         mend = f"if that is its name, write `metrics: {{hosts: [{strange}]}}` in its file and restart it"
         return "403 Forbidden", f"{REFUSAL}{strange}: {mend}"
 
 
-def _asked(environ: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return all hosts that a request names. Raises ValueError where one is none, or there should be one."""
+def _hosts_named(environ: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return all hosts that a request names. Raises ValueError if one is malformed or missing."""
     target = environ["REQUEST_URI"]
-    # What begins with two slashes is a path to the server.
+    # A target that begins with two slashes is a path.
     in_target = "" if target.startswith("//") else urlsplit(target).netloc
     without = [] if environ["SERVER_PROTOCOL"] == _WITHOUT_HOST else [""]
     in_header = [environ["HTTP_HOST"]] if "HTTP_HOST" in environ else without
@@ -79,7 +79,7 @@ def _host(authority: str) -> str:
 
 
 def _of_this_machine() -> set[str]:
-    """Return its name, in full and alone and as mDNS knows it; to ask DNS for more could take long."""
+    """Return its name with and without domain, and as mDNS has it. DNS is not asked, which could take long."""
     full = socket.gethostname().lower().removesuffix(".")
     alone = full.partition(".")[0]
     return {full, alone, f"{alone}.local"}

@@ -28,7 +28,7 @@ class _OfState(Collector):
         self._state = state
 
     def describe(self) -> list[Metric]:
-        """Let nothing be collected before the first scrape."""
+        """Keep the registry from collecting when this is registered."""
         return []
 
     def collect(self) -> Iterator[Metric]:
@@ -116,7 +116,7 @@ def _findings(state: RelayState) -> Metric:
     family = GaugeMetricFamily(
         "syncrelay_finding", "1 for each finding that holds.", labels=("group", "code", "severity", "topic")
     )
-    # Of two that differ in their words alone there must be one series.
+    # Findings that differ only in their sentence are one series.
     for labels in dict.fromkeys(_labels(report, finding) for report in state.groups for finding in report.findings):
         family.add_metric(labels, 1)
     return family

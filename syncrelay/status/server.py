@@ -1,7 +1,6 @@
 """The relay's HTTP: a page, /status, /tap, /metrics, /livez and /readyz, on threads of its own.
 
-waitress reads and writes without blocking, so a client that stalls or never ends its request takes a place among
-the connections for a while, and nothing else.
+waitress reads and writes without blocking, so a client that stalls occupies a connection for a while and nothing else.
 """
 
 import errno
@@ -27,11 +26,11 @@ from syncrelay.status.page import HEADERS, PATHS, page_file
 from syncrelay.status.state import RelayState, is_ready, status_of
 from syncrelay.status.taps import TapRefusedError, Taps
 
-# An idle loop turns once a second; what has not turned for this long hangs.
+# An idle receive loop turns once a second, so one that has not for this long hangs.
 _STALLED_S: Final = 5.0
 # A reader of /status takes milliseconds.
 _CLIENT_TIMEOUT_S: Final = 5
-# Each takes a file descriptor, of a usual 1024. Where there are so many, those that have idled longest make room.
+# Each takes a file descriptor, of a usual 1024. At this number, those that idled longest are closed.
 _CONNECTIONS: Final = 256
 _MAKING_ROOM: Final = 64
 _HEADER_BYTES: Final = 16_384
@@ -52,9 +51,9 @@ PATHS_TOLD: Final[Mapping[str, str]] = {
         " refused by DDS, and every required input has a publisher that fits; 503 otherwise."
     ),
 }
-"""What may be asked for, and what it gives; docs/reference/metrics.md is made of this."""
+"""The paths and what they give; docs/reference/metrics.md is made of this."""
 
-# Probes ask by whatever name they have for the relay, and a refusal would have it restarted. They tell nothing more.
+# Probes use any name for the relay, and a refusal would have it restarted. Their answers hold no state.
 _PROBES: Final = ("/livez", "/readyz")
 
 _Start = Callable[[str, list[tuple[str, str]]], Any]
@@ -62,11 +61,11 @@ _Answer = Callable[[dict[str, Any], _Start], Iterable[bytes]]
 
 
 class Server:
-    """Holds a port from its making on, answers and is announced once it serves; a context manager that ends it all."""
+    """Holds a port once it is made, answers and is announced once it serves, and ends on leaving its context."""
 
     def __init__(self, listen: Listen) -> None:
-        """Take the port, or the first free one of those that the file leaves open. Raises ListenError."""
-        # waitress warns of clients that go away, which is no concern of the robot's operator.
+        """Take the port, or the first free one of the usual ports if the file names none. Raises ListenError."""
+        # waitress warns of clients that go away, which does not concern the robot's operator.
         logging.getLogger("waitress").setLevel(logging.CRITICAL)
         self._socket = _bound(listen)
         host, port = self._socket.getsockname()[:2]
@@ -86,14 +85,14 @@ class Server:
     ) -> None:
         self._announcement.__exit__(kind, error, trace)
         if self._thread is not None:
-            # It has no stop of its own.
+            # waitress cannot be stopped from another thread.
             self._server.trigger.pull_trigger(lambda: close_all(self._channels))
             self._thread.join()
             self._server.task_dispatcher.shutdown()
         self._socket.close()
 
     def serve(self, state: Callable[[], RelayState], taps: Taps) -> None:
-        """Answer from now on; `state` is called on other threads."""
+        """Begin to answer; `state` is called on other threads."""
         self._server = create_server(
             _application(state, taps, self._hosts),
             map=self._channels,
@@ -119,7 +118,7 @@ class Server:
             self._server.asyncore.loop(timeout=1, map=self._channels, use_poll=True, count=1)
 
     def _make_room(self) -> None:
-        """Have connections closed that nothing is answered on, as waitress does once they have timed out."""
+        """Close the connections that idled longest, as waitress does once they time out."""
         idle = [each for each in self._server.active_channels.values() if not each.requests]
         for each in sorted(idle, key=lambda channel: channel.last_activity)[:_MAKING_ROOM]:
             each.will_close = True
@@ -148,7 +147,7 @@ def _bound(listen: Listen) -> socket.socket:
 def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _Answer:
     @cache
     def metrics() -> Any:
-        # Its library takes as long to import as all else here, and most relays are never scraped.
+        # Its import takes as long as that of everything else here, and most relays are never scraped.
         from prometheus_client import make_wsgi_app  # noqa: PLC0415
 
         from syncrelay.status.metrics import registry  # noqa: PLC0415
@@ -157,7 +156,7 @@ def _application(state: Callable[[], RelayState], taps: Taps, hosts: Hosts) -> _
 
     def answer_metrics(environ: dict[str, Any], start: _Start) -> Iterable[bytes]:
         told: list[tuple[str, list[tuple[str, str]]]] = []
-        # It knows no HEAD, and no length.
+        # It handles neither HEAD nor Content-Length.
         asked = {**environ, "REQUEST_METHOD": "GET"}
         body = b"".join(metrics()(asked, lambda status, headers: told.append((status, headers))))
         status, headers = told[-1]

@@ -1,7 +1,7 @@
-"""Those who tap the relay: each asks for what has left since it last asked, and whatever it does not fetch is lost.
+"""Answers `syncrelay tap`: each tap asks again and again for the sets and drops since it last asked.
 
-A tap asks again and again, by a name of its own choice, and each answer is short and complete. None holds a thread of
-the server, and of one that stalls there is nothing but a connection, which ends as that of any client does.
+A tap has a name of its own choice. Each answer is short and complete, so no tap occupies a thread of the server, and
+one that stalls loses lines instead of holding up the relay.
 """
 
 import json
@@ -21,21 +21,21 @@ from syncrelay.explain.tape import UNHEARD_S
 from syncrelay.sync import DropReason
 
 MOST_TAPS: Final = 64
-# All taps together take at most such a share of a core, as the receive thread needs the interpreter too; it may be
+# All taps together get this share of a core, because the receive thread needs the interpreter too; unused time is
 # saved up for a second.
 _SHARE: Final = 0.2
-# Written in some milliseconds, as long as the receive thread may wait for the interpreter.
+# Written in a few milliseconds, for which the receive thread may have to wait for the interpreter.
 _MOST_LINES: Final = 500
 _KEYS: Final = ("tap", "after", "group", "drops", "input", "reason")
 _MOST_FIELDS: Final = 64
-# Far more than a relay has at once; a reload brings others.
+# Far more than a relay has at once; reloads replace groups.
 _GROUPS_KEPT: Final = 1_000
 _NAME: Final = re.compile(r"[0-9A-Za-z]{1,32}")
 _NUMBER: Final = re.compile(r"[0-9]{1,18}")
 
 
 class TapRefusedError(SyncRelayError):
-    """The HTTP status and the sentence for a tap that is not answered."""
+    """A tap is refused with this HTTP status and this sentence."""
 
     def __init__(self, status: str, sentence: str) -> None:
         super().__init__(sentence)
@@ -44,7 +44,7 @@ class TapRefusedError(SyncRelayError):
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a tap wants of what leaves; empty is all. Reasons and `drops` leave out the sets."""
+    """Which sets and drops a tap wants; an empty choice is all. `reasons` and `drops` leave out the sets."""
 
     groups: frozenset[str]
     inputs: Collection[str]
@@ -53,11 +53,11 @@ class Wanted:
 
     @property
     def is_all(self) -> bool:
-        """Whether nothing is left out."""
+        """Whether every set and drop is wanted."""
         return not (self.groups or self.inputs or self.reasons or self.drops)
 
     def holds(self, each: Left, topics: Collection[str]) -> bool:
-        """Whether a set or drop of a group with these inputs is wanted."""
+        """Whether a set or drop is wanted, of a group with these input topics."""
         if self.is_all:
             return True
         outcome = each.outcome
@@ -75,7 +75,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """What a tap asks: under which name, after which number, None at first, and for what."""
+    """A tap's question: its name, the number of the last line that it has (None at first), and what it wants."""
 
     name: str
     after: int | None
@@ -115,7 +115,7 @@ def _require_known(wanted: frozenset[str], groups: Collection[str]) -> None:
 
 
 class Taps:
-    """Answers taps. Any thread. `full_name` gives a topic's name in the graph."""
+    """Answers taps, on any thread. `full_name` gives a topic's name in the graph."""
 
     def __init__(
         self, tape: Tape, full_name: Callable[[str], str], *, processor_s: Callable[[], float] = time.thread_time
@@ -129,35 +129,35 @@ class Taps:
         self._lock = Lock()
 
     def answer(self, text: str, *, reports: Callable[[], Mapping[str, GroupReport | None]] = dict) -> bytes:
-        """Return what has left since, as JSON. Raises TapRefusedError.
+        """Return the sets and drops since the last answer as JSON. Raises TapRefusedError.
 
-        `reports` gives the latest report of each group by its name, None before the first one. A tap that begins may
-        name none but these groups, where there are any. One that goes on may: a reload may have taken its group away,
-        and may bring it back.
+        `reports` gives the latest report of each group by its name, None before the first one. A new tap is refused
+        if it names another group. A tap that goes on is not: a reload may have removed its group and may bring it
+        back.
 
-        `after` is what to ask with next, `more` says that there is more at once. `lost` counts sets and drops of all
-        groups that were too old to be given; it is null where nobody counted. While taps have taken more than their
-        share of the processor, nothing is given.
+        In the answer `after` is the number to ask with next, and `more` says whether there is more at once. `lost`
+        counts sets and drops of all groups that were discarded before they could be given, null if nobody counted.
+        While taps have used up their share of the processor, no lines are given.
         """
         query = Query.of(text)
-        # The relay's state is not to be had for nothing.
+        # Asking for the state is costly, so only new taps do.
         if query.after is None and query.wanted.groups:
             _require_known(query.wanted.groups, reports())
         was_there = self._enter(query.name)
         last = self.tape.last
         if query.after is None or not was_there or query.after > last:
-            return _told(last, lost=0 if query.after is None else None)
+            return _answer(last, lost=0 if query.after is None else None)
         if not self._may_go_on():
-            return _told(query.after)
+            return _answer(query.after)
         began = self._processor_s()
         left, lost = self.tape.after(query.after, most=_MOST_LINES)
         after = left[-1].number if left else query.after
         judged = reports() if left else {}
         lines = [line for each in left if (line := self._line(each, query.wanted, judged)) is not None]
-        told = _told(after, more=after < last, lost=lost, lines=lines)
+        answer = _answer(after, more=after < last, lost=lost, lines=lines)
         with self._lock:
             self._left_s -= self._processor_s() - began
-        return told
+        return answer
 
     def _may_go_on(self) -> bool:
         now = time.monotonic()
@@ -167,7 +167,7 @@ class Taps:
             return self._left_s > 0
 
     def _enter(self, name: str) -> bool:
-        """Have the tape kept for a tap; whether it has been all the while since that one last asked."""
+        """Keep the tape running for a tap. Returns whether it has been running since this tap last asked."""
         now = time.monotonic()
         with self._lock:
             self._asked = {each: asked for each, asked in self._asked.items() if now - asked < UNHEARD_S}
@@ -191,7 +191,7 @@ class Taps:
         return lines.of_set(each.outcome, left=each.left, received=each.received)
 
     def _lines_of(self, group: GroupConfig) -> GroupLines:
-        # A group's hash is that of all it says.
+        # By identity: hashing a group goes through all of its options.
         lines = self._lines.get(id(group))
         if lines is None or lines.group is not group:
             if len(self._lines) >= _GROUPS_KEPT:
@@ -200,6 +200,6 @@ class Taps:
         return lines
 
 
-def _told(after: int, *, more: bool = False, lost: int | None = 0, lines: Sequence[str] = ()) -> bytes:
-    told = json.dumps({"after": after, "more": more, "lost": lost})
-    return f'{told[:-1]}, "lines": [{", ".join(lines)}]}}'.encode()
+def _answer(after: int, *, more: bool = False, lost: int | None = 0, lines: Sequence[str] = ()) -> bytes:
+    head = json.dumps({"after": after, "more": more, "lost": lost})
+    return f'{head[:-1]}, "lines": [{", ".join(lines)}]}}'.encode()

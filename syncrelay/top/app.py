@@ -1,4 +1,4 @@
-"""The application: asks a relay once a second, in a thread, and holds what the screens show."""
+"""The application: asks a relay once a second, on a thread, and holds what the screens show."""
 
 import asyncio
 import os
@@ -29,11 +29,11 @@ _PERIOD_S: Final = 1.0
 
 
 class EndedError(SyncRelayError):
-    """What was watched has ended for good."""
+    """The watched process has ended and will not come back."""
 
 
 class Heard(Message):
-    """What came of asking a relay: its answer, or why there was none."""
+    """The answer of a relay, or why there was none."""
 
     def __init__(self, url: str, heard: Answer | SyncRelayError) -> None:
         super().__init__()
@@ -41,28 +41,26 @@ class Heard(Message):
 
 
 def end_with_terminal() -> None:
-    """From now on, end the process as soon as its terminal is gone: there is nothing to restore, and no one to tell.
+    """From now on, end the process at once when its terminal is gone.
 
-    SIGHUP cannot be relied on for this: a process that nohup or a CI runner started ignores it, and it may come before
-    there is a handler.
+    SIGHUP is not enough: a process started by nohup or a CI runner ignores it, and it may arrive before its handler is
+    installed.
     """
-    terminal = sys.stderr.fileno()
-    Thread(target=_await_hang_up, args=(terminal,), name="terminal", daemon=True).start()
-
-
-def _await_hang_up(terminal: int) -> None:
     polled = select.poll()
-    polled.register(terminal, 0)
-    polled.poll()
-    os._exit(128 + signal.SIGHUP)
+    polled.register(sys.stderr.fileno(), 0)
+
+    def end() -> None:
+        polled.poll()
+        os._exit(128 + signal.SIGHUP)
+
+    Thread(target=end, name="terminal", daemon=True).start()
 
 
 class TopApp(App[None]):
-    """Watches one of the relays that were found, of several the one that the user chooses.
+    """Watches a relay; if several were found, the one that the user chooses.
 
-    `source` gives the state of the one at a URL, on a thread of its own. It raises NoAnswerError or OtherServerError
-    where there is none, and EndedError where there will be none any more: then the application ends.
-    `failure` is the error, a bug, that ended it.
+    `source` returns the answer of the relay at a URL and is called on a thread. It raises NoAnswerError or
+    OtherServerError if there is none, and EndedError to end the application. `failure` is the bug that ended it.
     """
 
     CSS_PATH = Path(__file__).parent / "top.tcss"
@@ -75,7 +73,7 @@ class TopApp(App[None]):
     def __init__(
         self, relays: Sequence[Answer], *, source: Callable[[str], Answer] = ask, period_s: float = _PERIOD_S
     ) -> None:
-        # The terminal's own colours, whatever its theme; said here already, so that NO_COLOR means none at all.
+        # The terminal's own colours; set before anything is drawn, so that NO_COLOR means none at all.
         super().__init__(ansi_color=True)
         self.theme = "ansi-dark"
         self.failure: Exception | None = None
@@ -89,7 +87,7 @@ class TopApp(App[None]):
 
     def on_mount(self) -> None:
         """Show the only relay, or ask which one."""
-        # Without it, the terminal would be left as it was drawn upon.
+        # Else a signal would end the process without restoring the terminal.
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.exit)
@@ -113,13 +111,11 @@ class TopApp(App[None]):
     def _follow(self, url: str) -> None:
         worker = get_current_worker()
         while not worker.is_cancelled and not self._ended.wait(self._period_s):
-            self.post_message(Heard(url, self._asked(url)))
-
-    def _asked(self, url: str) -> Answer | SyncRelayError:
-        try:
-            return self._source(url)
-        except (NoAnswerError, OtherServerError, EndedError) as error:
-            return error
+            try:
+                heard: Answer | SyncRelayError = self._source(url)
+            except (NoAnswerError, OtherServerError, EndedError) as error:
+                heard = error
+            self.post_message(Heard(url, heard))
 
     @on(Heard)
     def _take(self, event: Heard) -> None:
@@ -142,7 +138,7 @@ class TopApp(App[None]):
             self._watch(next(answer for answer in self._relays if answer.url == event.option.id))
 
     def action_pause(self) -> None:
-        """Hold the picture, or let it go on with what came meanwhile."""
+        """Hold the screen still, or go on with the latest answer."""
         if self.view is None or self._latest is None:
             return
         if self.view.paused:
@@ -163,7 +159,7 @@ class TopApp(App[None]):
             self.pop_screen()
 
     def action_keys(self) -> None:
-        """Say what the keys do."""
+        """Show what the keys do."""
         self.push_screen(KeysScreen())
 
     def _handle_exception(self, error: Exception) -> None:
@@ -171,5 +167,5 @@ class TopApp(App[None]):
         super()._handle_exception(error)
 
     def _fatal_error(self) -> None:
-        # Textual's own would print every local, whole states among them; `failure` is for the caller to raise.
+        # Textual's own prints all locals, whole statuses among them. The caller raises `failure`.
         self._close_messages_no_wait()

@@ -1,4 +1,4 @@
-"""The screens that ask or explain: which of several relays, what the keys do."""
+"""The screen to choose a relay from, and the one that explains the keys."""
 
 from collections.abc import Sequence
 from typing import ClassVar, Final
@@ -33,7 +33,7 @@ _MEANINGS: Final = (
 
 
 class RelaysScreen(Screen[None]):
-    """The relays that were found, to choose from."""
+    """A list of the relays that were found."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("question_mark", "app.keys", "Keys", key_display="?"),
@@ -57,7 +57,7 @@ def _relay(answer: Answer) -> Text:
 
 
 class KeysScreen(ModalScreen[None]):
-    """What the keys do and what the columns mean, until any key."""
+    """Explains keys and columns until any key is pressed."""
 
     def compose(self) -> ComposeResult:
         """Lay out one text."""

@@ -16,7 +16,7 @@ _MARK: Final = "▶"
 
 
 class Rows(OptionList):
-    """Lines by name, of which the selected one is marked and reversed; keys are those of lists, and vi's."""
+    """A list of lines by name. The selected one is marked and reversed; j and k move as the arrows do."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "select", "Open"),
@@ -36,7 +36,7 @@ class Rows(OptionList):
         return self.highlighted_option.id if self.highlighted_option else None
 
     def show(self, lines: Mapping[str, Text]) -> None:
-        """Show these lines; the selected name stays selected, and the list where it was scrolled to."""
+        """Show these lines; the selected name stays selected, and the list stays where it is scrolled to."""
         selected = self.selected
         was, self._rows = list(self._rows), dict(lines)
         if was != list(lines):

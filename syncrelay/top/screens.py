@@ -21,19 +21,19 @@ from syncrelay.top.rows import MARK_WIDTH, Rows
 from syncrelay.top.view import Order, View, title
 
 LEAST_WIDTH, LEAST_HEIGHT = 60, 15
-# The list leaves the group that is selected at least as much.
+# The rest is for the selected group.
 _LIST_SHARE: Final = 0.6
 
 
 class ShowsView(Protocol):
-    """What screens need of the application: what to show, and in which order."""
+    """What screens need of the application."""
 
     view: View | None
     order: Order
 
 
 class WatchScreen(Screen[None]):
-    """Shows the application's view; draws anew whenever it or the terminal's size changes."""
+    """Shows the application's view, and draws it again whenever it or the size of the terminal changes."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "app.pause", "Pause"),
@@ -42,7 +42,7 @@ class WatchScreen(Screen[None]):
     ]
 
     def compose(self) -> ComposeResult:
-        """Lay out what all screens have."""
+        """Lay out the title and the keys."""
         yield Static(id="small")
         yield Static(id="title")
         yield from self.compose_body()
@@ -57,11 +57,11 @@ class WatchScreen(Screen[None]):
         self.watch(self.app, "view", self.draw)
 
     def on_screen_resume(self) -> None:
-        """Show what changed while another screen was on top."""
+        """Show what changed while another screen was shown."""
         self.draw()
 
     def on_resize(self, event: Resize) -> None:
-        """Fit the new size, or say that it is too small."""
+        """Draw for the new size, or say that it is too small."""
         width, height = event.size
         self.set_class(width < LEAST_WIDTH or height < LEAST_HEIGHT, "-small")
         self.query_one("#small", Static).update(
@@ -75,7 +75,7 @@ class WatchScreen(Screen[None]):
         return cast("ShowsView", self.app)
 
     def draw(self) -> None:
-        """Draw the view if there is one and this screen is seen."""
+        """Draw the view if there is one and this screen is shown."""
         view = self.shown.view
         if view is None or not self.is_current or not self.size.width:
             return
@@ -85,12 +85,12 @@ class WatchScreen(Screen[None]):
         self.draw_body(view, height=self.size.height - len(lines) - 1)
 
     def draw_body(self, view: View, *, height: int) -> None:
-        """Draw what is between the title and the keys, on so many lines."""
+        """Draw what is between the title and the keys, on `height` lines."""
         raise NotImplementedError
 
 
 class GroupsScreen(WatchScreen):
-    """All groups, and what there is to say of the selected one."""
+    """The list of groups, and below it the selected one."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("s", "app.sort", "Sort"),
@@ -136,7 +136,7 @@ def _summary(group: Group, *, width: int, height: int) -> list[Text]:
         *group_blocks.figures(group, width),
     ]
     strip = [Text(""), *group_blocks.recent_sets(group, width)]
-    # Half a strip would say nothing.
+    # A strip is only of use as a whole.
     return [*lines, *strip] if len(lines) + len(strip) <= height else lines
 
 

@@ -1,4 +1,4 @@
-"""A group's recent messages as lanes of text: a letter per set, a mark per message that left without one."""
+"""A group's recent messages as lanes of text: a letter for each set, a mark for each dropped message."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,19 +14,19 @@ from syncrelay.sync.messages import DropReason
 
 Outcome: TypeAlias = RecentSet | RecentDrop
 
-# A 100 Hz input gives two messages a column, a set of a 10 Hz group has five for its letter and its span.
+# An input at 100 Hz has two messages in a column; a set of a group at 10 Hz has five columns for its letter and span.
 COLUMN_NS = 20_000_000
 # Columns for a set's letter and its span, where the scale may be chosen.
 _COLUMNS_PER_SET = 6
 _FINEST_NS = 1_000_000
-# Stamps farther apart than a strip of these are of different clocks, or were never set.
+# A strip of such columns is longer than stamps of one clock are apart.
 _COARSEST_NS = 10_000_000_000
-# Columns kept blank ahead of the newest message, where the lanes begin to be written over.
+# Columns ahead of the newest message that are kept blank, to show where old messages are written over.
 _GAP = 3
 
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-# Fixed middle tones (of the 256-colour palette), so that black letters on them and lines of them on a light or a
-# dark ground can be told, whatever the terminal's theme makes of `green`.
+# Middle tones of the 256-colour palette: black letters on them, and lines of them on light and dark grounds, are
+# readable whatever the terminal's theme makes of `green`.
 _COLOURS = tuple(f"color({number})" for number in (37, 71, 172, 133))
 
 
@@ -60,7 +60,7 @@ MARKS: Final[Mapping[DropReason, Mark]] = MappingProxyType(
         for reason, character in _CHARACTERS.items()
     }
 )
-"""Of messages that were needed: what costs sets stands out."""
+"""The marks of needed messages. Reasons that cost sets stand out."""
 
 
 def mark_of(drop: RecentDrop) -> Mark:
@@ -75,7 +75,7 @@ def letter_style(number: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """A group as the strip draws it: how many inputs it has, how many `sets` left, what happened last."""
+    """A group as the strip draws it: its number of inputs, of `sets` so far, and its last sets and drops."""
 
     n_inputs: int
     sets: int
@@ -83,62 +83,62 @@ class Lanes:
 
 
 class Axis(Protocol):
-    """Which stamps are on the strip and where."""
+    """Maps stamps to columns of the strip."""
 
     @property
     def width(self) -> int:
         """How many columns there are."""
 
     def column(self, stamp: int) -> int | None:
-        """Return the column of a stamp in nanoseconds; None where it is not on the strip."""
+        """Return the column of a stamp in nanoseconds, None outside the strip."""
 
     def joins(self, one: int, other: int) -> bool:
-        """Whether the way from one column to another is all on the strip."""
+        """Whether a line between two columns stays on the strip."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """As on an oscilloscope, time runs to the right and begins again at the left.
+    """Draws as an oscilloscope does: time runs to the right and starts again at the left.
 
-    A message stays where it was drawn until the sweep comes round. `head` is the newest stamp, in nanoseconds; one for
-    all groups, so that a message is in the same column in each of them.
+    A message stays in its column until the sweep comes round. All groups share `head`, the newest stamp in
+    nanoseconds, so that a message is in the same column in each of them.
     """
 
     head: int
     width: int
 
     def column(self, stamp: int) -> int | None:
-        """Return the column of a stamp; None when it is too old, or newer than the head."""
+        """Return the column of a stamp, None if it is too old or newer than the head."""
         behind = self.head // COLUMN_NS - stamp // COLUMN_NS
         if not 0 <= behind < self.width - _GAP:
             return None
         return stamp // COLUMN_NS % self.width
 
     def joins(self, one: int, other: int) -> bool:
-        """Whether the way between two columns does not lie across the strip's end."""
+        """Whether a line between two columns does not cross the end of the strip."""
         return abs(one - other) <= self.width // 2
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """The newest stamp, `head`, is in the last column, and what is older to the left of it; in nanoseconds."""
+    """Draws the newest stamp, `head`, in the last column and older ones to its left."""
 
     head: int
     width: int
     column_ns: int
 
     def column(self, stamp: int) -> int | None:
-        """Return the column of a stamp; None when it is too old, or newer than the head."""
+        """Return the column of a stamp, None if it is too old or newer than the head."""
         behind = self.head // self.column_ns - stamp // self.column_ns
         return self.width - 1 - behind if 0 <= behind < self.width else None
 
     def joins(self, _one: int, _other: int) -> bool:
-        """Whether the way between two columns is on the strip: always."""
+        """Whether a line between two columns stays on the strip: always."""
         return True
 
 
 def window_of(recent: Sequence[Outcome], width: int) -> Window:
-    """Return a window that gives every set the columns that it needs, or, without sets, holds all that happened."""
+    """Return a window in which each set has enough columns, or which holds all messages if there are no sets."""
     head = newest_stamp(recent)
     ends = sorted(max(_stamps(outcome)) for outcome in recent if isinstance(outcome, RecentSet))
     if len(ends) > 1:
@@ -150,7 +150,7 @@ def window_of(recent: Sequence[Outcome], width: int) -> Window:
 
 
 def _round_step(wanted: float) -> int:
-    """Return the least of 1, 2 and 5 times a power of ten milliseconds that is not less."""
+    """Round up to 1, 2 or 5 times a power of ten milliseconds."""
     decade = _FINEST_NS
     while True:
         for step in (decade, 2 * decade, 5 * decade):
@@ -160,7 +160,7 @@ def _round_step(wanted: float) -> int:
 
 
 def newest_stamp(recent: Iterable[Outcome]) -> int:
-    """Return the newest stamp of what happened, in nanoseconds; 0 where nothing did yet."""
+    """Return the newest stamp in nanoseconds, 0 if there is none."""
     return max((stamp for outcome in recent for stamp in _stamps(outcome)), default=0)
 
 
@@ -172,9 +172,9 @@ def _stamps(outcome: Outcome) -> Iterator[int]:
 
 
 def strip(lanes: Lanes, axis: Axis) -> list[Text]:
-    """Draw a lane per input with the joints of the sets between them, and below all the sets' spans in milliseconds.
+    """Draw two lines for each input: its lane, and below it the lines that join sets.
 
-    Two inputs make four lines, each input more makes two more.
+    The last line has the spans of the sets in milliseconds.
     """
     drawing = _Drawing(lanes=lanes.n_inputs, width=axis.width)
     for outcome in lanes.recent:
@@ -186,14 +186,14 @@ def strip(lanes: Lanes, axis: Axis) -> list[Text]:
 
 
 def _numbered_sets(lanes: Lanes) -> Iterator[tuple[int, RecentSet]]:
-    """Number the sets since the group's start, so that a set keeps its letter from frame to frame."""
+    """Number the sets from the group's start, so that a set keeps its letter from frame to frame."""
     recent = [outcome for outcome in lanes.recent if isinstance(outcome, RecentSet)]
     return enumerate(recent, start=lanes.sets - len(recent))
 
 
 def _draw_drop(drawing: "_Drawing", drop: RecentDrop, axis: Axis) -> None:
     column, mark = axis.column(drop.stamp), mark_of(drop)
-    # Where several share a column, it is what was needed that must be seen.
+    # In a column that several share, a needed message must be seen.
     if column is None or (mark is UNNEEDED and drawing.taken(2 * drop.input, column)):
         return
     drawing.put(2 * drop.input, column, *mark)
@@ -226,7 +226,7 @@ def _draw_joint(drawing: "_Drawing", line: int, above: int, below: int, style: s
 
 
 class _Drawing:
-    """Cells of a character and a style: a line per lane, one between two, and one below for labels."""
+    """Cells of a character and a style: a line for each lane, one below each, the last for labels."""
 
     def __init__(self, *, lanes: int, width: int) -> None:
         self.width = width
@@ -239,7 +239,7 @@ class _Drawing:
         self._cells[line][column] = (character, style)
 
     def label(self, column: int, text: str) -> None:
-        """Write below the lanes, about a column, unless that would touch another label."""
+        """Write a label below the lanes, centred on a column, unless it would touch another one."""
         line = len(self._cells) - 1
         begin = min(max(0, column - (len(text) - 1) // 2), self.width - len(text))
         if any(self.taken(line, near) for near in range(max(0, begin - 1), min(self.width, begin + len(text) + 1))):
@@ -252,7 +252,7 @@ class _Drawing:
 
 
 def _joined(cells: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """Join neighbours of one style, to spare rich a span per cell."""
+    """Join neighbours of one style, so that rich need not handle each cell."""
     text, style = "", ""
     for character, cell_style in cells:
         if cell_style != style:

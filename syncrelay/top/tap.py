@@ -1,4 +1,4 @@
-"""Follows what leaves a relay, over HTTP: asks again and again for what has left since."""
+"""Follows the sets and drops of a relay over HTTP: asks again and again for those since the last answer."""
 
 import json
 import secrets
@@ -17,7 +17,7 @@ _NAME_BYTES: Final = 8
 
 @dataclass(frozen=True, slots=True)
 class SetLine:
-    """A set; times and durations in nanoseconds. Stamps are as they came, without the `offsets` of their inputs."""
+    """A set; times and durations in nanoseconds. Its stamps do not include the `offsets` of the inputs."""
 
     group: Text
     time: int
@@ -29,7 +29,7 @@ class SetLine:
 
 @dataclass(frozen=True, slots=True)
 class DropLine:
-    """A message that left unmatched; times in nanoseconds. `unneeded`: it cost no set, as far as the relay tells."""
+    """A dropped message; times in nanoseconds. `unneeded` says that it cost no set, as far as the relay knows."""
 
     group: Text
     time: int
@@ -41,8 +41,8 @@ class DropLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What has left: lines as they came; `lost` counts what was too old to be told, None where nobody counted."""
+class TapAnswer:
+    """Sets and drops as lines; `lost` counts those that were discarded before, None if nobody counted."""
 
     after: Annotated[int, Field(ge=0)]
     more: bool
@@ -50,12 +50,12 @@ class Told:
     lines: tuple[dict[str, Any], ...]
 
 
-_TOLD: Final = TypeAdapter(Told)
+_ANSWER: Final = TypeAdapter(TapAnswer)
 _LINE: Final = TypeAdapter[SetLine | DropLine](SetLine | DropLine)
 
 
 def read_line(line: Mapping[str, Any]) -> SetLine | DropLine:
-    """Return a line as a value. Raises OtherServerError where it is none."""
+    """Return a line as a value. Raises OtherServerError if it is malformed."""
     try:
         return _LINE.validate_python(line)
     except ValidationError as error:
@@ -63,7 +63,7 @@ def read_line(line: Mapping[str, Any]) -> SetLine | DropLine:
 
 
 class Tap:
-    """A tap on the relay at a base URL. Of what leaves it wants the named groups, inputs and reasons; empty is all."""
+    """A tap on the relay at a base URL, for the named groups, inputs and reasons; an empty choice is all."""
 
     def __init__(
         self,
@@ -83,18 +83,18 @@ class Tap:
         """End the connection."""
         self._connection.close()
 
-    def read(self) -> Told:
-        """Return what has left since this was last called; at first, nothing. Raises as top.client.ask does."""
+    def read(self) -> TapAnswer:
+        """Return the sets and drops since the last call, at first none. Raises as top.client.ask does."""
         target = f"{self._path}?{urlencode(self._fields, doseq=True)}"
         try:
             body = get(self._connection, target)
         except NoAnswerError:
-            # The relay ends what is idle for some seconds, as when we had to wait for who reads our lines.
+            # The relay closes idle connections, such as ours while we wait for the reader of our lines.
             self._connection.close()
             body = get(self._connection, target)
         try:
-            told = _TOLD.validate_python(json.loads(body))
+            answer = _ANSWER.validate_python(json.loads(body))
         except (ValueError, RecursionError) as error:
             raise OtherServerError("what listens there is not a relay, or runs another version") from error
-        self._fields["after"] = told.after
-        return told
+        self._fields["after"] = answer.after
+        return answer

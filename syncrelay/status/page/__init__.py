@@ -1,7 +1,7 @@
-"""The page at the relay's root, for a browser: files of this folder, and nothing from anywhere else.
+"""The page for browsers at the relay's root: files of this folder, and nothing from anywhere else.
 
-It asks /status once a second, as `top` does: an answer is short and complete, so that no page, however many are open or
-forgotten, holds a thread of the server.
+It asks /status once a second, as `top` does. Each answer is short and complete, so pages that are left open occupy no
+thread of the server.
 """
 
 import json
