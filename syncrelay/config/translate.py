@@ -9,8 +9,8 @@ from pydantic_core import ErrorDetails
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode
 from syncrelay.config.problems import Path, Problem
+from syncrelay.config.scalars import read_plain
 from syncrelay.config.wording import describe, one_of, or_nearest, quoted
-from syncrelay.config.yaml_tree import read_plain
 
 Location: TypeAlias = tuple[str | int, ...]
 """A place in pydantic's words: a path with the tags of unions in it."""

@@ -1,15 +1,15 @@
-"""From YAML's events to a Document, in one pass without recursion, within bounds that no real file meets.
+"""From a text to a Document: PyYAML composes the nodes, and here they become keys and values with their places.
 
-On PyYAML's events and not its loader, because the loader keeps the last of two equal keys in silence, reads YAML
-1.1 scalars, recurses once per level and builds an alias bomb before anyone can object.
+The rest of PyYAML's loader is left out, because it keeps the last of two equal keys in silence, reads YAML 1.1 scalars
+and builds an alias bomb before anyone can object.
 """
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any, Final
 
 import yaml
+from yaml.composer import Composer
+from yaml.resolver import BaseResolver
 
 from syncrelay.config.document import (
     MOST_VALUES,
@@ -23,6 +23,7 @@ from syncrelay.config.document import (
     plain,
 )
 from syncrelay.config.problems import ConfigError, Path, Problem, Span, dotted
+from syncrelay.config.scalars import read_plain, substitute, variables_in
 from syncrelay.config.source import Source
 from syncrelay.config.wording import FilledIn, describe, quoted
 from syncrelay.config.yaml_errors import DEEPEST, TOO_DEEP, in_words
@@ -35,26 +36,10 @@ _LONGEST_KEY: Final = 255
 # A text of so many characters counts as one value more.
 _CHARACTERS: Final = 100
 
-# YAML 1.2's core schema (10.3.2), so that editors and syncrelay agree.
-_CONSTANTS: Final[dict[str, Scalar]] = {
-    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
-    **dict.fromkeys(("true", "True", "TRUE"), True),
-    **dict.fromkeys(("false", "False", "FALSE"), False),
-    **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
-    **{sign + word: float(sign + "inf") for sign in ("", "+", "-") for word in (".inf", ".Inf", ".INF")},
-}
-_DECIMAL = re.compile(r"[-+]?[0-9]+")
-_OCTAL_OR_HEXADECIMAL = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
-_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
-# Python refuses to read longer ones, and no key has a use for them.
-_LONGEST_NUMBER = 400
+_PLAIN, _OTHER = "plain", "other"
 
 # https://yaml.org/type/merge.html: not of YAML 1.2, but editors and Compose read it.
 _MERGE: Final = "<<"
-
-_DOLLAR = re.compile(
-    r"\$(?:(?P<escaped>\$)|\{(?P<name>[A-Za-z_]\w*)(?P<default>:-[^{}$]*)?\}|(?P<other>\{[^}]*\}?|\w*))"
-)
 
 
 def compose(source: Source, environ: Mapping[str, str], *, expected: str) -> tuple[Document, list[Problem]]:
@@ -62,244 +47,194 @@ def compose(source: Source, environ: Mapping[str, str], *, expected: str) -> tup
 
     Raises ConfigError where no tree can be made; of an empty file it says what was expected.
     """
-    composer = _Composer(source, environ)
+    tree = _Tree(source, environ)
     try:
-        for event in yaml.parse(source.text, Loader=LOADER):
-            composer.take(event)
+        composed = _Composer(source).compose_file()
     except yaml.MarkedYAMLError as error:
         text, span = in_words(error, source.lines)
         raise ConfigError([source.problem(text, span=span, code="yaml")]) from error
-    if composer.root is None or (isinstance(composer.root, ScalarNode) and composer.root.value is None):
+    root = None if composed is None else tree.node(composed, ())
+    if root is None or (isinstance(root, ScalarNode) and root.value is None):
         raise ConfigError([source.problem(f"the file is empty, expected {expected}", span=None, code="empty")])
-    return Document({source.index: source}, composer.root, variables=composer.variables), composer.problems
+    return Document({source.index: source}, root, variables=tree.variables), tree.problems
 
 
-@dataclass(slots=True)
-class _Open:
-    """A mapping or list whose end has not come yet. `key` is a mapping's key that waits for its value.
+class _Composer(Composer, BaseResolver):
+    """PyYAML's composer on the events of its parser, within bounds that no real file meets.
 
-    `merged` are the entries that a mapping has from others, where it does not have them itself; `merge` is the key that
-    says so, `is_merging` while that waits for its value.
+    Of aliases only the events tell where they stand, so what is refused of them is refused here.
     """
 
-    node: MappingNode | SequenceNode
-    anchor: str | None
-    step: str | int = 0
-    key: Span | None = None
-    merge: Span | None = None
-    is_merging: bool = False
-    merged: dict[str, Entry] = field(default_factory=dict)
+    def __init__(self, source: Source) -> None:
+        Composer.__init__(self)
+        BaseResolver.__init__(self)
+        parser = LOADER(source.text)
+        self.check_event, self.peek_event, self.get_event = parser.check_event, parser.peek_event, parser.get_event
+        self._source = source
+        self._depth = 0
+        # The values so far, counted through aliases too, and those below each anchor; None while it is open.
+        self._values = 0
+        self._below: dict[str, int | None] = {}
+
+    def compose_file(self) -> yaml.Node | None:
+        self.get_event()
+        root = None if self.check_event(yaml.StreamEndEvent) else self.compose_document()
+        if not self.check_event(yaml.StreamEndEvent):
+            raise self._refusal("a second document begins here, expected one per file", self.peek_event())
+        return root
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event = self.peek_event()
+        is_key = isinstance(parent, yaml.MappingNode) and index is None
+        self._check(event, is_key=is_key)
+        if isinstance(event, yaml.AliasEvent):
+            return super().compose_node(parent, index)
+        before, anchor = self._values, event.anchor
+        if anchor is not None:
+            # Of two anchors of one name, an alias means the one above it.
+            self.anchors.pop(anchor, None)
+            self._below[anchor] = None
+        if not is_key:
+            self._values += _size(event.value) if isinstance(event, yaml.ScalarEvent) else 1
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        if anchor is not None:
+            self._below[anchor] = self._values - before
+        return node
+
+    def resolve(self, kind: type[yaml.Node], _value: Any, implicit: Any) -> str:
+        """Return the tag of a node for which the file has none."""
+        return _PLAIN if kind is yaml.ScalarNode and implicit[0] else _OTHER
+
+    def _check(self, event: Any, *, is_key: bool) -> None:
+        match event:
+            case yaml.AliasEvent():
+                self._check_alias(event, is_key=is_key)
+            case _ if event.tag is not None:
+                written = event.tag.replace("tag:yaml.org,2002:", "!!")
+                raise self._refusal(f"tags such as {quoted(written)} are not supported", event)
+            case yaml.CollectionStartEvent() if is_key:
+                what = "mapping" if isinstance(event, yaml.MappingStartEvent) else "list"
+                raise self._refusal(f"a {what} cannot be a key: put text that begins with a bracket in quotes", event)
+            case yaml.CollectionStartEvent() if self._depth == DEEPEST:
+                raise self._refusal(TOO_DEEP, event)
+            case yaml.ScalarEvent() if is_key and len(event.value) > _LONGEST_KEY:
+                text = f"a key of {len(event.value)} characters, at most {_LONGEST_KEY} are allowed"
+                raise self._refusal(text, event)
+
+    def _check_alias(self, event: yaml.AliasEvent, *, is_key: bool) -> None:
+        alias, anchor = quoted(f"*{event.anchor}"), str(event.anchor)
+        below = self._below.get(anchor, 0)
+        if below is None:
+            raise self._refusal(f"{alias} refers to a block that contains it", event)
+        if anchor not in self._below:
+            raise self._refusal(f"{alias} has no anchor: there is no `&{anchor}` above", event)
+        if is_key:
+            raise self._refusal("an alias cannot be a key", event)
+        self._values += below
+        if self._values > MOST_VALUES:
+            raise self._refusal(f"with all aliases expanded the file has more than {MOST_VALUES} values", event)
+
+    def _refusal(self, text: str, event: Any) -> ConfigError:
+        return ConfigError([self._source.problem(text, span=_span(event, self._source), code="yaml")])
 
 
-class _Composer:
+def _span(at: Any, source: Source) -> Span:
+    """Return where an event or a node stands: a scalar or a bracket within its line, else the rest of the line."""
+    start, end = at.start_mark, at.end_mark
+    is_open = isinstance(at, yaml.CollectionStartEvent) or (isinstance(at, yaml.CollectionNode) and not at.flow_style)
+    width = 0 if is_open or end.line != start.line else end.column - start.column
+    if width < 1:
+        width = len(source.line(start.line + 1)) - start.column
+    return Span(start.line + 1, start.column + 1, max(1, width), source.index)
+
+
+class _Tree:
+    """Makes the tree of a file from PyYAML's nodes, and notes what is wrong with single keys and values."""
+
     def __init__(self, source: Source, environ: Mapping[str, str]) -> None:
-        self.root: Node | None = None
         self.problems: list[Problem] = []
         self.variables: dict[str, str] = {}
         self._source = source
         self._environ = environ
-        self._open: list[_Open] = []
-        self._anchors: dict[str, Node] = {}
+        # What an anchor stands for is one node, however many aliases mean it.
+        self._made: dict[int, Node] = {}
 
-    def take(self, event: yaml.Event) -> None:
-        match event:
-            case yaml.DocumentStartEvent() if self.root is not None:
-                raise self._refusal("a second document begins here, expected one per file", self._span(event))
-            case yaml.ScalarEvent():
-                self._scalar(event)
-            case yaml.AliasEvent():
-                self._alias(event)
-            case yaml.MappingStartEvent():
-                self._begin(MappingNode(self._span(event)), event)
-            case yaml.SequenceStartEvent():
-                self._begin(SequenceNode(self._span(event)), event)
-            case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
-                self._end(event)
+    def node(self, node: yaml.Node, path: Path, *, key: Span | None = None) -> Node:
+        """Return what a node of PyYAML's says; of an empty value its key is what can be shown."""
+        if id(node) not in self._made:
+            span = _span(node, self._source)
+            match node:
+                case yaml.MappingNode():
+                    self._made[id(node)] = self._mapping(node, span, path)
+                case yaml.SequenceNode():
+                    items = [self.node(item, (*path, index)) for index, item in enumerate(node.value)]
+                    self._made[id(node)] = SequenceNode(span, items, 1 + sum(item.size for item in items))
+                case yaml.ScalarNode():
+                    self._made[id(node)] = self._scalar(node, (key if not node.value else None) or span, path)
+        return self._made[id(node)]
 
-    def _begin(self, node: MappingNode | SequenceNode, event: Any) -> None:
-        self._check_tag(event)
-        if self._awaits_key():
-            what = "mapping" if isinstance(node, MappingNode) else "list"
-            raise self._refusal(f"a {what} cannot be a key: put text that begins with a bracket in quotes", node.span)
-        if len(self._open) == DEEPEST:
-            raise self._refusal(TOO_DEEP, node.span)
-        self._open.append(_Open(node, event.anchor))
+    def _mapping(self, node: yaml.MappingNode, span: Span, path: Path) -> MappingNode:
+        own: dict[str, Entry] = {}
+        merged: dict[str, Entry] = {}
+        merge: Span | None = None
+        size = 1
+        for key, value in node.value:
+            at, name = _span(key, self._source), str(key.value)
+            is_merging = name == _MERGE and key.tag == _PLAIN
+            if is_merging and merge is not None:
+                text = f"`<<` is also on line {merge.line}: write one with a list, `<<: [*one, *other]`"
+                self._report(text, at, (*path, name), code="duplicate_key")
+            elif not is_merging and name in own:
+                text = f"duplicate key, first on line {own[name].key.line}"
+                self._report(text, at, (*path, name), code="duplicate_key")
+            below = self.node(value, (*path, name), key=at)
+            size += below.size
+            if is_merging:
+                merge = merge or at
+                self._merge(below, merged, at, (*path, name))
+            else:
+                own.setdefault(name, Entry(at, below))
+        # Its own first: where a mapping as a whole is meant, its first key is shown.
+        return MappingNode(span, own | {name: entry for name, entry in merged.items() if name not in own}, size)
 
-    def _end(self, event: Any) -> None:
-        ended = self._open.pop()
-        closes_bracket = event.end_mark.column > event.start_mark.column
-        if closes_bracket and event.end_mark.line == ended.node.span.line - 1:
-            start = ended.node.span
-            ended.node.span = start._replace(width=event.end_mark.column - start.column + 1)
-        if isinstance(ended.node, MappingNode):
-            # Behind its own: where a mapping as a whole is meant, its first key is shown.
-            for key, entry in ended.merged.items():
-                ended.node.entries.setdefault(key, entry)
-        self._place(ended.node, ended.anchor)
-
-    def _scalar(self, event: yaml.ScalarEvent) -> None:
-        self._check_tag(event)
-        span = self._span(event)
-        if self._awaits_key():
-            self._key(event.value, span, is_plain=event.implicit[0])
-            return
-        top = self._open[-1] if self._open else None
-        if not event.value and top is not None and top.key is not None:
-            # Nothing stands there: its key is what can be shown.
-            span = top.key
-        self._place(self._value(event, span), event.anchor)
-
-    def _key(self, key: str, span: Span, *, is_plain: bool) -> None:
-        if len(key) > _LONGEST_KEY:
-            raise self._refusal(f"a key of {len(key)} characters, at most {_LONGEST_KEY} are allowed", span)
-        top = self._open[-1]
-        top.step, top.key = key, span
-        assert isinstance(top.node, MappingNode)  # noqa: S101  only a mapping awaits a key
-        top.is_merging = key == _MERGE and is_plain
-        if top.is_merging:
-            if top.merge is not None:
-                text = f"`<<` is also on line {top.merge.line}: write one with a list, `<<: [*one, *other]`"
-                self._report(text, span, code="duplicate_key")
-            top.merge = top.merge or span
-        elif key in top.node.entries:
-            first = top.node.entries[key].key.line
-            self._report(f"duplicate key, first on line {first}", span, code="duplicate_key")
-
-    def _value(self, event: yaml.ScalarEvent, span: Span) -> ScalarNode:
-        try:
-            value = self._resolved(event)
-            size = 1 + (len(value) // _CHARACTERS if isinstance(value, str) else 0)
-            return ScalarNode(span, value, size=size, written=event.value if "$" in event.value else None)
-        except ValueError as error:
-            self._report(str(error), span, code="substitution")
-            return ScalarNode(span, None, readable=False)
-
-    def _resolved(self, event: yaml.ScalarEvent) -> Scalar:
-        written: str = event.value
-        if "$" in written:
-            # Read as if it stood there unquoted: within braces a variable has no other way to be a number.
-            self.variables |= variables_in(written, self._environ)
-            text = substitute(written, self._environ)
-            return read_plain(text) if text else ""
-        return read_plain(written) if event.implicit[0] else written
-
-    def _alias(self, event: yaml.AliasEvent) -> None:
-        span, name = self._span(event), str(event.anchor)
-        if any(container.anchor == name for container in self._open):
-            raise self._refusal(f"{quoted('*' + name)} refers to a block that contains it", span)
-        target = self._anchors.get(name)
-        if target is None:
-            raise self._refusal(f"{quoted('*' + name)} has no anchor: there is no `&{name}` above", span)
-        if self._awaits_key():
-            raise self._refusal("an alias cannot be a key", span)
-        self._place(target, None)
-        if sum(container.node.size for container in self._open) > MOST_VALUES:
-            raise self._refusal(f"with all aliases expanded the file has more than {MOST_VALUES} values", span)
-
-    def _place(self, node: Node, anchor: str | None) -> None:
-        if anchor:
-            self._anchors[anchor] = node
-        if not self._open:
-            self.root = node
-            return
-        top = self._open[-1]
-        top.node.size += node.size
-        if isinstance(top.node, SequenceNode):
-            top.node.items.append(node)
-            top.step = len(top.node.items)
-            return
-        assert top.key is not None  # noqa: S101  a value follows its key
-        if top.is_merging:
-            self._merge(node, top, at=top.key)
-        else:
-            top.node.entries.setdefault(str(top.step), Entry(top.key, node))
-        top.key = None
-
-    def _merge(self, node: Node, top: _Open, *, at: Span) -> None:
+    def _merge(self, node: Node, merged: dict[str, Entry], at: Span, path: Path) -> None:
         """Note the entries of a mapping, or of a list of them; of two with one key, that of the first counts."""
         for source in node.items if isinstance(node, SequenceNode) else [node]:
             if isinstance(source, MappingNode):
-                for key, entry in source.entries.items():
-                    top.merged.setdefault(key, entry)
+                merged |= {key: entry for key, entry in source.entries.items() if key not in merged}
             elif not isinstance(source, ScalarNode) or source.readable:
                 written = source.written if isinstance(source, ScalarNode) else None
                 found = plain(source) if written is None else FilledIn(written)
                 text = f"expected a mapping such as `*name`, or a list of mappings, found {describe(found)}"
-                self._report(text, at, code="merge_key")
+                self._report(text, at, path, code="merge_key")
 
-    def _awaits_key(self) -> bool:
-        return bool(self._open) and isinstance(self._open[-1].node, MappingNode) and self._open[-1].key is None
+    def _scalar(self, node: yaml.ScalarNode, span: Span, path: Path) -> ScalarNode:
+        written: str = node.value
+        if "$" not in written:
+            value = read_plain(written) if node.tag == _PLAIN else written
+            return ScalarNode(span, value, size=_size(value))
+        self.variables |= variables_in(written, self._environ)
+        try:
+            text = substitute(written, self._environ)
+        except ValueError as error:
+            self._report(str(error), span, path, code="substitution")
+            return ScalarNode(span, None, readable=False)
+        # Read as if it stood there unquoted: within braces a variable has no other way to be a number.
+        value = read_plain(text) if text else ""
+        return ScalarNode(span, value, size=_size(value), written=written)
 
-    def _check_tag(self, event: Any) -> None:
-        if event.tag is not None:
-            written = event.tag.replace("tag:yaml.org,2002:", "!!")
-            raise self._refusal(f"tags such as {quoted(written)} are not supported", self._span(event))
-
-    def _report(self, text: str, span: Span, *, code: str) -> None:
+    def _report(self, text: str, span: Span, path: Path, *, code: str) -> None:
         if len(self.problems) == MOST_PROBLEMS:
             raise ConfigError([*self.problems, too_many(self._source, span)])
-        self.problems.append(self._source.problem(text, path=dotted(self._path()), span=span, code=code))
+        self.problems.append(self._source.problem(text, path=dotted(path), span=span, code=code))
 
-    def _refusal(self, text: str, span: Span) -> ConfigError:
-        return ConfigError([self._source.problem(text, span=span, code="yaml")])
 
-    def _path(self) -> Path:
-        return tuple(container.step for container in self._open)
-
-    def _span(self, event: Any) -> Span:
-        start, end = event.start_mark, event.end_mark
-        width = end.column - start.column if end.line == start.line else 0
-        if width < 1 or isinstance(event, yaml.CollectionStartEvent):
-            width = len(self._source.line(start.line + 1)) - start.column
-        return Span(start.line + 1, start.column + 1, max(1, width), self._source.index)
+def _size(value: Scalar) -> int:
+    return 1 + (len(value) // _CHARACTERS if isinstance(value, str) else 0)
 
 
 def too_many(source: Source, span: Span | None) -> Problem:
     """Return what is said of a file, at the place of its last problem that is told."""
     return source.problem("too many errors: the file was not read beyond this line", span=span, code="yaml")
-
-
-def read_plain(text: str) -> Scalar:
-    """Return the value of an unquoted scalar, as YAML 1.2 has it."""
-    if text in _CONSTANTS:
-        return _CONSTANTS[text]
-    if len(text) > _LONGEST_NUMBER:
-        return text
-    if _DECIMAL.fullmatch(text):
-        return int(text)
-    if _OCTAL_OR_HEXADECIMAL.fullmatch(text):
-        return int(text, 0)
-    if _FLOAT.fullmatch(text):
-        return float(text)
-    return text
-
-
-def substitute(text: str, environ: Mapping[str, str]) -> str:
-    """Return the text with its variables filled in; `$$` is a dollar sign.
-
-    A default stands for a variable that is unset or empty, as in a shell. Raises ValueError for an unset
-    variable without a default and for what only looks like a variable.
-    """
-    return _DOLLAR.sub(lambda found: _value(found, environ), text)
-
-
-def variables_in(text: str, environ: Mapping[str, str]) -> dict[str, str]:
-    """Return the values that variables in a text have in the environment, each with what stands for it."""
-    named = ((found["name"], found.group()) for found in _DOLLAR.finditer(text))
-    return {environ[name]: written for name, written in named if name and environ.get(name)}
-
-
-def _value(found: re.Match[str], environ: Mapping[str, str]) -> str:
-    if found["escaped"]:
-        return "$"
-    name, default = found["name"], found["default"]
-    if name is None:
-        raise ValueError(
-            f"{quoted(found.group())}: expected ${{NAME}} or ${{NAME:-default}}; write $$ for a dollar sign"
-        )
-    value = environ.get(name)
-    if default is not None:
-        return value or default.removeprefix(":-")
-    if value is None:
-        raise ValueError(f"the environment variable {name} is not set; write ${{{name}:-default}} to give it a default")
-    return value

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.config.yaml_tree import read_plain
+from syncrelay.config.scalars import read_plain
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 import pytest
 
 from syncrelay.config import ConfigError, load_text
-from syncrelay.config.yaml_tree import substitute
+from syncrelay.config.scalars import substitute
 
 FILE = """\
 version: 1
