@@ -1,4 +1,4 @@
-"""Batches of messages: large enough that the work for each batch does not count, small enough to hold in memory."""
+"""Batches of messages: large enough that the cost per batch does not matter, small enough for memory."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final
@@ -10,12 +10,12 @@ _BYTES: Final = 4_000_000
 
 
 def batched(messages: Iterable[RawMessage]) -> Iterator[list[RawMessage]]:
-    """Yield messages that come one by one as batches."""
+    """Yield single messages in batches."""
     return filled([each] for each in messages)
 
 
 def filled(batches: Iterable[list[RawMessage]]) -> Iterator[list[RawMessage]]:
-    """Yield small batches put together into larger ones; none is empty."""
+    """Yield small batches joined into larger ones; none is empty."""
     held: list[RawMessage] = []
     size = 0
     for batch in batches:

@@ -1,4 +1,4 @@
-"""A file's topics and a recording's channels, brought together; and what does not fit."""
+"""Which channels of a recording fill which inputs of a file, and what does not fit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,9 +23,9 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class GroupBinding:
-    """A group, its inputs in the file's order, and why an input has no channel, a sentence each.
+    """A group, its inputs in the file's order, and a sentence for each input without a channel.
 
-    The group's topics have the recording's types where the file leaves them out and the recording has one.
+    Types that the file leaves out are those of the recording, if it has exactly one.
     """
 
     group: GroupConfig
@@ -34,12 +34,12 @@ class GroupBinding:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every required input has a channel, so that sets can come."""
+        """Whether every required input has a channel, so that sets are possible."""
         return all(each.channels for each in self.inputs if each.config.required)
 
 
 def bind(config: Config, recording: Recording) -> tuple[GroupBinding, ...]:
-    """Return each group's binding, in the file's order."""
+    """Return the binding of each group, in the file's order."""
     return tuple(_bind(group, config, recording.channels) for group in config.groups)
 
 
@@ -56,7 +56,7 @@ def _bind(group: GroupConfig, config: Config, channels: Sequence[Channel]) -> Gr
 
 
 def _bind_topic(topic: TopicConfig, config: Config, channels: Sequence[Channel]) -> tuple[Input, list[str]]:
-    """Return an input and why it has no channel, or not all of its topic."""
+    """Return an input, and why channels of its topic are missing or do not fit."""
     name, output = full_name(topic.topic, config), full_name(topic.output, config)
     found = tuple(channel for channel in channels if channel.topic == name)
     if not found:

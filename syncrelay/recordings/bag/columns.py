@@ -18,12 +18,12 @@ from syncrelay.recordings.bag.recording import Channel, Encoding, RawMessage
 Nanoseconds: TypeAlias = npt.NDArray[np.int64]
 Places: TypeAlias = npt.NDArray[np.intp]
 Heads: TypeAlias = npt.NDArray[np.void]
-"""What each payload begins with, as far as the stamp of a leading Header goes."""
+"""The first bytes of each payload, up to the end of a leading Header's stamp."""
 
 _NS_PER_SECOND: Final = 1_000_000_000
-# Where a payload begins with a Header, its stamp ends here.
+# A leading Header's stamp ends here.
 _HEAD: Final = 12
-# As DDS serializes it, and as ROS 1 does behind its `seq`.
+# CDR as DDS has it in both byte orders, and ROS 1.
 _LITTLE: Final = np.dtype([("kind", "<u2"), ("options", "V2"), ("seconds", "<i4"), ("nanoseconds", "<u4")])
 _BIG: Final = np.dtype([("kind", "<u2"), ("options", "V2"), ("seconds", ">i4"), ("nanoseconds", ">u4")])
 _ROS1: Final = np.dtype([("seq", "<u4"), ("seconds", "<u4"), ("nanoseconds", "<u4")])
@@ -31,19 +31,19 @@ _CDR_BE, _CDR_LE, _CDR2_BE, _CDR2_LE = 0x0000, 0x0100, 0x0600, 0x0700
 
 
 class Batch:
-    """Messages that follow each other, with what is read of all of them."""
+    """Consecutive messages of a recording, with what is read from all of them at once."""
 
     def __init__(self, rows: Sequence[RawMessage]) -> None:
         self.rows = rows
 
     @cached_property
     def received(self) -> Nanoseconds:
-        """The times of receipt."""
+        """The receive times."""
         return np.array([received for _, received, _ in self.rows], dtype=np.int64)
 
     @cached_property
     def heads(self) -> Heads:
-        """What each payload begins with; of one that is shorter, bytes that no stamp can be read from."""
+        """The first bytes of each payload; a shorter payload gets bytes from which no stamp can be read."""
         heads = [payload[:_HEAD] for _, _, payload in self.rows]
         joined = b"".join(heads)
         if len(joined) != _HEAD * len(heads):
@@ -52,7 +52,7 @@ class Batch:
 
 
 class Column(NamedTuple):
-    """The messages of a batch that one reader has read: their places in it, their stamps or UNREADABLE, their keys."""
+    """Messages of a batch: their places in it, their stamps (or UNREADABLE), and their keys."""
 
     places: Places
     stamps: Nanoseconds
@@ -60,7 +60,7 @@ class Column(NamedTuple):
 
 
 ReadColumn: TypeAlias = Callable[[Batch, Places], tuple[Nanoseconds, Sequence[Hashable] | None]]
-"""From the messages at some places of a batch to their stamps, UNREADABLE where none can be used, and their keys."""
+"""From some places of a batch to the stamps (or UNREADABLE) and the keys of its messages."""
 
 
 def column_reader(group: GroupConfig, index: int, channel: Channel) -> ReadColumn:
@@ -75,7 +75,7 @@ def column_reader(group: GroupConfig, index: int, channel: Channel) -> ReadColum
 
 
 def stamp_or_receipt_column(channel: Channel) -> ReadColumn:
-    """Return what reads the headers' stamps, or the times of receipt of a type that is not known or has no header."""
+    """Return what reads header stamps, or receive times if the type is unknown or has no header."""
     has_header = isinstance(channel.encoding, Encoding) and bool(begins_with_header(channel))
     return _stamp_column("header" if has_header else "receive", channel)
 
@@ -100,7 +100,7 @@ def _one_by_one(read: ReadMessage) -> ReadColumn:
 
 
 def cdr_stamps(heads: Heads) -> Nanoseconds:
-    """Return what `read_stamp` gives of payloads that begin so, UNREADABLE for None."""
+    """Return what `read_stamp` returns for each payload, with UNREADABLE for None."""
     stamps, is_good = _nanoseconds(heads.view(_LITTLE))
     kinds = heads.view(_LITTLE)["kind"]
     is_little = (kinds == _CDR_LE) | (kinds == _CDR2_LE)
@@ -113,13 +113,13 @@ def cdr_stamps(heads: Heads) -> Nanoseconds:
 
 
 def ros1_stamps(heads: Heads) -> Nanoseconds:
-    """Return what `read_ros1_stamp` gives of payloads that begin so, UNREADABLE for None."""
+    """Return what `read_ros1_stamp` returns for each payload, with UNREADABLE for None."""
     stamps, is_good = _nanoseconds(heads.view(_ROS1))
     return np.where(is_good & (stamps <= LATEST_STAMP), stamps, UNREADABLE)
 
 
 def _nanoseconds(times: npt.NDArray[np.void]) -> tuple[Nanoseconds, npt.NDArray[np.bool_]]:
-    """Return times as numbers, and which of them have no more nanoseconds than a second has."""
+    """Return times in nanoseconds, and which of them have less than a second of nanoseconds."""
     stamps = times["seconds"].astype(np.int64) * _NS_PER_SECOND + times["nanoseconds"]
     return stamps, times["nanoseconds"] < _NS_PER_SECOND
 
@@ -131,10 +131,7 @@ _IN_ONE_GO: Final[Mapping[ReadStamp, Callable[[Heads], Nanoseconds]]] = {
 
 
 class Columns:
-    """Reads the batches of a recording for the inputs that its channels fill.
-
-    Each input has one channel or more, with what reads them.
-    """
+    """Reads the batches of a recording for inputs, each of which has one or more channels with their readers."""
 
     def __init__(self, inputs: Sequence[Sequence[tuple[Channel, ReadColumn]]]) -> None:
         self._numbers: dict[Channel, int] = {}
@@ -144,7 +141,7 @@ class Columns:
 
     @property
     def channels(self) -> Collection[Channel]:
-        """All that are read."""
+        """The channels of all inputs."""
         return self._numbers.keys()
 
     def read(self, batch: Batch) -> Iterator[tuple[int, Column]]:
@@ -158,9 +155,9 @@ class Columns:
                 yield index, _combined(found)
 
     def in_order(self, batch: Batch) -> Iterator[tuple[int, RawMessage, int, Hashable]]:
-        """Yield the messages of a batch: of what input by its index, as recorded, the stamp or UNREADABLE, the key.
+        """Yield the messages of a batch: index of the input, message, stamp (or UNREADABLE), key.
 
-        A message that is for two inputs comes in their order.
+        A message for two inputs is yielded for each, in their order.
         """
         found = dict(self.read(batch))
         if not found:
@@ -178,7 +175,7 @@ class Columns:
 
 
 def _combined(columns: Sequence[Column]) -> Column:
-    """Return the messages of several channels in the order of their places."""
+    """Merge the messages of several channels by their places."""
     if len(columns) == 1:
         return columns[0]
     order, _ = in_order([each.places for each in columns])
@@ -186,7 +183,7 @@ def _combined(columns: Sequence[Column]) -> Column:
 
 
 def _joined(columns: Sequence[Column], order: Places) -> Column:
-    """Return columns, one behind another, in another order."""
+    """Concatenate columns and reorder the result."""
     return Column(
         np.concatenate([each.places for each in columns])[order],
         np.concatenate([each.stamps for each in columns])[order],
@@ -195,16 +192,16 @@ def _joined(columns: Sequence[Column], order: Places) -> Column:
 
 
 def in_order(places: Sequence[Places]) -> tuple[Places, Places]:
-    """Return the order of columns, one behind another, by their places, and of what column each message then is.
+    """Return the order that sorts concatenated columns by place, and the column that each message then comes from.
 
-    Of equal places, the first column's comes first.
+    For equal places, the earlier column comes first.
     """
     order = np.argsort(np.concatenate(places), kind="stable")
     return order, np.repeat(np.arange(len(places)), [len(each) for each in places])[order]
 
 
 def keys_in_order(columns: Sequence[tuple[Sequence[Hashable] | None, int]], order: Places) -> Sequence[Hashable] | None:
-    """Return the keys of columns of a length, one behind another, in another order; None where no column has keys."""
+    """Concatenate and reorder the keys of columns, given with their lengths; None if no column has keys."""
     if all(keys is None for keys, _ in columns):
         return None
     joined: list[Hashable] = []

@@ -1,6 +1,6 @@
-"""Types by their definitions: as recorded, or as ROS 2 Jazzy has them where the recording tells nothing.
+"""Message types by their definitions: the recorded one, or that of ROS 2 Jazzy if none was recorded.
 
-The definitions are read by rosbags, whose typestore has those of Jazzy's common packages; no ROS is needed.
+rosbags parses the definitions, and knows those of Jazzy's common packages; no ROS is needed.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,29 +18,29 @@ from syncrelay.recordings.bag.plain_definitions import plain_idl, plain_msg
 from syncrelay.recordings.bag.recording import Channel, Definition
 
 Convert: TypeAlias = Callable[[bytes], bytes | None]
-"""From a ROS 1 payload to the same message as CDR; None where it is malformed."""
+"""From a ROS 1 payload to the same message as CDR; None if it is malformed."""
 
 _HEADER: Final = "std_msgs/msg/Header"
 _TIME: Final = "builtin_interfaces/msg/Time"
-# Far beyond the definitions of real messages; what is done with them takes seconds.
+# Far more than any real message has; rosbags takes seconds for it.
 _MOST_FIELDS: Final = 20_000
 _DEEPEST: Final = 50
-# A gibibyte of doubles; what else is counted by such a number takes place that no machine has.
+# A gibibyte of doubles.
 _LONGEST_ARRAY: Final = 1 << 27
-# rosidl's words for the primitives of .msg files, as its Python classes tell them.
+# Names of primitives in .msg files, and in rosidl's Python classes.
 _ROSIDL: Final = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
 
 
 def typestore(type_name: str, definition: Definition | None) -> Typestore | None:
-    """Return what decodes messages of a type, as CDR; None where neither its definition nor ROS 2 tells of it."""
+    """Return what decodes CDR messages of a type; None if neither its definition nor ROS 2 knows it."""
     store = _store_of(type_name, definition)
     return store if type_name in store.fielddefs else None
 
 
 def fields_of(channel: Channel) -> Callable[[str], Mapping[str, str]] | None:
-    """Return what tells the fields of a type (`pkg/Name`) that the channel's is made of, as rosidl's classes would.
+    """Return a function from a type (`pkg/Name`) within the channel's type to its fields, as in rosidl's classes.
 
-    None where the channel's type is known neither to the recording nor to ROS 2.
+    None if neither the recording nor ROS 2 knows the channel's type.
     """
     store = _store_of(channel.type, channel.definition)
     if channel.type not in store.fielddefs:
@@ -55,7 +55,7 @@ def fields_of(channel: Channel) -> Callable[[str], Mapping[str, str]] | None:
 
 
 def begins_with_header(channel: Channel) -> bool | None:
-    """Tell whether payloads begin with a std_msgs/Header; None where the type is not known."""
+    """Tell whether payloads begin with a std_msgs/Header; None if the type is unknown."""
     fields = _store_of(channel.type, channel.definition).fielddefs.get(channel.type)
     if fields is None:
         return None
@@ -63,19 +63,19 @@ def begins_with_header(channel: Channel) -> bool | None:
 
 
 def stamp_fields(type_name: str, definition: Definition | None = None) -> tuple[str, ...]:
-    """Return the fields of a type that `stamp: {field: ...}` can name as they are, none where the type is not known."""
+    """Return the names of a type's own Time fields, for `stamp: {field: ...}`; none if the type is unknown."""
     _, fields = _store_of(type_name, definition).fielddefs.get(type_name, ([], []))
     return tuple(name for name, description in fields if description == (Nodetype.NAME, _TIME))
 
 
 def converter(channel: Channel) -> Convert:
-    """Return what makes CDR of the payloads of a ROS 1 channel; raises BagError where its definition is no use."""
+    """Return what converts payloads of a ROS 1 channel to CDR; raises BagError if its definition cannot be read."""
     store = _store_of(channel.type, channel.definition)
     if channel.type not in store.fielddefs:
         raise BagError(f"{channel.topic}: the definition of {channel.type} in the bag cannot be read")
 
     def convert(payload: bytes) -> bytes | None:
-        # No element is smaller than a byte: a larger count is a lie, and would be counted down for hours.
+        # No element is smaller than a byte: a larger count is wrong, and rosbags would loop over it for hours.
         store.max_sequence_length = max(1, len(payload))
         try:
             return bytes(store.ros1_to_cdr(payload, channel.type))
@@ -86,7 +86,7 @@ def converter(channel: Channel) -> Convert:
 
 
 def as_ros2(channel: Channel) -> tuple[Definition | None, str]:
-    """Return the definition and the hash (RIHS01) that a ROS 2 recording of the channel has."""
+    """Return the definition and the RIHS01 hash that a ROS 2 recording of the channel has."""
     store = _store_of(channel.type, channel.definition)
     is_known = channel.type in store.fielddefs
     if channel.definition is not None and channel.definition.format != "ros1msg":
@@ -108,25 +108,25 @@ def jazzy_definition(type_name: str) -> tuple[Definition, str]:
 
 @lru_cache(maxsize=256)
 def _store_of(type_name: str, definition: Definition | None) -> Typestore:
-    """A store of what a definition holds: the type and all that it is made of; Jazzy's where that is of no use."""
+    """Return a store with a definition's type and all types within it; Jazzy's if the definition cannot be used."""
     if definition is None:
         return _jazzy()
     store = get_typestore(Stores.EMPTY)
     try:
         types = _parsed(type_name, definition)
-        # ROS 1's Header begins with `seq`, which rosbags skips by itself.
+        # ROS 1's Header begins with `seq`, which rosbags handles by itself.
         types.pop(_HEADER, None)
         types = {_HEADER: _jazzy().fielddefs[_HEADER], **types}
         types = {name: fields for name, fields in types.items() if name not in store.fielddefs}
         _require_bearable({**store.fielddefs, **types})
         store.register(types)
-    except Exception:  # noqa: BLE001  the parser asserts and recurses, and what it read becomes code: it may raise anything
+    except Exception:  # noqa: BLE001  the parser may raise anything: it asserts and recurses
         return _jazzy()
     return store
 
 
 def _require_bearable(types: Mapping[str, Any]) -> None:
-    """Raise ValueError or KeyError where types hold themselves, what is not there, or more than a message can."""
+    """Raise ValueError or KeyError for types that contain themselves, unknown types, or too many fields."""
     weights: dict[str, int] = {}
 
     def weight_of(name: str, depth: int) -> int:
@@ -147,7 +147,7 @@ def _require_bearable(types: Mapping[str, Any]) -> None:
         element, count = what
         if kind == Nodetype.ARRAY and count > _LONGEST_ARRAY:
             raise ValueError(f"an array of {count} elements is longer than a message can be")
-        # Numbers beside each other are one thing to skip, all else is gone through.
+        # Numbers side by side are skipped at once; everything else is visited one by one.
         is_plain = kind == Nodetype.SEQUENCE or (element[0] == Nodetype.BASE and element[1][0] != "string")
         return weight_of_field(element, depth) * (1 if is_plain else count)
 

@@ -1,4 +1,4 @@
-"""Which files a word of the command line means, and what rosbag2 says of the folder that they are in."""
+"""Which files a word of the command line means, and what metadata.yaml says about their folder."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -16,7 +16,7 @@ from syncrelay.urls import redacted
 
 
 def files_meant(named: Sequence[str]) -> Iterator[Path | str]:
-    """Yield the paths of files, and the URLs of those that are not here."""
+    """Yield the paths of local files, and URLs."""
     for name in named:
         if is_url(name):
             yield from files_of(name)
@@ -28,14 +28,14 @@ def files_meant(named: Sequence[str]) -> Iterator[Path | str]:
 
 
 def local_files(word: str) -> list[Path]:
-    """Return the files of this machine that open_recording would read; raises BagError where there are none."""
+    """Return the local files that open_recording would read; raises BagError if there are none."""
     return [file for file in files_meant([word]) if isinstance(file, Path)]
 
 
 def told_of(word: str, faults: list[str]) -> Metadata | None:
-    """Return what rosbag2 says of the folder that a word means, None where it means none, and take in what is missing.
+    """Return the metadata.yaml of the folder that a word means, and add to `faults` which of its files are missing.
 
-    A word that names a single file of a folder means that file alone.
+    None if there is no metadata.yaml, or the word names a single file.
     """
     name = redacted(word)
     try:
@@ -53,7 +53,7 @@ def told_of(word: str, faults: list[str]) -> Metadata | None:
 
 
 class _Found(NamedTuple):
-    """What a metadata.yaml holds, up to what is too large, and the names of the files beside it."""
+    """The first LARGEST + 1 bytes of a metadata.yaml, and the names of the files beside it."""
 
     content: bytes
     files: Sequence[str]
@@ -76,9 +76,9 @@ def _metadata(word: str) -> _Found | None:
 
 
 def is_recording(word: str) -> bool:
-    """Tell whether a word means a recording and no topic, and fetch nothing for it.
+    """Tell whether a word means a recording and not a topic, without fetching anything.
 
-    A recording is something that is there, a URL, or has a dot, which no topic has.
+    A recording exists, is a URL, or has a dot, which no topic has.
     """
     if is_url(word):
         return True
@@ -109,7 +109,7 @@ def _files_in(folder: Path) -> list[Path]:
 
 
 def _similar(path: Path, named: Sequence[str]) -> str:
-    """Return a question for the recording beside a path whose name is most like it, and that is not named already."""
+    """Return "did you mean" for the most similar recording beside a path that is not named already."""
     try:
         others = set(path.parent.iterdir()).difference(map(Path, named))
         beside = [each.name for each in sorted(others) if each.is_dir() or is_recording_name(each.name)]

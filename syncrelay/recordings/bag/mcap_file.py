@@ -1,4 +1,8 @@
-"""MCAP files: by their index, or by one made in a first pass where there is none that can be trusted."""
+"""MCAP files, read by their index, or by one made in a first pass if there is none that can be trusted.
+
+mcap's own reader stops at the first damage, and without an index it sorts the whole file in memory. A robot that lost
+power leaves exactly such files, so records are walked here and only parsed by mcap.
+"""
 
 import zlib
 from collections.abc import Collection, Iterator
@@ -35,13 +39,13 @@ from syncrelay.recordings.bag.sources import NoIndexError, Source
 MAGIC: Final = b"\x89MCAP0\r\n"
 """What an MCAP file begins with, and ends with if it was closed."""
 
-# Where the summary begins, where its offsets do, the checksum of all from the summary up to here.
+# Offset of the summary, offset of its offsets, checksum from the summary up to here.
 _FOOTER: Final = Struct("<QQI")
 _CHECKSUM_SIZE: Final = 4
-# DATA_END holds a checksum alone.
+# A DATA_END record holds only a checksum.
 _DATA_END_SIZE: Final = 4
 _TAIL: Final = 32_000
-# No text of a schema or a channel is so long.
+# No schema or channel record is longer.
 _LONGEST_TEXT: Final = 64_000_000
 _ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
 
@@ -50,7 +54,7 @@ class McapFile:
     """One MCAP file, opened for reading; see Recording."""
 
     def __init__(self, file: Source, name: str) -> None:
-        """Read a file that messages call `name`; raises NoIndexError where a far one would have to be gone through."""
+        """Read a file that messages call `name`; raises NoIndexError if one behind a URL has no trusted index."""
         self._file = file
         self._losses = Losses(name)
         self.size = file.size
@@ -100,7 +104,7 @@ class McapFile:
         told = sum(self._counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
         is_chosen = parts is not None or len(needed) < len(self._segments)
         if is_chosen and count < told and said == self.faults:
-            self._losses.say(f"its statistics tell of {told} messages, of which the index leads to {count}")
+            self._losses.say(f"the index finds {count} of the {told} messages in its statistics")
 
     def close(self) -> None:
         """See Recording."""
@@ -143,14 +147,14 @@ class McapFile:
         return chunk
 
     def _bytes(self, place: int, size: int) -> bytes:
-        """Read bytes that the file has: the caller has checked that."""
+        """Read bytes that are known to be in the file."""
         self._file.seek(place)
         return self._file.read(size)
 
     def _walk(self, place: int, end: int) -> Iterator[tuple[int, int, int]]:
-        """Yield opcode, begin and end of what each record of a part of the file holds.
+        """Yield opcode, begin and end of the content of each record between two places of the file.
 
-        Raises EOFError where the part ends within a record, and ValueError where none begins or too many tell nothing.
+        Raises EOFError if the last record is cut off, and ValueError where no record begins or too many hold nothing.
         """
         while place < end:
             begin = place + RECORD.size
@@ -163,7 +167,7 @@ class McapFile:
             yield opcode, begin, place
 
     def _read_index(self) -> bool:
-        """Take channels and chunks from the summary at the end of the file; False where it tells none, or a lie."""
+        """Take channels and chunks from the summary at the end of the file; False if there is none, or it is wrong."""
         try:
             chunks = list(self._summary())
         except UNREADABLE:
@@ -191,11 +195,11 @@ class McapFile:
         return True
 
     def _summary(self) -> Iterator[ChunkIndex]:
-        """Take in schemas and channels of the summary, yield its chunks; raises one of UNREADABLE."""
+        """Keep the schemas and channels of the summary and yield its chunks; raises one of UNREADABLE."""
         end = self.size - len(MAGIC) - RECORD.size - _FOOTER.size
         if end < len(MAGIC):
             raise EOFError("there is no footer")
-        # The footer, and all of the summary where it is no longer than most.
+        # This usually fetches the whole summary together with the footer.
         tail = max(len(MAGIC), self.size - _TAIL)
         self._file.expect([(tail, self.size - tail)])
         head, footer = self._bytes(end, RECORD.size), self._bytes(end + RECORD.size, _FOOTER.size)
@@ -218,7 +222,7 @@ class McapFile:
                 case Opcode.STATISTICS:
                     statistics = parsed(Statistics, self._text(place, stop))
                     told = statistics.chunk_count
-                    # A flipped bit could name another channel: only with a checksum is more taken from the index.
+                    # Without a checksum, a flipped bit in the index could hide a channel.
                     self._counts = statistics.channel_message_counts if checksum else {}
         if told not in (0, count):
             raise ValueError("chunks are missing in it")
@@ -230,13 +234,13 @@ class McapFile:
         return checksum
 
     def _text(self, begin: int, end: int) -> bytes:
-        """Read what a record holds that is not to be large."""
+        """Read the content of a record that describes something; raises ValueError if it is too large for that."""
         if end - begin > _LONGEST_TEXT:
             raise ValueError(f"{end - begin} bytes are no description")
         return self._bytes(begin, end - begin)
 
     def _scan(self) -> None:
-        """Find channels and segments by going through the file to its end, or as far as it can be read."""
+        """Find channels and segments by going through the file, as far as it can be read."""
         self._schemas.clear()
         self._records.clear()
         self._effort = Effort()
@@ -255,7 +259,7 @@ class McapFile:
         self._segments += loose.segments()
 
     def _note(self, opcode: int, begin: int, end: int, loose: Pieces) -> None:
-        """Take in what a record of the file says."""
+        """Use one record of the first pass."""
         place = begin - RECORD.size
         try:
             match opcode:
@@ -276,7 +280,7 @@ class McapFile:
         segment = Segment(record.offset, record.size, chunk.message_start_time, chunk.message_end_time)
         self._segments.append(segment)
         self._chunked.add(segment)
-        # Where its records end too soon is said when its messages are read.
+        # Damage is reported when the messages are read.
         with suppress(*UNREADABLE):
             for opcode, begin, end in records(content):
                 if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -302,7 +306,7 @@ class McapFile:
 
 
 def open_mcap(source: Source, name: str) -> McapFile:
-    """Open an MCAP file; raises BagError where nothing of it can be read, NoIndexError as McapFile does."""
+    """Open an MCAP file; raises BagError if nothing of it can be read, and NoIndexError as McapFile does."""
     file = McapFile(source, name)
     if not file.channels:
         file.close()

@@ -1,4 +1,4 @@
-"""A new recording: MCAP as rosbag2 writes it, alone or in a rosbag2 folder with its metadata."""
+"""Writes recordings: an MCAP file as rosbag2 writes it, alone or in a rosbag2 folder with metadata."""
 
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _METADATA_VERSION: Final = 9
 
 @dataclass(slots=True)
 class Output:
-    """One topic of a new recording: its channel's number, what is said about it, how many messages it has."""
+    """One topic of a new recording; `count` is its number of messages so far."""
 
     channel: int
     topic: str
@@ -32,13 +32,10 @@ class Output:
 
 
 class McapOutput:
-    """Writes CDR messages; a context manager after which the recording is there, or after an error is not."""
+    """Writes CDR messages; a context manager. After an error there is no recording."""
 
     def __init__(self, place: Path | str) -> None:
-        """Begin a file, if the name ends in .mcap, or a folder, at a path or a URL.
-
-        Raises OutputError where it exists or can't be made.
-        """
+        """Start a file (the name ends in .mcap) or a folder, at a path or a URL; raises OutputError if it exists."""
         is_file = str(place).endswith(MCAP_SUFFIX)
         with ExitStack() as opened:
             if not is_file and (path := local_path(place)) is not None:
@@ -81,7 +78,7 @@ class McapOutput:
         return sum(output.count for output in self._outputs)
 
     def add(self, topic: str, type_name: str, definition: Definition | None, type_hash: str, qos: Profile) -> Output:
-        """Begin a topic."""
+        """Add a topic."""
         if type_name not in self._schemas:
             text = definition.text.encode() if definition else b""
             encoding = definition.format if definition else ""
@@ -94,7 +91,7 @@ class McapOutput:
         return output
 
     def write(self, output: Output, payload: bytes, now: int) -> None:
-        """Write a message that is received at `now`, in nanoseconds."""
+        """Write a message with the receive time `now`, in nanoseconds."""
         self._writer.add_message(output.channel, now, payload, now, output.count)
         output.count += 1
         self._begin = now if self._begin is None else min(now, self._begin)
@@ -123,7 +120,7 @@ class McapOutput:
 
 
 def _close(file: BinaryIO) -> None:
-    # Where there is no space, closing it fails once more.
+    # On a full disk, closing fails once more.
     with suppress(OSError):
         file.close()
 

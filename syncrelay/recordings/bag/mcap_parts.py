@@ -1,4 +1,4 @@
-"""What need not be read of an MCAP file: chunks of other channels and, of a far one, what else plain chunks hold."""
+"""What need not be read of an MCAP file: chunks of other channels, and behind a URL other messages in plain chunks."""
 
 from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -13,9 +13,9 @@ from syncrelay.recordings.bag.recording import Channel
 from syncrelay.recordings.bag.segments import Segment
 from syncrelay.recordings.bag.sources import Source, Span
 
-# Chunks whose messages are looked up together.
+# How many chunks' message indexes are fetched together.
 _STRETCH: Final = 64
-# A chunk of which more than one part in so many is wanted is read as a whole, and its checksum is checked.
+# If more than half of a chunk is wanted, all of it is read, and its checksum is checked.
 _PART: Final = 2
 # Opcode and length, channel.
 _NUMBER: Final = slice(9, 11)
@@ -23,7 +23,7 @@ _NUMBER: Final = slice(9, 11)
 
 @dataclass(frozen=True, slots=True)
 class PlainChunk:
-    """Where the records of a chunk that is not compressed begin and end, and where the index of its messages ends."""
+    """An uncompressed chunk: where its records begin and end, and where the index of its messages ends."""
 
     begin: int
     end: int
@@ -31,7 +31,7 @@ class PlainChunk:
 
 
 def plain_chunk(index: ChunkIndex) -> PlainChunk | None:
-    """Return a chunk of which single messages can be read; None where that takes all of it."""
+    """Return a chunk of which single messages can be read; None if it has to be read as a whole."""
     end = index.chunk_start_offset + index.chunk_length
     if index.compression or not index.message_index_length or index.compressed_size != index.uncompressed_size:
         return None
@@ -40,27 +40,27 @@ def plain_chunk(index: ChunkIndex) -> PlainChunk | None:
 
 
 def is_needed(held: Collection[int] | None, channels: Mapping[int, Channel | None]) -> bool:
-    """Tell whether a chunk is read: not if an index that can be trusted names only what is not wanted.
+    """Tell whether a chunk is read: not if a trusted index names only channels that are not wanted.
 
-    `held` are the channels that the index names, nothing where it tells none; `channels` are None where not wanted.
+    `held` are the channel numbers in the index, None if it cannot be trusted; unwanted `channels` are None.
     """
     return not held or any(number not in channels or channels[number] is not None for number in held)
 
 
 def is_mixed(held: Collection[int] | None, channels: Mapping[int, Channel | None]) -> bool:
-    """Tell whether a chunk that is needed holds other channels too, all of them known."""
+    """Tell whether a needed chunk also holds channels that are not wanted, all of them known."""
     return (
         bool(held) and all(each in channels for each in held or ()) and None in {channels[each] for each in held or ()}
     )
 
 
 class Parts:
-    """The records of wanted messages, chunk by chunk in a given order; each stretch of chunks is planned at once."""
+    """Reads the wanted messages alone, chunk by chunk in a given order; requests are planned for 64 chunks at once."""
 
     def __init__(
         self, source: Source, segments: Sequence[Segment], plain: dict[Segment, PlainChunk], wanted: Collection[int]
     ) -> None:
-        """Read from a source; segments that are not in `plain` are left to the caller, who reads them as a whole."""
+        """Read from a source; segments that are not in `plain` are read as a whole by the caller."""
         self._source = source
         self._segments = segments
         self._plain = plain
@@ -69,7 +69,7 @@ class Parts:
         self._spans: dict[Segment, tuple[Span, ...]] = {}
 
     def of(self, segment: Segment) -> bytes | None:
-        """Return the records of a chunk's wanted messages; None where all of it is to be read."""
+        """Return the records of a chunk's wanted messages; None if all of it has to be read."""
         place = self._place[segment]
         if place % _STRETCH == 0:
             self._plan(self._segments[place : place + _STRETCH])
@@ -80,7 +80,7 @@ class Parts:
         return b"".join(records) if all(map(self._is_wanted, records)) else None
 
     def _is_wanted(self, record: bytes) -> bool:
-        """Tell whether a record is a wanted message, as the index has it."""
+        """Tell whether a record is a wanted message, as the index says."""
         return record[:1] == bytes([Opcode.MESSAGE]) and int.from_bytes(record[_NUMBER], "little") in self._wanted
 
     def _plan(self, segments: Sequence[Segment]) -> None:
@@ -97,7 +97,7 @@ class Parts:
         self._source.expect([span for spans in read for span in spans])
 
     def _looked_up(self, chunk: PlainChunk) -> Iterator[Span]:
-        """Yield where the wanted messages of a chunk stand, each up to the next message; raises one of UNREADABLE."""
+        """Yield the place of each wanted message of a chunk, up to the next message; raises one of UNREADABLE."""
         content = self._bytes(chunk.end, chunk.index_end - chunk.end)
         size = chunk.end - chunk.begin
         places: list[int] = []

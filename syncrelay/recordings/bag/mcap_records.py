@@ -1,4 +1,4 @@
-"""Records of MCAP files (the specification at mcap.dev), each parsed within the bytes that it has."""
+"""Records of MCAP files (specification: mcap.dev/spec), each parsed within its own bytes."""
 
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -26,7 +26,7 @@ MESSAGE_FIELDS: Final = _MESSAGE.size - RECORD.size
 """The least length of a message."""
 
 UNREADABLE: Final = (McapError, ZstdError, RuntimeError, error, ValueError, EOFError, OSError, MemoryError)
-"""What bytes raise that are not what they should be."""
+"""What damaged bytes raise."""
 
 _BEHIND: Final = "a record in it ends behind it"
 _NO_RECORD: Final = "there is no record where one should begin"
@@ -42,13 +42,13 @@ class Kind(Protocol[_Parsed_co]):
 
 
 class Readable(Protocol):
-    """What gives so many of the next bytes."""
+    """Anything with `read`, such as a file."""
 
     def read(self, size: int, /) -> bytes: ...
 
 
 class _Bounded:
-    """So many bytes of a stream: a length that asks for more raises, and does not get fewer."""
+    """The next `size` bytes of a stream; reading past them raises EOFError."""
 
     def __init__(self, stream: Readable, size: int) -> None:
         self._stream = stream
@@ -62,18 +62,18 @@ class _Bounded:
 
 
 def parsed(kind: Kind[_Parsed_co], content: bytes) -> _Parsed_co:
-    """Return a record of a kind from what stands behind its length; raises one of UNREADABLE."""
+    """Return a record of a kind, parsed from what follows its length; raises one of UNREADABLE."""
     return parsed_from(kind, BytesIO(content), len(content))
 
 
 def parsed_from(kind: Kind[_Parsed_co], stream: Readable, size: int) -> _Parsed_co:
-    """Return a record as `parsed` does from so many bytes that come next, of which none is copied twice."""
+    """Return a record as `parsed` does, from the next `size` bytes of a stream, without copying them twice."""
     bounded: Any = _Bounded(stream, size)
     return kind.read(ReadDataStream(bounded))
 
 
 def require_record(opcode: int) -> None:
-    """Raise ValueError for an opcode of 0, which no record has: where power was lost, a file may end in zeros."""
+    """Raise ValueError for opcode 0, which no record has: after a loss of power a file may end in zeros."""
     if not opcode:
         raise ValueError(_NO_RECORD)
 
@@ -84,14 +84,14 @@ def unpacked(chunk: Chunk, effort: Effort) -> bytes:
     if unpack is None:
         raise ValueError(f"it is compressed with {chunk.compression!r}, expected lz4 or zstd")
     content = unpack(chunk.data, effort)
-    # 0 is that of no sum.
+    # 0 means that there is no checksum.
     if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
         raise ValueError("its checksum is wrong")
     return content
 
 
 def records(content: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield opcode, begin and end of what each record holds; raises one of UNREADABLE where they end."""
+    """Yield opcode, begin and end of each record's content; raises one of UNREADABLE at a damaged one."""
     place = 0
     while place < len(content):
         opcode, length = RECORD.unpack_from(content, place)
@@ -106,9 +106,9 @@ def records(content: bytes) -> Iterator[tuple[int, int, int]]:
 def add_messages(
     found: list[RawMessage], content: bytes, channels: Mapping[int, Channel | None], effort: Effort
 ) -> None:
-    """Add the messages of a run of records that are of one of the channels by number, but of those that are None.
+    """Add the messages in a run of records to `found`, except those of channels that are None.
 
-    Those of no channel are STRAY. Raises one of UNREADABLE where the records end, with all added that stand before.
+    A message of an unknown channel becomes STRAY. Raises one of UNREADABLE at damage; all before it is added.
     The innermost loop of reading: half a microsecond each.
     """
     unpack, begin_payload, message, least = _MESSAGE.unpack_from, _MESSAGE.size, Opcode.MESSAGE.value, MESSAGE_FIELDS

@@ -1,4 +1,4 @@
-"""What rosbag2's metadata.yaml says that a folder holds, compared with what is there."""
+"""What rosbag2's metadata.yaml lists, compared with the files that are there."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from syncrelay.recordings.bag.names import topic_name
 from syncrelay.recordings.bag.qos import plain_yaml
 
 LARGEST: Final = 4_000_000
-"""Bytes of a metadata.yaml that is read: some 10,000 files are named in so many."""
+"""The largest metadata.yaml that is read, in bytes: enough for some 10,000 files."""
 
-# A topic's profiles, which have durations.
+# The durations in the QoS profiles of a topic.
 _DEEPEST: Final = 8
 _ROOT: Final = "rosbag2_bagfile_information"
 _NAMED: Final = 5
@@ -23,16 +23,16 @@ _NAMED: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class Metadata:
-    """The files of a recording, with how many messages each holds, None where that is not said, and each topic's."""
+    """Number of messages in each file (None if not listed) and of each topic."""
 
     files: Mapping[str, int | None]
     topics: Mapping[str, int]
 
     def missing(self, there: Sequence[str]) -> str:
-        """Say which files are not among those that are there; an empty text if none is missing.
+        """Return a sentence on files that are missing among those `there`; an empty text if none is.
 
-        A file may have been compressed or unpacked since. Where as many others are there, files were renamed: then
-        only the messages can show whether one is missing.
+        A file may have been compressed or decompressed since. If as many other files are there, files were renamed, and
+        only counting messages can show whether one is missing.
         """
         plain = {_unpacked(name) for name in there}
         gone = [name for name in self.files if _unpacked(name) not in plain]
@@ -50,9 +50,9 @@ class Metadata:
 
 
 def parse_metadata(content: bytes) -> Metadata | None:
-    """Return what a metadata.yaml says; None for a file of this name that is not rosbag2's.
+    """Return the content of a metadata.yaml; None if it is not rosbag2's.
 
-    Raises BagError, without the file's name, for one that cannot be read.
+    Raises BagError, without the file's name, if it cannot be read.
     """
     if len(content) > LARGEST:
         raise BagError(f"is larger than {LARGEST // 1_000_000} MB")
@@ -62,7 +62,7 @@ def parse_metadata(content: bytes) -> Metadata | None:
     about = document.get(_ROOT) if isinstance(document, dict) else None
     if not isinstance(about, dict):
         return None
-    # Older versions name files with the folder that they were recorded in, and count the messages of none.
+    # Older versions name files with their folder, and do not count the messages of each.
     files: dict[str, int | None] = {
         PurePosixPath(each).name: None for each in _listed(about, "relative_file_paths") if isinstance(each, str)
     }

@@ -29,7 +29,7 @@ from syncrelay.recordings.bag.sources import LocalFile, NoIndexError
 from syncrelay.urls import LOCAL, file_system, redacted
 
 Tell: TypeAlias = Callable[[str], object]
-"""Takes a sentence that is worth a remark and is no fault."""
+"""Called with a sentence that is worth a remark and is no fault."""
 
 _OPENERS: Final[Mapping[bytes, Callable[[Path, str], Recording]]] = {
     mcap_file.MAGIC: lambda path, name: mcap_file.open_mcap(LocalFile(path), name),
@@ -52,11 +52,10 @@ _PIECE: Final = 1_000_000
 
 
 def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Recording:
-    """Open a recording: files, and folders of which all files are one recording, by their paths or URLs.
+    """Open files and folders, given by paths or URLs, as one recording.
 
-    Of several files, those that cannot be read are faults of the recording, as are those that metadata.yaml names and
-    that are missing. Raises BagError where none can be read, and StorageError where one cannot be reached. `tell` takes
-    what has to be copied here first.
+    Files that cannot be read, or that metadata.yaml lists and are missing, are faults of the recording. `tell` is
+    called before a whole download. Raises BagError if none can be read, StorageError if one cannot be reached.
     """
     with ExitStack() as opened:
         files: list[Recording] = []
@@ -84,7 +83,7 @@ def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Reco
 
 
 class Files:
-    """Recordings of one drive as one; see Recording."""
+    """Several files as one recording; see Recording."""
 
     def __init__(
         self,
@@ -95,9 +94,9 @@ class Files:
         faults: Sequence[str],
         counts: Mapping[str, int],
     ) -> None:
-        """Read from files that `opened` closes; `faults` are those of files that are not among them.
+        """Read from files that `opened` closes; `faults` are those of files that could not be opened.
 
-        `counts` says how many messages of each topic there should be, and is empty where that is not known.
+        `counts` is the expected number of messages of each topic, empty if it is not known.
         """
         self._name = name
         self._files = sorted(files, key=lambda file: file.begin)
@@ -129,7 +128,7 @@ class Files:
         return self._counted(found, wanted) if self._counts else found
 
     def _counted(self, found: Iterator[list[RawMessage]], wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
-        """Pass on what is read; if it is less than there should be, and no fault explains that, it is one."""
+        """Pass on messages; too few of them, without a fault that explains it, become a fault."""
         count = 0
         for batch in found:
             count += len(batch)
@@ -150,12 +149,12 @@ class Files:
 
 
 def _counts(told: Sequence[Mapping[str, int]]) -> Mapping[str, int]:
-    """Return how many messages of each topic several folders hold."""
+    """Return the expected number of messages of each topic in all folders."""
     return sum(map(Counter, told), Counter())
 
 
 def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> Recording:
-    """Open a file behind a URL by ranges if that is possible, and else copy it here, once."""
+    """Open a file behind a URL by ranges if possible; otherwise download it once."""
     if scheme_of(url) in LOCAL:
         return _open(Path(file_system(url)[1]), url, opened, faults)
     remote = RemoteFile(url)
@@ -175,7 +174,7 @@ def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> 
 
 
 def _open(path: Path, name: str, opened: ExitStack, faults: list[str]) -> Recording:
-    """Open one file by its content, decompressed into a temporary one if it is compressed as a whole."""
+    """Open a file by its first bytes; one that is compressed as a whole is decompressed into a temporary file."""
     magic = _magic(path)
     for begin, decompressor in _DECOMPRESSORS.items():
         if magic.startswith(begin):
@@ -220,7 +219,7 @@ def _temporary(name: str, purpose: str, opened: ExitStack) -> Path:
 def _decompressed(
     path: Path, name: str, decompressor: Callable[[Path], Any], opened: ExitStack
 ) -> tuple[Path, list[str]]:
-    """Return a temporary file of the content, and what is wrong with it."""
+    """Return a temporary file with the content, and sentences on what is wrong with it."""
     folder = _temporary(name, "decompress it in", opened)
     content = folder / path.stem
     room = room_for(path.stat().st_size)

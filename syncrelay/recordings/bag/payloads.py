@@ -1,4 +1,4 @@
-"""Stamps and keys in recorded payloads, read in place where that can be done."""
+"""Stamps and keys in recorded payloads, read without decoding the message."""
 
 from collections.abc import Callable, Hashable
 from struct import Struct
@@ -12,13 +12,13 @@ from syncrelay.recordings.bag.definitions import begins_with_header, converter, 
 from syncrelay.recordings.bag.recording import LATEST, Channel, Encoding, RawMessage
 
 ReadStamp: TypeAlias = Callable[[bytes], int | None]
-"""From a payload to its stamp in nanoseconds; None where none can be read."""
+"""From a payload to its stamp in nanoseconds; None if it cannot be read."""
 
 ReadMessage: TypeAlias = Callable[[RawMessage], tuple[int | None, Hashable]]
-"""From a message to its stamp and its key; a stamp of None where the group cannot use the message."""
+"""From a message to its stamp and its key; the stamp is None if the group cannot use the message."""
 
 _NS_PER_SECOND: Final = 1_000_000_000
-# A ROS 1 Header begins with uint32 seq; the time behind it is two uint32, always little-endian.
+# A ROS 1 Header: uint32 seq, then a time of two uint32, always little-endian.
 _ROS1_STAMP: Final = Struct("<4xII")
 _ROS1_TIME: Final = Struct("<II")
 
@@ -32,7 +32,7 @@ def message_reader(group: GroupConfig, index: int, channel: Channel) -> ReadMess
     read = _stamped_by(stamp_reader(topic.stamp, channel))
     if topic.key is not None:
         read = _with_key(read, value_reader(channel, topic.key))
-    # Reading a header's stamp shows that there is a place for one, and that a header can hold it.
+    # A stamp that was read from a header can also be written to one.
     if group.restamp is None or topic.stamp == "header":
         return read
     latest = LATEST_STAMP if topic.stamp == "receive" else LATEST
@@ -61,7 +61,7 @@ def _with_key(read: ReadMessage, read_key: Callable[[bytes], Any]) -> ReadMessag
 
 
 def stamp_reader(source: StampSource, channel: Channel) -> ReadStamp | None:
-    """Return what reads the stamp that the file asks for; None for the receive time, which no payload holds.
+    """Return what reads the stamp that the file asks for; None for the receive time, which is not in the payload.
 
     Raises BagError where the channel's type has no such stamp.
     """
@@ -78,7 +78,7 @@ def stamp_reader(source: StampSource, channel: Channel) -> ReadStamp | None:
 
 
 def value_reader(channel: Channel, path: str) -> Callable[[bytes], Any]:
-    """Return what reads the field at a dotted path: a number, a text, or a time in nanoseconds; None where it cannot.
+    """Return what reads the field at a dotted path: a number, a text, or a time in ns; None if it cannot be read.
 
     Raises BagError where the type has no such field, or the recording does not define it.
     """
@@ -112,7 +112,7 @@ def _in_place(
 def read_ros1_stamp(payload: bytes) -> int | None:
     """Return the stamp of the Header that a ROS 1 payload begins with, in nanoseconds; None if it is malformed.
 
-    So is one after January 2038, which ROS 2 has no stamp for.
+    A stamp after January 2038 counts as malformed too: ROS 2 cannot hold it.
     """
     if len(payload) < _ROS1_STAMP.size:
         return None

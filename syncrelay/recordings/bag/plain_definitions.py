@@ -1,10 +1,10 @@
-"""Definitions without what tells no types, and within bounds: rosbags' parser tries all that can stand at a place."""
+"""Definitions without comments and annotations, and of bounded size: rosbags' parser backtracks over all of them."""
 
 import re
 from collections.abc import Iterator
 from typing import Final
 
-# Far beyond the definitions of real messages: of each the parser makes a second's work.
+# Far more than any real message has; the parser takes about a second for each of these.
 _LONGEST_RECORDED: Final = 1_000_000
 _LONGEST: Final = 100_000
 _MOST_LINES: Final = 5_000
@@ -15,18 +15,18 @@ _NO_LINE: Final = re.compile(r"^[ \t\r]*(?:#[^\n]*)?(?:\n|\Z)", re.MULTILINE)
 _STRING: Final = r'"(?:\\[\s\S]?|[^"\\])*(?:"|\Z)'
 # Of annotations only the value of an enumerator matters. A line with # is `#include`: all types follow in the text.
 _TOKEN: Final = re.compile(
-    rf"""  # What has no end goes to the end: nothing is gone through twice.
+    rf"""  # An unclosed string or comment extends to the end, so that nothing is scanned twice.
     (?P<kept>{_STRING}|@value\s*\(\s*-?\w+\s*\))
     |(?P<gap>(?:\s|//[^\n]*|\#[^\n]*|/\*[\s\S]*?(?:\*/|\Z)|@(?!value\b)[\w:]+(?:\s*\((?:{_STRING}|[^"()])*\))?)+)""",
     re.VERBOSE,
 )
-# Each bracket of a constant takes the parser 50 times longer, and a number may be shifted by gigabytes.
+# Each bracket in a constant makes the parser 50 times slower, and `<<` may ask for gigabytes.
 _UNBEARABLE: Final = re.compile(r"\(|<<|(?:sequence\s*<\s*){3}")
 _EXPRESSION: Final = re.compile(r'["=@\[|^&+*/%~-]|>>')
 
 
 def plain_msg(text: str) -> str:
-    """Return .msg text without comments and lines of nothing; raises ValueError where no message is so large."""
+    """Return .msg text without comments and empty lines; raises ValueError if it is too large."""
     _require(len(text) <= _LONGEST_RECORDED)
     plain = _NO_LINE.sub("", text)
     _require(len(plain) <= _LONGEST and plain.count("\n") <= _MOST_LINES)
@@ -34,9 +34,9 @@ def plain_msg(text: str) -> str:
 
 
 def plain_idl(text: str) -> Iterator[str]:
-    """Yield what IDL text has of each type, without comments and annotations.
+    """Yield the IDL text of each type, without comments and annotations.
 
-    Raises ValueError where no message is so large, or nests what the parser takes exponential time for.
+    Raises ValueError if it is too large, or nests what takes the parser exponential time.
     """
     _require(len(text) <= _LONGEST_RECORDED)
     expressions = 0

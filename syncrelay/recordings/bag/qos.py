@@ -1,4 +1,4 @@
-"""QoS as recordings carry it: read, matched to what a file asks for, and written (rosbag2's metadata, version 9)."""
+"""QoS profiles in recordings: read, combined with what a file asks for, and written as rosbag2 does (version 9)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -9,19 +9,19 @@ import yaml
 from syncrelay.config import QosOverrides, QosPreset
 from syncrelay.config.yaml_tree import LOADER
 
-# rclpy's default for every duration is 0, which is unset; rosbag2 writes it so, too.
+# rclpy's default for every duration, which rosbag2 writes too: 0 means no limit.
 _UNSET: Final = 0
 _NS_PER_SECOND: Final = 1_000_000_000
-# As the relay's subscriptions (syncrelay.ros.qos).
+# The depth of the relay's subscriptions (syncrelay.ros.qos).
 _DEPTH: Final = 100
-# Older files have rmw's numbers in place of names (rmw/types.h).
+# Older files have the numbers of rmw/types.h instead of names.
 _NAMES: Final[Mapping[str, Sequence[str]]] = {
     "history": ("system_default", "keep_last", "keep_all", "unknown"),
     "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
     "durability": ("system_default", "transient_local", "volatile", "unknown", "best_available"),
     "liveliness": ("system_default", "automatic", "manual_by_node", "manual_by_topic", "unknown", "best_available"),
 }
-# A list of profiles, each of which has durations.
+# List, profile, duration: real texts nest no deeper.
 _DEEPEST: Final = 5
 _LONGEST: Final = 100_000
 _DURATIONS: Final = ("deadline", "lifespan", "liveliness_lease_duration")
@@ -60,11 +60,11 @@ PRESETS: Final[Mapping[str, Profile]] = {
         liveliness_lease_duration=_BEST_AVAILABLE_NS,
     ),
 }
-"""The presets that a file may name."""
+"""The presets that a file can name."""
 
 
 def output_profile(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) -> Profile:
-    """Return what the relay's output would offer: what the file asks for, the rest as all publishers can serve it."""
+    """Return the profile of the relay's output: what the file asks for, and what all publishers can serve."""
     if isinstance(asked, QosPreset):
         return PRESETS[asked.name]
     served = Profile(
@@ -78,7 +78,7 @@ def output_profile(asked: QosPreset | QosOverrides, offered: Sequence[Profile]) 
 
 
 def read_profiles(recorded: str) -> tuple[Profile, ...]:
-    """Return the profiles of `offered_qos_profiles`, a YAML text; none where it makes no sense."""
+    """Return the profiles in a YAML text, `offered_qos_profiles`; none if it cannot be read."""
     listed = plain_yaml(recorded, longest=_LONGEST, deepest=_DEEPEST)
     if not isinstance(listed, list):
         return ()
@@ -86,9 +86,9 @@ def read_profiles(recorded: str) -> tuple[Profile, ...]:
 
 
 def plain_yaml(text: str, *, longest: int, deepest: int) -> Any:
-    """Return what a YAML text says; None where it is faulty, longer or more deeply nested, or has aliases or tags.
+    """Return the value of a YAML text; None if it is faulty, too long, too deeply nested, or has aliases or tags.
 
-    Aliases can stand for gigabytes; of a value that is not what its tag says, PyYAML raises anything.
+    Aliases can expand to gigabytes, and for a value that does not fit its tag PyYAML may raise anything.
     """
     try:
         is_plain = len(text) <= longest and _is_plain(text, deepest)

@@ -29,12 +29,12 @@ class Definition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
-    """A topic of a recording as one publisher, or a set of alike ones, filled it. Two channels are never equal.
+    """A topic as one publisher, or several alike ones, recorded it. Two channels are never equal.
 
     `type` is a full type name (`pkg/msg/Name`), also in a ROS 1 bag. `qos` is what the publishers offered,
     empty where that was not recorded. `type_hash` is the RIHS01 hash of REP 2016, empty if it was not recorded.
-    An encoding that is not known here stands as it was recorded. Names are printable, whatever was recorded: those
-    that are not by themselves are none that a file can have.
+    An unknown encoding is kept as it was recorded. Names are made printable: one
+    that has to be changed cannot stand in a file anyway.
     """
 
     id: int
@@ -53,10 +53,10 @@ class Channel:
 
 
 RawMessage: TypeAlias = tuple[Channel, int, bytes]
-"""A channel, when the message was received in nanoseconds, 0 to LATEST, and its payload."""
+"""Channel, receive time in nanoseconds (0 to LATEST), and payload."""
 
 LATEST: Final = 2**62 - 1
-"""The latest time of receipt, in 2116: ROS 1 tells none that is later, and what two times differ by fits 64 bits."""
+"""The latest receive time, in 2116: ROS 1 has none later, and the difference of two times fits 64 bits."""
 
 
 class Recording(Protocol):
@@ -69,17 +69,17 @@ class Recording(Protocol):
 
     @property
     def faults(self) -> list[str]:
-        """What could not be read, a sentence each; complete when all messages are read."""
+        """What could not be read, a sentence each; complete once all messages are read."""
         ...
 
     @property
     def size(self) -> int:
-        """Bytes that `batches` has to go through."""
+        """How many bytes `batches` goes through, for progress."""
         ...
 
     @property
     def position(self) -> int:
-        """Bytes that `batches` has gone through."""
+        """How many of these bytes `batches` has gone through."""
         ...
 
     @property
@@ -100,5 +100,5 @@ class Recording(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of the files."""
+        """Close the files."""
         ...

@@ -1,4 +1,4 @@
-"""A file behind a URL as a Source: what is planned to be read is fetched ahead, a few parts at a time, and no more."""
+"""A file behind a URL as a Source: what is announced by `expect` is fetched ahead, a few parts at a time."""
 
 import shutil
 from bisect import bisect_right
@@ -20,11 +20,11 @@ Fetch: TypeAlias = Callable[[int, int], bytes]
 # Why not one of fsspec's caches: they fetch whole blocks, one after another. Of a recording of 10 MB with two small
 # topics they fetch all of it instead of 55 kB.
 _AT_ONCE: Final = 4_000_000
-# Less than one more request costs.
+# Bytes between two spans that are fetched as well, because one more request would cost more.
 _GAP: Final = 32_000
-# Parts that are on their way, so that a store far away is not waited for at each: 32 MB at most.
+# Requests at a time, because a distant store takes long to answer each: 32 MB in memory at most.
 _AHEAD: Final = 8
-# Chunks that overlap in time are read in turns.
+# Windows that are kept, because chunks that overlap in time are read in turns.
 _HELD: Final = 3
 # At its begin a file could be read without ranges too.
 _PROBED: Final = (1, 2)
@@ -32,22 +32,22 @@ _IDENTITIES: Final = ("ETag", "generation", "etag", "Last-Modified", "LastModifi
 
 
 class RemoteFile:
-    """A file behind a URL, open for reading; see Source. What is read is what was there when it was opened.
+    """A file behind a URL, open for reading; see Source. It reads the version that was there when it was opened.
 
-    Each read gives all that was asked for, or raises StorageError.
+    Each read returns all the bytes that were asked for, or raises StorageError.
     """
 
     is_near = False
 
     def __init__(self, url: str) -> None:
-        """Find out what there is; raises StorageError where it cannot be reached, and UnavailableError."""
+        """Look up the file; raises StorageError if it cannot be reached, UnavailableError if a library is missing."""
         self._files, self._path = file_system(url)
         self._url = url
         self.name = redacted(url)
-        """What messages call it, without a secret."""
+        """The URL without secrets, for messages."""
         self._about = self._look()
         self.identity = _identity(self._about)
-        """What changes when the file is replaced; nothing where its server tells none."""
+        """Changes when the file is replaced; empty if its server sends nothing of the kind."""
         if self._about.get("size") is None:
             raise StorageError(f"{self.name}: the server does not tell its size, so its end is unknown: copy it here")
         self.size = int(self._about["size"])
@@ -76,13 +76,13 @@ class RemoteFile:
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def expect(self, spans: Sequence[Span]) -> None:
-        """See Source: what stands close together is asked for at once."""
+        """See Source. Spans that are close together become one request."""
         self._windows = list(_windows(spans, self.size))
         self._by_place = sorted((begin, number) for number, (begin, _) in enumerate(self._windows))
         self._coming.clear()
 
     def download(self, path: Path) -> None:
-        """Write the whole into a file; raises StorageError, and BagError where there is no space for it."""
+        """Write the whole file to a path; raises StorageError, and BagError if there is no space for it."""
         try:
             free = shutil.disk_usage(path.parent).free
             if self.size <= free:
@@ -94,12 +94,12 @@ class RemoteFile:
         raise BagError(f"{self.name}: cannot be copied to {path.parent}: {why}, set TMPDIR to another folder")
 
     def close(self) -> None:
-        """See Source: connections are those of a file system that others use too."""
+        """See Source. The connections belong to a file system that others use too."""
         self._held.clear()
         self.expect(())
 
     def _look(self) -> Mapping[str, Any]:
-        """Return what the store says of the file now."""
+        """Return what the store says about the file now."""
         about: Mapping[str, Any] = tried(self._url, lambda: self._files.info(self._path))
         if about["type"] != "file":
             raise StorageError(f"{self.name}: is a folder, expected a file")
@@ -131,7 +131,7 @@ class RemoteFile:
                 file.write(piece)
 
     def _holding(self, asked: int) -> tuple[int, bytes]:
-        """Return bytes that hold the present place, and where they begin."""
+        """Return bytes that contain the present offset, and where they begin."""
         place = self._place
         for each in self._held:
             if each[0] <= place < each[0] + len(each[1]):
@@ -145,7 +145,7 @@ class RemoteFile:
         return self._held[-1]
 
     def _planned(self, number: int) -> bytes:
-        """Return what is in a window, and have those fetched that come next."""
+        """Return the bytes of a window, and start to fetch the next ones."""
         for each in range(number, min(number + _AHEAD, len(self._windows))):
             if each not in self._coming:
                 begin, size = self._windows[each]
@@ -156,7 +156,7 @@ class RemoteFile:
         return coming.result()
 
     def _begun(self, begin: int, end: int) -> Future[bytes]:
-        """Fetch in a thread that nobody waits for when this process ends: a server may take its time."""
+        """Fetch in a daemon thread: the process can end while a slow server still answers."""
         coming: Future[bytes] = Future()
 
         def fetch() -> None:
@@ -182,7 +182,7 @@ class RemoteFile:
 
 
 def _fetcher(files: Any, path: str, about: Mapping[str, Any], url: str) -> Fetch:
-    """Return what fetches parts of a file, of the version that was opened where its store can tell versions apart."""
+    """Return what fetches ranges of the opened version of a file, as far as its store knows versions."""
     if "generation" in about:
         return lambda begin, end: bytes(files.cat_file(path, start=begin, end=end, generation=about["generation"]))
     pinned: dict[str, Any] = {}
@@ -195,7 +195,7 @@ def _fetcher(files: Any, path: str, about: Mapping[str, Any], url: str) -> Fetch
             headers["If-Match"] = about["ETag"]
         pinned = {"headers": headers, "size": about["size"]}
     file = tried(url, lambda: files.open(path, "rb", cache_type="none", **pinned))
-    # Files of S3 and of servers; what is in memory has no cache, and needs none.
+    # Files of S3 and HTTP fetch ranges by their cache. Other file systems have cat_file.
     cache = getattr(file, "cache", None)
     if cache is None:
         return lambda begin, end: bytes(files.cat_file(path, start=begin, end=end))
@@ -208,7 +208,7 @@ def _identity(about: Mapping[str, Any]) -> str:
 
 
 def _windows(spans: Sequence[Span], size: int) -> Iterator[Span]:
-    """Yield what to ask for, none larger than is asked for at once, in the order in which it is read."""
+    """Yield the requests for spans, in the order of reading, none larger than _AT_ONCE."""
     begin = end = 0
     for place, length in spans:
         if end and place >= begin and place - end <= _GAP and place + length - begin <= _AT_ONCE:

@@ -1,4 +1,4 @@
-"""A recording fed to the groups of a file as the relay would have got it, with receive time as `now`."""
+"""Feeds a recording to the groups of a file as the relay would have received it, with receive time as `now`."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
 from syncrelay.sync import InputCounts, Message, Outcome
 
 Listener: TypeAlias = Callable[[GroupBinding, Outcome, int], None]
-"""Told of each set and drop of a group when it leaves, and at what time. The payload of a message is the RawMessage."""
+"""Called with each set and drop of a group and the time at which it leaves. A message's payload is its RawMessage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +40,12 @@ class GroupReplay:
         self._listeners = listeners
 
     def readers(self) -> Iterator[list[tuple[Channel, ReadColumn]]]:
-        """Give what reads the channels of each input; raises BagError for a stamp or key that isn't there."""
+        """Yield the readers of each input's channels; raises BagError for a stamp or key that a type does not have."""
         for index, each in enumerate(self.binding.inputs):
             yield [(channel, column_reader(self.binding.group, index, channel)) for channel in each.channels]
 
     def result(self) -> GroupResult:
-        """Give the counts so far."""
+        """Return the counts so far."""
         engine = self.driver.engine
         topics = (each.config.topic for each in self.binding.inputs)
         inputs = tuple(InputResult(*each) for each in zip(topics, engine.counts(), strict=True))
@@ -67,7 +67,7 @@ class Replay:
         self._recording = recording
         self._groups = [GroupReplay(binding, listeners) for binding in bindings]
         self._columns = Columns([readers for group in self._groups for readers in group.readers()])
-        # What waited in one group leaves before a later message of another arrives.
+        # A set whose deadline has passed leaves before a later message is fed to any group.
         self._waiting = [group.driver for group in self._groups if group.driver.has_deadlines]
         self._inputs = [(group.driver, index) for group in self._groups for index in range(len(group.binding.inputs))]
         self._now = recording.begin
@@ -78,7 +78,7 @@ class Replay:
             self._feed(rows)
             yield
         for group in self._groups:
-            # A damaged recording may give a false end.
+            # The end of a damaged recording may be wrong.
             group.driver.finish(max(self._now, self._recording.end))
 
     def _feed(self, rows: Sequence[RawMessage]) -> None:
@@ -93,7 +93,7 @@ class Replay:
                 driver.add(Message(index, stamp, raw, key), now=now)
 
     def results(self) -> list[GroupResult]:
-        """Give what became of all messages so far, in the order of the groups."""
+        """Return what became of all messages so far, in the order of the groups."""
         return [group.result() for group in self._groups]
 
 
@@ -111,6 +111,6 @@ def replay(
 
 
 def received(message: Message) -> int:
-    """When a message that was replayed had been received, in nanoseconds."""
+    """Return when a replayed message was received, in nanoseconds."""
     raw: Any = message.payload
     return int(raw[1])

@@ -1,6 +1,6 @@
 """A recording as segments that are read whole: chunks of MCAP files and ROS 1 bags, in the order of receive times.
 
-Segments may overlap in time, as several threads write them. Only what overlaps is held in memory.
+Segments may overlap in time, as recorders write with several threads. Only overlapping ones are held in memory.
 """
 
 from bisect import bisect_left, bisect_right
@@ -13,14 +13,14 @@ from syncrelay.recordings.bag.losses import Losses
 from syncrelay.recordings.bag.recording import LATEST, RawMessage
 
 PIECE: Final = 4_000_000
-"""How much is read at a time of what stands in no chunk."""
+"""How many bytes are read at a time outside of chunks."""
 
 _RECEIVED: Final = itemgetter(1)
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """Messages that stand together: where in the file, and the receive times of the first and the last of them."""
+    """Messages that stand together in a file: their place, and the first and last receive time by the index."""
 
     offset: int
     size: int
@@ -29,7 +29,7 @@ class Segment:
 
 
 def extent(segments: Sequence[Segment]) -> tuple[int, int]:
-    """Return the first and the last time of receipt that segments tell of; 0 of none."""
+    """Return the first and the last receive time of all segments; 0 if there are none."""
     times = [time for each in segments for time in (each.begin, each.end) if 0 <= time <= LATEST]
     return min(times, default=0), max(times, default=0)
 
@@ -39,7 +39,7 @@ def read_in_order(
     read: Callable[[Segment], list[RawMessage]],
     losses: Losses,
 ) -> Iterator[tuple[Segment, list[RawMessage]]]:
-    """Yield, for each segment in turn, the messages that nothing later can precede.
+    """Yield each segment in the order of time, with the messages that no later segment can precede.
 
     What comes too late for that, as its segment tells other times than it has, is counted by `losses`, as is what
     belongs to no channel or no time, and is left out.
@@ -49,7 +49,7 @@ def read_in_order(
     until = 0
     for place, segment in enumerate(by_time):
         held += read(segment)
-        # Sorted runs, one behind another, are merged in one go.
+        # Timsort merges runs that are sorted already.
         held.sort(key=_RECEIVED)
         held = losses.kept(held)
         too_late = bisect_left(held, until, key=_RECEIVED)
@@ -65,15 +65,14 @@ def read_in_order(
 
 
 class Pieces:
-    """Messages outside of chunks, as segments that are read whole."""
+    """Collects messages outside of chunks into segments of about PIECE bytes."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._done: list[Segment] = []
         self._last: Segment | None = None
 
     def add(self, record: Segment) -> None:
-        """Take a message that stands behind all before."""
+        """Add a message that stands after all others in the file."""
         last = self._last
         if last is None or record.offset - last.offset > PIECE:
             self._done += self._open()
@@ -83,7 +82,7 @@ class Pieces:
             self._last = Segment(last.offset, size, min(last.begin, record.begin), max(last.end, record.end))
 
     def segments(self) -> list[Segment]:
-        """Give what all messages are in."""
+        """Return the segments that hold all messages."""
         return self._done + self._open()
 
     def _open(self) -> list[Segment]:

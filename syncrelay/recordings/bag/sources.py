@@ -1,4 +1,4 @@
-"""Where the bytes of a recording come from, as its reader sees it: a file of this machine, or one behind a URL."""
+"""What a reader of recordings reads from: a local file, or one behind a URL."""
 
 import os
 from collections.abc import Sequence
@@ -6,34 +6,34 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 Span: TypeAlias = tuple[int, int]
-"""Where bytes begin, and how many they are."""
+"""Offset and number of bytes."""
 
 
 class NoIndexError(Exception):
-    """A file that is not to be gone through twice has no index that can be trusted."""
+    """A file behind a URL has no index that can be trusted; to make one would download it twice."""
 
 
 class Source(Protocol):
-    """A file that is open for reading, at any place of it."""
+    """A file that is open for reading at any offset."""
 
     size: int
     is_near: bool
-    """Whether going through all of it costs little more than reading what is wanted."""
+    """Whether the file is local, so that reading all of it is cheap."""
 
     def seek(self, place: int, /) -> object:
-        """Have the next bytes read from a place on."""
+        """Set the offset of the next read."""
         ...
 
     def read(self, size: int, /) -> bytes:
-        """Return so many of the next bytes, and fewer only at the end of the file."""
+        """Return the next `size` bytes; fewer only at the end of the file."""
         ...
 
     def expect(self, spans: Sequence[Span]) -> None:
-        """Take in what is read next, in this order: who fetches it may fetch no more than that, and no less at once."""
+        """Announce what is read next, in this order, so that it can be fetched ahead and in few requests."""
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close it."""
         ...
 
 
@@ -43,7 +43,6 @@ class LocalFile:
     is_near = True
 
     def __init__(self, path: Path) -> None:
-        """Open a file."""
         self._file = path.open("rb")
         self.size = os.fstat(self._file.fileno()).st_size
         self.seek = self._file.seek
@@ -51,4 +50,4 @@ class LocalFile:
         self.close = self._file.close
 
     def expect(self, spans: Sequence[Span]) -> None:
-        """See Source: the system reads ahead by itself."""
+        """See Source. The operating system reads ahead by itself."""

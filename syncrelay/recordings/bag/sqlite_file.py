@@ -1,6 +1,6 @@
-"""rosbag2's sqlite3 files, by SQL. What a recorder that was killed left in the write-ahead log is read too.
+"""rosbag2's sqlite3 files, read by SQL. The write-ahead log that a killed recorder left is read too.
 
-Whatever a column is declared as, sqlite3 keeps values of any kind in it: those of another kind are left out.
+sqlite3 stores values of any type in any column: rows with a wrong type are left out.
 """
 
 import os
@@ -26,23 +26,23 @@ MAGIC: Final = b"SQLite format 3\0"
 """What every sqlite3 file begins with."""
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
-# Those of no known topic too, so that they are missed.
+# This includes rows of unknown topics, so that they are reported.
 _BY_TIME: Final = """
 SELECT topic_id, timestamp, data FROM messages WHERE (topic_id IS NULL OR topic_id NOT IN ({})) ORDER BY timestamp"""
-# By the index of the times: no scan.
+# sqlite3 answers this by the index of timestamps, without a scan.
 _END_OF: Final = """
 SELECT timestamp FROM messages WHERE timestamp BETWEEN 0 AND ? AND typeof(timestamp) = 'integer'
 ORDER BY timestamp {} LIMIT 1"""
 _FIRST_PAYLOADS: Final = "SELECT data FROM messages WHERE typeof(data) = 'blob' LIMIT 3"
 _TABLES: Final = ("topics", "messages", "message_definitions")
 _KIND: Final = "SELECT DISTINCT type FROM pragma_table_list WHERE name = ? COLLATE NOCASE AND schema = 'main'"
-# The column of table_xinfo that is not 0 for those that are generated.
+# The column of table_xinfo that is not 0 for generated columns.
 _HIDDEN: Final = 6
 _ENCODINGS: Final[dict[str, Encoding | str]] = {each.value: each for each in Encoding}
-# A sentence of sqlite3's own that quotes a damaged name is no text, which is a ValueError.
+# ValueError: an error text of sqlite3 that quotes a damaged name is no valid UTF-8.
 _UNREADABLE: Final = (sqlite3.Error, ValueError, MemoryError)
 _NOT_UNPACKED: Final = (ZstdError, ValueError, EOFError, MemoryError)
-# A row takes ten bytes or more and some tens of steps; a view without an end, or pages in a circle, take more.
+# A row has at least ten bytes and takes some tens of steps; an endless view, or pages in a circle, take more.
 _STEPS_PER_BYTE: Final = 50
 _STEPS_AT_ONCE: Final = 1_000_000
 
@@ -51,7 +51,7 @@ class SqliteFile:
     """One sqlite3 file of a rosbag2 recording, opened for reading; see Recording."""
 
     def __init__(self, path: Path, name: str) -> None:
-        """Open a file that messages call `name`; raises BagError where it is no recording."""
+        """Open a file that messages call `name`; raises BagError if it is no recording."""
         self._losses = Losses(name)
         self.size = path.stat().st_size
         self.position = 0
@@ -59,7 +59,7 @@ class SqliteFile:
         try:
             self._require_tables()
             self.channels = tuple(self._channels())
-            # Of a damaged index, the first may be the later one.
+            # sorted: with a damaged index the first time may be the later one.
             self.begin, self.end = sorted(self._end(order) for order in ("ASC", "DESC"))
             self._is_packed = self._has_packed()
         except _UNREADABLE as fault:
@@ -106,7 +106,7 @@ class SqliteFile:
         self.position = self.size
 
     def _require_tables(self) -> None:
-        """Raise ValueError where what is read is computed and not stored: there may be no end to that."""
+        """Raise ValueError for views and generated columns, which may compute rows without end."""
         for name in _TABLES:
             kinds = self._database.execute(_KIND, (name,)).fetchall()
             columns = self._database.execute(f"PRAGMA table_xinfo({name})")
@@ -143,7 +143,7 @@ class SqliteFile:
                     yield type_name, Definition(encoding, text)
 
     def _described(self, query: str) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows of a table that describes; raises ValueError where they hold more than the file."""
+        """Yield the rows of a descriptive table; raises ValueError if they hold more bytes than the file."""
         size = 0
         for row in self._database.execute(query):
             size += sum(len(each) for each in row if isinstance(each, str | bytes))
@@ -151,7 +151,7 @@ class SqliteFile:
             yield row
 
     def _require_stored(self, size: int) -> None:
-        """Raise ValueError for more bytes than the file has, as where its pages are in a circle."""
+        """Raise ValueError for more bytes than the file has, which happens if its pages form a circle."""
         if size > self._stored:
             raise ValueError("its tables hold more than the file")
 
@@ -169,7 +169,7 @@ def _marks(count: int) -> str:
 
 
 def _why(channel: Channel | None, time: object, payload: object) -> str:
-    """Tell why a row is no message."""
+    """Return why a row is no message."""
     if channel is None:
         return OF_NO_CHANNEL
     if type(time) is not int:
@@ -178,9 +178,9 @@ def _why(channel: Channel | None, time: object, payload: object) -> str:
 
 
 def _opened(path: Path, name: str) -> tuple[sqlite3.Connection, int]:
-    """Open a file without changing it or what is beside it; return how many bytes there are to read, too."""
+    """Open a file without changing it or its log; return it, and how many bytes there are to read."""
     log = path.with_name(f"{path.name}-wal")
-    # A log is read only where its index can be made beside it; immutable files are read without it.
+    # sqlite3 reads the log only if it can write an index beside it; immutable files are read without the log.
     is_logged = log.exists() and os.access(path.parent, os.W_OK)
     mode = "mode=ro" if is_logged else "mode=ro&immutable=1"
     try:

@@ -12,15 +12,15 @@ _PATTERN: Final = re.compile(r"[*?\[]")
 
 
 def is_url(word: str) -> bool:
-    """Tell whether a word means something behind a URL, and no file of this machine."""
+    """Tell whether a word is a URL and not a path."""
     return bool(scheme_of(word))
 
 
 def find(word: str) -> list[str]:
-    """Return the recordings that a word means, in the order of their names; any word but a URL means itself.
+    """Return the recordings that a word means, sorted by name; a path, and a URL of a server, means itself.
 
-    In a store a pattern means what matches it, a folder all recordings below it, of which a folder of rosbag2 is one. A
-    server has no listing: its URL means itself. Raises BagError where there is none.
+    In a store a pattern means what matches it, and a folder all recordings below it; a rosbag2 folder is one recording.
+    Raises BagError if there is none.
     """
     if not _is_listed(word):
         return [word]
@@ -58,7 +58,7 @@ def files_of(word: str) -> list[str]:
 
 
 def metadata_of(word: str) -> str | None:
-    """Return the URL of what rosbag2 says of the files of a folder; None where a word means no folder that has it."""
+    """Return the URL of the metadata.yaml in the folder that a word means; None if there is none."""
     if not _is_listed(word) or _PATTERN.search(word):
         return None
     files, path = file_system(word)
@@ -72,7 +72,7 @@ def _is_listed(word: str) -> bool:
 
 
 def _kinds(word: str, files: Any, path: str) -> dict[str, str]:
-    """Return the files and folders that a word means, and which of both each is."""
+    """Return the URLs that a word means, each with its type: `file` or `directory`."""
     if not _PATTERN.search(word):
         return {files.unstrip_protocol(path.rstrip("/")): tried(word, lambda: str(files.info(path)["type"]))}
     found = tried(word, lambda: files.glob(path, detail=True))

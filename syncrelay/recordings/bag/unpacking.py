@@ -1,4 +1,4 @@
-"""What is compressed inside of recordings, unpacked within bounds: a length that lies does not cost its memory."""
+"""Decompression of chunks and messages with bounded memory, whatever size they claim to have."""
 
 import bz2
 from typing import Final, Protocol
@@ -8,18 +8,18 @@ import zstandard
 
 from syncrelay.recordings.bag.effort import Effort
 
-# Zstandard packs no more than 128 KiB into a block, and no block into less than 4 bytes.
+# A block of Zstandard holds at most 128 KiB and takes at least 4 bytes.
 _MOST_IN_A_BLOCK: Final = 1 << 17
 _LEAST_BLOCK: Final = 4
 _UNKNOWN: Final = -1
 _FIRST_PIECE: Final = 1 << 20
-# So many bytes of Zstandard unpack to 32 MiB at most.
+# 1 KiB of Zstandard is at most 256 blocks, which unpack to 32 MiB.
 _INPUT_PIECE: Final = 1 << 10
 _ZSTD: Final = zstandard.ZstdDecompressor()
 
 
 class _Decompressor(Protocol):
-    """As those of bz2 and lz4."""
+    """What the decompressors of bz2 and lz4 have in common."""
 
     @property
     def eof(self) -> bool: ...
@@ -28,7 +28,7 @@ class _Decompressor(Protocol):
 
 
 def plain(content: bytes, _effort: Effort) -> bytes:
-    """Return what is not compressed."""
+    """Return content that is not compressed."""
     return content
 
 
@@ -58,7 +58,7 @@ def _unpacked(decompressor: _Decompressor, packed: bytes, effort: Effort) -> byt
     effort.begin(len(packed))
     pieces, most = [], _FIRST_PIECE
     while not decompressor.eof:
-        # A byte more than there is room for shows that there is more.
+        # One byte more than is allowed, so that unpack() below notices.
         piece = decompressor.decompress(packed, min(most, effort.most + 1))
         if not piece and not decompressor.eof:
             raise EOFError("it ends too early")
@@ -69,7 +69,7 @@ def _unpacked(decompressor: _Decompressor, packed: bytes, effort: Effort) -> byt
 
 
 def _streamed(packed: bytes, effort: Effort) -> bytes:
-    """Unpack a frame that does not tell its size, as those who write it piece by piece leave it."""
+    """Unpack a frame without a size in its header, as streaming writers leave it."""
     stream = _ZSTD.decompressobj()
     pieces, place = [], 0
     while not stream.eof:

@@ -1,4 +1,4 @@
-"""A recording with faults laid over it: what would have been recorded, had they been there."""
+"""A recording with faults laid over it: what would have been recorded with these faults."""
 
 import heapq
 from collections.abc import Collection, Iterator, Sequence
@@ -15,14 +15,14 @@ from syncrelay.rig.what_if import MOST_LATE, Disturbance, Fault, disturbances
 
 
 class Disturbed:
-    """A recording as it would have been with faults; see Recording.
+    """What would have been recorded with faults; see Recording.
 
     Raises UsageError for a fault of a topic that the recording lacks, and for a clock that stamps nothing: a type
     without a Header.
     """
 
     def __init__(self, recording: Recording, faults: Sequence[Fault], *, seed: int) -> None:
-        """Two of the same recording, faults and seed are equal."""
+        """The same recording, faults and seed give the same messages."""
         topics = list(dict.fromkeys(channel.topic for channel in recording.channels))
         try:
             self._disturbances = disturbances(faults, topics, seed=seed, began=recording.begin)
@@ -53,7 +53,7 @@ class Disturbed:
         return self._recording.faults
 
     def idle(self) -> list[str]:
-        """Return a sentence for each fault that has changed no message of those read so far."""
+        """Return a sentence for each fault that has not changed any message so far."""
         return [sentence for each in self._disturbances.values() for sentence in each.idle()]
 
     @property
@@ -66,7 +66,7 @@ class Disturbed:
         return filled(self._in_order(wanted))
 
     def _in_order(self, wanted: Collection[Channel]) -> Iterator[list[RawMessage]]:
-        """Yield messages when none that is received sooner can still come: late ones wait for the others."""
+        """Yield a message once no earlier one can follow; late ones wait until then."""
         waiting: list[tuple[int, int, RawMessage]] = []
         numbers = count()
         for batch in self._recording.batches(wanted):
@@ -96,7 +96,7 @@ class Disturbed:
 
 
 def _restamped(payload: bytes, channel: Channel, disturbance: Disturbance, received: int) -> bytes:
-    """Return a payload with the stamp that the clock would have set; one without a stamp stays as it is."""
+    """Return a payload with the stamp that the faulty clock would have set; without a stamp, return it unchanged."""
     if not disturbance.changes_stamps:
         return payload
     is_ros1 = channel.encoding is Encoding.ROS1

@@ -1,4 +1,4 @@
-"""Sets of a replay as a recording: what the relay would have published."""
+"""Writes the sets of a replay as a recording of what the relay would have published."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -16,24 +16,24 @@ from syncrelay.sync import Match, Message, Outcome
 
 
 class Outgoing(NamedTuple):
-    """From a recorded payload and a set's common stamp to what leaves; whether it gets that stamp."""
+    """How a recorded payload and the common stamp of a set become an output, and whether it has that stamp."""
 
     written: Callable[[bytes, int | None], bytes]
     is_restamped: bool
 
 
 class _Manifest(NamedTuple):
-    """What serializes the manifests of a group, and where they are written."""
+    """The writer of a group's manifests, and their topic in the recording."""
 
     writer: ManifestWriter
     output: Output
 
 
 class SetWriter:
-    """Writes the sets of a replay as the relay would publish them, at the time at which they leave.
+    """Writes the sets of a replay as the relay would publish them, with the time at which they leave.
 
-    Payloads are those that were recorded, with the stamp of `restamp` in their place if the file has one. Those of a
-    ROS 1 bag are written as ROS 2 has them: CDR, without the header's seq. Manifests stand behind their sets.
+    Payloads are the recorded bytes, restamped if the file says so. ROS 1 payloads become CDR without the header's seq.
+    A manifest follows the messages of its set.
     """
 
     def __init__(self, recording: McapOutput) -> None:
@@ -42,10 +42,10 @@ class SetWriter:
         self._payloads: dict[tuple[str, Channel], Outgoing] = {}
         self._manifests: dict[str, _Manifest] = {}
         self.messages = 0
-        """How many messages of sets were written."""
+        """How many messages were written, without manifests."""
 
     def begin(self, binding: GroupBinding) -> None:
-        """Make the outputs of a group, so that those without a message are there too."""
+        """Add the output topics of a group; those without a message are recorded too."""
         for each in binding.inputs:
             if each.channels:
                 self._add(each)
@@ -53,7 +53,7 @@ class SetWriter:
             self._manifests[binding.group.name] = self._manifest(binding)
 
     def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
-        """Write a set that leaves at `now`; drops are none."""
+        """Write a set that leaves at `now`; drops are ignored."""
         if not isinstance(outcome, Match):
             return
         pairs = zip(binding.inputs, outcome.messages, strict=True)
@@ -94,13 +94,13 @@ class SetWriter:
 
 
 def outgoing(each: Input, channel: Channel) -> Outgoing:
-    """Return what makes the messages of an input that a channel holds those that leave.
+    """Return the function that turns a recorded message into its output.
 
-    It raises BagError for a message that does not fit its definition.
+    The function raises BagError for a message that does not fit its definition.
     """
     convert = converter(channel) if channel.encoding is Encoding.ROS1 else None
     has_header = begins_with_header(channel)
-    # Of a type that nothing is known of, the file says where the stamp is.
+    # If the type is unknown, the file's `stamp` decides.
     restamped = each.config.stamp == "header" if has_header is None else has_header
 
     def payload_of(recorded: bytes, stamp: int | None) -> bytes:
