@@ -5,7 +5,6 @@ import os
 from argparse import Namespace
 from contextlib import closing
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from syncrelay.recordings.analysis import Analysis
+    from syncrelay.recordings.fleet.run import Run
 
 
 def parser() -> Parser:
@@ -94,11 +94,11 @@ def _analyze_many(
     """Leave an analysis of each recording in a folder, and a table of all of them where there are groups."""
     from syncrelay.cli.fleet import do_on_many
     from syncrelay.config.wording import counted
-    from syncrelay.output_files import local_path
     from syncrelay.recordings.fleet.robots import RobotPattern
     from syncrelay.recordings.fleet.summary import Summary
     from syncrelay.recordings.fleet.table import TABLE, fleet_rows, write_table
     from syncrelay.recordings.fleet.tasks import AnalyzeTask
+    from syncrelay.urls import redacted
 
     if arguments.write or arguments.html:
         parser.error("--write and --html are for one recording, and --into is for many")
@@ -110,17 +110,17 @@ def _analyze_many(
     if not has_groups:
         return do_on_many(task, bags, arguments)
     pattern = None if arguments.robot is None else RobotPattern.parse(arguments.robot)
-    # do_on_many refuses a store.
-    folder, summary = local_path(arguments.into) or Path(), Summary()
+    folder, summary = arguments.into.rstrip("/"), Summary()
 
-    def finish(*_: object) -> int:
-        for row in write_table(folder, fleet_rows(folder, pattern)):
+    def finish(run: "Run", _sources: object) -> int:
+        for row in write_table(f"{folder}/{TABLE}", fleet_rows(folder, run.entries(), pattern)):
             summary.take(row)
             if arguments.json:
                 put(row.model_dump_json())
         for line in () if arguments.json else summary.lines():
             put(line)
-        remark(f"wrote {folder / TABLE}: {counted(summary.rows, 'row')}; docs/howto/fleet_report.md has ten queries")
+        rows = counted(summary.rows, "row")
+        remark(f"wrote {redacted(folder)}/{TABLE}: {rows}; docs/howto/fleet_report.md has ten queries")
         return DONE
 
     return do_on_many(task, bags, arguments, finish=finish)

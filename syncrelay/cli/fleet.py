@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 from syncrelay.cli.boundary import AT_FAULT, DONE, OUR_BUG, put, remark, say
 from syncrelay.cli.stop import Terminated
 from syncrelay.config.wording import counted
-from syncrelay.errors import SyncRelayError, UsageError
+from syncrelay.errors import SyncRelayError
 from syncrelay.output_files import local_path
 from syncrelay.printable import printable
 from syncrelay.recordings.fleet.job import Engine, Failed, Finished
@@ -40,8 +40,6 @@ def do_on_many(task: Task, words: Sequence[str], arguments: Namespace, *, finish
     recording, or the folder cannot be used; with --strict also for the first recording that is at fault.
     """
     path, named = local_path(arguments.into), redacted(arguments.into)
-    if path is None and finish is not None:
-        raise UsageError(f"{named}: this command reads its results again: name a folder of this machine")
     with ExitStack() as opened:
         store = None if path is not None else ResultStore(arguments.into.rstrip("/"))
         if path is None:
@@ -108,7 +106,7 @@ def _take(finished: Finished, run: Run, progress: Progress) -> int:
     """Count a recording that has ended, say what is wrong with it, and return the exit code for it."""
     job, outcome = finished
     progress.take(finished)
-    name = job.source.shown[0]
+    name = job.source.shown
     if isinstance(outcome, Failed):
         if outcome.is_bug:
             say(outcome.why)

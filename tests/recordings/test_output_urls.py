@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pyarrow.dataset
+import pyarrow.parquet
 import pytest
 
 from tests.cli.command import run, run_python
@@ -155,10 +156,21 @@ def test_the_results_of_a_fleet_are_kept_in_a_store_and_done_once(options, folde
     )
 
 
+def test_the_table_of_facts_is_written_to_a_store(folder):
+    words = ["analyze", "rig.mcap", "nothing.mcap", "--config", "f.yaml", "--json", "--into"]
+    (folder / "nothing.mcap").write_bytes(b"")
+    far, near = stored(folder, *words, "store://new"), run(*words, "here", folder=folder)
+    assert (far.returncode, far.stdout) == (near.returncode, near.stdout) == (1, near.stdout), far.stderr
+    assert names(folder / "store" / "new") == names(folder / "here")
+    tables = [
+        pyarrow.parquet.read_table(where / "facts.parquet") for where in (folder / "store" / "new", folder / "here")
+    ]
+    assert tables[0].num_rows == 2
+    assert tables[0] == tables[1]
+
+
 def test_a_store_with_other_files_is_no_place_for_results(folder):
     (folder / "store" / "mine").mkdir()
     (folder / "store" / "mine" / "notes").write_text("")
     done = stored(folder, "export", "rig.mcap", "--config", "f.yaml", "-o", "store://mine/")
     assert (done.returncode, "holds files and no _ledger.jsonl" in done.stderr) == (1, True)
-    done = stored(folder, "analyze", "rig.mcap", "--config", "f.yaml", "--into", "store://new")
-    assert (done.returncode, "name a folder of this machine" in done.stderr) == (2, True)

@@ -39,26 +39,27 @@ class ResultFile:
     hash: Annotated[str, Field(alias="blake2b")]
 
 
-def content_of(words: Sequence[str]) -> Content:
-    """Read all bytes of a recording's files; for URLs, ask their servers. Raises BagError if that is not possible."""
-    parts = [_of_url(word) if is_url(word) else _of_files(word) for word in words]
-    hashes = [part.hash for part in parts]
-    return Content(
-        hash=hashes[0] if len(hashes) == 1 else _of_several(hashes),
-        size=sum(part.size for part in parts),
-        marks=tuple(mark for part in parts for mark in part.marks),
-    )
+def content_of(place: str) -> Content:
+    """Read all bytes of a recording's files; for a URL, ask its server. Raises BagError if that is not possible."""
+    if is_url(place):
+        return _of_url(place)
+    files = local_files(place)
+    marks = _marks(files)
+    hashes = [_hash(path) for path in files]
+    # The order of the parts of a split recording is that of their names.
+    named = [f"{path.name} {each}" for path, each in zip(files, hashes, strict=True)]
+    return Content(hashes[0] if len(hashes) == 1 else _of_several(named), sum(mark[0] for mark in marks), marks)
 
 
-def marks_of(words: Sequence[str]) -> tuple[tuple[int, ...], ...]:
-    """Return the marks of a recording, see Content, without reading its files."""
-    return tuple(mark for word in words if not is_url(word) for mark in _marks(local_files(word)))
+def marks_of(place: str) -> tuple[tuple[int, ...], ...]:
+    """Return the marks of a recording, see Content, without reading its files; a URL has none."""
+    return () if is_url(place) else _marks(local_files(place))
 
 
-def size_of(words: Sequence[str]) -> int:
+def size_of(place: str) -> int:
     """Return the size of a recording's files in bytes; 0 for URLs, and if it cannot be told without reading."""
     try:
-        return sum(mark[0] for mark in marks_of(words))
+        return sum(mark[0] for mark in marks_of(place))
     except BagError:
         return 0
 
@@ -116,15 +117,6 @@ def _of_url(word: str) -> Content:
             parts.append((f"{file.identity}:{file.size}", file.size))
     hashes = [told for told, _ in parts]
     return Content(_of_several(hashes), sum(size for _, size in parts), ())
-
-
-def _of_files(word: str) -> Content:
-    files = local_files(word)
-    marks = _marks(files)
-    hashes = [_hash(path) for path in files]
-    # The order of the parts of a split recording is that of their names.
-    named = [f"{path.name} {each}" for path, each in zip(files, hashes, strict=True)]
-    return Content(hashes[0] if len(hashes) == 1 else _of_several(named), sum(mark[0] for mark in marks), marks)
 
 
 def _of_several(lines: Sequence[str]) -> str:

@@ -55,7 +55,7 @@ class ParquetTask:
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
-        with closing(open_recording(source.words)) as recording, eased_collector():
+        with closing(open_recording([source.place])) as recording, eased_collector():
             bindings = bind(self.config, recording)
             sets = SetsOf(bindings, self.content, name=source.name)
             replay = Replay(recording, bindings, listeners=sets.listeners)
@@ -83,7 +83,7 @@ class LerobotTask:
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
         with eased_collector():
-            return write_episode(source.name, source.words, self.config, folder)
+            return write_episode(source.name, [source.place], self.config, folder)
 
 
 def require_own(out: Path) -> None:

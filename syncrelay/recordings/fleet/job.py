@@ -109,9 +109,9 @@ class Engine(Protocol):
 def took_too_long(job: Job) -> str:
     """Return the sentence for a job that was ended because of its time limit."""
     limit = "10 min and 10 s for each MB" if job.time_limit is None else f"{job.time_limit / _NS_PER_SECOND:g} s"
-    return f"{job.source.shown[0]}: not done within {limit}: check it, or give it longer by --time-limit"
+    return f"{job.source.shown}: not done within {limit}: check it, or give it longer by --time-limit"
 
 
 def given_up(job: Job, why: str) -> str:
     """Return the sentence for a job whose workers died."""
-    return f"{job.source.shown[0]}: {why} {TRIES} times: check whether there is enough memory, or use fewer --jobs"
+    return f"{job.source.shown}: {why} {TRIES} times: check whether there is enough memory, or use fewer --jobs"

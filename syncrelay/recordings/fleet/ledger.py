@@ -46,13 +46,13 @@ _Text = InstanceOf[str]
 class Entry:
     """A line of the ledger; the last line of a name counts.
 
-    `recording` are the words that it was opened with, `content` is the hash of its bytes, empty if they could not be
-    read, and `size` how many there are. `error` says why it failed.
+    `recording` is its absolute path or URL, `content` the hash of its bytes, empty if they could not be read, and
+    `size` how many there are. `error` says why it failed.
     """
 
     name: Annotated[_Text, AfterValidator(_result_name)]
     state: State
-    recording: tuple[_Text, ...]
+    recording: _Text
     fingerprint: _Text
     content: _Text = ""
     size: Annotated[int, Field(alias="bytes")] = 0
@@ -153,19 +153,6 @@ class Ledger:
     def _keep(self, entry: Entry) -> None:
         facts = {name: fact for name, fact in entry.facts.items() if name in (PROBLEMS, NOTES)}
         self.entries[entry.name] = replace(entry, facts=facts)
-
-
-def read_ledger(folder: Path) -> list[Entry]:
-    """Return the last entry of each recording in a folder, sorted by name, also while a command is working in it.
-
-    Raises SyncRelayError if there is no ledger.
-    """
-    try:
-        content = (folder / LEDGER).read_bytes()
-    except OSError as error:
-        raise SyncRelayError(f"{folder}: its {LEDGER} cannot be read: {error.strerror}") from error
-    entries = {entry.name: entry for entry in _entries(content) if entry is not None}
-    return [entries[name] for name in sorted(entries)]
 
 
 def _entries(content: bytes) -> Iterator[Entry | None]:

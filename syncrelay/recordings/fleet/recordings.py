@@ -39,7 +39,7 @@ def find_sources(words: Sequence[str], *, into: Path | str) -> list[Source]:
         others = [place for place in places if not place.startswith(own)]
         if not others:
             raise BagError(f"{word}: names only results in {into}, which is where results go")
-        found.update((place, Source(result_name(place), (place,))) for place in others)
+        found.update((place, Source(result_name(place), place)) for place in others)
     return list(found.values())
 
 

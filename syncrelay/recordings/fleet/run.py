@@ -60,7 +60,7 @@ class Run:
         for source in sources:
             entry = self._ledger.entries.get(source.name)
             done = entry if entry is not None and self._is_ours(entry) else None
-            jobs.append(Job(source, task, into, done, size_of(source.words), version, time_limit, store))
+            jobs.append(Job(source, task, into, done, size_of(source.place), version, time_limit, store))
         # The largest first, so that none of them is begun when all others are done.
         self.jobs: Final = tuple(sorted(jobs, key=lambda job: -job.size))
         """All recordings, in the order in which they are begun."""
@@ -84,6 +84,10 @@ class Run:
                 if each is not None:
                     self._take(each)
                 yield each
+
+    def entries(self) -> list[Entry]:
+        """Return the last entry of each recording that the folder has, sorted by name."""
+        return [entry for _, entry in sorted(self._ledger.entries.items())]
 
     def entry(self, job: Job) -> Entry | None:
         """Return the ledger's entry for a job, with PROBLEMS and NOTES as its only facts."""

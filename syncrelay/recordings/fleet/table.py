@@ -1,7 +1,7 @@
 """FOLDER/facts.parquet: the facts of all recordings in a folder of results, as one table."""
 
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from types import NoneType
 from typing import Annotated, Any, Final, get_args, get_origin
 
@@ -10,16 +10,18 @@ import pyarrow.parquet as pq
 from pydantic import BaseModel, ValidationError
 
 from syncrelay.errors import SyncRelayError
-from syncrelay.output_files import written_whole
+from syncrelay.output_files import begins_with, written_whole
 from syncrelay.printable import printable
 from syncrelay.recordings.fleet.facts import FACTS, FleetRow
-from syncrelay.recordings.fleet.ledger import Entry, State, read_ledger
+from syncrelay.recordings.fleet.ledger import Entry, State
 from syncrelay.recordings.fleet.robots import RobotPattern, robots_of
+from syncrelay.urls import redacted
 
 TABLE: Final = "facts.parquet"
 """The file with the rows of all recordings in the folder of all results."""
 
 _AT_ONCE: Final = 1000
+_MOST_BYTES: Final = 1 << 30
 _ARROW: Final[dict[object, pa.DataType]] = {
     str: pa.string(),
     int: pa.int64(),
@@ -46,11 +48,11 @@ def _arrow(kind: Any) -> pa.DataType:
     return pa.struct(list(schema_of(kind)))
 
 
-def write_table(folder: Path, rows: Iterable[FleetRow]) -> Iterator[FleetRow]:
-    """Write rows as TABLE of a folder, some at a time, and yield each. Raises OutputError if it cannot be written."""
+def write_table(place: str, rows: Iterable[FleetRow]) -> Iterator[FleetRow]:
+    """Write rows to a file or URL, some at a time, and yield each. Raises OutputError if it cannot be written."""
     schema = schema_of(FleetRow)
     batch: list[dict[str, Any]] = []
-    with written_whole(folder / TABLE) as scratch, pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
+    with written_whole(place) as scratch, pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
         for row in rows:
             batch.append(row.model_dump())
             if len(batch) == _AT_ONCE:
@@ -60,20 +62,25 @@ def write_table(folder: Path, rows: Iterable[FleetRow]) -> Iterator[FleetRow]:
         writer.write_table(pa.Table.from_pylist(batch, schema))
 
 
-def fleet_rows(folder: Path, pattern: RobotPattern | None) -> Iterator[FleetRow]:
-    """Yield the rows of all recordings in a folder of results, failed ones too, sorted by the results' names."""
-    entries = [entry for entry in read_ledger(folder) if entry.state is not State.REMOVED]
-    robots = robots_of([entry.recording[0] for entry in entries], pattern)
+def fleet_rows(folder: str, entries: Sequence[Entry], pattern: RobotPattern | None) -> Iterator[FleetRow]:
+    """Yield the rows of all recordings with an entry in the ledger of a folder or URL, failed ones too."""
+    entries = [entry for entry in entries if entry.state is not State.REMOVED]
+    robots = robots_of([entry.recording for entry in entries], pattern)
     for entry, robot in zip(entries, robots, strict=True):
-        for row in _rows_of(folder, entry):
+        for row in _rows_of(f"{folder}/{entry.name}", entry):
             yield row.model_copy(update={"robot": robot and printable(robot), "size_bytes": entry.size or None})
 
 
-def _rows_of(folder: Path, entry: Entry) -> list[FleetRow]:
+def _rows_of(result: str, entry: Entry) -> list[FleetRow]:
     if entry.state is State.FAILED:
-        return [FleetRow(recording=entry.recording[0], error=entry.error)]
-    result = folder / entry.name
-    try:
-        return [FleetRow.model_validate_json(line) for line in (result / FACTS).read_bytes().splitlines()]
-    except (OSError, ValidationError) as error:
-        raise SyncRelayError(f"{result / FACTS}: cannot be read: remove {result}, and run the command again") from error
+        return [FleetRow(recording=entry.recording, error=entry.error)]
+    rows = []
+    with suppress(ValidationError):
+        rows = [
+            FleetRow.model_validate_json(line) for line in begins_with(f"{result}/{FACTS}", _MOST_BYTES).splitlines()
+        ]
+    if not rows:
+        raise SyncRelayError(
+            f"{redacted(result)}/{FACTS}: cannot be read: remove the folder, and run the command again"
+        )
+    return rows

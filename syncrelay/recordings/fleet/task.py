@@ -28,18 +28,18 @@ _NOT_OF_INPUTS: Final = frozenset({"output", "qos"})
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A recording: the absolute paths or URLs that open_recording takes, and the name of its result.
+    """A recording: its absolute path or URL, and the name of its result.
 
     No other recording has this name, and any file system can hold it.
     """
 
     name: str
-    words: tuple[str, ...]
+    place: str
 
     @property
-    def shown(self) -> tuple[str, ...]:
-        """The words for people and for the ledger: URLs without logins and signatures."""
-        return tuple(map(redacted, self.words))
+    def shown(self) -> str:
+        """The place for people and for the ledger: a URL without login and signature."""
+        return redacted(self.place)
 
 
 class Task(Protocol):

@@ -57,7 +57,7 @@ class ReplayTask:
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
-        with closing(open_recording(source.words)) as plain, eased_collector():
+        with closing(open_recording([source.place])) as plain, eased_collector():
             recording = Disturbed(plain, self.what_if, seed=self.seed) if self.what_if else plain
             bindings = bind(self.config, recording)
             with McapOutput(folder / SETS) as output:
@@ -93,16 +93,16 @@ class AnalyzeTask:
 
     def run(self, source: Source, folder: Path) -> dict[str, JSON]:
         """See Task."""
-        with closing(open_recording(source.words)) as recording, eased_collector():
+        with closing(open_recording([source.place])) as recording, eased_collector():
             if self.text is None and not self.topics:
-                document = inventory_as_json(source.shown[0], recording, inventory(recording))
+                document = inventory_as_json(source.shown, recording, inventory(recording))
                 facts = about(recording, ())
             else:
                 text, bindings = bind_file_or_topics(recording, file=self.file, text=self.text, topics=self.topics)
                 analysis = analyze(recording, text, bindings)
                 if self.text is None:
                     analysis = settled(analysis)
-                document = as_json(source.shown[0], analysis)
+                document = as_json(source.shown, analysis)
                 facts = about(recording, bindings)
                 facts["groups"] = [
                     {
@@ -114,7 +114,7 @@ class AnalyzeTask:
                 ]
                 problems = problems_of(recording, bindings)
                 about_file = {"file": self.file, "file_hash": self.file_hash}
-                rows = rows_of(analysis, recording=source.shown[0], problems=problems, **about_file)
+                rows = rows_of(analysis, recording=source.shown, problems=problems, **about_file)
                 (folder / FACTS).write_text("".join(f"{row.model_dump_json()}\n" for row in rows), encoding="utf-8")
         (folder / ANALYSIS).write_text(f"{json.dumps(document, indent=2)}\n")
         return facts

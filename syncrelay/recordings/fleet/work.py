@@ -46,7 +46,7 @@ def _performed(job: Job) -> Outcome:
         return Failed(why, ends_all=True)
     folder, content = job.scratch_folder(), ""
     try:
-        found = content_of(job.source.words)
+        found = content_of(job.source.place)
         content = found.hash
         # The size of what is behind a URL is known only now.
         _end_after(job.limit_of(found.size))
@@ -56,7 +56,7 @@ def _performed(job: Job) -> Outcome:
     except SyncRelayError as error:
         failed = Failed(str(error), content, ends_all=isinstance(error, OutputError))
     except MemoryError:
-        failed = Failed(f"{job.source.shown[0]}: takes more memory than a worker has: use fewer --jobs", content)
+        failed = Failed(f"{job.source.shown}: takes more memory than a worker has: use fewer --jobs", content)
     except Exception as error:  # noqa: BLE001  a bug with one recording must not stop the others
         if isinstance(error, OSError) and error.errno in (*NO_SPACE, EROFS):
             failed = Failed(f"{job.into}: cannot be written: {error.strerror}", content, ends_all=True)
@@ -69,8 +69,8 @@ def _performed(job: Job) -> Outcome:
 def _done(job: Job, content: Content, folder: Path) -> Done:
     folder.mkdir(parents=True)
     facts = job.task.run(job.source, folder)
-    if marks_of(job.source.words) != content.marks:
-        raise BagError(f"{job.source.shown[0]}: was changed while it was read: is it still being recorded?")
+    if marks_of(job.source.place) != content.marks:
+        raise BagError(f"{job.source.shown}: was changed while it was read: is it still being recorded?")
     files = results_in(folder)
     if job.store is not None:
         job.store.put(job.source.name, folder)

@@ -22,7 +22,7 @@ class Obedient:
         return fingerprint_of("copy", config="", options={"option": self.option})
 
     def run(self, source: Source, folder: Path):
-        path = Path(source.words[0])
+        path = Path(source.place)
         with path.with_suffix(".attempts").open("a") as attempts:
             attempts.write(f"{os.getpid()}\n")
         text = path.read_text()

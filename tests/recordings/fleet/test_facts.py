@@ -221,8 +221,9 @@ def test_the_summary_is_one_screen_about_the_same(fleet):
 def test_a_robot_is_what_its_path_says(pattern, places, robots, tmp_path):
     with Ledger(tmp_path) as ledger:
         for place in places:
-            ledger.append(Entry(result_name(place), State.FAILED, (place,), "analyze version:1", error="torn"))
-    rows = fleet_rows(tmp_path, None if pattern is None else RobotPattern.parse(pattern))
+            ledger.append(Entry(result_name(place), State.FAILED, place, "analyze version:1", error="torn"))
+        entries = [*ledger.entries.values()]
+    rows = fleet_rows(str(tmp_path), entries, None if pattern is None else RobotPattern.parse(pattern))
     assert {row.recording: row.robot for row in rows} == dict(zip(places, robots, strict=True))
 
 

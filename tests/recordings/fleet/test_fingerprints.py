@@ -196,7 +196,7 @@ def source(tmp_path):
         jittery("/lidar", period_ms=100, jitter_ms=9, count=30, seed=2),
         at("/imu", *range(0, 3_000, 20)),
     )
-    return Source("bag-0123456789abcdef", (str(write_mcap(tmp_path / "bag.mcap", frames)),))
+    return Source("bag-0123456789abcdef", str(write_mcap(tmp_path / "bag.mcap", frames)))
 
 
 @pytest.mark.faults

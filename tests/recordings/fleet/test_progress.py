@@ -15,9 +15,9 @@ _DONE = Done(Content("", 0, ()), {}, {}, Path())
 
 
 def jobs(*sizes, done=()):
-    entry = Entry("", State.DONE, (), "")
+    entry = Entry("", State.DONE, "", "")
     return tuple(
-        Job(Source(str(n), ()), Obedient(), Path(), entry if n in done else None, size, "")
+        Job(Source(str(n), ""), Obedient(), Path(), entry if n in done else None, size, "")
         for n, size in enumerate(sizes)
     )
 

@@ -15,7 +15,7 @@ def found(folder, *words, into="out"):
     """The recordings that words name, relative to the folder."""
     sources = find_sources([word if "://" in word else f"{folder}/{word}" for word in words], into=folder / into)
     assert len({source.name for source in sources}) == len(sources)
-    return [source.words[0].removeprefix(f"{folder}/") for source in sources]
+    return [source.place.removeprefix(f"{folder}/") for source in sources]
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_a_list_names_a_recording_on_each_line(folder, monkeypatch):
         pass
     (folder / "list.txt").write_bytes(b"# monday\n\n a/x.mcap \nb/*\nhttps://day.example/one.mcap\n" + odd + b"\r\n")
     sources = find_sources(["@list.txt"], into=folder / "out")
-    places = [os.fsencode(source.words[0]) for source in sources]
+    places = [os.fsencode(source.place) for source in sources]
     assert places == [
         os.fsencode(folder / "a/x.mcap"),
         os.fsencode(folder / "b/deep/x.mcap"),
