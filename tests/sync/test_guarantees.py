@@ -347,25 +347,6 @@ def test_left_overs_of_the_first_pass_do_not_disturb_the_second(policy, rig, dat
     assert sets_of(flat(two)) == sets_of(flat(one))
 
 
-@given(data=st.data(), chosen=options(optional=False, limited=False, thinned=False))
-def test_sets_of_approximate_time_depend_on_stamps_alone_while_no_queue_is_full(data, chosen):
-    chosen = replace(chosen, queue_size=100, min_periods=())  # a period that is not kept leads astray
-    streams = [
-        [Message(index, stamp * TICK, (index, stamp)) for stamp in sorted(data.draw(st.sets(few(1, 60), max_size=20)))]
-        for index in range(chosen.n_inputs)
-    ]
-    told = []
-    for _ in range(2):
-        policy = make_policy("approximate_time", chosen)
-        waiting = [list(stream) for stream in streams]
-        left = []
-        while any(waiting):
-            stream = data.draw(st.sampled_from([stream for stream in waiting if stream]))
-            left += sets_of(policy.add(stream.pop(0)))
-        told.append(left)
-    assert told[0] == told[1]
-
-
 @pytest.mark.parametrize("policy", ONCE)
 @given(rig=rigs(optional=False, limited=False, thinned=False))
 def test_a_policy_alone_loses_nothing_either(policy, rig):

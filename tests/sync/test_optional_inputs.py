@@ -5,7 +5,6 @@ from functools import partial
 import pytest
 
 from syncrelay.sync import (
-    ApproximateEpsilonTime,
     ApproximateTime,
     Drop,
     DropReason,
@@ -13,7 +12,7 @@ from syncrelay.sync import (
     Message,
 )
 from tests.sync.support.drawn import group_cases
-from tests.sync.support.grouped import approximate, by_key, eager, exact, grouped, paced, third_optional
+from tests.sync.support.grouped import approximate, by_key, exact, grouped, paced, third_optional
 from tests.sync.support.timeline import START_NS, TICK_NS, stamp
 
 test_optional = group_cases(
@@ -88,29 +87,6 @@ test_optional = group_cases(
             lidar  |a...
             camera |.A..
             -> g: gaA
-            """,
-        ),
-        "epsilon counts for them as slop does": (
-            lambda: grouped(
-                ApproximateEpsilonTime(n_inputs=3, queue_size=2, epsilon_ns=TICK_NS),
-                required=(True, False, True),
-                max_wait=9,
-            ),
-            """
-            lidar  |a....b...
-            imu    |.x......y
-            camera |.A...B...
-            -> A: axA
-            -> y: b-B
-            """,
-        ),
-        "slop counts from the ends of a set": (
-            partial(eager, slop=4),
-            """
-            lidar  |..a.....
-            camera |.....A..
-            imu    |x......y
-            -> y: x too_far, aA-
             """,
         ),
         "what another optional input has shut out goes when no later set could take it": (
@@ -268,26 +244,6 @@ test_optional = group_cases(
             -> x: aAx
             -> z: bBz
             -> @8: cC-
-            """,
-        ),
-        "by key: of each optional input": (
-            partial(by_key, 4, required=(True, True, False, False), max_wait=9),
-            """
-            left  |a....
-            right |A....
-            depth |.x...
-            masks |...z.
-            keys: aAxz
-            -> z: aAxz
-            """,
-        ),
-        "by key: at once where no input is optional": (
-            partial(by_key, max_wait=9),
-            """
-            left  |a.
-            right |.A
-            keys: aA
-            -> A: aA
             """,
         ),
         "by key: not once its input has shown the key of a later set": (

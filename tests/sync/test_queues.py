@@ -1,35 +1,6 @@
 import pytest
 
-from syncrelay.sync.messages import Message
-from syncrelay.sync.queues import Losses, StampQueue
-
-
-def message(stamp, payload=None):
-    return Message(0, stamp, payload)
-
-
-def test_a_queue_is_in_stamp_order_whatever_the_order_of_arrival():
-    queue = StampQueue()
-    for stamp in (3, 1, 5, 4, 2):
-        assert queue.insert(stamp, message(stamp)) is None
-    assert queue.stamps == [1, 2, 3, 4, 5]
-    assert [queued.stamp for queued in queue.messages] == queue.stamps
-
-
-def test_a_message_of_a_stamp_that_is_queued_replaces_that_one():
-    queue = StampQueue()
-    for stamp in (1, 2, 3):
-        queue.insert(stamp, message(stamp, "first"))
-    assert queue.insert(2, message(2, "second")) == message(2, "first")
-    assert [queued.payload for queued in queue.messages] == ["first", "second", "first"]
-
-
-def test_the_oldest_are_taken():
-    queue = StampQueue()
-    for stamp in (1, 2, 3):
-        queue.insert(stamp, message(stamp))
-    assert queue.take(2) == [message(1), message(2)]
-    assert (queue.stamps, queue.messages) == ([3], [message(3)])
+from syncrelay.sync.queues import Losses
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 from functools import partial
 
-from syncrelay.sync import ApproximateTimeEager, DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
+from syncrelay.sync import DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
 from tests.sync.support.drawn import group_cases
 from tests.sync.support.timeline import START_NS, TICK_NS, stamp
 
@@ -68,39 +68,6 @@ test_drawn = group_cases(
             -> C: cC
             """,
         ),
-        "a set earlier than that does not": (
-            partial(exact, period=4),
-            """
-            left  |a.b..
-            right |A.B..
-            -> A: aA
-            -> B: b thinned, B thinned
-            """,
-        ),
-        "after a pause it goes on in the period that the set falls in": (
-            partial(exact, period=4),
-            """
-            left  |a.........bc
-            right |A.........BC
-            -> A: aA
-            -> B: bB
-            -> C: cC
-            """,
-        ),
-        "both at once: of every second set, one a period": (
-            partial(exact, every=2, period=4),
-            """
-            left  |abcdefg
-            right |ABCDEFG
-            -> A: aA
-            -> B: b thinned, B thinned
-            -> C: c thinned, C thinned
-            -> D: d thinned, D thinned
-            -> E: eE
-            -> F: f thinned, F thinned
-            -> G: g thinned, G thinned
-            """,
-        ),
         "after a jump the next set is the first": (
             partial(exact, every=2),
             f"""
@@ -142,24 +109,6 @@ test_drawn = group_cases(
             -> c: b thinned, cB
             """,
         ),
-        "a set that did not pass may lack an optional input": (
-            partial(latest, required=(True, False), every=2),
-            """
-            lidar |ab.c
-            odom  |..B.
-            -> a: a-
-            -> c: b thinned, cB
-            """,
-        ),
-        "and not if it is in one that passes": (
-            partial(latest, every=2),
-            """
-            lidar |.a.b.c
-            odom  |A.B...
-            -> a: aA
-            -> c: b thinned, cB
-            """,
-        ),
     }
 )
 
@@ -195,15 +144,6 @@ def test_what_passed_before_a_flush_is_not_known_after_it():
     assert [(counts.matched, counts.buffered) for counts in group.counts()] == [(2, 1), (1, 1)]
 
 
-def test_the_least_period_is_a_nanosecond():
-    group = SyncGroup(ExactTime(n_inputs=2, queue_size=1), required=(True, True), min_set_period_ns=1)
-    for time in (1, 2, 3):
-        for index in (0, 1):
-            group.add(Message(index, time, None), now=0)
-    assert group.sets == 3
-    assert [counts.buffered for counts in group.counts()] == [0, 0]
-
-
 def test_sets_without_stamps_are_thinned_by_the_clock():
     group = grouped(EqualKey(n_inputs=2, queue_size=9), period=2)
     passed = []
@@ -214,22 +154,3 @@ def test_sets_without_stamps_are_thinned_by_the_clock():
             tick for outcome in group.add(Message(1, 0, tick, key=tick), now=now) if hasattr(outcome, "messages")
         ]
     assert passed == [0, 2, 4]
-
-
-def test_the_period_is_of_the_stamps_that_sets_are_matched_by():
-    group = exact(period=2, offsets_ns=(0, 10 * TICK_NS))
-    for column in range(4):
-        group.add(Message(0, stamp(column), None), now=0)
-        group.add(Message(1, stamp(column - 10), None), now=0)
-    assert group.sets == 2
-
-
-def test_the_period_is_of_the_latest_required_stamp_of_a_set():
-    # Both sets end within a period of each other, but for their earliest stamps, the optional one, or no offset.
-    policy = ApproximateTimeEager(n_inputs=3, queue_size=9, slop_ns=3 * TICK_NS)
-    offsets_ns = (0, 10 * TICK_NS, 0)
-    group = grouped(policy, period=4, required=(True, True, False), max_wait_ns=0, offsets_ns=offsets_ns)
-    for index, column in ((0, 0), (1, 3), (2, 7), (0, 4), (1, 5)):
-        group.add(Message(index, stamp(column) - offsets_ns[index], None), now=0)
-    assert group.sets == 1
-    assert [counts.dropped for counts in group.counts()] == [{DropReason.THINNED: 1}] * 3
