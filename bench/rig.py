@@ -20,7 +20,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Image, Imu
 
-from syncrelay.cdr import read_stamp, write_stamp
+from syncrelay.cdr import patch_stamp, read_stamp
 
 TYPES = {"Image": Image, "Imu": Imu}
 PROFILE = QoSProfile(depth=100)
@@ -47,9 +47,9 @@ def publish(node, asked):
             time.sleep(max(0.0, due - time.monotonic()))
             group = groups[number % len(groups)]
             # One stamp, when the last of them is due: however busy the machine is, they are a set.
-            write_stamp(payload, time.time_ns() + int((len(group) - 1) * asked.apart * 1e9))
+            payload = patch_stamp(payload, time.time_ns() + int((len(group) - 1) * asked.apart * 1e9))
             for publisher in group:
-                publisher.publish(bytes(payload))
+                publisher.publish(payload)
                 if asked.apart:
                     time.sleep(asked.apart)
         say("done")
@@ -58,7 +58,7 @@ def publish(node, asked):
 def payload_of(type_name, size):
     """A serialized message; an image has so many bytes of pixels."""
     message = Imu() if type_name == "Imu" else Image(height=1, width=size, step=size, data=bytes(size))
-    return bytearray(serialize_message(message))
+    return serialize_message(message)
 
 
 def receive(node, asked):

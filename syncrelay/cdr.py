@@ -1,4 +1,4 @@
-"""Stamps in serialized messages: read and patched in place of decoding.
+"""Stamps in serialized messages, read and patched without decoding the messages.
 
 A payload is a message as DDS carries it: four bytes of encapsulation header (DDSI-RTPS 2.5, 10.2), then the
 fields. Where the first field is a std_msgs/Header, its stamp stands first: int32 seconds and uint32
@@ -13,9 +13,6 @@ Payload: TypeAlias = bytes | bytearray | memoryview
 _NS_PER_SECOND: Final = 1_000_000_000
 _STAMP_AT: Final = 4
 _STAMP_END: Final = 12
-STAMP_BYTES: Final = slice(_STAMP_AT, _STAMP_END)
-"""Where the stamp of a leading Header lies in a payload."""
-
 _MIN_SECONDS: Final = -(2**31)
 _MAX_SECONDS: Final = 2**31 - 1
 LATEST_STAMP: Final = _MAX_SECONDS * _NS_PER_SECOND + _NS_PER_SECOND - 1
@@ -39,8 +36,8 @@ _BIG_ENDIANS: Final = frozenset(kind << 8 for kind, layout in _STAMP_LAYOUTS.ite
 def read_stamp(payload: Payload) -> int | None:
     """Return the stamp of the leading Header in nanoseconds, or None if the payload is malformed.
 
-    Malformed: shorter than its stamp, an encapsulation that is neither plain CDR nor plain XCDR2, or a
-    nanosecond part of a second or more. Negative seconds are valid (builtin_interfaces/Time).
+    A payload is malformed if it ends before the end of the stamp, is neither plain CDR nor plain XCDR2, or has
+    nanoseconds of a second or more. Negative seconds are valid (builtin_interfaces/Time).
     """
     try:
         encapsulation, seconds, nanoseconds = _ENCAPSULATED(payload)
@@ -57,7 +54,7 @@ def read_stamp(payload: Payload) -> int | None:
 
 
 def has_place_for_stamp(payload: Payload) -> bool:
-    """Whether a payload can hold the stamp of a leading Header, whatever stands there now."""
+    """Tell whether a payload is long enough and of an encapsulation in which a leading stamp can be set."""
     return len(payload) >= _STAMP_END and not payload[0] and payload[1] in _STAMP_LAYOUTS
 
 
@@ -66,19 +63,10 @@ def patch_stamp(payload: Payload, stamp: int) -> bytes:
 
     Raises ValueError for a payload that has no place for one, and for a stamp whose seconds don't fit an int32.
     """
-    whole = memoryview(payload)
-    return b"".join((whole[:_STAMP_AT], _stamp_bytes(payload, stamp), whole[_STAMP_END:]))
-
-
-def write_stamp(payload: bytearray | memoryview, stamp: int) -> None:
-    """Set the stamp of the payload's leading Header in place; otherwise as `patch_stamp`."""
-    payload[STAMP_BYTES] = _stamp_bytes(payload, stamp)
-
-
-def _stamp_bytes(payload: Payload, stamp: int) -> bytes:
     if not has_place_for_stamp(payload):
         raise ValueError("the payload has no stamp to patch")
     seconds, nanoseconds = divmod(stamp, _NS_PER_SECOND)
     if not _MIN_SECONDS <= seconds <= _MAX_SECONDS:
         raise ValueError(f"a stamp of {stamp} ns does not fit builtin_interfaces/Time")
-    return _STAMP_LAYOUTS[payload[1]].pack(seconds, nanoseconds)
+    whole = memoryview(payload)
+    return b"".join((whole[:_STAMP_AT], _STAMP_LAYOUTS[payload[1]].pack(seconds, nanoseconds), whole[_STAMP_END:]))

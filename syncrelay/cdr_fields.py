@@ -1,8 +1,8 @@
-"""One field of a serialized message, found by skipping what stands before it: nothing is deserialized.
+"""One field of a serialized message, found by skipping the fields before it: nothing is deserialized.
 
-Layout after the OMG's CDR (DDS-XTypes 1.3, 7.4.1 and 7.4.3.5): a primitive is aligned to its size, counted from
-behind the encapsulation header, to at most 8 bytes in plain CDR and 4 in plain XCDR2; strings and sequences begin
-with a uint32 length, a string's counts its final zero.
+The layout is that of the OMG's CDR (DDS-XTypes 1.3, 7.4.1 and 7.4.3.5). A primitive is aligned to its size, but to at
+most 8 bytes in plain CDR and 4 in plain XCDR2, counted from the end of the encapsulation header. Strings and sequences
+begin with a uint32 length; that of a string counts its final zero.
 """
 
 import re
@@ -13,12 +13,12 @@ from typing import Any, Final, NamedTuple, TypeAlias
 from syncrelay.cdr import Payload
 
 FieldsOf: TypeAlias = Callable[[str], Mapping[str, str]]
-"""From a type's name to its fields' names and types in order, as rosidl's Python classes tell them."""
+"""From a type's name to the names and types of its fields, in order, with rosidl's names of types."""
 
 TIME: Final = "builtin_interfaces/Time"
 
 MOST_VALUES: Final = 20_000
-"""So many values are gone through on the way to a field, in ten to forty milliseconds; all groups wait meanwhile."""
+"""At most this many values are skipped before a field. That takes 10 to 40 ms, while all groups wait."""
 
 _NS_PER_SECOND: Final = 1_000_000_000
 _PRIMITIVES: Final = {
@@ -39,8 +39,11 @@ _PRIMITIVES: Final = {
 _ARRAY = re.compile(r"(?P<type>.+)\[(?P<count>\d+)\]")
 _SEQUENCE = re.compile(r"sequence<(?P<type>.+?)(, \d+)?>")
 _STRING = re.compile(r"string(<\d+>)?")
-# What of the encapsulation header names an order of bytes and the largest alignment.
+# Byte orders and largest alignments, by the second byte of the encapsulation header.
 _ENCAPSULATIONS: Final = {0x00: (">", 8), 0x01: ("<", 8), 0x06: (">", 4), 0x07: ("<", 4)}
+
+
+_BODY_AT: Final = 4
 
 
 class UnreadableFieldError(Exception):
@@ -48,9 +51,9 @@ class UnreadableFieldError(Exception):
 
 
 class _Bytes(NamedTuple):
-    """A payload behind its encapsulation header, its byte order as Struct's, and the largest alignment.
+    """A payload without its encapsulation header, its byte order as in `struct`, and the largest alignment.
 
-    `passed` counts the values that were gone through one by one, as its only item.
+    The only item of `passed` counts the values that were skipped one by one.
     """
 
     body: memoryview
@@ -60,23 +63,23 @@ class _Bytes(NamedTuple):
 
 
 _Skip: TypeAlias = Callable[[_Bytes, int], int]
-"""From the place where a value begins, padding before it included, to the place behind it."""
+"""From the place where a value or the padding before it begins to the end of the value."""
 _Read: TypeAlias = Callable[[_Bytes, int], Any]
 
 
 def field_reader(fields_of: FieldsOf, type_name: str, path: str) -> Callable[[Payload], Any]:
     """Return what reads the field at a dotted path: a number, a text, or a time in nanoseconds.
 
-    The reader gives None for a payload that is malformed on the way to the field, or has more than MOST_VALUES there;
-    numbers beside each other count as one. Raises UnreadableFieldError
-    where the type has no such field, or it is not one value.
+    The reader returns None for a payload that is malformed before the end of the field, or has more than MOST_VALUES
+    values before it; consecutive numbers of an array count as one. Raises UnreadableFieldError if the type has no such
+    field, or if the field is not one value.
     """
     skips, found = _route(fields_of, type_name, path.split("."))
     return _behind(skips, _reader(found, path))
 
 
 def time_reader(fields_of: FieldsOf, type_name: str, path: str) -> Callable[[Payload], int | None]:
-    """Return what reads the time at a dotted path as field_reader does; raises it for any other field as well."""
+    """Return what reads the time at a dotted path; as field_reader, but raises its error for any other field, too."""
     skips, found = _route(fields_of, type_name, path.split("."))
     if found != TIME:
         raise UnreadableFieldError(f"{path} is {found}, expected {TIME}")
@@ -84,7 +87,7 @@ def time_reader(fields_of: FieldsOf, type_name: str, path: str) -> Callable[[Pay
 
 
 def _behind(skips: Sequence[_Skip], read: _Read) -> Callable[[Payload], Any]:
-    """Return what reads a value behind others."""
+    """Return what skips some values and then reads one."""
 
     def read_field(payload: Payload) -> Any:
         encapsulation = _ENCAPSULATIONS.get(payload[1]) if len(payload) >= _BODY_AT and not payload[0] else None
@@ -102,15 +105,12 @@ def _behind(skips: Sequence[_Skip], read: _Read) -> Callable[[Payload], Any]:
     return read_field
 
 
-_BODY_AT: Final = 4
-
-
 class _Lying(Exception):  # noqa: N818  a payload's fault, told by None
-    """A length that the payload cannot hold, or that nobody has the time for."""
+    """A length that the payload cannot hold, or that takes too long to skip."""
 
 
 def _route(fields_of: FieldsOf, type_name: str, steps: Sequence[str]) -> tuple[list[_Skip], str]:
-    """What stands before the field, and the field's type."""
+    """Return what skips the fields before a field, and the type of the field."""
     skips: list[_Skip] = []
     for step in steps:
         if "/" not in type_name or "<" in type_name or "[" in type_name:
@@ -204,7 +204,7 @@ def _message_skipper(fields_of: FieldsOf, type_name: str) -> _Skip:
 
 
 def _pass(data: _Bytes, count: int) -> None:
-    """Take in that so many values are gone through one by one."""
+    """Count values that are skipped one by one."""
     data.passed[0] += count
     if data.passed[0] > MOST_VALUES:
         raise _Lying
@@ -218,7 +218,7 @@ def _read_length(data: _Bytes, place: int) -> tuple[int, int]:
 
 
 def _require_room(data: _Bytes, place: int, count: int) -> None:
-    """No element is smaller than a byte: a larger count is a lie, and would be counted down for hours."""
+    """Raise _Lying for more elements than bytes are left, as no element is smaller than a byte."""
     if count > len(data.body) - place:
         raise _Lying
 

@@ -1,6 +1,6 @@
 """Matched sets as datasets: tables of Arrow, Parquet files, LeRobot datasets. Needs the extra `datasets`.
 
-`read_sets` and `ray_dataset` (extra `fleet`) are for programs: sets stream into training with no files between.
+Programs read sets with `read_sets`, or on a cluster with `ray_dataset` (extra `fleet`), without files in between.
 """
 
 from typing import Any
@@ -11,7 +11,7 @@ __all__ = ["ray_dataset", "read_sets"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import Ray, which takes seconds, only for who asks for it."""
+    """Import Ray only when `ray_dataset` is used: it takes seconds."""
     if name == "ray_dataset":
         from syncrelay.recordings.datasets.on_ray import ray_dataset  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""Images as PNG or JPEG: smaller than raw ones, and what training reads."""
+"""Images encoded as PNG or JPEG."""
 
 import io
 import sys
@@ -14,15 +14,15 @@ from syncrelay.errors import BagError
 ImageFormat: TypeAlias = Literal["png", "jpeg"]
 IMAGE: Final = "sensor_msgs/msg/Image"
 NEEDED: Final = ("height", "width", "encoding", "is_bigendian", "step", "data")
-"""The fields of an Image without which it cannot be drawn."""
+"""The fields of an Image that its pixels are read from."""
 
-# A level that costs little: the next ones take twice the time for some per cent.
+# Higher levels take twice the time to save a few per cent.
 _PNG_LEVEL: Final = 1
 _JPEG_QUALITY: Final = 95
 
 
 class _Pixels(NamedTuple):
-    """How an encoding lies in memory: numpy's type, channels, and their order as Pillow wants them."""
+    """An encoding: numpy's type, the number of channels, and the order that makes RGB of them."""
 
     kind: str
     channels: int
@@ -76,16 +76,16 @@ def pixels_of(image: Mapping[str, Any], topic: str) -> np.ndarray[Any, Any]:
 
 
 class ImageColumn:
-    """Encodes a column of Images; see the module."""
+    """Encodes a column of Images."""
 
     def __init__(self, topic: str, image_format: ImageFormat) -> None:
         self._topic = topic
         self._format: Final = image_format
         self.undecodable = 0
-        """How many were no such image: they are null."""
+        """How many images had other bytes than their fields say. They are null."""
 
     def arrow(self, decoded: pa.StructType, asked: frozenset[str]) -> pa.StructType:
-        """Return the type of the column: the fields asked for, with `format` before `data` in place of the layout."""
+        """Return the type of the column: the fields asked for, with `format` in place of the layout of pixels."""
         kept = [
             field for field in decoded if field.name in asked and field.name not in ("is_bigendian", "step", "data")
         ]
@@ -93,7 +93,7 @@ class ImageColumn:
         return pa.struct([*kept, *more])
 
     def encode(self, decoded: pa.ChunkedArray, arrow: pa.StructType) -> pa.ChunkedArray:
-        """Return the column of that type."""
+        """Return the encoded column; `arrow` is its type."""
         rows = [None if not row.is_valid else self._row(row.as_py(), arrow) for row in decoded]
         return pa.chunked_array([pa.array(rows, type=arrow)])
 

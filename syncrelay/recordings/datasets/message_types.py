@@ -1,7 +1,7 @@
-"""Message types as trees, what they are in Arrow, and which of their fields are asked for.
+"""Message types as trees, their types in Arrow, and which of their fields are asked for.
 
-bool, numbers and strings are Arrow's own; a message within a message is a struct, `T[n]` a fixed-size list, `T[]` a
-list, and `uint8[]` and `byte[]` are binary: images, clouds and packets stay bytes.
+A message within a message is a struct, `T[n]` a fixed-size list and `T[]` a list in Arrow. `uint8[]` and `byte[]` are
+binary, so that images, clouds and packets stay bytes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -140,7 +140,7 @@ def _size_of_all(parts: Sequence[Sizes]) -> Sizes:
 
 
 def type_tree(store: Typestore, type_name: str) -> Struct:
-    """Return the tree of a type that a store knows; raises BagError for what no decoder is there for."""
+    """Return the tree of a type that a store knows; raises BagError for a field that cannot be decoded."""
     fields = store.fielddefs[type_name][1]
     return Struct(type_name, tuple(Field(name, _node(store, type_name, what)) for name, what in fields))
 
@@ -162,10 +162,10 @@ def _node(store: Typestore, owner: str, description: Any) -> Node:
 
 
 def only(tree: Struct, paths: Sequence[str], topic: str) -> Struct:
-    """Return a tree of which these fields alone, named by dotted paths, are asked for.
+    """Return a tree of which only these fields, named by dotted paths, are asked for.
 
-    Raises BagError for one that is not there. A field within the elements of an array has the path that it would have
-    without the array.
+    The path of a field within the elements of an array does not name the array's elements. Raises BagError for a field
+    that is not there.
     """
     asked: dict[str, list[str]] = {}
     for path in paths:
@@ -201,14 +201,14 @@ def _narrowed_node(node: Node, rests: Sequence[str], name: str, topic: str) -> N
 
 
 def is_empty(node: Node) -> bool:
-    """Tell whether nothing that is asked for is in a tree."""
+    """Tell whether a tree has no field that is asked for."""
     if isinstance(node, Array | Run):
         return is_empty(node.element)
     return isinstance(node, Struct) and not any(field.is_asked and not is_empty(field.node) for field in node.fields)
 
 
 def arrow_type(node: Node) -> pa.DataType:
-    """Return a tree's Arrow type; fields of known units say so in their metadata (`unit`)."""
+    """Return a tree's Arrow type. Fields of a known unit have it in their metadata (`unit`)."""
     match node:
         case Number():
             return node.arrow

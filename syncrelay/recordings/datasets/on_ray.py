@@ -1,4 +1,4 @@
-"""Sets of many recordings as a dataset of Ray Data: read by the cluster, block by block, while training goes on."""
+"""Sets of many recordings as a dataset of Ray Data, which the cluster reads block by block while training runs."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -29,9 +29,9 @@ def ray_dataset(
 ) -> Dataset:
     """Return the sets of recordings as a dataset; a row is a set, with the columns of `read_sets`.
 
-    A recording is a read task: paths must mean the same on every node. `options` are those of
+    Each recording is a read task, so paths must be the same on every node. `options` are those of
     `ray.data.read_datasource`, such as `ray_remote_args={"memory": 2e9}`. Other arguments are those of `read_sets`.
-    A recording that cannot be read fails its task, and what reads the dataset.
+    A recording that cannot be read fails its task and the reading of the dataset.
     """
     loaded = config if isinstance(config, Config) else load(fspath(config))
     read = partial(read_sets, config=loaded, group=group, fields=fields, images=images, raw=raw, most_bytes=most_bytes)
@@ -42,13 +42,13 @@ class SetsOfRecordings(Datasource):  # type: ignore[misc]  # Ray's counts as unt
     """See `ray_dataset`."""
 
     def __init__(self, recordings: Sequence[str], read: Callable[[str], Iterator[pa.RecordBatch]]) -> None:
-        """`read` gives the sets of a recording."""
+        """`read` yields the sets of a recording."""
         super().__init__()
         self._recordings = tuple(recordings)
         self._read = read
 
     def estimate_inmemory_data_size(self) -> int | None:
-        """See Ray: it is not known before the recordings are read."""
+        """See Ray; unknown before the recordings are read."""
         return None
 
     def get_read_tasks(self, parallelism: int, *_: Any, **__: Any) -> list[ReadTask]:

@@ -12,22 +12,21 @@ from syncrelay.output_files import cannot_be_written
 from syncrelay.recordings.datasets.reading import SetsOf
 from syncrelay.recordings.datasets.tables import SetTable
 
-SUFFIX: Final = ".parquet"
-# Its higher levels take twice the time for a tenth of the size.
+# Higher levels take twice the time to save a tenth of the size.
 _ZSTD_LEVEL: Final = 1
 
 
-def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path, *, ending: str = SUFFIX) -> None:
+def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path) -> None:
     """Write the sets of each group that leave in the steps of a replay, a row group at a time.
 
-    Each group has a file in the folder, its name and `ending`. Raises OutputError where a file cannot be written.
+    Each group has a file in the folder. Raises OutputError where a file cannot be written.
     """
     with ExitStack() as opened:
         writers: dict[SetTable, pq.ParquetWriter] = {}
 
         def write(group: SetTable, table: pa.Table, **options: int) -> None:
             if group not in writers:
-                path = folder / f"{group.binding.group.name}{ending}"
+                path = folder / f"{group.binding.group.name}.parquet"
                 writers[group] = opened.enter_context(_open(path, table.schema))
             writers[group].write_table(table, **options)
 
@@ -35,7 +34,7 @@ def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path, *, ending: 
             for group, table in sets.parts(steps):
                 write(group, table, row_group_size=len(table))
             for group in sets.groups:
-                # A group without a set has a file too: it says which columns there would be.
+                # A group without sets has a file too, which shows the columns.
                 if group not in writers:
                     write(group, group.table())
         except OSError as error:
@@ -45,9 +44,9 @@ def write_parquet(sets: SetsOf, steps: Iterable[None], folder: Path, *, ending: 
 def _open(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
     leaves = [*_leaves("", schema)]
     texts = [name for name, kind in leaves if pa.types.is_string(kind)]
-    # What is compared with: neither pictures nor what stands within lists.
+    # Statistics are of no use for pictures and for elements of lists.
     compared = [name for name, kind in leaves if not pa.types.is_binary(kind) and ".list." not in name]
-    # Pictures are compressed already: to try again costs their time and gives nothing.
+    # Pictures are compressed already.
     pictures = [f"{field.name}.data" for field in schema if _is_picture(field.type)]
     return pq.ParquetWriter(
         path,
@@ -61,7 +60,7 @@ def _open(path: Path, schema: pa.Schema) -> pq.ParquetWriter:
 
 
 def _is_picture(kind: pa.DataType) -> bool:
-    """Tell whether a column holds CompressedImage, or what images became: a format's name beside bytes."""
+    """Tell whether a column holds pictures, of CompressedImage or encoded here: a format beside bytes."""
     if not pa.types.is_struct(kind):
         return False
     types = {field.name: field.type for field in kind}

@@ -1,4 +1,4 @@
-"""Sets of recordings as tables, read as they are asked for: memory holds some, whatever the recording's size."""
+"""Sets of recordings as tables. They are read as they are asked for, so memory does not grow with the recording."""
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -20,33 +20,33 @@ from syncrelay.recordings.datasets.tables import Content, Fields, SetTable
 T = TypeVar("T")
 
 MOST_BYTES: Final = 32_000_000
-"""How many bytes of messages are held until they become a table."""
+"""A table is made of this many bytes of messages."""
 
-# Small messages cost by their number.
+# A table of small messages is limited by their number.
 _MOST_SETS: Final = 20_000
 
 
 class Part(NamedTuple):
-    """Sets of one group that left one behind another."""
+    """A table of consecutive sets of one group."""
 
     group: SetTable
     table: pa.Table
 
 
 class SetsOf:
-    """The sets that leave in a replay, group by group as tables."""
+    """The sets that leave in a replay, as tables of each group."""
 
     def __init__(self, bindings: Sequence[GroupBinding], content: Content, *, name: str) -> None:
-        """`name` is what the sets' column `recording` says.
+        """`name` is the value of the column `recording`.
 
         Raises BagError for a field that a recorded type does not have.
         """
         self.groups: Final = tuple(SetTable(binding, content, recording=name) for binding in bindings)
         self.listeners: Final[tuple[Listener, ...]] = tuple(group.take for group in self.groups)
-        """What the replay has to tell."""
+        """The listeners of the replay."""
 
     def parts(self, steps: Iterable[None], *, most_bytes: int = MOST_BYTES) -> Iterator[Part]:
-        """Yield the sets of all groups, as they leave in the steps of a replay; those of a group in their order."""
+        """Yield tables of all groups while the steps of a replay run; the sets of a group come in order."""
         for _ in steps:
             is_full = sum(group.bytes for group in self.groups) >= most_bytes
             for group in self.groups:
@@ -73,10 +73,10 @@ def read_sets(
 ) -> Iterator[pa.RecordBatch]:
     """Yield the sets of recordings as record batches; a row is a set, in the order in which sets leave.
 
-    Each of `recordings` (a file, a rosbag2 folder or a URL) is read by itself and after the one before. `config` is a
-    file's path, or what `syncrelay.config.load` gives; `group` names one of its groups and is needed where it has
-    several. `fields` maps an input to dotted paths of the fields that are wanted, None to all; `images` is "png" or
-    "jpeg" for all images, or maps an input to one of them; images that it leaves out stay raw pixels. With `raw` each
+    Each of `recordings` (a file, a rosbag2 folder or a URL) is matched by itself, one after another. `config` is a
+    path, or the result of `syncrelay.config.load`; `group` names one of its groups, and may be left out if it has one.
+    `fields` maps an input to dotted paths of its fields; an input that is not in it has all fields. `images` is "png"
+    or "jpeg" for all images, or maps an input to one of them; other images keep their raw pixels. With `raw` each
     message is its CDR bytes. A batch holds the sets of about `most_bytes` bytes of messages. The columns are those of
     syncrelay.recordings.datasets.tables. If a part of a recording is missing or cannot be read, this warns after the
     rest has been read.
@@ -102,19 +102,19 @@ def read_sets(
 
 
 def resolved(by_input: Mapping[str, T], config: Config) -> dict[str, T]:
-    """Return what is said of inputs by their full names; raises UsageError for an input that no group has."""
+    """Return a mapping of inputs with their full names as keys; raises UsageError for an input that no group has."""
     topics = [full_name(topic.topic, config) for group in config.groups for topic in group.topics]
     found: dict[str, T] = {}
-    for named, said in by_input.items():
+    for named, value in by_input.items():
         name = full_name(named, config)
         if name not in topics:
             raise UsageError(f"{named} is no input of the file{did_you_mean(named, topics)}; it has {all_of(topics)}")
-        found[name] = said
+        found[name] = value
     return found
 
 
 def require_complete(bindings: Sequence[GroupBinding]) -> None:
-    """Raise BagError where a required input has no messages in the recording: there can be no sets."""
+    """Raise BagError if the recording lacks a required input, so that there can be no sets."""
     lacking = [problem for binding in bindings if not binding.is_complete for problem in binding.problems]
     if lacking:
         raise BagError("\n".join(lacking))

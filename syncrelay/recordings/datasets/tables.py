@@ -1,10 +1,10 @@
-"""Sets of a group as rows of a table: when they were, and each input's message.
+"""Sets of a group as rows of a table: their times, and the message of each input.
 
-Columns: `set` (from 1), `stamp` (what restamping gave it, else the tick of the clock that triggered it, else the
-newest), `left_at`, `span_ns` (with the inputs' offsets), `latency_ns` (since its last message was received),
-`recording`, `stamps` and `received` (structs with a field for each input), and a column for each input, named as its
-topic, null where the set lacks an optional one. Times are timestamps of nanoseconds in UTC; where the recording's clock
-does not count from 1970, neither do they.
+Columns: `set` (from 1), `stamp` (the common stamp of restamping, else the tick of the clock that triggered the set,
+else the newest stamp), `left_at`, `span_ns` (with the inputs' offsets), `latency_ns` (from receiving the last message
+of the set), `recording`, `stamps` and `received` (structs with a field for each input), and a column for each input,
+named as its topic, which is null where the set lacks an optional input. Times are timestamps in nanoseconds, in UTC
+if the clock of the recording counts from 1970.
 """
 
 import json
@@ -33,36 +33,36 @@ METADATA: Final = b"syncrelay"
 
 _CLOUD: Final = "sensor_msgs/msg/PointCloud2"
 Fields: TypeAlias = Mapping[str, Sequence[str]]
-"""Dotted paths of the fields that are asked for, by an input's full name; all fields of one that isn't there."""
+"""Dotted paths of fields, by an input's full name. An input that is not in it has all its fields."""
 
 Images: TypeAlias = Mapping[str, ImageFormat]
-"""What an input's images become, by its full name."""
+"""The format that an input's images are encoded in, by its full name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What a table holds of messages: fields, images as PNG or JPEG, or with `raw` each payload as CDR bytes."""
+    """What of messages is in a table: which fields, images as PNG or JPEG, or with `raw` whole payloads."""
 
     fields: Fields = field(default_factory=dict)
     images: Images = field(default_factory=dict)
     other_images: ImageFormat | None = None
-    """What images of inputs that `images` does not name become; None leaves their pixels raw."""
+    """The format of the images of all other inputs; None leaves raw pixels."""
     raw: bool = False
 
 
 class SetTable:
-    """Gathers the sets of one group until they are taken as a table. It is a listener of a replay."""
+    """Gathers the sets of one group until they are taken as a table. `take` is a listener of a replay."""
 
     def __init__(self, binding: GroupBinding, content: Content, *, recording: str) -> None:
-        """`recording` is what the column of that name says.
+        """`recording` is the value of the column of that name.
 
         Raises BagError for a type that the recording does not define and for fields that it does not have.
         """
         self.binding: Final = binding
         self.bytes = 0
-        """How many bytes the messages that were gathered have."""
+        """How many bytes the gathered messages have."""
         self.count = 0
-        """How many sets there were so far."""
+        """How many sets are in tables so far."""
         self._recording = recording
         self._columns = [_InputColumn(each, content) for each in binding.inputs]
         self._offsets = [each.config.offset_ns for each in binding.inputs]
@@ -71,7 +71,7 @@ class SetTable:
         self._schema: pa.Schema | None = None
 
     def take(self, binding: GroupBinding, outcome: Outcome, now: int) -> None:
-        """Gather a set that leaves at `now`; drops and other groups' sets are none of it."""
+        """Gather a set of this group that leaves at `now`."""
         if binding is not self.binding or not isinstance(outcome, Match):
             return
         self._matches.append(outcome)
@@ -80,11 +80,11 @@ class SetTable:
 
     @property
     def gathered(self) -> int:
-        """How many sets a table would have now."""
+        """How many sets are gathered."""
         return len(self._matches)
 
     def table(self) -> pa.Table:
-        """Return the sets that were gathered, and begin anew."""
+        """Return the gathered sets, and begin anew."""
         matches, left = self._matches, self._left
         self._matches, self._left, self.bytes = [], [], 0
         numbers = range(self.count + 1, self.count + 1 + len(matches))
@@ -125,15 +125,15 @@ class SetTable:
         return max(matched) - min(matched)
 
     def _described(self, table: pa.Table) -> pa.Schema:
-        """Return the schema of this and all following tables, with what is known of the inputs."""
+        """Return the schema of this and all following tables, with metadata about the inputs."""
         group = self.binding.group
         about: dict[str, Any] = {"version": own_version(), "group": group.name, "policy": group.options.policy}
         about["inputs"] = {column.topic: column.described(table[column.topic]) for column in self._columns}
         schema = table.schema
         for index, name in enumerate(schema.names):
             if name in about["inputs"]:
-                told = {key: value for key, value in about["inputs"][name].items() if isinstance(value, str)}
-                schema = schema.set(index, schema.field(index).with_metadata(told))
+                texts = {key: value for key, value in about["inputs"][name].items() if isinstance(value, str)}
+                schema = schema.set(index, schema.field(index).with_metadata(texts))
         return schema.with_metadata({METADATA: json.dumps(about)})
 
 
@@ -155,7 +155,7 @@ class _InputColumn:
             raise BagError(f"{each.topic} is {self.type}, expected {IMAGE}: --images does not go with it")
         paths = content.fields.get(each.topic)
         if paths is not None and not paths:
-            # No field is asked for: a column of nulls, of whatever type the messages are.
+            # Without fields the column is of nulls, and messages of any type will do.
             return
         image_format = content.images.get(each.topic, content.other_images)
         if image_format is not None and self.type == IMAGE and (paths is None or "data" in paths):
@@ -176,12 +176,12 @@ class _InputColumn:
 
     @property
     def undecodable(self) -> int:
-        """How many messages are null though the set had one."""
+        """How many messages of sets could not be decoded, and are null."""
         images = 0 if self._images is None else self._images.undecodable
         return self._undecodable + images + sum(each.undecodable for each in set(self._decoders.values()))
 
     def column(self, messages: Sequence[tuple[Message | None, int | None]]) -> pa.ChunkedArray:
-        """Return the column of some messages, each with its set's common stamp."""
+        """Return a column of messages, each given with the common stamp of its set."""
         if pa.types.is_null(self.arrow):
             return pa.chunked_array([pa.nulls(len(messages))])
         payloads = [None if message is None else self._payload(message, stamp) for message, stamp in messages]
@@ -191,7 +191,7 @@ class _InputColumn:
         return found if self._images is None else self._images.encode(found, self.arrow)
 
     def described(self, column: pa.ChunkedArray) -> dict[str, Any]:
-        """Return what is known of the input: its type, and what its first message says of itself."""
+        """Return metadata about the input: its type, and the frame and the fields of its first message."""
         about: dict[str, Any] = {"type": self.type, "offset_ns": self._offset}
         first = next((row.as_py() for row in column if row.is_valid), None)
         if isinstance(first, dict):
@@ -206,7 +206,7 @@ class _InputColumn:
         decoders = set(self._decoders.values())
         if len(decoders) == 1:
             return decoders.pop().decode(payloads)
-        # Each decoder gets the rows that are its own; of the others' it gives null.
+        # Each decoder decodes its own rows and gives null for the others.
         whole: pa.Array | None = None
         for decoder in decoders:
             own = [
@@ -235,7 +235,7 @@ class _InputColumn:
         return self._decoder_of(store, channel.type, paths)
 
     def _decoder_of_missing(self, paths: Sequence[str] | None) -> Iterator[Decoder]:
-        """Yield what gives the type of a column of nulls, where ROS 2 knows the type that the file names."""
+        """Yield a decoder for the type in the file, if ROS 2 knows it: the column of nulls has its type."""
         store = typestore(self.type, None) if self.type else None
         if store is not None:
             yield self._decoder_of(store, self.type, paths)
@@ -248,8 +248,8 @@ class _InputColumn:
 
 
 def _stamp_of(match: Match) -> int:
-    told = match.tick if match.stamp is None else match.stamp
-    return max([each for each in match.stamps if each is not None]) if told is None else told
+    stamp = match.tick if match.stamp is None else match.stamp
+    return max([each for each in match.stamps if each is not None]) if stamp is None else stamp
 
 
 def _times(names: Sequence[str], rows: Sequence[Sequence[int | None]]) -> pa.StructArray:

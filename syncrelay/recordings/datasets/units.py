@@ -1,4 +1,4 @@
-"""Units of the fields of common messages, as their definitions and REP 103 say."""
+"""Units of the fields of common messages, from their definitions and REP 103."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -6,7 +6,7 @@ from typing import Final
 
 _M, _RAD, _S = "m", "rad", "s"
 
-# A message within another that has a unit of its own, such as Imu's angular_velocity, stands with the outer one.
+# The unit of a member that is a message, such as Imu's angular_velocity, is with the outer message.
 _UNITS: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
     {
         "builtin_interfaces/msg/Time": {"sec": _S, "nanosec": "ns"},
@@ -61,5 +61,5 @@ _UNITS: Final[Mapping[str, Mapping[str, str]]] = MappingProxyType(
 
 
 def unit_of(type_name: str, field: str) -> str | None:
-    """Return the unit of a message's field, None where its definition fixes none."""
+    """Return the unit of a message's field; None if its definition does not fix one."""
     return _UNITS.get(type_name, {}).get(field)
