@@ -8,8 +8,9 @@ from syncrelay.config.document import Document, SequenceNode
 from syncrelay.config.export import ACTION, ExportKeys, ExportSource, LerobotKeys, TaskTopic, sources_of
 from syncrelay.config.interfaces import PRIMITIVES, Interfaces
 from syncrelay.config.problems import Path, Problem
-from syncrelay.config.resolved import GroupConfig, TopicConfig
+from syncrelay.config.resolved import GroupConfig
 from syncrelay.config.sections import NodeConfig
+from syncrelay.config.typechecks import Wanted, check_field
 from syncrelay.config.wording import all_of, one_of, or_nearest, quoted
 
 IMAGES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -17,7 +18,10 @@ IMAGES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 
 _PATH: Final = ("export", "lerobot")
 _TEXTS: Final = frozenset(["string", "wstring"])
-_BYTES: Final = frozenset(["uint8", "byte", "char"])
+_A_TEXT: Final = Wanted(_TEXTS, "a string")
+_NUMBERS: Final = Wanted(
+    PRIMITIVES - _TEXTS, "numbers", in_arrays=PRIMITIVES - _TEXTS - {"uint8", "byte", "char"}, takes_messages=True
+)
 
 
 def check_export(
@@ -81,64 +85,31 @@ class _Sources:
         task = self.lerobot.task
         if isinstance(task, TaskTopic):
             source = ExportSource(self.node.absolute(task.topic), task.field)
-            yield from self._source(source, (*_PATH, "task", "topic"), (*_PATH, "task", "field"), _TEXTS)
+            yield from self._source(source, (*_PATH, "task", "topic"), (*_PATH, "task", "field"), _A_TEXT)
         for name, written in self.lerobot.features.items():
             path = (*_PATH, "features", name)
             is_list = isinstance(self.document.find(path), SequenceNode)
             for index, source in enumerate(sources_of(written, self.node)):
                 place = (*path, index) if is_list else path
-                yield from self._source(source, place, place, PRIMITIVES - _TEXTS)
+                yield from self._source(source, place, place, _NUMBERS)
 
-    def _source(self, source: ExportSource, topic: Path, field: Path, wanted: frozenset[str]) -> Iterator[Problem]:
+    def _source(self, source: ExportSource, topic: Path, field: Path, wanted: Wanted) -> Iterator[Problem]:
         inputs = dict(zip(self.group.inputs.names, self.group.topics, strict=True))
-        config = inputs.get(source.topic)
-        if config is None:
+        type_name = inputs[source.topic].type if source.topic in inputs else None
+        if source.topic not in inputs:
             close = self.document.nearest(source.topic, inputs)
             found = self.document.filled_in(topic) or quoted(source.topic)
             text = f"{found} is not an input of the group {self.group.name}{or_nearest(close)}"
             yield self.document.problem(topic, text, code="bad_value")
-        elif config.type is not None:
-            text = self._fault(source, config, wanted)
-            if text:
-                if filled_in := self.document.filled_in(field):
-                    text = f"expected a field of {config.type} of another type, found {filled_in}"
-                yield self.document.problem(field, text, code="no_such_field", subject=config.type)
-
-    def _fault(self, source: ExportSource, config: TopicConfig, wanted: frozenset[str]) -> str:
-        """Say what is wrong with a source whose type is known."""
-        type_name = config.type or ""
-        if source.field is None:
-            if type_name in IMAGES:
-                return ""
-            return (
+        elif type_name is not None and source.field is None and type_name not in IMAGES:
+            text = (
                 f"{source.topic} is {type_name}, expected {one_of(IMAGES)}; for numbers write their field too,"
                 " TOPIC:FIELD"
             )
-        steps = source.field.split(".")
-        return "" if self.interfaces is None else _field_fault(type_name, steps, wanted, self.interfaces, self.document)
-
-
-def _field_fault(
-    type_name: str, steps: Sequence[str], wanted: frozenset[str], interfaces: Interfaces, document: Document
-) -> str:
-    """Follow a path of fields; say where it misses what is wanted, nothing where that cannot be told."""
-    first, *rest = steps
-    fields = interfaces.fields(type_name)
-    if fields is None:
-        return ""
-    by_name = {field.name: field for field in fields}
-    field = by_name.get(first)
-    if field is None:
-        close = document.nearest(first, by_name)
-        return f"{type_name} has no field {quoted(first)}{or_nearest(close) or f', it has {one_of(by_name)}'}"
-    if rest and not field.is_array and field.type not in PRIMITIVES:
-        return _field_fault(field.type, rest, wanted, interfaces, document)
-    found = f"{field.type}[]" if field.is_array else field.type
-    if rest:
-        return f"{quoted(first)} of {type_name} is {found}, and `{rest[0]}` is looked for in it"
-    is_text_wanted = wanted == _TEXTS
-    is_fit = field.type in wanted and not (field.is_array and (is_text_wanted or field.type in _BYTES))
-    # Of a message, all its fields are taken: the recording tells whether they are numbers.
-    if is_fit or (field.type not in PRIMITIVES and not field.is_array and not is_text_wanted):
-        return ""
-    return f"{quoted(first)} of {type_name} is {found}, expected {'a string' if is_text_wanted else 'numbers'}"
+            if filled_in := self.document.filled_in(field):
+                text = f"expected a topic of images, or TOPIC:FIELD, found {filled_in}"
+            yield self.document.problem(field, text, code="no_such_field", subject=type_name)
+        elif type_name is not None and source.field is not None and self.interfaces is not None:
+            yield from check_field(
+                type_name, field, source.field, wanted, document=self.document, interfaces=self.interfaces
+            )

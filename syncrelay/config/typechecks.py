@@ -46,7 +46,9 @@ def _check_topic(
             yield document.problem(of_type, text, code="not_checked", severity=Severity.NOTE, subject=type_name)
             return
         for each in asked:
-            yield from _check_field(type_name, each, document, interfaces)
+            yield from check_field(
+                type_name, each.path, each.steps, each.wanted, document=document, interfaces=interfaces
+            )
         if goes_by_header and not _begins_with_header(fields):
             yield _no_header(group, type_name, path, fields, document=document, interfaces=interfaces)
 
@@ -160,11 +162,19 @@ def _time_paths(fields: Sequence[Field], interfaces: Interfaces, *, depth: int =
         yield from (f"{field.name}.{path}" for path in _time_paths(below or (), interfaces, depth=depth - 1))
 
 
-class _Wanted(NamedTuple):
-    """The types that a field may have, and what they are called."""
+class Wanted(NamedTuple):
+    """The types that a field may have and what they are called; and those of which it may be an array."""
 
     types: frozenset[str]
     name: str
+    in_arrays: frozenset[str] = frozenset()
+    takes_messages: bool = False
+    """Whether a message will do too: what is in it, the recording tells."""
+
+    def takes(self, field: Field) -> bool:
+        """Tell whether a field has a type that is wanted."""
+        is_message = field.type not in PRIMITIVES and self.takes_messages
+        return field.type in self.in_arrays if field.is_array else field.type in self.types or is_message
 
 
 class _AskedField(NamedTuple):
@@ -172,49 +182,50 @@ class _AskedField(NamedTuple):
 
     path: Path
     steps: str
-    wanted: _Wanted
+    wanted: Wanted
 
 
-_A_TIME: Final = _Wanted(frozenset([TIME]), TIME)
-_A_KEY: Final = _Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a string or a time")
+_A_TIME: Final = Wanted(frozenset([TIME]), TIME)
+_A_KEY: Final = Wanted(PRIMITIVES - {"wstring"} | {TIME}, "a number, a string or a time")
 
 
-def _check_field(type_name: str, field: _AskedField, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
-    text = _field_fault(type_name, (), field.steps.split("."), field.wanted, interfaces, document=document)
+def check_field(
+    type_name: str, path: Path, steps: str, wanted: Wanted, *, document: Document, interfaces: Interfaces
+) -> Iterator[Problem]:
+    """Yield what is wrong with the fields that the file names at `path`. A type without its .msg file is believed."""
+    text = _field_fault(type_name, (), steps.split("."), wanted, interfaces, document=document)
     if text is not None:
-        if filled_in := document.filled_in(field.path):
-            text = f"expected a field of {type_name} that is {field.wanted.name}, found {filled_in}"
-        yield document.problem(field.path, text, code="no_such_field", subject=type_name)
+        if filled_in := document.filled_in(path):
+            text = f"expected a field of {type_name} that is {wanted.name}, found {filled_in}"
+        yield document.problem(path, text, code="no_such_field", subject=type_name)
 
 
 def _field_fault(
     type_name: str,
     above: tuple[str, ...],
     steps: Sequence[str],
-    wanted: _Wanted,
+    wanted: Wanted,
     interfaces: Interfaces,
     *,
     document: Document,
 ) -> str | None:
-    """Follow the steps of a path; say where it misses what is wanted. A type without .msg is believed."""
     first, *rest = steps
     fields = interfaces.fields(type_name)
     if fields is None:
-        return None if "/" in type_name else f"{quoted(above[-1])} is {type_name}, which has no fields"
+        return None
     by_name = {field.name: field for field in fields}
     field = by_name.get(first)
     if field is None:
         close = document.nearest(first, by_name)
         hint = f"did you mean `{'.'.join((*above, close, *rest))}`?" if close else f"it has {one_of(by_name)}"
         return f"{type_name} has no field {quoted(first)}, {hint}"
-    if field.is_array:
-        return f"{quoted(first)} of {type_name} is an array, expected one {wanted.name.removeprefix('a ')}"
+    found = f"{quoted(first)} of {type_name} is {field.type}{'[]' if field.is_array else ''}"
+    if rest and (field.is_array or field.type in PRIMITIVES):
+        return f"{found}, which has no field {quoted(rest[0])}"
     if rest:
         return _field_fault(field.type, (*above, first), rest, wanted, interfaces, document=document)
-    if field.type in wanted.types:
-        return None
-    hint = _time_below((*above, first), field, interfaces)
-    return f"{quoted(first)} of {type_name} is {field.type}, expected {wanted.name}{hint}"
+    hint = _time_below((*above, first), field, interfaces) if TIME in wanted.types else ""
+    return None if wanted.takes(field) else f"{found}, expected {wanted.name}{hint}"
 
 
 def _time_below(path: tuple[str, ...], field: Field, interfaces: Interfaces) -> str:
