@@ -1,21 +1,19 @@
 """What another file changes, key by key, and what a reload would make of it, with the values as they are written."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Final
 
 from syncrelay.config.document import EXTENSION, MappingNode
+from syncrelay.config.keys import Keys
 from syncrelay.config.load import Config
 from syncrelay.config.names_in_graph import MANIFEST_TYPE, manifest_topic
 from syncrelay.config.problems import Path
 from syncrelay.config.reload import Exchange, Subscription, exchange, needs_restart
-from syncrelay.config.resolved import GroupConfig, TopicConfig
-
-_KEYS: Final = {"offset_ns": "offset", "min_period_ns": "min_period", "tolerance": "max_age"}
-"""What the file calls those of TopicConfig that it calls otherwise."""
+from syncrelay.config.resolved import GroupConfig
 
 _FROM_ELSEWHERE: Final = ("output", "type")
-"""What a topic may have although its own keys do not say so: from output_prefix, or from another group."""
+"""Keys of a topic that output_prefix or another group may say for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,29 +132,28 @@ class _Pair:
         )
 
     def _options(self) -> Iterator[KeyChange]:
-        before, now = self.before.options, self.now.options
-        for key in dict.fromkeys([*type(before).model_fields, *type(now).model_fields]):
-            if key != "topics" and getattr(before, key, None) != getattr(now, key, None):
-                path = (*self.now.path, key)
-                old, new = self.old.written(path), self.new.written(path)
-                # With another policy, keys come and go that nobody has written.
-                if old != new:
-                    yield KeyChange(key, old, new)
+        path = self.now.path
+        yield from self._keys(self.before.options, self.now.options, path, path)
 
     def _topic(self, name: str) -> Iterator[KeyChange]:
         at_before, at = self.before.inputs.names.index(name), self.now.inputs.names.index(name)
-        before, now = self.before.topics[at_before], self.now.topics[at]
-        for field in fields(TopicConfig):
-            was, is_now = getattr(before, field.name), getattr(now, field.name)
-            if field.name == "topic" or was == is_now:
-                continue
-            key = _KEYS.get(field.name, field.name)
-            paths = ((*self.now.path, "topics", index, key) for index in (at_before, at))
-            old, new = (config.written(path) for config, path in zip((self.old, self.new), paths, strict=True))
-            if key in _FROM_ELSEWHERE:
-                old, new = old or was, new or is_now
-            if old != new:
+        old_path, path = ((*self.now.path, "topics", index) for index in (at_before, at))
+        for change in self._keys(self.before.options.topics[at_before], self.now.options.topics[at], old_path, path):
+            if change.key not in _FROM_ELSEWHERE:
+                yield replace(change, topic=name)
+        for key in _FROM_ELSEWHERE:
+            was, is_now = getattr(self.before.topics[at_before], key), getattr(self.now.topics[at], key)
+            if was != is_now:
+                old, new = self.old.written((*old_path, key)) or was, self.new.written((*path, key)) or is_now
                 yield KeyChange(key, old, new, topic=name)
+
+    def _keys(self, before: Keys, now: Keys, old_path: Path, path: Path) -> Iterator[KeyChange]:
+        for key in dict.fromkeys([*type(before).model_fields, *type(now).model_fields]):
+            if key not in ("topic", "topics") and getattr(before, key, None) != getattr(now, key, None):
+                old, new = self.old.written((*old_path, key)), self.new.written((*path, key))
+                # With another policy, keys come and go that nobody has written.
+                if old != new:
+                    yield KeyChange(key, old, new)
 
 
 def _subscriptions(old: Config, new: Config) -> Endpoints:
