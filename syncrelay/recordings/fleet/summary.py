@@ -1,6 +1,6 @@
 """What a fleet's table of facts says at first sight: one screen of text."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import nsmallest
@@ -23,16 +23,6 @@ _MOST: Final = 3
 
 
 @dataclass(slots=True)
-class _Gain:
-    """How many rows a value was suggested for, and what all values suggested for these rows give together."""
-
-    rows: int = 0
-    now: int = 0
-    then: int = 0
-    possible: int = 0
-
-
-@dataclass(slots=True)
 class Summary:
     """Takes the rows of a fleet in any order, and says what is in them in no more than 22 lines."""
 
@@ -44,7 +34,7 @@ class Summary:
     _shares: list[float] = field(default_factory=list)
     _robots: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     _codes: defaultdict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
-    _values: defaultdict[str, _Gain] = field(default_factory=lambda: defaultdict(_Gain))
+    _values: Counter[str] = field(default_factory=Counter)
 
     def take(self, row: FleetRow) -> None:
         """Take in a row."""
@@ -61,11 +51,7 @@ class Summary:
             self._codes[code].add(row.recording)
         for each in row.suggestions:
             at = f" at {each.topic}" if each.topic else ""
-            gain = self._values[f"{row.group_name}: `{each.key}: {each.value}`{at}"]
-            gain.rows += 1
-            gain.now += row.matched_sets or 0
-            gain.then += row.suggested_sets or 0
-            gain.possible += row.possible_sets or 0
+            self._values[f"{row.group_name}: `{each.key}: {each.value}`{at}"] += 1
         if row.robot is not None:
             # A robot without a share counts as one all the same.
             self._robots[row.robot].extend([] if row.share is None else [row.share])
@@ -114,13 +100,9 @@ class Summary:
             "most frequent findings, by recordings",
             [f"{-count:>6}  {code}" for count, code in codes[:_MOST]],
         )
-        values = sorted(self._values.items(), key=lambda each: (-each[1].rows, each[0]))
+        values = sorted(self._values.items(), key=lambda each: (-each[1], each[0]))
         yield from _section(
-            "most frequent suggestions, by rows, and what these rows give with all of theirs",
-            [
-                f"{gain.rows:>6}  {value}: {gain.then} of {gain.possible} sets, not {gain.now}"
-                for value, gain in values[:_MOST]
-            ],
+            "most frequent suggestions, by rows", [f"{rows:>6}  {value}" for value, rows in values[:_MOST]]
         )
 
 
