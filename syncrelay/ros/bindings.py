@@ -1,8 +1,9 @@
 """Which groups run, and on which topics: how others take their place while messages flow."""
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, TypeAlias
 
 from syncrelay.config import TopicConfig
 from syncrelay.config.names_in_graph import manifest_topic
@@ -13,11 +14,14 @@ from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import ReloadError
 from syncrelay.explain import Endpoint
-from syncrelay.ros.entities import Entities, Purpose, RefusedError
-from syncrelay.ros.inputs import TopicInput
-from syncrelay.ros.listeners import Listeners, PublishersOf
-from syncrelay.ros.outputs import InputBinding
+from syncrelay.ros.entities import Entities, Purpose, RefusedError, has_subscriber
+from syncrelay.ros.inputs import InputBinding, TopicInput
 from syncrelay.sync import DropReason
+
+# A subscriber that is restarted, or that waits for publishers of another QoS, is back by then.
+_GRACE_S: Final = 2.0
+
+PublishersOf: TypeAlias = Callable[[GroupRelay], Sequence[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +36,7 @@ class GroupBinding:
         """What keeps the group from giving sets, in words."""
         if self.group.failure is not None:
             return "a reload or restart: a bug stopped it"
-        required = [each for each in self.inputs if self.group.config.topics[each.index].required]
+        required = [each for each in self.inputs if self.group.config.topics[each.output.index].required]
         missing = ", ".join(filter(None, (each.missing for each in required)))
         if self.group.sleeps and self.publishers and not missing:
             return f"a subscriber of {one_of(each.topic_name for each in self.publishers)}"
@@ -41,7 +45,42 @@ class GroupBinding:
     @property
     def publishers(self) -> list[Any]:
         """Those whose subscribers keep a lazy group awake. On the main thread."""
-        return [each.publisher for each in self.inputs if each.publisher is not None]
+        return [each.output.publisher for each in self.inputs if each.output.publisher is not None]
+
+
+class Listeners:
+    """Counts the subscribers of lazy groups. On the main thread."""
+
+    def __init__(self, loop: ReceiveLoop) -> None:
+        self._loop = loop
+        self._unheard_since: dict[GroupRelay, float] = {}
+
+    def count(self, lazy: Sequence[GroupBinding], more: PublishersOf) -> None:
+        """Wake the groups that have a subscriber, and let sleep those that have had none for a while.
+
+        Beside those of their outputs, subscribers of `more` of a group's publishers count.
+        """
+        now = time.monotonic()
+        unheard = [each for each in lazy if not any(map(has_subscriber, (*each.publishers, *more(each.group))))]
+        self._unheard_since = {each.group: self._unheard_since.get(each.group, now) for each in unheard}
+        for binding in lazy:
+            group, since = binding.group, self._unheard_since.get(binding.group)
+            if since is None and group.sleeps:
+                self._switch(binding, group.wake)
+            elif since is not None and not group.sleeps and now - since >= _GRACE_S:
+                self._switch(binding, group.sleep)
+
+    def _switch(self, binding: GroupBinding, switch: Callable[[], None]) -> None:
+        """Have all its inputs be fed, or not, between two messages; then have their topics subscribed, or not."""
+
+        def turn() -> None:
+            switch()
+            for each in binding.inputs:
+                each.topic.outputs.feed()
+
+        self._loop.call(turn).result()
+        for each in binding.inputs:
+            each.topic.try_again()
 
 
 class GroupBindings:
@@ -131,7 +170,7 @@ class GroupBindings:
         self, ended: Sequence[GroupBinding], unused: Sequence[TopicInput], begun: Sequence[InputBinding]
     ) -> None:
         """Make the publishers of those who begin, and exchange the groups."""
-        ending = {each.publisher for each in _inputs_of(ended)} | {topic.entity for topic in unused}
+        ending = {each.output.publisher for each in _inputs_of(ended)} | {topic.entity for topic in unused}
         try:
             late = [each for each in begun if not self._has_publisher(each, ending)]
             if late:
@@ -146,9 +185,9 @@ class GroupBindings:
     def _has_publisher(self, binding: InputBinding, ending: set[Any]) -> bool:
         """Make a publisher; False where it can be made only when these end. Raises RefusedError."""
         try:
-            binding.topic.make_publisher(binding)
+            binding.topic.make_publisher(binding.output)
         except RefusedError:
-            if not self._entities.frees(binding.output, ending):
+            if not self._entities.frees(binding.output.topic, ending):
                 raise
             return False
         return True
@@ -158,26 +197,27 @@ class GroupBindings:
     ) -> None:
         """End what holds the topics of those who are late, then make their publishers, or else the old ones again."""
         ending = _inputs_of(ended)
-        wanted = {self._node.resolve_topic_name(each.output) for each in late}
+        wanted = {self._node.resolve_topic_name(each.output.topic) for each in late}
         self._loop.call(lambda: _suspend(ended)).result()
         try:
-            self._end_publishers([each for each in ending if each.publisher and each.publisher.topic_name in wanted])
+            publishers = [(each, each.output.publisher) for each in ending if each.output.publisher]
+            self._end_publishers([each for each, publisher in publishers if publisher.topic_name in wanted])
             for topic in unused:
                 if topic.name in wanted:
                     topic.close()
             for each in late:
-                each.topic.make_publisher(each)
+                each.topic.make_publisher(each.output)
         except BaseException:
             self._end_publishers(late)
             for each in ending:
-                each.topic.make_publisher_or_report(each)
+                each.topic.make_publisher_or_report(each.output)
             self._loop.call(lambda: _resume(ended)).result()
             raise
 
     def _end_publishers(self, bindings: Sequence[InputBinding]) -> None:
         for each in bindings:
-            if each.publisher is not None:
-                publisher, each.publisher = each.publisher, None
+            if (publisher := each.output.publisher) is not None:
+                each.output.publisher = None
                 self._entities.end(publisher)
 
     def _binding(self, group: GroupRelay, topics: dict[Subscription, TopicInput]) -> GroupBinding:
@@ -223,11 +263,11 @@ def _inputs_of(bindings: Sequence[GroupBinding]) -> list[InputBinding]:
 def _switch(ended: Sequence[GroupBinding], begun: Sequence[InputBinding]) -> None:
     """End some groups and begin others."""
     for each in _inputs_of(ended):
-        each.topic.outputs.detach(each.group)
+        each.topic.outputs.detach(each.output.group)
     for binding in ended:
         binding.group.flush(DropReason.SHUTDOWN)
     for each in begun:
-        each.topic.outputs.attach(each)
+        each.topic.outputs.attach(each.output)
 
 
 def _suspend(ended: Sequence[GroupBinding]) -> None:
@@ -239,6 +279,6 @@ def _suspend(ended: Sequence[GroupBinding]) -> None:
 def _resume(ended: Sequence[GroupBinding]) -> None:
     """Have groups that were to end go on, by the publishers that they have now."""
     for each in _inputs_of(ended):
-        each.topic.outputs.connect([each])
+        each.topic.outputs.connect([each.output])
     for binding in ended:
         binding.group.resume()

@@ -211,7 +211,7 @@ class Groups:
                 continue
             self._announced[name] = waiting_for
             # The names after all remaps, as the graph shows them.
-            pairs = [(each.topic.name, self._node.resolve_topic_name(each.output)) for each in binding.inputs]
+            pairs = [(each.topic.name, self._node.resolve_topic_name(each.output.topic)) for each in binding.inputs]
             flow = ", ".join(f"{topic} -> {output}" for topic, output in pairs)
             text = f"waiting for {waiting_for}" if waiting_for else f"running: {flow}"
             _LOG.info("%s: %s", name, text, extra={"group": name})

@@ -4,6 +4,7 @@ import importlib
 import logging
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -16,8 +17,7 @@ from syncrelay.errors import TypeImportError
 from syncrelay.explain import Endpoint, Refusal
 from syncrelay.ros import graph
 from syncrelay.ros.entities import Entities, RefusedError
-from syncrelay.ros.handlers import handler
-from syncrelay.ros.outputs import InputBinding, Outputs
+from syncrelay.ros.outputs import Output, Outputs, handler
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.types import SettlingType, import_type, name_of
 
@@ -75,7 +75,7 @@ class TopicInput:
             or self._failure is not None
             or (self._message_type is None and (self.type is not None or bool(self.publishers)))
             or not all(each.is_named for each in self.publishers)
-            or any(binding.not_readable for binding in self.outputs.bindings)
+            or any(output.not_readable for output in self.outputs.all)
             or (self._is_refused and self._may_try)
         )
 
@@ -86,7 +86,7 @@ class TopicInput:
     @property
     def _is_wanted(self) -> bool:
         """Whether a group that uses it is awake."""
-        return not all(binding.group.sleeps for binding in self.outputs.bindings)
+        return not all(output.group.sleeps for output in self.outputs.all)
 
     @property
     def _may_try(self) -> bool:
@@ -96,29 +96,29 @@ class TopicInput:
     def _publisher_words(self) -> str:
         return f"a publisher of {self.name}{f' ({self.type})' if self.type else ''}"
 
-    def bind(self, group: GroupRelay, index: int) -> InputBinding:
+    def bind(self, group: GroupRelay, index: int) -> "InputBinding":
         """Make ready to feed an input of a group; raises TypeImportError for a field that the type does not have."""
-        binding = InputBinding(group, index, self)
+        output = Output(group, index)
         if self._message_type is not None:
-            binding.handler = handler(group, index, self._message_type)
-        return binding
+            output.handler = handler(group, index, self._message_type)
+        return InputBinding(self, output)
 
     def keep_type(self, publisher: Endpoint) -> None:
         """Have the type that was taken from this publisher before, if the file has none."""
         if self.type is None:
             self.type, self.type_from = publisher.type, publisher
 
-    def make_publisher(self, binding: InputBinding) -> None:
+    def make_publisher(self, output: Output) -> None:
         """Make the publisher of one that is bound, if its QoS is known. Raises RefusedError."""
         if self.profile is not None:
-            self.outputs.make_publisher(binding, self._message_type, self.profile)
+            self.outputs.make_publisher(output, self._message_type, self.profile)
 
-    def make_publisher_or_report(self, binding: InputBinding) -> None:
+    def make_publisher_or_report(self, output: Output) -> None:
         """Make its publisher, or log that DDS refuses it, and try again later."""
         try:
-            self.make_publisher(binding)
+            self.make_publisher(output)
         except RefusedError as error:
-            binding.publisher_refusal = error.refusal
+            output.refusal = error.refusal
             self._put_off(error.refusal)
 
     def close(self) -> None:
@@ -160,17 +160,17 @@ class TopicInput:
             raise error
 
     def _find_type(self) -> str | None:
-        lacking = [binding for binding in self.outputs.bindings if binding.handler is None]
+        lacking = [output for output in self.outputs.all if output.handler is None]
         if self._message_type is not None and not lacking:
             return None
         importlib.invalidate_caches()
         if self._message_type is None and (missing := self._import_type()):
             return missing
-        for binding in lacking:
-            binding.find_handler(self._message_type)
-            if binding.not_readable:
-                self._say_once(logging.ERROR, f"{binding.group.config.name}: {self.name}: {binding.not_readable}")
-        if self.outputs.source is not None and any(binding.handler for binding in lacking):
+        for output in lacking:
+            output.find_handler(self._message_type)
+            if output.not_readable:
+                self._say_once(logging.ERROR, f"{output.group.config.name}: {self.name}: {output.not_readable}")
+        if self.outputs.source is not None and any(output.handler for output in lacking):
             self._loop.call(self.outputs.feed).result()
         return None
 
@@ -237,10 +237,10 @@ class TopicInput:
             self._refused(error.refusal)
             return
         self.refusal = None
-        lacking = [binding for binding in self.outputs.bindings if binding.publisher is None]
-        for binding in lacking:
-            self.make_publisher_or_report(binding)
-        if any(binding.publisher is not None for binding in lacking):
+        lacking = [output for output in self.outputs.all if output.publisher is None]
+        for output in lacking:
+            self.make_publisher_or_report(output)
+        if any(output.publisher is not None for output in lacking):
             self._loop.call(lambda: self.outputs.connect(lacking)).result()
 
     def _refusal(self, why: str) -> Refusal:
@@ -259,7 +259,7 @@ class TopicInput:
 
         Raises RefusedError, with nothing changed. An output that DDS does not make again stays as it was.
         """
-        is_wanted, publishers, refused = self._is_wanted, dict[InputBinding, Any](), list[Refusal]()
+        is_wanted, publishers, refused = self._is_wanted, dict[Output, Any](), list[Refusal]()
         subscription = self._entities.subscription(self._message_type, self._topic, profile) if is_wanted else None
         if profile != self.profile:
             publishers, refused = self.outputs.remake(self._message_type, profile)
@@ -287,7 +287,7 @@ class TopicInput:
             if entity is not None:
                 self._entities.end(entity)
 
-    def _swap(self, source: Source | None, publishers: Mapping[InputBinding, Any]) -> list[Any]:
+    def _swap(self, source: Source | None, publishers: Mapping[Output, Any]) -> list[Any]:
         """Receive from another source, or none, publish by others; the publishers that end. On the loop's thread."""
         # First what may fail.
         if source is not None:
@@ -301,6 +301,28 @@ class TopicInput:
     def _fail(self, error: Exception) -> None:
         """Note that the source gives no more messages. On the loop's thread."""
         self.outputs.source, self._failure, self._force_poll = None, error, True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InputBinding:
+    """An input of a group: the topic that feeds it, and the way its messages leave."""
+
+    topic: TopicInput
+    output: Output
+
+    @property
+    def refusal(self) -> Refusal | None:
+        """What DDS refuses that it needs."""
+        return self.topic.refusal or self.output.refusal
+
+    @property
+    def missing(self) -> str | None:
+        """What it waits for, in words."""
+        if self.topic.missing:
+            return self.topic.missing
+        if self.output.not_readable:
+            return f"the field of {self.topic.name} that the file names"
+        return f"DDS to let it {self.refusal.verb} {self.refusal.topic}" if self.refusal else None
 
 
 def _loss_counter(subscription: Any) -> Any:

@@ -1,59 +1,41 @@
-"""The inputs of groups that one topic feeds, and the publishers by which its messages leave."""
+"""What one topic feeds: handlers that read stamps and keys for groups, and publishers by which the messages leave."""
 
 import time
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rclpy.duration import Duration
 
+from syncrelay.cdr import has_place_for_stamp, read_stamp
 from syncrelay.dataflow.backend import Deliver, Outlet, Payload, RclBackend, Source
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.errors import TypeImportError
 from syncrelay.explain import Refusal
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
-from syncrelay.ros.handlers import handler
 from syncrelay.ros.qos import output_profile
-from syncrelay.ros.types import begins_with_header
-
-if TYPE_CHECKING:
-    from syncrelay.ros.inputs import TopicInput
+from syncrelay.ros.types import begins_with_header, stamp_reader, value_reader
 
 
-class InputBinding:
-    """An input of a group: the topic that feeds it, what handles its messages, and where they leave."""
+class Output:
+    """An input of a group on its way out: what handles its messages, and the publisher by which they leave."""
 
-    __slots__ = ("_outlet", "group", "handler", "index", "not_readable", "publisher", "publisher_refusal", "topic")
+    __slots__ = ("_outlet", "group", "handler", "index", "not_readable", "publisher", "refusal")
 
-    def __init__(self, group: GroupRelay, index: int, topic: "TopicInput") -> None:
+    def __init__(self, group: GroupRelay, index: int) -> None:
         self.group = group
         self.index = index
-        self.topic = topic
         self.handler: Deliver | None = None
-        self.publisher: Any = None
-        self.publisher_refusal: Refusal | None = None
-        """Why DDS does not make its publisher. Until it does, nothing is fed: sets would lack the message."""
         self.not_readable: str | None = None
         """Why the stamp or key that the file names cannot be read from messages of the type."""
+        self.publisher: Any = None
+        self.refusal: Refusal | None = None
+        """Why DDS does not make its publisher. Until it does, nothing is fed: sets would lack the message."""
         self._outlet: tuple[Any, Outlet] | None = None
 
     @property
-    def output(self) -> str:
+    def topic(self) -> str:
         """Where its messages leave, as the file has it."""
         return self.group.config.topics[self.index].output
-
-    @property
-    def refusal(self) -> Refusal | None:
-        """What DDS refuses that it needs."""
-        return self.topic.refusal or self.publisher_refusal
-
-    @property
-    def missing(self) -> str | None:
-        """What it waits for, in words."""
-        if self.topic.missing:
-            return self.topic.missing
-        if self.not_readable:
-            return f"the field of {self.topic.name} that the file names"
-        return f"DDS to let it {self.refusal.verb} {self.refusal.topic}" if self.refusal else None
 
     def outlet(self, backend: RclBackend) -> Outlet:
         """Return the outlet of its publisher: the same for as long as that is, so that it counts what was sent."""
@@ -73,7 +55,7 @@ class Outputs:
     """Feeds the inputs of groups from one topic. On the main thread, where nothing else is said."""
 
     def __init__(self, *, entities: Entities, backend: RclBackend) -> None:
-        self.bindings: list[InputBinding] = []
+        self.all: list[Output] = []
         self.source: Source | None = None
         """What feeds them; None as long as nothing does."""
         self.largest = 0
@@ -86,69 +68,69 @@ class Outputs:
     @property
     def are_refused(self) -> bool:
         """Whether DDS does not make one of the publishers."""
-        return any(binding.publisher_refusal for binding in self.bindings)
+        return any(output.refusal for output in self.all)
 
-    def make_publisher(self, binding: InputBinding, message_type: Any, profile: Any) -> None:
+    def make_publisher(self, output: Output, message_type: Any, profile: Any) -> None:
         """Make the publisher of one that has none, unless nothing is to be published. Raises RefusedError."""
-        if self._publishes and binding.publisher is None:
-            binding.publisher = self._made(binding, message_type, profile)
-            binding.publisher_refusal = None
+        if self._publishes and output.publisher is None:
+            output.publisher = self._made(output, message_type, profile)
+            output.refusal = None
 
-    def remake(self, message_type: Any, profile: Any) -> tuple[dict[InputBinding, Any], list[Refusal]]:
+    def remake(self, message_type: Any, profile: Any) -> tuple[dict[Output, Any], list[Refusal]]:
         """Make publishers of another QoS. What DDS refuses stays as it was."""
-        made: dict[InputBinding, Any] = {}
+        made: dict[Output, Any] = {}
         refused = []
-        for binding in self.bindings if self._publishes else ():
+        for output in self.all if self._publishes else ():
             try:
-                made[binding] = self._made(binding, message_type, profile)
+                made[output] = self._made(output, message_type, profile)
             except RefusedError as error:
-                binding.publisher_refusal = None if binding.publisher else error.refusal
+                output.refusal = None if output.publisher else error.refusal
                 # The error itself would hold on to its callers, and so to what they end.
                 refused.append(error.refusal)
         return made, refused
 
-    def _made(self, binding: InputBinding, message_type: Any, profile: Any) -> Any:
-        return self._entities.publisher(message_type, binding.output, output_profile(profile))
+    def _made(self, output: Output, message_type: Any, profile: Any) -> Any:
+        return self._entities.publisher(message_type, output.topic, output_profile(profile))
 
     def wait_until_acknowledged(self, deadline: int) -> None:
         """Give reliable subscribers until `deadline`, by time.monotonic_ns(), to get what was published last."""
-        for binding in self.bindings:
-            if binding.publisher is not None:
+        for output in self.all:
+            if output.publisher is not None:
                 left = max(0, deadline - time.monotonic_ns())
-                binding.publisher.wait_for_all_acked(Duration(nanoseconds=left))
+                output.publisher.wait_for_all_acked(Duration(nanoseconds=left))
 
     # These run on the loop's thread, or before that runs.
 
-    def attach(self, binding: InputBinding) -> None:
+    def attach(self, output: Output) -> None:
         """Feed it from now on."""
-        self.bindings.append(binding)
-        self.connect([binding])
+        self.all.append(output)
+        self.connect([output])
 
     def detach(self, group: GroupRelay) -> None:
         """Feed a group no longer."""
-        self.bindings = [binding for binding in self.bindings if binding.group is not group]
+        self.all = [output for output in self.all if output.group is not group]
         self.feed()
 
-    def exchange(self, source: Source | None, publishers: Mapping[InputBinding, Any]) -> list[Any]:
+    def exchange(self, source: Source | None, publishers: Mapping[Output, Any]) -> list[Any]:
         """Be fed by another source, and publish by these publishers; those that they replace."""
         self.source = source
-        old = [binding.publisher for binding in publishers]
-        for binding, publisher in publishers.items():
-            binding.publisher, binding.publisher_refusal = publisher, None
+        old = [output.publisher for output in publishers]
+        for output, publisher in publishers.items():
+            output.publisher, output.refusal = publisher, None
         self.connect(list(publishers))
         return old
 
-    def connect(self, bindings: Sequence[InputBinding]) -> None:
+    def connect(self, outputs: Sequence[Output]) -> None:
         """Publish by the publishers that they have now, and feed those who lack none."""
-        for binding in bindings:
-            if binding.publisher is not None:
-                restamped = begins_with_header(binding.publisher.msg_type)
-                binding.group.connect(binding.index, binding.outlet(self._backend), restamped=restamped)
+        for output in outputs:
+            if output.publisher is not None:
+                restamped = begins_with_header(output.publisher.msg_type)
+                output.group.connect(output.index, output.outlet(self._backend), restamped=restamped)
         self.feed()
 
     def feed(self) -> None:
         """Feed those that have a handler, whose messages can leave, and whose group is awake."""
-        fed = [each for each in self.bindings if not each.publisher_refusal and not each.group.sleeps]
+        fed = [each for each in self.all if not each.refusal and not each.group.sleeps]
         self._handlers = [each.handler for each in fed if each.handler]
         if self.source is None:
             return
@@ -165,3 +147,32 @@ class Outputs:
         """Feed all of them a message."""
         for handle in self._handlers:
             handle(payload)
+
+
+def handler(group: GroupRelay, index: int, message_type: Any) -> Deliver:
+    """Return what handles messages of a type for an input of a group; raises TypeImportError for a missing field.
+
+    What it returns raises nothing: an exception stops the group, and no other group on the topic.
+    """
+    topic = group.config.topics[index]
+    read = stamp_reader(topic.stamp, message_type)
+    if read is read_stamp and topic.key is None:
+        return group.flow.by_header(index, group.fail)
+    read_key = None if topic.key is None else value_reader(message_type, topic.key)
+    has_place = None
+    if group.config.restamp is not None and topic.stamp != "header" and begins_with_header(message_type):
+        has_place = has_place_for_stamp
+
+    def handle(payload: Payload) -> None:
+        try:
+            content = payload.content()
+            stamp = read(content) if read else payload.received
+            key = read_key(content) if read_key else None
+            # Without a key, or without a place for the common stamp, a message counts as malformed.
+            if (read_key and key is None) or (has_place and not has_place(content)):
+                stamp = None
+            group.flow.receive(index, payload, stamp, key)
+        except Exception as error:  # noqa: BLE001  it stops the group alone
+            group.fail(error)
+
+    return handle

@@ -9,7 +9,7 @@ from syncrelay.dataflow.observers import Losses
 from syncrelay.explain import Endpoint, GraphSnapshot, InputGraph, Refusal
 from syncrelay.ros import graph
 from syncrelay.ros.entities import Purpose
-from syncrelay.ros.outputs import InputBinding
+from syncrelay.ros.inputs import InputBinding
 
 
 class _Around(NamedTuple):
@@ -69,7 +69,7 @@ class Surroundings:
             rivals_since=self._rivals_since.get(binding, 0),
             alike=around.alike,
             not_importable=topic.not_importable,
-            not_readable=binding.not_readable,
+            not_readable=binding.output.not_readable,
             refusal=binding.refusal or _unpublished(binding, around.output),
             lost=losses.recent,
             lost_in_all=losses.total,
@@ -79,10 +79,10 @@ class Surroundings:
 
     def _poll(self, binding: InputBinding) -> _Around:
         node, topic = self._node, binding.topic
-        output = node.resolve_topic_name(binding.output)
+        output = node.resolve_topic_name(binding.output.topic)
         publishers = node.get_publishers_info_by_topic(output)
         # For one that only observes, the relay itself, which has its name, is no rival.
-        own = int(binding.publisher is not None) if self._publishes else len(publishers)
+        own = int(binding.output.publisher is not None) if self._publishes else len(publishers)
         rivals = graph.others(publishers, than=self._relay_name, own=own)
         if rivals:
             self._rivals_since.setdefault(binding, time.time_ns())
@@ -99,7 +99,7 @@ class Surroundings:
 
     def _alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
         """Find what may have been meant: our own outputs, and those of other relays, are not it."""
-        outputs = {self._node.resolve_topic_name(binding.output) for binding in self._bindings}
+        outputs = {self._node.resolve_topic_name(binding.output.topic) for binding in self._bindings}
         published = graph.published_topics(self._node).items()
         of_type = [each for each in published if type_name in (None, *each[1]) and each[0] not in outputs]
         return graph.topics_alike(name, type_name, [each for each in of_type if not self._is_relayed(each[0])])
@@ -113,7 +113,7 @@ class Surroundings:
 
 def _unpublished(binding: InputBinding, output: str) -> Refusal | None:
     """What rcl did not publish last."""
-    last = binding.group.unpublished.get(binding.index)
+    last = binding.output.group.unpublished.get(binding.output.index)
     if last is None:
         return None
     why = f"{last.why} ({counted(last.messages, 'message')} so far)"

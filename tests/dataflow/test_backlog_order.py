@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from syncrelay.dataflow.backend import ALL
-from syncrelay.dataflow.backlog import Backlog
+from syncrelay.dataflow.inbox import Backlog
 from tests.dataflow.payloads import Named
 
 
@@ -27,14 +27,6 @@ class _Source:
         return Named(name, received)
 
 
-def _deliver(backlog: Backlog, sources: list[_Source], until: int) -> None:
-    """As the inbox has it."""
-    if len(sources) == 1 and not backlog.held:
-        backlog.deliver_alone(sources[0], until)
-    else:
-        backlog.deliver(sources, until)
-
-
 def test_messages_of_all_sources_leave_by_their_time_of_receipt():
     delivered: list[str] = []
     sources = [_Source(delivered, (1, "a"), (4, "b")), _Source(delivered, (2, "A"), (3, "B"), (5, "C"))]
@@ -46,11 +38,11 @@ def test_what_came_after_the_look_waits_for_the_next_one():
     delivered: list[str] = []
     backlog = Backlog()
     slow, fast = _Source(delivered), _Source(delivered, (1, "a"), (6, "b"))
-    _deliver(backlog, [fast], 5)
+    backlog.deliver([fast], 5)
     assert delivered == ["a"]
     assert backlog.held == {fast}
     slow.messages.append((5, "A"))
-    _deliver(backlog, [slow], 10)
+    backlog.deliver([slow], 10)
     assert delivered == ["a", "A", "b"]
     assert not backlog.held
 
@@ -59,10 +51,10 @@ def test_a_clock_that_is_set_back_holds_up_no_source():
     delivered: list[str] = []
     backlog = Backlog()
     ahead, other = _Source(delivered, (1000, "a"), (1001, "b")), _Source(delivered, (1, "A"))
-    _deliver(backlog, [ahead], 500)
+    backlog.deliver([ahead], 500)
     assert delivered == []
     for now in (1, 2):
-        _deliver(backlog, [other], now)
+        backlog.deliver([other], now)
     assert delivered == ["A", "a", "b"]
     assert ahead.waited == 0
 
@@ -71,7 +63,7 @@ def test_what_is_told_of_a_source_that_ends_is_told_no_more():
     backlog = Backlog()
     failing = _Source([], (6, "a"))
     failing.deliver = {}.__getitem__
-    _deliver(backlog, [failing], 5)
+    backlog.deliver([failing], 5)
     backlog.forget(failing)
     assert not backlog.failed
 
@@ -80,10 +72,10 @@ def test_a_flood_is_handed_on_in_batches_and_without_a_gap():
     delivered: list[str] = []
     backlog = Backlog()
     flood = _Source(delivered, *((n, f"{n}") for n in range(1000)))
-    _deliver(backlog, [flood], 1000)
+    backlog.deliver([flood], 1000)
     assert 0 < len(delivered) < 1000
     while backlog.held:
-        _deliver(backlog, [], 1000)
+        backlog.deliver([], 1000)
     assert delivered == [f"{n}" for n in range(1000)]
 
 
@@ -99,10 +91,10 @@ def test_a_source_that_ends_gives_what_is_held_of_it():
     delivered: list[str] = []
     backlog = Backlog()
     ending, staying = _Source(delivered, (6, "a")), _Source(delivered, (7, "A"))
-    _deliver(backlog, [ending, staying], 5)
+    backlog.deliver([ending, staying], 5)
     backlog.forget(ending)
     assert delivered == ["a"]
-    _deliver(backlog, [], 10)
+    backlog.deliver([], 10)
     assert delivered == ["a", "A"]
 
 
@@ -130,7 +122,7 @@ def test_each_source_tells_how_long_its_own_messages_waited_whenever_it_was_look
         for source in sources:
             came = sorted(chance.randint(looked, now + 5) for _ in range(chance.choice([0, 0, 1, 3])))
             source.messages.extend((at, (source, at)) for at in came)
-        _deliver(backlog, [each for each in sources if each.messages or each in backlog.held], now)
+        backlog.deliver([each for each in sources if each.messages or each in backlog.held], now)
         for source, at in delivered:
             waits[source] = max(waits.get(source, 0), now - at)
         delivered.clear()

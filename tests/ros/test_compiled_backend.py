@@ -38,7 +38,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile
 from syncrelay.ros.backend_choice import choose_backend
 from syncrelay.ros.compiled import backend as compiled_backend
 from syncrelay.ros.compiled import path
-from syncrelay.ros.handlers import handler
+from syncrelay.ros.outputs import handler
 from tests.ros.in_process import own_node
 
 pytestmark = pytest.mark.ros

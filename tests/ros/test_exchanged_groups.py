@@ -221,7 +221,7 @@ def test_a_field_that_a_type_does_not_have_stops_the_one_input_that_asks_for_it(
     first, second = here.bindings.all
     assert first.waiting_for is None
     assert second.waiting_for == "the field of /x that the file names"
-    assert second.inputs[0].not_readable.startswith(f"{_IMU} has no usable field no.such: ")
+    assert second.inputs[0].output.not_readable.startswith(f"{_IMU} has no usable field no.such: ")
     assert second.inputs[0].topic.is_due
     sent = import_type(_IMU)()
 

@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False
 """The path of a message in compiled code: messages are taken and published in librcl, without a copy in Python.
 
-The inbox and the flow do what dataflow/inbox.py, backlog.py and flow.py do, which are easier to read; only the waiting
+The inbox and the flow do what dataflow/inbox.py and flow.py do, which are easier to read; only the waiting
 differs. An rcl wait set is filled, attached to every reader and taken apart for each wait. Here DDS itself rings a bell
 when a message arrives, so a wait costs the same for any number of subscriptions.
 
