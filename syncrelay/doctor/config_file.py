@@ -1,12 +1,13 @@
-"""The file: what `validate` finds in it, and what remaps make of its names."""
+"""The file: what `validate` finds in it, what remaps make of its names, and whether its address can be had."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from syncrelay.config import Config, Problem, Severity, TopicConfig, render
+from syncrelay.config import Config, Listen, Problem, Severity, render
 from syncrelay.config.wording import all_of, counted
 from syncrelay.doctor.diagnosis import Diagnosis, error, info
+from syncrelay.errors import ListenError
 
 # The name of a check is a contract: these are older than the sentences of the file.
 _REMAP_CODES: Final = {"loop": "remap_loop", "repeated_output": "remap_outputs"}
@@ -55,10 +56,9 @@ def check_files(files: Sequence[str], problems: Sequence[Problem]) -> Iterator[D
 def check_types(config: Config, unusable: Mapping[str, str]) -> Iterator[Diagnosis]:
     """Yield types of the file that are installed but cannot be used; `unusable` has the fault of each."""
     for name, fault in unusable.items():
-        topics = all_of(dict.fromkeys(topic.topic for topic in _topics(config) if topic.type == name))
-        groups = all_of(
-            dict.fromkeys(group.name for group in config.groups if any(topic.type == name for topic in group.topics))
-        )
+        users = [(topic, group) for group in config.groups for topic in group.topics if topic.type == name]
+        topics = all_of(dict.fromkeys(topic.topic for topic, _ in users))
+        groups = all_of(dict.fromkeys(group.name for _, group in users))
         yield error(
             "type_unusable",
             f"{name} is installed but cannot be imported: {fault}",
@@ -80,6 +80,20 @@ def check_remaps(config: Config, names: Mapping[str, str]) -> Iterator[Diagnosis
         )
 
 
-def _topics(config: Config) -> Iterator[TopicConfig]:
-    for group in config.groups:
-        yield from group.topics
+def check_listen(listen: Listen | None) -> Iterator[Diagnosis]:
+    """Yield that the address that the file asks for cannot be had; the relay that runs already may be why."""
+    if listen is None or not listen.is_asked_for:
+        return
+    # The web server's packages are not needed to look at a broken installation.
+    from syncrelay.status.server import Server  # noqa: PLC0415
+
+    try:
+        with Server(listen):
+            pass
+    except ListenError as error:
+        yield info(
+            "listen",
+            str(error),
+            impact="the relay exits at once with code 1, unless it is the one that listens there already",
+            fix="`syncrelay top` shows whether a relay answers there; if not, give `metrics` another `listen`",
+        )

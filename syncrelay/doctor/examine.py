@@ -6,7 +6,7 @@ from typing import Final
 
 from syncrelay.config import Config, ConfigError, Problem, load
 from syncrelay.config.interfaces import Interfaces
-from syncrelay.doctor.config_file import check_files, check_remaps, check_types
+from syncrelay.doctor.config_file import check_files, check_listen, check_remaps, check_types
 from syncrelay.doctor.container import check_isolation, look_at_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, info, worst_first
 from syncrelay.doctor.discovery import check_discovery, look_at_discovery
@@ -14,7 +14,6 @@ from syncrelay.doctor.folders import check_folders, look_at_folders
 from syncrelay.doctor.graph import check_clock, check_graph, check_own_name, check_state
 from syncrelay.doctor.groups import check_groups, check_sizes
 from syncrelay.doctor.installation import Installation, check_installation, look_at_installation, middleware_of
-from syncrelay.doctor.listen import check_listen
 from syncrelay.doctor.network import check_network, look_at_interfaces
 from syncrelay.doctor.shared_memory import check_shared_memory, look_at_shared_memory
 from syncrelay.doctor.start import check_start

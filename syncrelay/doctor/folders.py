@@ -58,16 +58,17 @@ def look_at_folders(environ: Mapping[str, str], *, heartbeat_variable: str) -> W
     return Written(
         log_folder=folder,
         log_named_by=named_by,
-        log_fault=_folder_fault(folder) if folder else None,
+        log_fault=_folder_fault(folder, may_make=True) if folder else None,
         heartbeat=Path(beat) if beat else None,
         heartbeat_fault=_file_fault(Path(beat)) if beat else None,
     )
 
 
-def _folder_fault(folder: Path) -> str | None:
-    # Asked by making it, as ROS itself would: as root, a look at the permissions proves nothing.
+def _folder_fault(folder: Path, *, may_make: bool = False) -> str | None:
+    """Why no file can be written in a folder; one that ROS would make is made, as root can write where it may not."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if may_make:
+            folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return None
     except OSError as error:
@@ -79,15 +80,7 @@ def _file_fault(path: Path) -> str | None:
     try:
         os.close(os.open(path, os.O_WRONLY | os.O_NOFOLLOW | os.O_CLOEXEC))
     except FileNotFoundError:
-        return _folder_fault_of_a_file(path.parent)
+        return _folder_fault(path.parent)
     except OSError as error:
         return "it is a symbolic link, which is not followed" if error.errno == errno.ELOOP else error.strerror
     return None
-
-
-def _folder_fault_of_a_file(folder: Path) -> str | None:
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            return None
-    except OSError as error:
-        return error.strerror

@@ -6,10 +6,10 @@ import pytest
 
 from syncrelay.config import Listen
 from syncrelay.dataflow.backend import BackendName
+from syncrelay.doctor.config_file import check_listen
 from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.examine import Examination
 from syncrelay.doctor.installation import look_at_installation
-from syncrelay.doctor.listen import check_listen
 from syncrelay.doctor.report import heading
 from syncrelay.doctor.start import check_start
 from syncrelay.doctor.start_check import StartResult

@@ -4,8 +4,8 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from enum import Enum
 from typing import Any, Final
 
@@ -66,18 +66,10 @@ class StartResult:
 def start_node(plan: Plan, environ: Mapping[str, str]) -> StartResult:
     """Start a node as planned, end it, and return how that went. It finds nobody and nobody finds it."""
     quiet = {name: value for name, value in environ.items() if name not in _OVERRULED}
-    request = {
-        "node": plan.node,
-        "namespace": plan.namespace,
-        "types": plan.types,
-        "names": plan.names,
-        "ros_args": plan.ros_args,
-        "use_sim_time": plan.use_sim_time,
-    }
     try:
         done = subprocess.run(
             [sys.executable, "-m", "syncrelay.doctor.start_check"],
-            input=json.dumps(request),
+            input=json.dumps(asdict(plan)),
             env={**quiet, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"},
             capture_output=True,
             text=True,
@@ -89,37 +81,26 @@ def start_node(plan: Plan, environ: Mapping[str, str]) -> StartResult:
         return StartResult(Step.IMPORT, f"it did not finish within {_DEADLINE_S:.0f} s")
     except OSError as error:
         return StartResult(Step.IMPORT, f"{sys.executable} cannot be started: {error.strerror}")
-    return _read(_objects(done.stdout), done.returncode, done.stderr)
+    return _read(done)
 
 
-def _objects(stdout: str) -> list[dict[str, Any]]:
+def _read(done: "subprocess.CompletedProcess[str]") -> StartResult:
+    """Return what the process said: of each field the last."""
+    said: dict[str, Any] = {"step": Step.IMPORT.value}
     # What libraries print on the way is no object.
-    return [json.loads(line) for line in stdout.splitlines() if line.startswith('{"step"')]
-
-
-def _read(objects: Sequence[Mapping[str, Any]], code: int, stderr: str) -> StartResult:
-    said: dict[str, Any] = {}
-    for each in objects:
-        said |= each
-    unusable = said.get("unusable", {})
-    middleware = said.get("middleware", "")
-    if code == 0 and "names" in said:
-        return StartResult(
-            None,
-            "",
-            unusable,
-            said["full_name"],
-            said["names"],
-            said["use_sim_time"],
-            middleware,
-            **said["path"],
-        )
-    step = Step(said.get("step", Step.IMPORT.value))
-    if "fault" in said:
-        return StartResult(step, said["fault"], unusable, middleware=middleware)
-    if step is Step.TYPES and (last := said.get("type")):
-        return StartResult(step, "", {**unusable, last: _end(code, stderr)}, middleware=middleware)
-    return StartResult(step, _end(code, stderr), unusable, middleware=middleware)
+    for line in done.stdout.splitlines():
+        if line.startswith('{"step"'):
+            said |= json.loads(line)
+    step, last_type = Step(said.pop("step")), said.pop("type", None)
+    if done.returncode == 0 and "names" in said:
+        return StartResult(**said)
+    if "fault" not in said:
+        end = _end(done.returncode, done.stderr)
+        if step is Step.TYPES and last_type:
+            said["unusable"] = {**said["unusable"], last_type: end}
+        else:
+            said["fault"] = end
+    return StartResult(step, **said)
 
 
 def _end(code: int, stderr: str) -> str:

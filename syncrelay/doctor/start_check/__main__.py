@@ -60,10 +60,10 @@ def _start(plan: dict[str, Any]) -> None:
         return
     _say(
         Step.NAMES,
-        full_name=node.get_fully_qualified_name(),
+        node=node.get_fully_qualified_name(),
         names=names,
         use_sim_time=bool(node.get_parameter("use_sim_time").value),
-        path=_path(node, context),
+        **_path(node, context),
     )
     leave(node, context)
     if is_leaving():
