@@ -13,7 +13,7 @@ from tests.recordings.bag.making import BEST_EFFORT, rig, write_mcap, write_ros1
 
 FRAMES = rig(12)
 _SMALL_CHUNKS = {"chunk_size": 500}
-_NO_INDEX = {
+NO_INDEX = {
     "index_types": IndexType.NONE,
     "repeat_channels": False,
     "repeat_schemas": False,
@@ -21,14 +21,14 @@ _NO_INDEX = {
     "use_summary_offsets": False,
 }
 
-_Make = Callable[[Path], Path]
+Make = Callable[[Path], Path]
 
 
-def _mcap(**options) -> _Make:
+def mcap(**options) -> Make:
     return lambda folder: write_mcap(folder / "rig.mcap", FRAMES, **{**_SMALL_CHUNKS, **options})
 
 
-def _sqlite3(**options) -> _Make:
+def sqlite(**options) -> Make:
     def make(folder: Path) -> Path:
         (file,) = write_rosbag2(folder / "rig", FRAMES, qos=[BEST_EFFORT], **options).glob("*.db3")
         with sqlite3.connect(file) as database:
@@ -41,23 +41,23 @@ def _sqlite3(**options) -> _Make:
     return make
 
 
-def _ros1(compression=None) -> _Make:
+def ros1(compression=None) -> Make:
     return lambda folder: write_ros1(folder / "rig.bag", FRAMES, compression=compression, chunk=500)
 
 
-KINDS: Mapping[str, _Make] = {
-    "sqlite3": _sqlite3(),
-    "sqlite3, messages compressed": _sqlite3(mode=CompressionMode.MESSAGE),
-    "MCAP": _mcap(),
-    "MCAP without checksums": _mcap(enable_crcs=False),
-    "MCAP, zstd": _mcap(compression=CompressionType.ZSTD),
-    "MCAP, lz4, without checksums": _mcap(compression=CompressionType.LZ4, enable_crcs=False),
-    "MCAP, zstd, without an index": _mcap(compression=CompressionType.ZSTD, **_NO_INDEX),
-    "MCAP without chunks": _mcap(use_chunking=False),
-    "MCAP without chunks or an index": _mcap(use_chunking=False, **_NO_INDEX),
-    "ROS 1": _ros1(),
-    "ROS 1, bz2": _ros1(Ros1Writer.CompressionFormat.BZ2),
-    "ROS 1, lz4": _ros1(Ros1Writer.CompressionFormat.LZ4),
+KINDS: Mapping[str, Make] = {
+    "sqlite3": sqlite(),
+    "sqlite3, messages compressed": sqlite(mode=CompressionMode.MESSAGE),
+    "MCAP": mcap(),
+    "MCAP without checksums": mcap(enable_crcs=False),
+    "MCAP, zstd": mcap(compression=CompressionType.ZSTD),
+    "MCAP, lz4, without checksums": mcap(compression=CompressionType.LZ4, enable_crcs=False),
+    "MCAP, zstd, without an index": mcap(compression=CompressionType.ZSTD, **NO_INDEX),
+    "MCAP without chunks": mcap(use_chunking=False),
+    "MCAP without chunks or an index": mcap(use_chunking=False, **NO_INDEX),
+    "ROS 1": ros1(),
+    "ROS 1, bz2": ros1(Ros1Writer.CompressionFormat.BZ2),
+    "ROS 1, lz4": ros1(Ros1Writer.CompressionFormat.LZ4),
 }
 
 

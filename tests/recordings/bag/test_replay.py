@@ -8,7 +8,7 @@ from syncrelay.config import load_text
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
-from syncrelay.recordings.bag.replay import received, replay
+from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import Drop, DropReason, Match
 from tests.recordings.bag.making import (
     CUSTOM,
@@ -20,7 +20,7 @@ from tests.recordings.bag.making import (
     write_ros1,
     write_rosbag2,
 )
-from tests.ros.cdr_messages import STRING, TIME_REFERENCE, VECTOR, header, serialize, time, vector
+from tests.ros.cdr_messages import STRING, TIME_REFERENCE, VECTOR, header, serialize, time
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS, at, merged
@@ -59,44 +59,47 @@ def test_sets_and_counts_are_those_of_the_engine(write, tmp_path):
     assert _drops(left)[-1][1] is DropReason.SHUTDOWN
 
 
-def test_a_set_that_waits_leaves_at_its_deadline_not_at_the_next_message(tmp_path):
-    topics = [*inputs(_PAIR), {"topic": "/imu", "type": VECTOR, "required": False}]
-    path = write_mcap(tmp_path / "rig.mcap", [*rig(3), *at("/imu", 5000)])
-    left, _ = _replayed(path, _group(topics, max_wait="40ms"))
-    waited = [
-        now - max(received(m) for m in outcome.messages if m) for outcome, now in left if isinstance(outcome, Match)
-    ]
-    assert waited == [40 * MS] * 3
-    assert all(outcome.messages[2] is None for outcome, _ in left if isinstance(outcome, Match))
+_OTHER = Frame("/camera", TIME_REFERENCE, BEGIN, serialize(TIME_REFERENCE, header(BEGIN), time(0), ""))
 
 
-def test_what_still_waits_at_the_end_leaves_when_its_time_has_come(tmp_path):
-    left, _ = _replayed(write_mcap(tmp_path / "rig.mcap", rig(1)), _group(inputs(_PAIR), max_wait="1s"))
-    ((a_set, now),) = left
-    assert isinstance(a_set, Match)
-    assert now == max(frame.time for frame in rig(1)) + 1000 * MS
-
-
-def test_a_topic_that_the_recording_lacks_is_named_with_the_nearest(tmp_path):
-    recording = open_recording([str(write_mcap(tmp_path / "rig.mcap", rig(2)))])
-    topics = inputs({"/camra": VECTOR, "/xyz": VECTOR})
-    (binding,) = bind(load_text(config({"front": _group(topics)})), recording)
-    recording.close()
-    assert binding.problems == (
-        "front: /camra is not in the recording, did you mean `/camera`?",
-        "front: /xyz is not in the recording, it has /lidar, /camera",
-    )
+@pytest.mark.parametrize(
+    ("frames", "topics", "problems"),
+    [
+        (
+            rig(2),
+            inputs({"/camra": VECTOR, "/xyz": VECTOR}),
+            [
+                "/camra is not in the recording, did you mean `/camera`?",
+                "/xyz is not in the recording, it has /lidar, /camera",
+            ],
+        ),
+        (
+            rig(2),
+            inputs({"/camera": "sensor_msgs/msg/Image", "/lidar": VECTOR}),
+            [f"/camera is recorded as {VECTOR}, the file says sensor_msgs/msg/Image"],
+        ),
+        (
+            [_OTHER, *rig(2)],
+            [{"topic": "/camera"}, {"topic": "/lidar"}],
+            [
+                (
+                    f"/camera is recorded as {TIME_REFERENCE} and {VECTOR}, and the file has no type for it: write the one"
+                    " that is meant"
+                )
+            ],
+        ),
+    ],
+    ids=["no such topic", "another type", "two types and none in the file"],
+)
+def test_what_does_not_fit_is_named_and_not_fed(frames, topics, problems, tmp_path):
+    kinds = [[each for each in frames if each is _OTHER], [each for each in frames if each is not _OTHER]]
+    paths = [str(write_mcap(tmp_path / f"{number}.mcap", each)) for number, each in enumerate(kinds) if each]
+    with closing(open_recording(paths)) as recording:
+        (binding,) = bind(load_text(config({"front": _group(topics)})), recording)
+        (result,) = replay(recording, [binding])
+    assert binding.problems == tuple(f"front: {problem}" for problem in problems)
     assert not binding.is_complete
-
-
-def test_a_type_that_differs_from_the_files_is_named_and_not_fed(tmp_path):
-    topics = inputs({"/camera": "sensor_msgs/msg/Image", "/lidar": VECTOR})
-    recording = open_recording([str(write_mcap(tmp_path / "rig.mcap", rig(2)))])
-    (binding,) = bind(load_text(config({"front": _group(topics)})), recording)
-    (result,) = replay(recording, [binding])
-    recording.close()
-    assert binding.problems == (f"front: /camera is recorded as {VECTOR}, the file says sensor_msgs/msg/Image",)
-    assert [each.counts.fed for each in result.inputs] == [0, 2]
+    assert result.inputs[0].counts.fed == 0
 
 
 def test_types_that_the_file_leaves_out_are_the_recordings(tmp_path):
@@ -105,19 +108,6 @@ def test_types_that_the_file_leaves_out_are_the_recordings(tmp_path):
     with_types, _ = _replayed(path, _group(inputs(_PAIR)))
     assert _sets(left) == _sets(with_types)
     assert result.sets == 39
-
-
-def test_two_recorded_types_of_a_topic_are_named_where_the_file_has_none(tmp_path):
-    other = [Frame("/camera", TIME_REFERENCE, BEGIN, serialize(TIME_REFERENCE, header(BEGIN), time(0), ""))]
-    paths = [write_mcap(tmp_path / "a.mcap", rig(2)), write_mcap(tmp_path / "b.mcap", other)]
-    recording = open_recording([str(path) for path in paths])
-    (binding,) = bind(load_text(config({"front": _group([{"topic": "/camera"}, {"topic": "/lidar"}])})), recording)
-    recording.close()
-    (problem,) = binding.problems
-    assert problem.startswith("front: /camera is recorded as ")
-    assert VECTOR in problem
-    assert TIME_REFERENCE in problem
-    assert not binding.is_complete
 
 
 def test_names_are_resolved_as_the_node_would(tmp_path):
@@ -172,12 +162,6 @@ def test_headerless_messages_go_by_their_receive_time(tmp_path):
         _replayed(path, _group(topics))
     left, _ = _replayed(path, _group(inputs(dict.fromkeys(_PAIR, HEADERLESS), stamp="receive"), max_wait="0ms"))
     assert _sets(left) == [(frames[0].time,) * 2, (frames[2].time,) * 2]
-
-
-def test_messages_without_a_readable_stamp_are_counted(tmp_path):
-    frames = [Frame("/camera", VECTOR, BEGIN, vector(BEGIN)[:8]), Frame("/lidar", VECTOR, BEGIN, vector(0))]
-    left, _ = _replayed(write_mcap(tmp_path / "rig.mcap", frames), _group(inputs(_PAIR)))
-    assert _drops(left) == [(0, DropReason.MALFORMED), (0, DropReason.UNSTAMPED)]
 
 
 def test_a_channel_that_is_not_of_ros_is_named(tmp_path):
