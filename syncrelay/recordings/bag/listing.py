@@ -9,9 +9,8 @@ from syncrelay.config.wording import did_you_mean
 from syncrelay.errors import BagError, StorageError
 from syncrelay.recording_files import METADATA, SUFFIXES, is_recording_name
 from syncrelay.recordings.bag.metadata import LARGEST, Metadata, parse_metadata
-from syncrelay.recordings.bag.names import natural
 from syncrelay.recordings.bag.remote_file import RemoteFile
-from syncrelay.recordings.bag.storage import files_of, is_url, metadata_of
+from syncrelay.recordings.bag.storage import files_of, is_url, metadata_of, natural
 from syncrelay.urls import redacted
 
 

@@ -9,8 +9,8 @@ from syncrelay.config.wording import all_of, counted
 from syncrelay.errors import BagError
 from syncrelay.printable import printable
 from syncrelay.recording_files import COMPRESSED, METADATA
-from syncrelay.recordings.bag.names import topic_name
 from syncrelay.recordings.bag.qos import plain_yaml
+from syncrelay.recordings.bag.recording import topic_name
 
 LARGEST: Final = 4_000_000
 """The largest metadata.yaml that is read, in bytes: enough for some 10,000 files."""

@@ -19,11 +19,10 @@ import zstandard
 from syncrelay.config.wording import counted
 from syncrelay.errors import BagError, StorageError
 from syncrelay.recording_files import METADATA, scheme_of
-from syncrelay.recordings.bag import mcap_file, ros1_file, sqlite_file
-from syncrelay.recordings.bag.batching import batched, filled
+from syncrelay.recordings.bag import mcap_file, mcap_index, ros1_file, sqlite_file
 from syncrelay.recordings.bag.effort import TOO_MUCH, room_for
 from syncrelay.recordings.bag.listing import files_meant, told_of
-from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording
+from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording, batched, filled
 from syncrelay.recordings.bag.remote_file import RemoteFile
 from syncrelay.recordings.bag.sources import LocalFile, NoIndexError
 from syncrelay.urls import LOCAL, file_system, redacted
@@ -32,7 +31,7 @@ Tell: TypeAlias = Callable[[str], object]
 """Called with a sentence that is worth a remark and is no fault."""
 
 _OPENERS: Final[Mapping[bytes, Callable[[Path, str], Recording]]] = {
-    mcap_file.MAGIC: lambda path, name: mcap_file.open_mcap(LocalFile(path), name),
+    mcap_index.MAGIC: lambda path, name: mcap_file.open_mcap(LocalFile(path), name),
     sqlite_file.MAGIC: sqlite_file.SqliteFile,
     ros1_file.MAGIC: ros1_file.Ros1File,
 }
@@ -162,7 +161,7 @@ def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> 
     why = "its format is read from a file of this machine"
     if not remote.has_ranges:
         why = "its server cannot send parts of it"
-    elif remote.read(_LONGEST_MAGIC).startswith(mcap_file.MAGIC):
+    elif remote.read(_LONGEST_MAGIC).startswith(mcap_index.MAGIC):
         try:
             return mcap_file.open_mcap(remote, remote.name)
         except NoIndexError:

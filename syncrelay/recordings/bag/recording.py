@@ -1,12 +1,18 @@
 """What every kind of recording offers: channels, and their messages in the order in which they were received."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, Protocol, TypeAlias
 
 from syncrelay.printable import printable
 from syncrelay.recordings.bag.qos import Profile
+
+# Renamed in ROS 2, with the same fields.
+_RENAMED: Final = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
+# A batch is large enough that its cost does not matter, and small enough for memory.
+_MESSAGES: Final = 2_000
+_BYTES: Final = 4_000_000
 
 
 class Encoding(Enum):
@@ -46,10 +52,22 @@ class Channel:
     type_hash: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "topic", printable(self.topic))
-        object.__setattr__(self, "type", printable(self.type))
+        object.__setattr__(self, "topic", printable(topic_name(self.topic)))
+        object.__setattr__(self, "type", printable(_full_type_name(self.type)))
         if not isinstance(self.encoding, Encoding):
             object.__setattr__(self, "encoding", printable(self.encoding))
+
+
+def topic_name(recorded: str) -> str:
+    """Return a topic name with its leading slash, which some recorders leave out."""
+    return recorded if recorded.startswith("/") else f"/{recorded}"
+
+
+def _full_type_name(recorded: str) -> str:
+    """Return the full type name for ROS 1's `pkg/Name`; a full name is returned unchanged."""
+    package, slash, name = recorded.partition("/")
+    full = f"{package}/msg/{name}" if slash and "/" not in name else recorded
+    return _RENAMED.get(full, full)
 
 
 RawMessage: TypeAlias = tuple[Channel, int, bytes]
@@ -102,3 +120,25 @@ class Recording(Protocol):
     def close(self) -> None:
         """Close the files."""
         ...
+
+
+def batched(messages: Iterable[RawMessage]) -> Iterator[list[RawMessage]]:
+    """Yield single messages in batches."""
+    return filled([each] for each in messages)
+
+
+def filled(batches: Iterable[list[RawMessage]]) -> Iterator[list[RawMessage]]:
+    """Yield small batches joined into larger ones; none is empty."""
+    held: list[RawMessage] = []
+    size = 0
+    for batch in batches:
+        if not held and len(batch) >= _MESSAGES:
+            yield batch
+            continue
+        held += batch
+        size += sum([len(payload) for _, _, payload in batch])
+        if len(held) >= _MESSAGES or size >= _BYTES:
+            yield held
+            held, size = [], 0
+    if held:
+        yield held

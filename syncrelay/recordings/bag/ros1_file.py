@@ -10,12 +10,10 @@ from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.rosbag1.reader import IndexData, decompressors
 
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag.batching import batched
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import Losses
-from syncrelay.recordings.bag.names import full_type_name, topic_name
 from syncrelay.recordings.bag.qos import Profile
-from syncrelay.recordings.bag.recording import Channel, Definition, Encoding, RawMessage
+from syncrelay.recordings.bag.recording import Channel, Definition, Encoding, RawMessage, batched
 from syncrelay.recordings.bag.unpacking import unbz2, unlz4
 
 MAGIC: Final = b"#ROSBAG V2.0\n"
@@ -118,8 +116,8 @@ def _channel(connection: Connection) -> Channel:
     is_latched = isinstance(about, ConnectionExtRosbag1) and about.latching == 1
     return Channel(
         connection.id,
-        topic_name(connection.topic),
-        full_type_name(connection.msgtype),
+        connection.topic,
+        connection.msgtype,
         Encoding.ROS1,
         Definition("ros1msg", connection.msgdef.data),
         _LATCHED if is_latched else (),

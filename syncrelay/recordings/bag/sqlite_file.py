@@ -15,11 +15,10 @@ from urllib.parse import quote
 from zstandard import ZstdError
 
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag.batching import batched
 from syncrelay.recordings.bag.effort import Effort
 from syncrelay.recordings.bag.losses import OF_NO_CHANNEL, OF_NO_TIME, Losses
 from syncrelay.recordings.bag.qos import read_profiles
-from syncrelay.recordings.bag.recording import LATEST, Channel, Definition, Encoding, RawMessage
+from syncrelay.recordings.bag.recording import LATEST, Channel, Definition, Encoding, RawMessage, batched
 from syncrelay.recordings.bag.unpacking import unzstd
 
 MAGIC: Final = b"SQLite format 3\0"

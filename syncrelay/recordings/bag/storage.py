@@ -5,7 +5,6 @@ from typing import Any, Final
 
 from syncrelay.errors import BagError
 from syncrelay.recording_files import METADATA, is_recording_name, scheme_of
-from syncrelay.recordings.bag.names import natural
 from syncrelay.urls import SERVERS, file_system, redacted, tried
 
 _PATTERN: Final = re.compile(r"[*?\[]")
@@ -14,6 +13,11 @@ _PATTERN: Final = re.compile(r"[*?\[]")
 def is_url(word: str) -> bool:
     """Tell whether a word is a URL and not a path."""
     return bool(scheme_of(word))
+
+
+def natural(name: str) -> list[tuple[int, str]]:
+    """Return a sort key by which numbers in names count: _9 before _10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
 def find(word: str) -> list[str]:

@@ -7,10 +7,9 @@ from typing import Final
 
 from syncrelay.cdr import LATEST_STAMP, patch_stamp, read_stamp
 from syncrelay.errors import UsageError
-from syncrelay.recordings.bag.batching import filled
 from syncrelay.recordings.bag.definitions import begins_with_header
 from syncrelay.recordings.bag.payloads import read_ros1_stamp, with_ros1_stamp
-from syncrelay.recordings.bag.recording import LATEST, Channel, Encoding, RawMessage, Recording
+from syncrelay.recordings.bag.recording import LATEST, Channel, Encoding, RawMessage, Recording, filled
 from syncrelay.rig.what_if import MOST_LATE, Disturbance, Fault, disturbances
 
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from syncrelay.cdr import read_stamp
 from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.bag import Channel, Encoding
-from syncrelay.recordings.bag.batching import filled
 from syncrelay.recordings.bag.columns import Batch, Columns, cdr_stamps, ros1_stamps
 from syncrelay.recordings.bag.payloads import read_ros1_stamp
+from syncrelay.recordings.bag.recording import filled
 
 _SECOND = 1_000_000_000
 _EDGES = [0, 1, _SECOND - 1, _SECOND, 2**31 - 1, 2**31, 2**32 - 1]

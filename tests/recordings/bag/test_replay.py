@@ -59,6 +59,7 @@ def test_sets_and_counts_are_those_of_the_engine(write, tmp_path):
     assert _drops(left)[-1][1] is DropReason.SHUTDOWN
 
 
+_WHICH = "and the file has no type for it: write the one that is meant"
 _OTHER = Frame("/camera", TIME_REFERENCE, BEGIN, serialize(TIME_REFERENCE, header(BEGIN), time(0), ""))
 
 
@@ -82,10 +83,7 @@ _OTHER = Frame("/camera", TIME_REFERENCE, BEGIN, serialize(TIME_REFERENCE, heade
             [_OTHER, *rig(2)],
             [{"topic": "/camera"}, {"topic": "/lidar"}],
             [
-                (
-                    f"/camera is recorded as {TIME_REFERENCE} and {VECTOR}, and the file has no type for it: write the one"
-                    " that is meant"
-                )
+                f"/camera is recorded as {TIME_REFERENCE} and {VECTOR}, {_WHICH}",
             ],
         ),
     ],

@@ -1,0 +1,234 @@
+"""Where the messages of an MCAP file are: by its summary, or by a first pass if there is none that can be trusted.
+
+mcap's own reader stops at the first damage, and without an index it sorts the whole file in memory. A robot that lost
+power leaves exactly such files, so records are walked here and only parsed by mcap.
+"""
+
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from struct import Struct
+from typing import Final
+
+from mcap.opcode import Opcode
+from mcap.records import Channel as ChannelRecord
+from mcap.records import Chunk, ChunkIndex, Schema, Statistics
+
+from syncrelay.recordings.bag.effort import Effort
+from syncrelay.recordings.bag.losses import Losses
+from syncrelay.recordings.bag.mcap_parts import PlainChunk, plain_chunk
+from syncrelay.recordings.bag.mcap_records import (
+    MESSAGE_FIELDS,
+    RECORD,
+    UNREADABLE,
+    parsed,
+    parsed_from,
+    records,
+    require_record,
+    unpacked,
+)
+from syncrelay.recordings.bag.segments import PIECE, Pieces, Segment
+from syncrelay.recordings.bag.sources import NoIndexError, Source
+
+MAGIC: Final = b"\x89MCAP0\r\n"
+"""What an MCAP file begins with, and ends with if it was closed."""
+
+# Offset of the summary, offset of its offsets, checksum from the summary up to here.
+_FOOTER: Final = Struct("<QQI")
+_CHECKSUM_SIZE: Final = 4
+# A DATA_END record holds only a checksum.
+_DATA_END_SIZE: Final = 4
+_TAIL: Final = 32_000
+# No schema or channel record is longer.
+_LONGEST_TEXT: Final = 64_000_000
+
+
+class McapIndex:
+    """The channels, schemas and segments of an MCAP file.
+
+    `chunked` are the segments that are chunks. From a trusted summary come `holds`, the channel numbers of
+    each chunk, `plain` the uncompressed chunks, and `counts` the number of messages of each channel.
+    """
+
+    def __init__(self, file: Source, losses: Losses) -> None:
+        """Read the index of a file; raises NoIndexError if one behind a URL has none that can be trusted."""
+        self._file = file
+        self._losses = losses
+        self._size = file.size
+        self._effort = Effort()
+        self.segments: list[Segment] = []
+        self.chunked: set[Segment] = set()
+        self.schemas: dict[int, Schema] = {}
+        self.channels: dict[int, ChannelRecord] = {}
+        self.holds: dict[Segment, frozenset[int]] = {}
+        self.plain: dict[Segment, PlainChunk] = {}
+        self.counts: dict[int, int] = {}
+        if not self._read_index():
+            if not file.is_near:
+                raise NoIndexError
+            self._scan()
+
+    def _walk(self, place: int, end: int) -> Iterator[tuple[int, int, int]]:
+        """Yield opcode, begin and end of the content of each record between two places of the file.
+
+        Raises EOFError if the last record is cut off, and ValueError where no record begins or too many hold nothing.
+        """
+        while place < end:
+            begin = place + RECORD.size
+            opcode, length = RECORD.unpack(self._bytes(place, RECORD.size)) if begin <= end else (0, end)
+            place = begin + length
+            if place > end:
+                raise EOFError("a record ends past the end")
+            require_record(opcode)
+            self._effort.pass_record()
+            yield opcode, begin, place
+
+    def _read_index(self) -> bool:
+        """Take channels and chunks from the summary at the end of the file; False if there is none, or it is wrong."""
+        try:
+            chunks = list(self._summary())
+        except UNREADABLE:
+            chunks = []
+        ordered = sorted(chunks, key=lambda each: each.chunk_start_offset)
+        ends = [each.chunk_start_offset + each.chunk_length for each in ordered]
+        if (
+            not (chunks and self.channels)
+            or ordered[0].chunk_start_offset < len(MAGIC)
+            or ends[-1] > self._size
+            or any(end > after.chunk_start_offset for end, after in zip(ends, ordered[1:], strict=False))
+            or any(each.message_start_time > each.message_end_time for each in chunks)
+        ):
+            return False
+        self.segments = [
+            Segment(each.chunk_start_offset, each.chunk_length, each.message_start_time, each.message_end_time)
+            for each in chunks
+        ]
+        self.chunked = set(self.segments)
+        if self.counts:
+            held = (frozenset(each.message_index_offsets) for each in chunks)
+            self.holds = dict(zip(self.segments, held, strict=True))
+            plain = zip(self.segments, map(plain_chunk, chunks), strict=True)
+            self.plain = {segment: chunk for segment, chunk in plain if chunk is not None}
+        return True
+
+    def _summary(self) -> Iterator[ChunkIndex]:
+        """Keep the schemas and channels of the summary and yield its chunks; raises one of UNREADABLE."""
+        end = self._size - len(MAGIC) - RECORD.size - _FOOTER.size
+        if end < len(MAGIC):
+            raise EOFError("there is no footer")
+        # This usually fetches the whole summary together with the footer.
+        tail = max(len(MAGIC), self._size - _TAIL)
+        self._file.expect([(tail, self._size - tail)])
+        head, footer = self._bytes(end, RECORD.size), self._bytes(end + RECORD.size, _FOOTER.size)
+        begin, _, checksum = _FOOTER.unpack(footer)
+        if head != RECORD.pack(Opcode.FOOTER, _FOOTER.size) or not len(MAGIC) <= begin < end:
+            raise ValueError("there is no summary")
+        self._file.expect([(begin, self._size - begin)])
+        if checksum not in (0, self._checksum(begin, end + RECORD.size + _FOOTER.size - _CHECKSUM_SIZE)):
+            raise ValueError("its checksum is wrong")
+        count = told = 0
+        self.counts = {}
+        for opcode, place, stop in self._walk(begin, end):
+            match opcode:
+                case Opcode.SCHEMA | Opcode.CHANNEL:
+                    self._define(opcode, self._text(place, stop))
+                case Opcode.CHUNK_INDEX:
+                    self._effort.found_message()
+                    yield parsed(ChunkIndex, self._text(place, stop))
+                    count += 1
+                case Opcode.STATISTICS:
+                    statistics = parsed(Statistics, self._text(place, stop))
+                    told = statistics.chunk_count
+                    # Without a checksum, a flipped bit in the index could hide a channel.
+                    self.counts = statistics.channel_message_counts if checksum else {}
+        if told not in (0, count):
+            raise ValueError("chunks are missing in it")
+
+    def _checksum(self, begin: int, end: int) -> int:
+        checksum = 0
+        for place in range(begin, end, PIECE):
+            checksum = zlib.crc32(self._bytes(place, min(PIECE, end - place)), checksum)
+        return checksum
+
+    def _text(self, begin: int, end: int) -> bytes:
+        """Read the content of a record that describes something; raises ValueError if it is too large for that."""
+        if end - begin > _LONGEST_TEXT:
+            raise ValueError(f"{end - begin} bytes are no description")
+        return self._bytes(begin, end - begin)
+
+    def _scan(self) -> None:
+        """Find channels and segments by going through the file, as far as it can be read."""
+        self.schemas.clear()
+        self.channels.clear()
+        self._effort = Effort()
+        loose = Pieces()
+        place = len(MAGIC)
+        try:
+            for opcode, begin, end in self._walk(place, self._size):
+                if opcode == Opcode.DATA_END and end - begin == _DATA_END_SIZE:
+                    break
+                self._note(opcode, begin, end, loose)
+                place = end
+            else:
+                self._losses.not_closed()
+        except UNREADABLE:
+            self._losses.cut_off(place, self._size)
+        self.segments += loose.segments()
+
+    def _note(self, opcode: int, begin: int, end: int, loose: Pieces) -> None:
+        """Use one record of the first pass."""
+        place = begin - RECORD.size
+        try:
+            match opcode:
+                case Opcode.SCHEMA | Opcode.CHANNEL:
+                    self._define(opcode, self._text(begin, end))
+                case Opcode.MESSAGE:
+                    self._effort.found_message()
+                    time = int.from_bytes(self._bytes(begin, min(MESSAGE_FIELDS, end - begin))[6:14], "little")
+                    loose.add(Segment(place, end - place, time, time))
+                case Opcode.CHUNK:
+                    self._note_chunk(Segment(place, end - place, 0, 0))
+        except UNREADABLE as fault:
+            self._losses.damaged(f"the {Opcode(opcode).name.lower()} at byte {place}", fault)
+
+    def _note_chunk(self, record: Segment) -> None:
+        chunk = chunk_at(self._file, record)
+        content = unpacked(chunk, self._effort)
+        segment = Segment(record.offset, record.size, chunk.message_start_time, chunk.message_end_time)
+        self.segments.append(segment)
+        self.chunked.add(segment)
+        # Damage is reported when the messages are read.
+        with suppress(*UNREADABLE):
+            for opcode, begin, end in records(content):
+                if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    self._define_in(record, opcode, content[begin:end])
+                if opcode == Opcode.MESSAGE:
+                    self._effort.found_message()
+                else:
+                    self._effort.pass_record()
+
+    def _define_in(self, chunk: Segment, opcode: int, content: bytes) -> None:
+        try:
+            self._define(opcode, content)
+        except UNREADABLE as fault:
+            self._losses.damaged(f"a {Opcode(opcode).name.lower()} in the chunk at byte {chunk.offset}", fault)
+
+    def _define(self, opcode: int, content: bytes) -> None:
+        if opcode == Opcode.SCHEMA:
+            schema = parsed(Schema, content)
+            self.schemas[schema.id] = schema
+        else:
+            channel = parsed(ChannelRecord, content)
+            self.channels[channel.id] = channel
+
+    def _bytes(self, place: int, size: int) -> bytes:
+        """Read bytes that are known to be in the file."""
+        self._file.seek(place)
+        return self._file.read(size)
+
+
+def chunk_at(file: Source, record: Segment) -> Chunk:
+    """Return the chunk of a record; raises one of UNREADABLE."""
+    file.seek(record.offset + RECORD.size)
+    chunk: Chunk = parsed_from(Chunk, file, record.size - RECORD.size)
+    return chunk
