@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from syncrelay.recordings.analysis.buckets import counted_in_buckets, floor_of, middle_of
 from syncrelay.recordings.analysis.report_json import as_json
-from tests.cli.html_reports import analyzed, drive
+from tests.recordings.analysis.html_reports import analyzed, drive
 
 _ANY = st.integers(min_value=-(2**63), max_value=2**63 - 1)
 

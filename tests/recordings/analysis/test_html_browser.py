@@ -11,7 +11,7 @@ from syncrelay.recordings.analysis import Analysis
 from syncrelay.recordings.analysis.html import as_html
 from syncrelay.recordings.analysis.report_json import as_json
 from tests.browser import launched, needs_chromium, opened
-from tests.cli.html_reports import HOSTILE, TOPICS, analyzed, drive, renamed
+from tests.recordings.analysis.html_reports import HOSTILE, TOPICS, analyzed, drive, renamed
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import inputs
 from tests.ros.streams import jittery, merged

@@ -16,7 +16,7 @@ from syncrelay.recordings.analysis.html.packing import pack
 from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 from tests.cli.command import run_here
-from tests.cli.html_reports import HOSTILE, analyzed, drawings_in, drive, renamed, unpacked
+from tests.recordings.analysis.html_reports import HOSTILE, analyzed, drawings_in, drive, renamed, unpacked
 from tests.recordings.bag.making import rig, write_mcap
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
