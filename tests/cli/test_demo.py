@@ -1,24 +1,19 @@
 """The demo as a user starts it: real processes over DDS."""
 
 import os
-import pty
 import re
-import select
 import signal
-import struct
 import subprocess
 import sys
-import termios
-import time
-from fcntl import ioctl
 from pathlib import Path
 
 import pytest
-import yaml
 
 import syncrelay.cli
 from syncrelay.cli.demo import isolation
 from syncrelay.config import load_text
+from syncrelay.rig.schedule import SENSORS
+from tests.cli.terminals import on_terminal
 from tests.ros.processes import DEADLINE_S, wait_until
 
 _SHIPPED = Path(syncrelay.cli.__file__).parent / "demo.yaml"
@@ -39,16 +34,8 @@ def test_the_shipped_file_is_printed_as_it_is_without_ros():
 
 def test_the_shipped_file_is_valid_and_names_the_rigs_topics():
     config = load_text(_SHIPPED.read_text())
-    assert [group.name for group in config.groups] == ["camera_lidar", "lidar_imu"]
-    assert {topic.topic for group in config.groups for topic in group.topics} == {
-        "/demo/camera/image_raw",
-        "/demo/lidar/points",
-        "/demo/imu/data",
-    }
-
-
-def test_the_shipped_file_is_plain_yaml():
-    assert yaml.safe_load(_SHIPPED.read_text())["groups"]["camera_lidar"]["topics"][0]["offset"] == "-12ms"
+    topics = {topic.topic for group in config.groups for topic in group.topics}
+    assert topics == {sensor.topic for sensor in SENSORS.values()}
 
 
 @pytest.mark.parametrize(
@@ -188,21 +175,17 @@ def test_it_removes_what_a_sensor_left_that_hung_in_dds_and_was_killed(stage):
     assert stage.left_in_shared_memory() == set()
 
 
-@pytest.mark.ros
-def test_the_rig_does_not_outlive_it(stage):
-    demo = stage.start("demo", _DEMO)
-    demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
-    sensors = children(demo.pid)
-    demo.send(signal.SIGKILL)
-    wait_until(lambda: not any(map(running, sensors)), "the end of the rig")
+_HANGS = (
+    "import time; from rclpy.node import Node; from syncrelay.rig import processes; processes.LEAVE_WITHIN_S = 1; "
+    "Node.destroy_node = lambda self: time.sleep(600)"
+)
 
 
 @pytest.mark.ros
-def test_not_even_a_sensor_that_hangs_outlives_it(stage):
-    stage.before_each_sensor(
-        "import time; from rclpy.node import Node; from syncrelay.rig import processes; processes.LEAVE_WITHIN_S = 1; "
-        "Node.destroy_node = lambda self: time.sleep(600)"
-    )
+@pytest.mark.parametrize("fault", [None, _HANGS], ids=["in order", "sensors hang"])
+def test_the_rig_does_not_outlive_it(stage, fault):
+    if fault is not None:
+        stage.before_each_sensor(fault)
     demo = stage.start("demo", _DEMO)
     demo.wait_until(lambda: "lidar_imu" in demo.stdout, "a first line")
     sensors = children(demo.pid)
@@ -212,7 +195,7 @@ def test_not_even_a_sensor_that_hangs_outlives_it(stage):
 
 @pytest.mark.ros
 def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
-    screen = on_terminal(stage)
+    screen = shown_on_terminal(stage)
     drawn, _, after = screen.partition("\x1b[?1049l")
     assert "Starting a simulated camera" in drawn.partition("\x1b[?1049h")[2]
     assert re.search(r"camera -12 ms.*A", drawn)
@@ -224,47 +207,21 @@ def test_a_terminal_sees_the_strip_and_keeps_the_summary(stage):
 @pytest.mark.ros
 @pytest.mark.parametrize("setting", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "latin-1"}])
 def test_a_terminal_that_cannot_draw_gets_plain_lines(stage, setting):
-    screen = on_terminal(stage, **setting)
+    screen = shown_on_terminal(stage, **setting)
     assert "\x1b[?1049h" not in screen
     assert "s  camera_lidar: " in screen
 
 
-def on_terminal(stage, **environ):
-    """Run a demo to its end on a terminal of 80x24; everything that was written to it.
+def shown_on_terminal(stage, **environ):
+    """Run a demo to its end on a terminal; all that it wrote.
 
     It runs for longer where a busy machine left a group without a set.
     """
     for seconds in (3, 6, 15, 45):
-        code, written = run_on_terminal(stage, [*_DEMO, "--seconds", f"{seconds}"], seconds + DEADLINE_S, environ)
+        argv = [*_DEMO, "--seconds", f"{seconds}"]
+        with on_terminal(argv, folder=stage.folder, environ=stage.environment | environ) as terminal:
+            code = terminal.wait_for_end()
         if code == 0:
             break
-    assert code == 0, written
-    return written
-
-
-def run_on_terminal(stage, argv, within_s, environ):
-    ours, theirs = pty.openpty()
-    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
-    environment = stage.environment | {"TERM": "xterm-256color"} | environ
-    process = subprocess.Popen(
-        argv, stdin=theirs, stdout=theirs, stderr=theirs, env=environment, cwd=stage.folder, start_new_session=True
-    )
-    os.close(theirs)
-    try:
-        written = read_until_closed(ours, time.monotonic() + within_s)
-        return process.wait(DEADLINE_S), written
-    finally:
-        process.kill()
-        process.wait()
-        os.close(ours)
-
-
-def read_until_closed(descriptor, deadline):
-    written = b""
-    while select.select([descriptor], [], [], max(0, deadline - time.monotonic()))[0]:
-        try:
-            chunk = os.read(descriptor, 65536)
-        except OSError:  # the other end is closed
-            break
-        written += chunk
-    return written.decode()
+    assert code == 0, terminal.written
+    return terminal.written

@@ -60,13 +60,6 @@ def test_what_is_written_is_of_one_recording(folder):
     assert "--write and --html are for one recording, found 2" in done.stderr
 
 
-@pytest.mark.parametrize("jobs", ["0", "1.5"])
-def test_jobs_are_a_whole_number(jobs, folder):
-    done = run("analyze", "short.mcap", "--jobs", jobs, folder=folder)
-    assert done.returncode == 2
-    assert f"expected a whole number above 0, found {jobs}" in done.stderr
-
-
 def _script(body: str) -> str:
     lines = ("import os, signal, sys, time", "from syncrelay.cli.side_by_side import Work, side_by_side", body)
     return "\n".join(lines)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin
 
 from syncrelay.config import load_text
-from tests.cli.in_process import read_by_all
 from tests.faults.extent import chosen
 from tests.recordings.bag.making import write_mcap, write_rosbag2
+from tests.recordings.in_process import read_by_all
 from tests.ros.cdr_messages import VECTOR, vector
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame

@@ -2,7 +2,6 @@
 
 import json
 import os
-import pty
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +10,6 @@ import pytest
 
 from tests import preloaded
 from tests.cli.command import BAD, GOOD, ROOT, run
-from tests.cli.terminals import read_to_the_end
 from tests.doctor.environments import OURS, distribution, site_with, unshared
 
 # Nothing that whoever runs the tests has chosen; on a domain of its own the doctor is alone.
@@ -324,17 +322,3 @@ def test_what_it_says_to_do_about_stale_files_removes_them_and_no_others(base):
     command = unshared(["mount"], f"{made}; set +e\n{clean}\nls /dev/shm >&2", "--version")
     done = subprocess.run(command, env=base, capture_output=True, text=True, timeout=120, check=False)
     assert done.stderr.split() == ["fastrtps_port7499", "fastrtps_port7499_el", "kept"]
-
-
-@pytest.mark.ros
-@pytest.mark.parametrize(("no_color", "coloured"), [("", True), ("1", False)])
-def test_colour_is_for_terminals_that_want_it(no_color, coloured, base):
-    reader, terminal = pty.openpty()
-    environ = {**base, "NO_COLOR": no_color, "TERM": "xterm", "ROS_DOMAIN_ID": "x"}
-    command = [sys.executable, "-m", "syncrelay", "doctor"]
-    subprocess.run(command, env=environ, stdout=terminal, check=False, timeout=120)
-    os.close(terminal)
-    shown = read_to_the_end(reader).decode()
-    os.close(reader)
-    assert "ROS_DOMAIN_ID=x is not a domain" in shown
-    assert ("\033[" in shown) == coloured

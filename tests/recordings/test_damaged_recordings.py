@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.in_process import read_by_all
 from tests.faults.extent import chosen
 from tests.recordings.bag.damage import KINDS, damaged, with_lying_lengths
+from tests.recordings.in_process import read_by_all
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 
