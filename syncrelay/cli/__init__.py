@@ -1,4 +1,4 @@
-"""The command line: the only place that exits. Imports nothing slow, so that a signal is heard from the start."""
+"""The command line: the only place that exits. Imports nothing slow, so that signals are handled from the start."""
 
 import os
 import sys
@@ -23,9 +23,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: Sequence[str], stop: StopRequest) -> int:
     release_signals()
-    # No model of ours has a use for them, and to find that there are none takes a look at every installed package.
+    # No model of ours uses plugins, and to search for them pydantic looks at every installed package.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # Only now: what follows is imported with the signals in hand.
+    # Imported after the signal handlers are installed.
     from syncrelay.cli.boundary import guarded
     from syncrelay.cli.dispatch import dispatch
 
@@ -34,15 +34,15 @@ def _run(words: Sequence[str], stop: StopRequest) -> int:
         from syncrelay.ros.leaving import is_leaving
 
         if is_leaving():
-            # Python's own end would wait for what DDS holds.
+            # The normal exit of Python would wait for DDS, which does not end.
             os._exit(code)
     return code
 
 
 def _open_closed_streams() -> None:
-    """Have standard streams that a shell or an init closed (`>&-`) be as good as none.
+    """Replace standard streams that a shell or an init has closed (`>&-`) by /dev/null.
 
-    Else what is opened next, such as a socket, gets the number of one, and what is printed goes into it.
+    Otherwise the next file or socket that is opened gets the number of such a stream, and what is printed goes into it.
     """
     while (number := os.open(os.devnull, os.O_RDWR)) in (0, 1, 2):
         pass
@@ -53,7 +53,7 @@ def _open_closed_streams() -> None:
 
 
 def _runs_until_stopped(words: Sequence[str]) -> bool:
-    """Tell the relay, which has options and no command, and the demo from commands that end by themselves."""
+    """Return whether the words start the relay, which has no command, or the demo: those run until stopped."""
     if not words or words[0] != "demo":
         return bool(words) and words[0].startswith("-")
     return not any(word.startswith("--record") for word in words)

@@ -30,9 +30,9 @@ EXIT_CODES: Final[Mapping[int, str]] = {
     INTERRUPTED: "interrupted",
     TERMINATED: "ended by SIGTERM",
 }
-"""What help and docs/reference/command_line.md say of them."""
+"""Their meanings, as help and docs/reference/command_line.md give them."""
 
-# All that our own texts are coloured with (syncrelay.config.render, syncrelay.doctor.text), and nothing else.
+# The colours of our own texts (syncrelay.config.render, syncrelay.doctor.text); no other sequence reaches a terminal.
 _COLOURS: Final = re.compile("(\033\\[(?:[0-2]|3[134])m)")
 
 
@@ -44,13 +44,13 @@ def guarded(command: Callable[[], int]) -> int:
         try:
             sys.stderr.flush()
         except OSError:
-            # The terminal is gone, which is how the relay was ended: no failure of its own.
+            # The terminal was closed, which ended the relay: that is no failure.
             _abandon(sys.stderr)
 
 
 def _guarded(command: Callable[[], int]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
-        # A file's name or line may hold what the terminal's encoding lacks.
+        # File names and lines may have characters that the terminal's encoding lacks.
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = command()
@@ -61,7 +61,7 @@ def _guarded(command: Callable[[], int]) -> int:
     except (KeyboardInterrupt, Terminated) as ended:
         return TERMINATED if isinstance(ended, Terminated) else INTERRUPTED
     except BrokenPipeError:
-        # Who read us has seen enough.
+        # The reader has closed the pipe.
         _abandon(sys.stdout)
         return AT_FAULT
     except Exception as error:  # noqa: BLE001  the boundary: everything else is our bug
@@ -70,7 +70,7 @@ def _guarded(command: Callable[[], int]) -> int:
 
 
 def _of_machine_or_bug(error: Exception) -> int:
-    """Say what this machine lacks, a package or space on a disk, or else that it is our bug."""
+    """Report a missing package or a full disk; anything else is our bug, and is shown with its traceback."""
     if isinstance(error, ImportError) and error.name and error.name.partition(".")[0] != "syncrelay":
         remark(_lacking(error, error.name.partition(".")[0]))
         return UNAVAILABLE
@@ -84,7 +84,7 @@ def _of_machine_or_bug(error: Exception) -> int:
 
 
 def say(text: str) -> None:
-    """Print talk on stderr, as `put` does; where nobody takes it, or it finds no space, that is no failure."""
+    """Print text on stderr, made safe as by `put`; that it cannot be written is ignored."""
     try:
         sys.stderr.write(f"{_safe(text, sys.stderr)}\n")
         sys.stderr.flush()
@@ -93,17 +93,17 @@ def say(text: str) -> None:
 
 
 def remark(sentence: str) -> None:
-    """Print a sentence of talk on stderr; whatever it quotes, no line of it passes for another sentence."""
+    """Print a sentence on stderr; its further lines are indented, so that none looks like another sentence."""
     say(f"syncrelay: {one_entry(sentence)}")
 
 
 def put(text: str) -> None:
-    """Print what was asked for on stdout: no control character but newlines and, where colour is wanted, colours."""
+    """Print data on stdout: no control characters but newlines and, where colour is wanted, our colours."""
     _to_stdout(lambda: sys.stdout.write(f"{_safe(text, sys.stdout)}\n"))
 
 
 def flush() -> None:
-    """Have what was put seen at once, also by who reads it through a pipe."""
+    """Flush stdout, so that whoever reads it through a pipe sees it at once."""
     _to_stdout(sys.stdout.flush)
 
 
@@ -125,7 +125,7 @@ def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isat
 def _safe(text: str, stream: TextIO) -> str:
     if text.isprintable() or not wants_colour(stream.isatty()):
         return printable_lines(text)
-    # What the pattern splits off stands at the odd places.
+    # The colours that the pattern matches have the odd indices.
     parts = enumerate(_COLOURS.split(text))
     return "".join(part if at % 2 else printable_lines(part) for at, part in parts)
 
@@ -141,13 +141,13 @@ def _to_stdout(write: Callable[[], object]) -> None:
 
 
 def _abandon(stream: TextIO) -> None:
-    """Keep the interpreter from flushing once more, as it ends, what nobody takes."""
+    """Point a stream at /dev/null, so that Python does not fail when it flushes the stream at its exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _tell(error: SyncRelayError) -> None:
     if isinstance(error, UsageError | UnavailableError):
-        # At once: the import below takes far longer than to read the words.
+        # The import below takes far longer than reading the words did.
         remark(str(error))
         return
     from syncrelay.config import ConfigError, render

@@ -1,7 +1,7 @@
 """`syncrelay completion SHELL`, and what its script asks for at every press of TAB.
 
-argcomplete tells from the words of the line what is expected next, and speaks with the shells. What completes a word
-is told by its metavar. Nothing slow is imported: what a file or a recording holds is read only where it is wanted.
+argcomplete finds out what the line expects next, and speaks with the shells. The metavar of an argument selects what
+completes it. Nothing slow is imported; a file or a recording is read only where its content completes the word.
 """
 
 import os
@@ -26,11 +26,11 @@ from syncrelay.printable import printable
 from syncrelay.yaml_files import group_names, yaml_files
 
 _PROGRAM: Final = "syncrelay"
-# Of processor time: a recording without an index, or compressed as a whole, may take long to open.
+# Processor time: a recording without an index, or one that is compressed as a whole, may take long to open.
 _PATIENCE_S: Final = 2.0
-# As syncrelay.config reads of a file, which takes longer to import than a press of TAB may take.
+# The limit of syncrelay.config, which takes too long to import at a press of TAB.
 _MOST_BYTES: Final = 1_000_000
-# What a line may have before a program's name; zsh gives the whole line.
+# Words that may stand before the program's name, as zsh passes the whole line.
 _BEFORE: Final = re.compile(r".*[;&|({]|\w+=.*|sudo|env|exec|nice|nohup|time|!")
 
 _Completer = Callable[[str, Namespace], Iterable[str] | Mapping[str, str]]
@@ -59,9 +59,9 @@ def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
 
 
 def complete() -> int:
-    """Answer a shell, which speaks through argcomplete's variables, with the words that may stand at the cursor.
+    """Print the words that may stand at the cursor of the line in argcomplete's variables.
 
-    What takes longer than a user waits for ends the process.
+    After 2 s of processor time the kernel ends the process.
     """
     signal.setitimer(signal.ITIMER_PROF, _PATIENCE_S)
     before = split_line(os.environ["COMP_LINE"], int(os.environ["COMP_POINT"]))[3]
@@ -77,7 +77,7 @@ def complete() -> int:
     os.environ["_ARGCOMPLETE"] = str(start + 1 + has_command)
     ExclusiveCompletionFinder()(
         parser,
-        # Where a file is expected, options are offered once a dash is typed.
+        # Where a file is expected, options are offered only after a dash.
         exit_method=_return,
         always_complete_options=False if has_positionals and words else "long",
         validator=lambda completion, typed: completion.startswith(typed) and printable(completion) == completion,
@@ -86,7 +86,7 @@ def complete() -> int:
 
 
 def _return(_code: int) -> None:
-    """End nothing: the process ends as it does after any command."""
+    """Return, where argcomplete would exit: the process ends as after any command."""
 
 
 def _is_start(words: Sequence[str], place: int) -> bool:
@@ -153,7 +153,7 @@ def _groups(_typed: str, arguments: Namespace) -> Iterator[str]:
     for name in arguments.config or ():
         with suppress(OSError):
             for path in map(Path, yaml_files(str(Path(name).expanduser()))):
-                # A pipe would be waited for, and emptied.
+                # Reading a pipe would wait for it, and empty it.
                 if path.is_file():
                     with path.open("rb") as file:
                         yield from group_names(file.read(_MOST_BYTES))

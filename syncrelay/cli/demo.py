@@ -27,7 +27,7 @@ _FRAME_S: Final = 0.125
 _LINE_S: Final = 1.0
 _RECORDED_S: Final = 30.0
 _SECOND: Final = 1_000_000_000
-# Any time would do; always the same makes the same recording.
+# The stamp of the first message: always the same, so that equal seeds give equal recordings.
 _START: Final = 1_767_225_600 * _SECOND
 # How long a message takes from its publisher to the recorder.
 _ON_THE_WAY: Final = 500_000

@@ -21,7 +21,7 @@ VARIABLE: Final = "SYNCRELAY_HEARTBEAT"
 """The environment variable that names the file; without it there is no heartbeat."""
 
 _PERIOD_NS: Final = 500_000_000
-# An idle loop turns once a second: one that has not turned for this long hangs.
+# An idle loop turns once a second; one that has not turned for this long is taken to hang.
 _STALE_NS: Final = 5_000_000_000
 
 
@@ -48,12 +48,12 @@ class Heartbeat:
         now = time.monotonic_ns()
         if now >= self._due:
             self._due = now + _PERIOD_NS
-            # One write of one length at one place: a reader finds the old time or the new one.
+            # A single write of fixed length: a reader sees the old time or the new one, never a mix.
             os.pwrite(self._file, b"%020d\n" % now, 0)
 
 
 def ailment(path: Path) -> str | None:
-    """Return what is wrong with the relay that writes this file, None if nothing is."""
+    """Return what is wrong with the relay that writes this file; None if it is receiving."""
     try:
         written = path.read_bytes()
     except OSError as error:
@@ -87,7 +87,7 @@ def healthcheck() -> int:
     """Print what is wrong, if anything is; 0 if the relay is receiving, 1 if not."""
     named = os.environ.get(VARIABLE)
     found = ailment(Path(named)) if named else f"{VARIABLE} is not set: it must name the heartbeat file"
-    print(found or "receiving")  # noqa: T201  Docker keeps it with the result
+    print(found or "receiving")  # noqa: T201  Docker stores it with the result
     return 1 if found else 0
 
 

@@ -1,4 +1,4 @@
-"""Files that a command writes, and never over something of the user's."""
+"""Files that a command writes. It never replaces a file of the user's."""
 
 from typing import TYPE_CHECKING, Final
 
@@ -15,13 +15,13 @@ _HEAD: Final = 500
 
 
 def write_new(name: str, text: str) -> None:
-    """Write a file that is not there yet, and say so; raises OutputError for one that is, or cannot be written."""
+    """Write a new file, and say so; raises OutputError if it exists or cannot be written."""
     require_new(name)
     _write(name, text)
 
 
 def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
-    """Write a file's text with suggested values as write_new does; where there are none, say so instead."""
+    """Write a file's text with the suggested values as a new file; if there are none, say so instead."""
     if not changes:
         remark(f"no values to change: {name} was not written")
         return
@@ -31,7 +31,7 @@ def write_suggested(name: str, text: str, changes: "Sequence[Change]") -> None:
 
 
 def write_again(name: str, text: str, *, mark: str) -> None:
-    """Write a file as write_new does, but also over one that has a mark near its begin: a former one of the kind."""
+    """Write a new file, or replace one that has a mark near its begin: an earlier file of the same kind."""
     if mark.encode() not in begins_with(name, _HEAD):
         require_new(name)
     _write(name, text)

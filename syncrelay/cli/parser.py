@@ -1,4 +1,4 @@
-"""argparse with our errors: one sentence, the nearest valid word, where to read on."""
+"""argparse with our errors: one sentence, the nearest valid word, and where to read more."""
 
 import argparse
 import os
@@ -17,7 +17,7 @@ _WIDTH: Final = 78
 IMAGE_FORMATS: Final = ("png", "jpeg")
 """What `export --images` can make of an image."""
 
-# The metavars of words that name YAML files which are read.
+# The metavars of arguments that name YAML files to read.
 _YAML_FILES: Final = ("FILE", "OLD", "NEW")
 
 
@@ -68,13 +68,13 @@ class Parser(argparse.ArgumentParser):
         """
         self.add_help_option()
         own, ros_args = self._split(words)
-        # Whatever else is there, or missing.
+        # Also where other words are wrong or missing.
         if "-h" in own or "--help" in own:
             raise HelpRequested(self.format_help())
         try:
             arguments, unknown = self.parse_known_args(own)
         except UsageError as error:
-            # A recording alone: something that is required is missing beside it.
+            # If a recording was named and something required is missing, show which commands take a recording.
             recordings = filter(holds_recording, own) if "required" in str(error) else ()
             for recording in recordings:
                 raise UsageError(f"{error}{for_recording(recording)}") from error

@@ -1,15 +1,13 @@
-"""The relays that a command speaks to: all that answer, or the one that is meant."""
-
-from collections.abc import Sequence
+"""The relays that a command talks to: all that answer, or the one that is named."""
 
 from syncrelay.errors import SyncRelayError
 from syncrelay.top.client import Answer, Search, base_urls, search
 
 
 def find(named: str | None, *, otherwise: str) -> tuple[Answer, ...]:
-    """Return the relays of this machine, or those at the host, host:port or URL that is named; one or more.
+    """Return the relays of this machine, or those at the host, host:port or URL that is named; at least one.
 
-    Raises SyncRelayError where none answers, with what to do `otherwise`, and UsageError for a name that is none.
+    Raises SyncRelayError, which ends with the hint `otherwise`, if none answers, and UsageError for a malformed name.
     """
     found = search(base_urls(named))
     if not found.relays:
@@ -19,15 +17,19 @@ def find(named: str | None, *, otherwise: str) -> tuple[Answer, ...]:
 
 
 def find_one(named: str | None, *, otherwise: str) -> Answer:
-    """Return the only relay there is; as `find`. Raises SyncRelayError where there are several, with their URLs."""
+    """Return the only relay that `find` finds; raises SyncRelayError with their URLs if there are several."""
     found = find(named, otherwise=otherwise)
     if len(found) > 1:
-        raise SyncRelayError(_several(found))
+        lines = "".join(
+            f"\n  --url {each.url}   {each.status.relay.node}: {', '.join(group.name for group in each.status.groups)}"
+            for each in found
+        )
+        raise SyncRelayError(f"{len(found)} relays answer; choose one{lines}")
     return found[0]
 
 
 def otherwise(named: str | None) -> str:
-    """Say what to do where no relay answers."""
+    """Return a hint for where no relay answers."""
     if named is None:
         return (
             "  Start one with `syncrelay --config FILE` (not with `metrics: null` in it),\n"
@@ -40,14 +42,6 @@ def otherwise(named: str | None) -> str:
 
 
 def _others(found: Search) -> str:
-    # Of a machine whose name is not known, or that is off, all ports say the same.
+    # All ports of a machine that is off or unknown give the same reason, which is said once.
     reasons = {text.partition(": ")[2]: text for text in reversed(found.others)}
     return "".join(f"\n  {text}" for text in reversed(reasons.values()))
-
-
-def _several(relays: Sequence[Answer]) -> str:
-    lines = "".join(
-        f"\n  --url {each.url}   {each.status.relay.node}: {', '.join(group.name for group in each.status.groups)}"
-        for each in relays
-    )
-    return f"{len(relays)} relays answer; choose one{lines}"

@@ -72,49 +72,26 @@ def parser() -> Parser:
 
 
 def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
-    """Run `syncrelay --config FILE`, or answer --help and --version."""
+    """Run `syncrelay --config FILE`: relay its groups until stopped, reading it again at SIGHUP; or answer --version.
+
+    Returns 0 after an orderly end. Raises ConfigError for a faulty file, UsageError for a group that it lacks,
+    RosUnavailableError where ROS cannot be used.
+    """
     if arguments.version:
         put(f"syncrelay {own_version()}")
         return DONE
     if not arguments.config:
         parser.error("--config FILE is missing")
     parser.refuse_repeated(arguments.config)
-    return run(
-        arguments.config,
-        arguments.group,
-        arguments.log_level,
-        arguments.log_format,
-        arguments.ros_args,
-        watch=arguments.watch,
-        stop=stop,
-    )
-
-
-def run(
-    config_paths: Sequence[str],
-    groups: Sequence[str],
-    log_level: str,
-    log_format: str,
-    ros_args: Sequence[str],
-    *,
-    watch: bool = False,
-    stop: StopRequest,
-) -> int:
-    """Relay the groups of files, all of them if `groups` is empty; 0 after an orderly end.
-
-    The files are read again at SIGHUP, and with `watch` when one changes.
-
-    Raises ConfigError for a faulty file, UsageError for a group that they lack, RosUnavailableError where ROS
-    cannot be used.
-    """
+    config_paths, groups = arguments.config, arguments.group
     with resting_collector():
         from syncrelay.config.rereading import ConfigFiles
         from syncrelay.logs import LOGGER, configure
         from syncrelay.ros.environment import require_rclpy
 
-    configure(log_level, log_format)
-    # Before they are read: what changes while the relay starts is seen too.
-    files = ConfigFiles(config_paths, watched=watch)
+    configure(arguments.log_level, arguments.log_format)
+    # Made before the files are read, so that changes during the start of the relay are seen.
+    files = ConfigFiles(config_paths, watched=arguments.watch)
     config = loaded(config_paths, groups)
     require_rclpy()
     with resting_collector():
@@ -141,7 +118,7 @@ def run(
             config,
             config_paths=config_paths,
             groups=groups or None,
-            ros_args=ros_args,
+            ros_args=arguments.ros_args,
             on_turn=heartbeat.beat if heartbeat else None,
             manage=managed if config.node.lifecycle else None,
         ) as relay,
@@ -167,11 +144,11 @@ def run(
             )
         _relay_until(stop, relay, files, lambda read: _reload(relay, read, config_paths, groups))
         log_summary(relay.drain())
-    return 0
+    return DONE
 
 
 def loaded(config_paths: Sequence[str], groups: Sequence[str]) -> "Config":
-    """Read files as the relay does, log what is hardly meant, and return what they say.
+    """Read files as the relay does, log warnings about them, and return their configuration.
 
     Raises ConfigError for a faulty file, UsageError where they lack one of these groups.
     """
@@ -207,7 +184,7 @@ def _relay_until(stop: StopRequest, relay: "Relay", files: "ConfigFiles", reload
 
 
 def _reload(relay: "Relay", read: "Reading", config_paths: Sequence[str], groups: Sequence[str]) -> None:
-    """Take on the files as they were read again; whatever is wrong with them, the relay keeps its configuration."""
+    """Apply the files that were read again; if anything is wrong with them, the relay keeps its configuration."""
     from syncrelay.logs import LOGGER
 
     try:
@@ -218,7 +195,7 @@ def _reload(relay: "Relay", read: "Reading", config_paths: Sequence[str], groups
         refusal = f"{_FAILED if relay.groups else _FAILED_WITHOUT_GROUPS}\n{error}"
         LOGGER.error("%s", refusal)
         relay.refuse_reload(error.outline)
-    except Exception as error:  # noqa: BLE001  a file that finds a bug of ours is no reason to end what runs
+    except Exception as error:  # noqa: BLE001  a bug that a file triggers must not end the running relay
         refusal = f"{_BUG}\n{''.join(traceback.format_exception(error)).rstrip()}"
         LOGGER.exception("%s", _BUG)
         relay.refuse_reload(f"reload failed because of a bug in syncrelay, {type(error).__name__}; see the relay's log")
@@ -243,9 +220,9 @@ def _heartbeat(named: str | None) -> AbstractContextManager[Heartbeat | None]:
 
 
 def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]":
-    """Return a server on the file's port, None where it asks for none and its default ports are taken.
+    """Return a server on the file's port; None if the file names none and the default ports are taken.
 
-    Raises ListenError where the port that it asks for cannot be had.
+    Raises ListenError if the port that the file names cannot be used.
     """
     if listen is None:
         return nullcontext()

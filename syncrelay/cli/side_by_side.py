@@ -1,7 +1,7 @@
-"""Pieces of work side by side, each in a process of its own, that print as if done one after another.
+"""Work done side by side, each piece in a process of its own, with output as if done one after another.
 
-Processes are forked: what is imported is there at once, and what a piece of work breaks is its own. So this is for
-commands that have started no thread. When a process ends, its memory is free.
+The processes are forked: imports are there at once, and a crash stays in its process. Only commands that have started
+no thread can do this. The end of a process frees its memory.
 """
 
 import os
@@ -16,13 +16,13 @@ from typing import Final, NoReturn
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, INTERRUPTED, OUR_BUG, guarded, pass_on, remark
 
-# Of prctl(2): the signal that the kernel sends when the parent ends, however it ends.
+# Of prctl(2): which signal the kernel sends when the parent ends, in whatever way.
 _PR_SET_PDEATHSIG: Final = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What is done for one file: its name, and what prints and returns an exit code."""
+    """The work on one file: the file's name, and a function that prints and returns an exit code."""
 
     name: str
     do: Callable[[], int]
@@ -30,7 +30,7 @@ class Work:
 
 @dataclass(slots=True)
 class _Worker:
-    """A process, and the files in memory that it prints into."""
+    """A process, and the files in memory that hold its output."""
 
     work: Work
     pid: int
@@ -39,9 +39,9 @@ class _Worker:
 
 
 def side_by_side(works: Sequence[Work], *, jobs: int) -> int:
-    """Do all of the work, so many at a time, and print what each prints in its turn; the greatest exit code.
+    """Do all of the work with so many processes, print each output in its turn, and return the greatest exit code.
 
-    A process that dies is that file's fault, and the others go on. When this is interrupted, all end.
+    If a process dies, that counts as a fault of its file and the others continue. An interrupt ends all of them.
     """
     waiting = list(reversed(works))
     running: dict[int, _Worker] = {}
@@ -74,7 +74,7 @@ def _begin(work: Work) -> _Worker:
     sys.stderr.flush()
     parent = os.getpid()
     with warnings.catch_warnings():
-        # Of threads: numpy's own are idle, and made anew.
+        # Python warns of forking with threads. Those are numpy's: they are idle, and numpy starts its own in the fork.
         warnings.simplefilter("ignore", DeprecationWarning)
         pid = os.fork()
     if not pid:
@@ -83,7 +83,7 @@ def _begin(work: Work) -> _Worker:
 
 
 def _work(work: Work, parent: int, out: int, err: int) -> NoReturn:
-    """Do a piece of work in a process that has just been forked, and end it without what the parent does as it ends."""
+    """Do a piece of work in the forked process, and exit without the parent's exit handlers."""
     code = OUR_BUG
     try:
         signal.signal(signal.SIGINT, _interrupt_once)
@@ -97,7 +97,7 @@ def _work(work: Work, parent: int, out: int, err: int) -> NoReturn:
 
 
 def _interrupt_once(_number: int, _frame: FrameType | None) -> None:
-    """Interrupt what is done, and not what it then clears away: Ctrl-C comes from the terminal, and from the parent."""
+    """Raise KeyboardInterrupt for the first SIGINT only: the terminal sends one, and the parent another."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise KeyboardInterrupt
 
@@ -111,7 +111,7 @@ def _end_with(parent: int) -> None:
 
 
 def _tell(worker: _Worker, code: int) -> int:
-    """Print what a process printed, and say what ended it if a signal did; return its exit code."""
+    """Print the output of a process, and the signal that ended it if one did; return its exit code."""
     pass_on(_content(worker.out), _content(worker.err))
     if code < 0:
         why = f"the process that read it was ended by {signal.Signals(-code).name}"

@@ -11,41 +11,41 @@ from collections.abc import Callable
 from types import FrameType
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-# Of `struct sigaction` in Linux's C libraries: its size at most, where its flags stand, and one of them.
+# `struct sigaction` of Linux's C libraries: an upper bound of its size, the offset of its flags, and one of the flags.
 _ACTION_BYTES = 256
 _FLAGS_AT = 8 + 128
 _SA_RESETHAND = 0x80000000
-# What a shell says of a process that a signal ended, added to the signal's number.
+# A shell adds this to a signal's number for the exit code of a process that the signal ended.
 _ENDED_BY = 128
 TERMINATED = _ENDED_BY + signal.SIGTERM
 """The exit code of a command that SIGTERM ended."""
 
-# `systemctl stop` and `timeout` signal all processes of a launch, and launch then signals its nodes once more, which it
-# also does after Ctrl-C where it has no terminal: what comes within a second is one request.
+# `systemctl stop` and `timeout` signal all processes of a launch, and launch then signals its nodes again; it does so
+# after Ctrl-C too where it has no terminal. Signals within one second count as one request.
 _ONE_REQUEST_S = 1.0
 
 
 def release_signals() -> None:
-    """Unblock SIGINT and SIGTERM; those that were held back arrive now.
+    """Unblock SIGINT and SIGTERM; signals that were held back arrive now.
 
-    The image's entry point blocks them: PID 1 would lose what comes before Python has a handler.
+    The image's entry point blocks them, because PID 1 loses signals that arrive before it has a handler.
     """
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
 
 
 class Terminated(BaseException):
-    """SIGTERM came, and work is undone. No Exception: what catches those is not to swallow it."""
+    """SIGTERM came before the work was done. Not an Exception, so that `except Exception` does not swallow it."""
 
 
 class Termination:
-    """Has SIGTERM end a command that ends by itself, with what it has begun cleared away; a context manager.
+    """Raises Terminated at SIGTERM, so that a command that ends by itself cleans up first; a context manager.
 
     A second SIGTERM ends the process at once.
     """
 
     def __init__(self) -> None:
         self.came = False
-        """Also where what was raised did not get through, as out of a library's callback."""
+        """Whether SIGTERM came, even if Terminated was lost, as in a callback of a library."""
 
     def __enter__(self) -> "Termination":  # noqa: PYI034  typing is not imported before the signals are in hand
         self._former = signal.signal(signal.SIGTERM, self._end)
@@ -63,13 +63,13 @@ class Termination:
 
 
 class StopRequest:
-    """A request to end: until `defer` it ends the process at once, from then on it is remembered.
+    """A request to end. Before `defer` it ends the process at once; afterwards it is remembered.
 
-    A second SIGINT or SIGTERM ends the process at once, whatever hangs by then. From `wake_with` on, when there is
-    something to end in order, only one that comes more than a second after the first.
+    A second SIGINT or SIGTERM ends the process at once, whatever hangs. After `wake_with`, when there is something to
+    end in order, it does so only if it comes more than a second after the first.
 
-    A signal that arrives while modules are still being imported would kill the process, or be lost where it is
-    PID 1: so this is installed before they are.
+    It is installed before other modules are imported: a signal during the imports would kill the process, or be lost
+    if that is PID 1.
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,7 @@ class StopRequest:
         self._count_on_a_thread()
 
     def defer(self) -> None:
-        """Only remember the request from here on: there is now something to end in order."""
+        """Remember requests from here on, as there is now something to end in order."""
         self._deferred = True
 
     def wake_with(self, wake: Callable[[], None]) -> None:
@@ -101,7 +101,7 @@ class StopRequest:
             wake()
             return
         for number in _SIGNALS:
-            # No longer taken once: the second must find its handler, however soon it comes.
+            # Installed again without SA_RESETHAND: a second signal must find its handler, however soon it comes.
             signal.signal(number, self._request)
 
     def take_reload(self) -> bool:
@@ -111,7 +111,7 @@ class StopRequest:
 
     def _request_reload(self, _signal: int, _frame: FrameType | None) -> None:
         if self._had_terminal and not os.isatty(sys.stderr.fileno()):
-            # Not asked for: the terminal is gone, and with it whoever could end us.
+            # This SIGHUP comes from a closed terminal. It asks for no reload, and nobody is left to end the relay.
             self._stop()
             return
         self._reload = True
@@ -125,24 +125,24 @@ class StopRequest:
             return
         self._signalled = True
         if self._wake is None and os.getpid() != 1:
-            # The kernel needs no turn of this thread for it. Of PID 1 it takes no signal that has no handler.
+            # The kernel then acts on the second signal without this thread. PID 1 ignores signals without a handler.
             for each in _SIGNALS:
                 signal.signal(each, signal.SIG_DFL)
         self._stop()
 
     def _stop(self) -> None:
         self.requested = True
-        # There is nothing to read again; and as it ends, Python would let the signal kill the process.
+        # A reload would be in vain, and during its exit Python would let SIGHUP kill the process.
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
         if self._wake is not None:
             self._wake()
         elif not self._deferred:
             os.write(2, b"syncrelay: stopped before it started\n")
-            # No exception: raised in the middle of an import, it could be swallowed there.
+            # An exception could be swallowed by an import that is under way.
             os._exit(0)
 
     def _count_on_a_thread(self) -> None:
-        """Let a second signal of another kind end the process too while Python cannot run the handlers."""
+        """End the process at a second signal of another kind even while Python cannot run the handlers."""
         import threading
 
         received, told = os.pipe()
@@ -160,7 +160,7 @@ class StopRequest:
         for number in second or _requests(received):
             if os.getpid() == 1:
                 os._exit(_ENDED_BY + number)
-            # It has no handler any more.
+            # The first signal removed its handler.
             os.kill(os.getpid(), number)
 
 
@@ -173,10 +173,10 @@ def _requests(received: int) -> list[int]:
 
 def _pass_over_what_comes_in_a_second(received: int, told: int) -> None:
     for number in _SIGNALS:
-        # Should all of Python hang before that second is over, the third is the end.
+        # If all of Python hangs before the second is over, a third signal ends the process.
         _take_once(number)
     time.sleep(_ONE_REQUEST_S)
-    # Not to wait where nothing came.
+    # Written so that the read below does not wait if no signal came.
     os.write(told, b"\0")
     os.read(received, 64)
     for number in _SIGNALS:
@@ -184,7 +184,7 @@ def _pass_over_what_comes_in_a_second(received: int, told: int) -> None:
 
 
 def _leave_to_the_kernel(number: int) -> None:
-    """As SIG_DFL, on any thread: the signal ends the process. Of PID 1 the kernel takes none that has no handler."""
+    """Set SIG_DFL from any thread, so that the signal ends the process. PID 1 keeps its handler."""
     if os.getpid() == 1:
         return
     import ctypes
@@ -193,9 +193,9 @@ def _leave_to_the_kernel(number: int) -> None:
 
 
 def _take_once(number: int) -> None:
-    """Let the kernel itself end the process at the second signal, in case Python never gets to run the handler.
+    """Reset the handler at the first signal, so that the kernel ends the process at the second.
 
-    It only does when this thread next runs Python: not while a call into DDS or a file system hangs.
+    Python runs handlers only when this thread next runs Python code: not while a call into DDS or a file system hangs.
     """
     if os.getpid() == 1:
         return

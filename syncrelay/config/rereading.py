@@ -1,4 +1,4 @@
-"""The relay's files, read again on a thread of their own: a pipe or a file system that hangs stops nobody else."""
+"""The relay's files, read again on a thread of its own, so that a pipe or a file system that hangs delays nothing."""
 
 import threading
 import time
@@ -14,15 +14,15 @@ from syncrelay.yaml_files import yaml_files
 
 # `syncrelay reload` waits for 10 s.
 _PATIENCE_S: Final = 6.0
-# Of it, what a pipe may take to come to its end: it says so itself.
+# How long a pipe may take to end, which has an error of its own.
 _PIPE_S: Final = 5.0
 _LOOK_S: Final = 0.5
-# A file that is written in place, or copied over a slow link, may rest half-written. NFS shows a change up to 3 s late.
+# A file that is written in place or copied over a slow link may be half-written. NFS shows a change up to 3 s late.
 _SETTLED_S: Final = 3.0
 
 
 class Reading(NamedTuple):
-    """What came of reading the files: a Config, or what it raised. `asked` wait to be told what it led to, in words."""
+    """The result of reading the files: a Config, or the exception. `asked` are requests that wait for it."""
 
     config: Future[Config]
     asked: tuple[Future[str], ...]
@@ -34,13 +34,13 @@ class _Request(NamedTuple):
 
 
 class ConfigFiles:
-    """Reads files again when asked, and where they are watched when one has changed or is gone.
+    """Reads files again on request, and if they are watched, when one has changed or is gone.
 
-    A context manager, which does not wait for a read that hangs: the thread ends with the process.
+    A context manager. Leaving it does not wait for a read that hangs: the thread ends with the process.
     """
 
     def __init__(self, paths: Sequence[str], *, watched: bool) -> None:
-        """Note what the files are: a change from here on is seen."""
+        """Note the state of the files: changes are seen from here on."""
         self._paths = tuple(paths)
         self._known = self._marks() if watched else None
         self._seen = self._known
@@ -67,9 +67,9 @@ class ConfigFiles:
         self._done = done
 
     def read_again(self) -> Future[str]:
-        """Read the files, on the thread that reads. Any thread.
+        """Ask for the files to be read. Any thread.
 
-        The future is for who takes what is read from now on, to tell what it led to.
+        Whoever takes the reading sets the future's result: what the reading led to, in words.
         """
         request = _Request(time.monotonic(), Future())
         with self._lock:
@@ -78,9 +78,9 @@ class ConfigFiles:
         return request.told
 
     def take(self) -> Reading | None:
-        """Return what was read since this was last asked.
+        """Return what was read since the last call, None if nothing was.
 
-        For who has waited too long, that is a ConfigError. If the read ends after all, its Config is returned then.
+        A request that has waited too long gets a ConfigError. If its read ends after all, the Config is returned then.
         """
         with self._lock:
             read, self._read = self._read, None
@@ -102,7 +102,7 @@ class ConfigFiles:
 
     def _read_now(self) -> None:
         with self._lock:
-            # Who asks while it is being read wants to know what the files are then.
+            # Requests during the read are for a later one, as the files may have changed.
             asked = list(self._waiting)
         read: Future[Config] = Future()
         try:
@@ -118,7 +118,7 @@ class ConfigFiles:
         self._done()
 
     def have_changed(self, *, now: float) -> bool:
-        """Whether watched files are others than when this last said so, and have been the same for some seconds."""
+        """Whether watched files have changed since this last returned True, and then rested for some seconds."""
         if self._known is None:
             return False
         marks = self._marks()
@@ -134,7 +134,7 @@ class ConfigFiles:
 
 
 def _files(path: str) -> tuple[str, ...]:
-    """Return the files to look at; of a directory that cannot be read, itself."""
+    """Return the files of a directory, or the path itself if it is none or cannot be read."""
     try:
         return yaml_files(path)
     except OSError:
@@ -142,7 +142,7 @@ def _files(path: str) -> tuple[str, ...]:
 
 
 def _mark(path: Path) -> tuple[int, int, int] | None:
-    """Return what changes when a file does; follows links, as a mounted volume changes those instead."""
+    """Return what identifies the content of a file. Links are followed, as mounted volumes change the links."""
     try:
         status = path.stat()
     except OSError:

@@ -1,4 +1,4 @@
-"""The demo's lines and last words, for where nothing can be drawn and for the end."""
+"""The demo as text: a line a second where nothing can be drawn, and the summary at the end."""
 
 from dataclasses import dataclass
 from itertools import chain
@@ -25,7 +25,7 @@ class Moment:
 
 
 def plain_line(moment: Moment) -> str:
-    """Return one line on all groups, for where nothing can be drawn."""
+    """Return one line on all groups."""
     return f"{moment.elapsed_s:5.1f} s  {'; '.join(map(_in_short, moment.state.groups))}"
 
 

@@ -1,6 +1,13 @@
 """The page: words and tables from a template that escapes all it is given, drawings from data that is no script."""
 
+import hashlib
+from base64 import b64encode
+from datetime import UTC, datetime
+from importlib.resources import files
 from typing import Any, Final
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from syncrelay.errors import BagError
 from syncrelay.explain import words
@@ -8,8 +15,10 @@ from syncrelay.printable import printable, printable_lines
 from syncrelay.recordings.analysis import Analysis, file_with_changes
 from syncrelay.recordings.analysis.html.drawings import drawings_of
 from syncrelay.recordings.analysis.html.words import TopicRow, group_words, topic_row
-from syncrelay.recordings.pages import MARK, content_hash, joined, template, when
 from syncrelay.status.fates import FATES, Fate
+
+MARK: Final = '<meta name="generator" content="syncrelay">'
+"""Stands near the begin of every page, and in no other file."""
 
 _PACKAGE: Final = "syncrelay.recordings.analysis.html"
 _STYLES: Final = ("uplot/uPlot.min.css", "../../../status/page/colours.css", "page/report.css")
@@ -23,11 +32,11 @@ def as_html(name: str, analysis: Analysis) -> str:
     most = _MOST_MESSAGES // max(1, len(analysis.groups))
     drawings = [drawings_of(group, analysis, most=most) for group in analysis.groups]
     told = [group_words(group, drawing) for group, drawing in zip(analysis.groups, drawings, strict=True)]
-    script, style = joined(_PACKAGE, _SCRIPTS), joined(_PACKAGE, _STYLES)
-    page: str = template(_PACKAGE, "report.html.jinja").render(
+    script, style = _joined(_SCRIPTS), _joined(_STYLES)
+    page: str = _template("report.html.jinja").render(
         mark=MARK,
         name=printable(name),
-        began=when(analysis.begin),
+        began=_when(analysis.begin),
         lasts=words.seconds(analysis.end - analysis.begin),
         messages=sum(topic.messages for topic in analysis.topics),
         faults=list(map(printable, analysis.faults)),
@@ -39,8 +48,8 @@ def as_html(name: str, analysis: Analysis) -> str:
         file=_file(analysis),
         script=script,
         style=style,
-        script_hash=content_hash(script),
-        style_hash=content_hash(style),
+        script_hash=_content_hash(script),
+        style_hash=_content_hash(style),
     )
     return page
 
@@ -54,3 +63,40 @@ def _file(analysis: Analysis) -> str:
 
 def _fate(fate: Fate) -> dict[str, Any]:
     return {"name": fate.name, "word": fate.word, "path": fate.path, "filled": fate.is_filled}
+
+
+def _template(name: str) -> Any:
+    """Return a template. It escapes all it is given, as recordings come from strangers, and refuses unknown names."""
+    environment = Environment(
+        loader=PackageLoader(_PACKAGE, "page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["coded"] = _coded
+    return environment.get_template(name)
+
+
+def _joined(names: tuple[str, ...]) -> str:
+    folder = files(_PACKAGE)
+    return "\n" + "\n".join(folder.joinpath(name).read_text(encoding="utf-8").strip() for name in names) + "\n"
+
+
+def _content_hash(text: str) -> str:
+    """Return the hash by which the page's Content-Security-Policy admits a style or a script."""
+    return f"sha256-{b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}"
+
+
+def _when(nanoseconds: int) -> str:
+    try:
+        return f"{datetime.fromtimestamp(nanoseconds / 1_000_000_000, tz=UTC):%Y-%m-%d %H:%M:%S} UTC"
+    except (OverflowError, ValueError):
+        return f"{nanoseconds} ns"
+
+
+def _coded(text: str) -> Markup:
+    """Return a sentence, escaped, with what stands between backticks as code."""
+    parts = text.split("`")
+    wrapped = (Markup("<code>{}</code>").format(part) if at % 2 else escape(part) for at, part in enumerate(parts))
+    return Markup("").join(wrapped)
