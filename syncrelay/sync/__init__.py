@@ -9,11 +9,10 @@ from syncrelay.sync.exact_time import ExactTime
 from syncrelay.sync.group import SyncGroup
 from syncrelay.sync.latest_at_ticks import LatestAtTicks
 from syncrelay.sync.latest_time import LatestTime
-from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, Restamp
 from syncrelay.sync.optional import OptionalInputs
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.queues import StampQueue
-from syncrelay.sync.restamp import Restamp
 from syncrelay.sync.ticks import Ticks
 
 __all__ = [

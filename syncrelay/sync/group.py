@@ -6,9 +6,8 @@ from typing import Generic
 from syncrelay.sync.arrivals import Arrivals
 from syncrelay.sync.counts import InputCounts, Ledger
 from syncrelay.sync.matching import ByClock, Limited, Matching, Unlimited
-from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, T
+from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, Restamp, T, common_stamp
 from syncrelay.sync.policy import Policy
-from syncrelay.sync.restamp import Restamp, common_stamp
 from syncrelay.sync.thinning import Thinning
 
 

@@ -3,8 +3,7 @@ from functools import partial
 import pytest
 
 from syncrelay.sync import ApproximateTime, Message
-from tests.sync.support.drawn import policy_cases
-from tests.sync.support.timeline import TICK_NS
+from tests.sync.support.timeline import TICK_NS, policy_cases
 
 
 def approximate(inputs=2, queue=10, slop=20, periods=None, **options):

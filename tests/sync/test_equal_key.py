@@ -3,7 +3,7 @@ from functools import partial
 import pytest
 
 from syncrelay.sync import Drop, DropReason, EqualKey, Match, Message
-from tests.sync.support.drawn import policy_cases
+from tests.sync.support.timeline import policy_cases
 
 equal_key = partial(EqualKey, n_inputs=2, queue_size=3)
 

@@ -3,7 +3,7 @@ from functools import partial
 import pytest
 
 from syncrelay.sync import Drop, DropReason, ExactTime, Message
-from tests.sync.support.drawn import policy_cases
+from tests.sync.support.timeline import policy_cases
 
 exact = partial(ExactTime, n_inputs=2, queue_size=10)
 three = partial(ExactTime, n_inputs=3, queue_size=10)

@@ -8,9 +8,8 @@ from syncrelay.sync import (
     InputCounts,
     Message,
 )
-from tests.sync.support.drawn import group_cases
 from tests.sync.support.grouped import GAP, approximate, by_key, exact, latest
-from tests.sync.support.timeline import START_NS, play_group, stamp
+from tests.sync.support.timeline import START_NS, group_cases, play_group, stamp
 
 test_disorder = group_cases(
     {

@@ -1,16 +1,14 @@
-from dataclasses import dataclass
 from functools import partial
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncrelay.sync import Drop, DropReason, LatestAtTicks, LatestTime, Match, Message, Restamp, SyncGroup, Ticks
+from syncrelay.sync import Drop, DropReason, LatestAtTicks, LatestTime, Match, Message, Restamp, Ticks
 from syncrelay.sync.latest_at_ticks import REST_NS
-from tests.sync.support.drawn import group_cases
 from tests.sync.support.grouped import grouped
-from tests.sync.support.rigs import START, TICK, Step, few, run, steps, take
-from tests.sync.support.timeline import START_NS, TICK_NS
+from tests.sync.support.rigs import START, TICK, Step, options, run, steps, take
+from tests.sync.support.timeline import START_NS, TICK_NS, group_cases
 
 
 def by_clock(inputs=2, queue=10, age=None, hz=20, **options):
@@ -35,15 +33,6 @@ test_drawn = group_cases(
             -> @15: bA
             """,
         ),
-        "a message newer than the tick does not serve it": (
-            partial(by_clock, max_wait=3),
-            """
-            lidar |.a....b........
-            odom  |A..............
-            -> @8: aA
-            -> @13: bA
-            """,
-        ),
         "max_wait is how long a message may be on its way": (
             partial(by_clock, max_wait=3),
             """
@@ -66,23 +55,6 @@ test_drawn = group_cases(
             -> @10: bc
             """,
         ),
-        "a message that comes at its tick comes too late for it": (
-            by_clock,
-            """
-            lidar |.a...b.....
-            odom  |A..........
-            -> @5: aA
-            -> @10: bA
-            """,
-        ),
-        "no set leaves before every required input has had a message": (
-            by_clock,
-            """
-            lidar |.a..........
-            odom  |.......A....
-            -> @10: aA
-            """,
-        ),
         "no set leaves when a required input has nothing young enough": (
             partial(by_clock, age=5),
             """
@@ -100,25 +72,6 @@ test_drawn = group_cases(
             lidar |.a...
             odom  |....A.
             -> a: a expired
-            """,
-        ),
-        "a message of just the greatest age still serves": (
-            partial(by_clock, age=4),
-            """
-            lidar |.a....
-            odom  |.A....
-            -> @5: aA
-            """,
-        ),
-        "a set leaves without an optional input that has nothing": (
-            partial(by_clock, age=4, **third_optional),
-            """
-            lidar |.a.....b...c....
-            odom  |.A.....B...C....
-            gps   |...G............
-            -> @5: aAG
-            -> @10: bB-
-            -> @15: cC-
             """,
         ),
         "of the messages between two ticks only the last is kept": (
@@ -331,117 +284,53 @@ def test_the_queue_that_is_needed_has_room_for_every_tick_that_is_waited_for():
     assert sets == 30
 
 
-@dataclass(frozen=True)
-class Rig:
-    """Times in steps of 10 ms."""
-
-    required: tuple
-    hz: Ticks
-    max_ages: tuple
-    max_wait: int | None
-    offsets: tuple
-    every: int = 1
-    queue: int = 1000
-
-    def group(self):
-        inputs = len(self.required)
-        policy = LatestAtTicks(
-            n_inputs=inputs,
-            queue_size=self.queue,
-            ticks=self.hz,
-            max_ages_ns=[None if age is None else age * TICK for age in self.max_ages],
-        )
-        return SyncGroup(
-            policy,
-            required=self.required,
-            max_wait_ns=None if self.max_wait is None else self.max_wait * TICK,
-            offsets_ns=[offset * TICK for offset in self.offsets],
-            every=self.every,
-            restamp=Restamp.TICK,
-        )
-
-    @property
-    def wait_ns(self):
-        return (self.max_wait or 0) * TICK
+_RATES = (Ticks(100), Ticks(20), Ticks(30), Ticks(2997, 100), Ticks(300), Ticks(3, 2))
 
 
-RATES = (Ticks(100), Ticks(20), Ticks(30), Ticks(2997, 100), Ticks(300), Ticks(3, 2))
-
-
-@st.composite
-def rigs(draw, *, disorder=True, jumps=True, **chosen):
-    inputs = draw(few(1, 3))
-    rig = Rig(
-        required=draw(st.tuples(*[st.booleans()] * inputs).filter(any)),
-        hz=draw(st.sampled_from(RATES)),
-        max_ages=draw(st.tuples(*[st.none() | few(0, 20)] * inputs)),
-        max_wait=draw(st.none() | few(0, 20)),
-        offsets=draw(st.tuples(*[few(-5, 5)] * inputs)),
-        **{key: draw(each) for key, each in chosen.items()},
+def clocked(chosen, ticks, queue=1000):
+    policy = LatestAtTicks(n_inputs=chosen.n_inputs, queue_size=queue, ticks=ticks, max_ages_ns=chosen.max_ages_ns)
+    return grouped(
+        policy,
+        required=chosen.required,
+        max_wait=chosen.max_wait,
+        offsets_ns=[offset * TICK for offset in chosen.offsets] or None,
     )
-    taken = draw(steps(inputs, disorder=disorder, jumps=jumps))
-    return rig, taken
 
 
-def flat(left):
-    return [outcome for outcomes in left for outcome in outcomes]
-
-
-def slow_sets(rig, taken):
+def slow_sets(chosen, ticks, taken):
     """The rule itself: at each tick, of what was added before it, the latest not newer one of every input."""
-    now = taken[0].now
-    last = taken[-1].now
-    first = rig.hz.last_until(now - rig.wait_ns) + 1
-    for index in range(first, rig.hz.last_until(last - rig.wait_ns) + 1):
-        tick = rig.hz.at(index)
-        came = [step.message for step in taken if step.message is not None and step.now < tick + rig.wait_ns]
+    wait = (chosen.max_wait or 0) * TICK
+    offsets = [offset * TICK for offset in chosen.offsets or (0,) * chosen.n_inputs]
+    for index in range(ticks.last_until(taken[0].now - wait) + 1, ticks.last_until(taken[-1].now - wait) + 1):
+        tick = ticks.at(index)
+        came = [step.message for step in taken if step.message is not None and step.now < tick + wait]
         members = []
-        for place in range(len(rig.required)):
-            stamps = [
-                stamp
-                for each in came
-                if each.input == place and (stamp := each.stamp + rig.offsets[place] * TICK) <= tick
-            ]
-            latest = max(stamps, default=None)
-            is_young = latest is not None and (
-                rig.max_ages[place] is None or tick - latest <= rig.max_ages[place] * TICK
-            )
-            members.append(latest - rig.offsets[place] * TICK if is_young else None)
-        if all(stamp is not None for stamp, needed in zip(members, rig.required, strict=True) if needed):
+        for place, (offset, max_age) in enumerate(zip(offsets, chosen.max_ages_ns, strict=True)):
+            ages = [tick - each.stamp - offset for each in came if each.input == place]
+            age = min((age for age in ages if age >= 0), default=None)
+            members.append(None if age is None or (max_age is not None and age > max_age) else tick - age - offset)
+        if all(stamp is not None for stamp, needed in zip(members, chosen.required, strict=True) if needed):
             yield tick, tuple(members)
 
 
-@given(drawn=rigs(disorder=False))
-def test_sets_are_those_of_the_rule(drawn):
-    rig, taken = drawn
+@given(chosen=options(thinned=False), ticks=st.sampled_from(_RATES), data=st.data())
+def test_sets_are_those_of_the_rule(chosen, ticks, data):
+    taken = data.draw(steps(chosen.n_inputs, disorder=False))
     if taken:
-        left = sets_of(flat(run(rig.group(), taken)))
-        assert [(match.tick, match.stamps) for match in left] == list(slow_sets(rig, taken))
+        left = sets_of(outcome for outcomes in run(clocked(chosen, ticks), taken) for outcome in outcomes)
+        assert [(match.tick, match.stamps) for match in left] == list(slow_sets(chosen, ticks, taken))
 
 
-@given(drawn=rigs(queue=few(1, 4)))
-def test_no_message_is_newer_than_its_tick_or_too_old_and_all_required_are_there(drawn):
-    rig, taken = drawn
-    for match in sets_of(flat(run(rig.group(), taken))):
-        assert rig.hz.at(rig.hz.last_until(match.tick)) == match.tick == match.stamp
-        for stamp, needed, offset, max_age in zip(match.stamps, rig.required, rig.offsets, rig.max_ages, strict=True):
-            assert stamp is not None or not needed
-            if stamp is not None:
-                age = match.tick - stamp - offset * TICK
-                assert age >= 0
-                assert max_age is None or age <= max_age * TICK
-
-
-@given(drawn=rigs(queue=few(1, 4)))
-def test_the_next_deadline_is_when_the_next_set_leaves(drawn):
-    rig, taken = drawn
-    group = rig.group()
+@given(chosen=options(thinned=False), ticks=st.sampled_from(_RATES), data=st.data())
+def test_the_next_deadline_is_when_the_next_set_leaves(chosen, ticks, data):
+    group = clocked(chosen, ticks, queue=chosen.queue_size)
     clock = START
-    for step in taken:
+    for step in data.draw(steps(chosen.n_inputs)):
         clock = max(clock, step.now)
         take(group, Step(clock, step.message))
     deadline = group.next_deadline()
     if deadline is not None:
         assert deadline > clock
         assert list(group.expire(now=deadline - 1)) == []
-        assert [match.tick + rig.wait_ns for match in sets_of(group.expire(now=deadline))] == [deadline]
+        (match,) = sets_of(group.expire(now=deadline))
+        assert match.tick + (chosen.max_wait or 0) * TICK == deadline

@@ -3,8 +3,7 @@ from functools import partial
 import pytest
 
 from syncrelay.sync import DropReason, LatestTime, Message
-from tests.sync.support.drawn import policy_cases
-from tests.sync.support.timeline import TICK_NS, play_policy
+from tests.sync.support.timeline import TICK_NS, play_policy, policy_cases
 
 
 def latest(inputs=2, queue=10, age=3, **options):

@@ -7,9 +7,8 @@ import pytest
 from syncrelay.sync import (
     Message,
 )
-from tests.sync.support.drawn import group_cases
 from tests.sync.support.grouped import approximate, exact, latest
-from tests.sync.support.timeline import TICK_NS, stamp
+from tests.sync.support.timeline import TICK_NS, group_cases, stamp
 
 test_max_wait = group_cases(
     {

@@ -11,9 +11,8 @@ from syncrelay.sync import (
     LatestTime,
     Message,
 )
-from tests.sync.support.drawn import group_cases
 from tests.sync.support.grouped import approximate, by_key, exact, grouped, paced, third_optional
-from tests.sync.support.timeline import START_NS, TICK_NS, stamp
+from tests.sync.support.timeline import START_NS, TICK_NS, group_cases, stamp
 
 test_optional = group_cases(
     {

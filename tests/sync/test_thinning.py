@@ -1,8 +1,7 @@
 from functools import partial
 
 from syncrelay.sync import DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
-from tests.sync.support.drawn import group_cases
-from tests.sync.support.timeline import START_NS, TICK_NS, stamp
+from tests.sync.support.timeline import START_NS, TICK_NS, group_cases, stamp
 
 
 def grouped(policy, *, period=None, required=(True, True), **options):

@@ -5,6 +5,8 @@ A column is a tick of 10 ms.
 
 from dataclasses import dataclass, replace
 
+import pytest
+
 from syncrelay.recordings.cases.drawing import parse as parse_drawing
 from syncrelay.sync import Drop, Match, Message
 
@@ -78,3 +80,25 @@ def play_group(group, drawing, raw_stamp=lambda message: message.stamp):
             message = arrivals.pop(0)[1]
             note(message.payload, group.add(replace(message, stamp=raw_stamp(message)), now=stamp(column)))
     return tuple(lines), timeline.expected
+
+
+def policy_cases(cases):
+    """`cases`: a sentence -> (a function that makes the policy, a drawing)."""
+
+    @pytest.mark.parametrize(("make", "drawing"), cases.values(), ids=cases)
+    def test(make, drawing):
+        left, drawn = play_policy(make(), drawing)
+        assert left == drawn
+
+    return test
+
+
+def group_cases(cases):
+    """`cases`: a sentence -> (a function that makes the group, a drawing)."""
+
+    @pytest.mark.parametrize(("make", "drawing"), cases.values(), ids=cases)
+    def test(make, drawing):
+        left, drawn = play_group(make(), drawing)
+        assert left == drawn
+
+    return test
