@@ -16,8 +16,10 @@ from syncrelay.config.installed import NOT_SHARED, Policies, installed_policies,
 from syncrelay.config.keys import NOT_NULL, Keys
 from syncrelay.config.models import Group, Topic, Topics
 from syncrelay.config.names import check_group_name
+from syncrelay.config.qos import QosOverrides
 from syncrelay.config.sections import DiagnosticsConfig, MetricsConfig, NodeConfig
-from syncrelay.config.wording import describe
+from syncrelay.config.translate import Form
+from syncrelay.config.wording import describe, one_of
 
 AnyKeys = TypeVar("AnyKeys", bound=Keys)
 
@@ -191,3 +193,29 @@ def _partial_export() -> Any:
 
 def _partial_group(model: type[Group]) -> type[Group]:
     return _partial(model, topics=(_tuple_of(_partial(topic_model(model))), ()))
+
+
+def relay_form() -> Form:
+    """Return what errors of the relay's file are told by, with the policies that are installed."""
+    known = file_format()
+    return Form(
+        known.file,
+        levels={
+            "the file": known.file,
+            "`node`": NodeConfig,
+            "`metrics`": MetricsConfig,
+            "`diagnostics`": DiagnosticsConfig,
+            "`export`": ExportKeys,
+            "`export.lerobot`": LerobotKeys,
+            "a group": known.any_group,
+            "a topic": known.any_topic,
+            "a topic's `qos`": QosOverrides,
+        },
+        missing={
+            "groups": "expected one group or more",
+            "topics": "expected a list of 2 or more topics",
+            "version": "expected `version: 1`",
+            "policy": f"expected {one_of(known.groups)}",
+        },
+        kinds=known.groups,
+    )

@@ -15,13 +15,12 @@ from syncrelay.config.defaults import merged_documents, merged_files, with_defau
 from syncrelay.config.document import Document, as_written, flow, plain
 from syncrelay.config.export import LerobotConfig, resolve_lerobot
 from syncrelay.config.export_checks import check_export
-from syncrelay.config.file import FileKeys, file_format
+from syncrelay.config.file import FileKeys, file_format, relay_form
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.config.listen import Listen
 from syncrelay.config.names_in_graph import NamesInFile
 from syncrelay.config.partial import partial_file
 from syncrelay.config.problems import ConfigError, Path, Problem, Severity
-from syncrelay.config.relay_form import RelayForm
 from syncrelay.config.resolved import GroupConfig, resolve_groups, resolve_listen
 from syncrelay.config.sections import DiagnosticsConfig, NodeConfig
 from syncrelay.config.source import PATIENCE_S, Patience, Source, check_text, listed, read_source
@@ -160,7 +159,7 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
         return _Part(document, file_format().file.model_validate(keys), problems)
     except ValidationError as error:
         faults = error.errors(include_url=False)
-        return _Part(*partial_file(document, faults), problems + translate(_known(faults), document, RelayForm()))
+        return _Part(*partial_file(document, faults), problems + translate(_known(faults), document, relay_form()))
 
 
 def _known(faults: Sequence[ErrorDetails]) -> list[ErrorDetails]:

@@ -7,9 +7,9 @@ from typing import Any
 from pydantic_core import ErrorDetails
 
 from syncrelay.config.document import Document, MappingNode, Node, ScalarNode, SequenceNode
-from syncrelay.config.file import FileKeys, partial_format
+from syncrelay.config.file import FileKeys, file_format, partial_format
+from syncrelay.config.places import place
 from syncrelay.config.problems import Path
-from syncrelay.config.relay_form import path_of
 
 
 def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Document, FileKeys]:
@@ -18,7 +18,8 @@ def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Do
     In it a missing topic is empty, and another key that is needed None.
     """
     # A group whose name is refused has its keys all the same.
-    faulty = frozenset(_key(path_of(error["loc"])) for error in errors if error["loc"][2:] != ("[key]",))
+    locs = (error["loc"] for error in errors if error["loc"][2:] != ("[key]",))
+    faulty = frozenset(_key(place(file_format().file, loc).path) for loc in locs)
     usable = _usable(document.root, (), faulty)
     keys = usable if isinstance(usable, dict) else {}
     return replace(document, faulty=faulty), partial_format().model_validate(keys)

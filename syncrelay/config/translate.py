@@ -1,19 +1,18 @@
 """pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
 
 import re
-from collections.abc import Iterator, Sequence
-from typing import Any, Final, Protocol, TypeAlias
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from syncrelay.config.document import Document, MappingNode, ScalarNode
+from syncrelay.config.places import Location, alternatives, place
 from syncrelay.config.problems import Path, Problem
 from syncrelay.config.scalars import read_plain
-from syncrelay.config.wording import describe, one_of, or_nearest, quoted
-
-Location: TypeAlias = tuple[str | int, ...]
-"""A place in pydantic's words: a path with the tags of unions in it."""
+from syncrelay.config.wording import all_of, describe, one_of, or_nearest, quoted
 
 _EXPECTED: Final = {
     "int_type": "a whole number",
@@ -36,28 +35,45 @@ _TRUTH_WORDS: Final = ("yes", "no", "on", "off", "true", "false")
 _A_WORD: Final = re.compile(r"[\w./~-]{1,80}")
 
 
-class Form(Protocol):
-    """What the words of an error come from, for one kind of file."""
+@dataclass(frozen=True, slots=True)
+class Form:
+    """What the words of an error come from, for one kind of file: its model, and where in it keys can stand, in words.
+
+    `missing` says what is expected in place of some keys; of others, the examples of the models do. `kinds` are the
+    tags of unions by which people know the branches.
+    """
+
+    file: type[BaseModel]
+    levels: Mapping[str, type[BaseModel]]
+    missing: Mapping[str, str]
+    kinds: Collection[str] = ()
 
     def path(self, loc: Location) -> Path:
         """Return the path of a place of pydantic's."""
-        ...
+        return place(self.file, loc).path
 
     def model(self, loc: Location) -> type[BaseModel]:
         """Return the model whose keys stand at a place of pydantic's."""
-        ...
-
-    def levels(self) -> Iterator[tuple[str, type[BaseModel]]]:
-        """Yield where keys can stand, in words, and the model of each place."""
-        ...
+        return place(self.file, loc).model
 
     def owners(self, loc: Location) -> str | None:
-        """Return where alone a key can stand that is one of another kind of mapping at this place; None for others."""
-        ...
+        """Return which kinds alone have a key that is missing in the kind at this place; None for other keys."""
+        key, kind = str(loc[-1]), place(self.file, loc).tag
+        others = alternatives(self.file, loc[:-1])
+        if kind not in self.kinds or key in place(self.file, loc[:-1]).model.model_fields:
+            return None
+        owners = [other for other in self.kinds if key in others[other].model_fields]
+        verb = "does" if len(owners) == 1 else "do"
+        return f"{kind} has no `{key}`, only {all_of(owners)} {verb}" if owners else None
 
-    def missing(self, loc: Location) -> str:
+    def expected(self, loc: Location) -> str:
         """Say what is expected where a key is missing."""
-        ...
+        key = str(loc[-1])
+        if key in self.missing:
+            return self.missing[key]
+        kind = str(loc[-2]).strip("<>") if len(loc) > 1 else ""
+        example = (self.model(loc[:-1]).model_fields[key].examples or [""])[0]
+        return f"{f'{kind} needs it, ' if kind in self.kinds else ''}for example `{key}: {example}`"
 
 
 def translate(errors: Sequence[ErrorDetails], document: Document, form: Form) -> list[Problem]:
@@ -89,7 +105,7 @@ def _problem(error: ErrorDetails, path: Path, meant: str | None, document: Docum
             text = _unknown_key(error["loc"], meant, document, form)
             return document.problem(path, text, code="unknown_key", span=document.key_span(path))
         case "missing":
-            text = f"missing, {form.missing(error['loc'])}"
+            text = f"missing, {form.expected(error['loc'])}"
             return document.problem(path, text, code="missing_key", span=_owner_span(path, document))
         case kind if kind in _EXPECTED:
             found = document.filled_in(path)
@@ -178,7 +194,7 @@ def _unknown_key(loc: Location, meant: str | None, document: Document, form: For
     owners = form.owners(loc)
     if owners is not None:
         return owners
-    levels = [level for level, owner in form.levels() if key in owner.model_fields]
+    levels = [level for level, owner in form.levels.items() if key in owner.model_fields]
     if levels and document.nearest(key, model.model_fields, likeness=_A_SLIP) is None:
         return f"`{key}` does not belong here, it is a key of {levels[0]}"
     if "$" in key:

@@ -6,7 +6,7 @@ from typing import Any, Final
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
 
-from syncrelay.config.relay_form import RelayForm
+from syncrelay.config.file import relay_form
 from syncrelay.config.wording import all_of, quoted
 from syncrelay.printable import printable
 
@@ -69,7 +69,7 @@ def misplaced(names: Iterable[str]) -> str | None:
 
 def _place(name: str) -> str | None:
     first, *below = name.split(".")
-    levels = list(RelayForm().levels())
+    levels = list(relay_form().levels.items())
     if name == "config":
         return "behind `--config`"
     if first == "qos_overrides":

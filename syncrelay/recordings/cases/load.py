@@ -19,7 +19,7 @@ from syncrelay.recordings.bag import is_url
 from syncrelay.recordings.bag.bindings import full_name
 from syncrelay.recordings.cases import drawing as drawings
 from syncrelay.recordings.cases.drawing import Drawing
-from syncrelay.recordings.cases.form import CasesForm
+from syncrelay.recordings.cases.form import CASES_FORM
 from syncrelay.recordings.cases.models import LONGEST, MOST_SECONDS, Case, CasesFile, InputSource
 from syncrelay.recordings.cases.names import input_named
 from syncrelay.rig.what_if import Fault
@@ -79,7 +79,7 @@ def _suite(source: Source, folder: Path, environ: Mapping[str, str]) -> Suite:
     try:
         file = CasesFile.model_validate(plain(document.root))
     except ValidationError as error:
-        raise _refusal([*problems, *translate(error.errors(include_url=False), document, CasesForm())]) from error
+        raise _refusal([*problems, *translate(error.errors(include_url=False), document, CASES_FORM)]) from error
     config = _tested(file.config, folder, document, environ)
     reader = _Reader(document, config, folder)
     if not file.cases:
