@@ -62,11 +62,6 @@ def a_lidar_that_returns(
     return run(*sources, seconds=80, seed=chance.randrange(1000), options=SLOP, publishers=is_there)
 
 
-@pytest.mark.parametrize("seed", range(25))
-def test_of_a_healthy_rig_that_starts_late_nothing_is_said(seed):
-    assert a_rig_that_starts_late(random.Random(seed)).warnings == []
-
-
 @pytest.mark.parametrize(("ppm", "slop"), [(10_000, "20ms"), (20_000, "20ms"), (1000, "20ms"), (200, "5ms")])
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.long

@@ -5,28 +5,7 @@ import pytest
 from tests.explain.scenario import Source, run
 
 _CAMERA, _LIDAR = Source("/camera", hz=30, jitter_ms=2), Source("/lidar", hz=10, jitter_ms=2)
-_IMU = Source("/imu", hz=5, required=False)
 _SLOP = {"slop": "60ms"}
-_PAUSES = [(20.1, 20.4), (30.0, 33.0), (45.0, 75.0), (100.3, 109.5)]
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        _SLOP,
-        {**_SLOP, "max_wait": "100ms", "queue_size": 20},
-        {"policy": "latest_time", "trigger": "/lidar", "max_age": "1s"},
-    ],
-    ids=["approximate_time", "with an optional input", "latest_time"],
-)
-def test_of_a_healthy_rig_nothing_is_found_but_the_pauses_and_none_of_them_is_a_line(options):
-    sources = (_CAMERA, _LIDAR, _IMU) if "max_wait" in options else (_CAMERA, _LIDAR)
-    told = run(*sources, seconds=140, options=options, paused=_PAUSES)
-    assert told.lines == []
-    assert told.ever_found == {"paused"}
-    assert [second for second, _ in told.findings("paused")] == [30, 31, 32, *range(45, 75), *range(101, 110)]
-    # Soon after, the rate is again that of now.
-    assert told.facts.figures.rate_hz == pytest.approx(10, rel=0.1)
 
 
 def test_a_silence_that_begins_in_a_pause_is_told_after_it():

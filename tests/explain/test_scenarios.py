@@ -159,62 +159,6 @@ def test_only_the_cause_is_said(told_of, code, topics):
     assert len(told.warnings) <= 4
 
 
-HEALTHY = {
-    "30 Hz camera and 10 Hz lidar": (
-        [Source("/camera", 30, delay_ms=20, **REAL), Source("/lidar", 10, delay_ms=30, **REAL)],
-        {"slop": "30ms"},
-    ),
-    "200 Hz IMU, 20 Hz camera and 1 Hz GPS": (
-        [
-            Source("/imu", 200, delay_ms=2, jitter_ms=0.2, delay_jitter_ms=0.5),
-            Source("/camera", 20, delay_ms=20, **REAL),
-            Source("/gps", 1, delay_ms=80, **REAL),
-        ],
-        {"slop": "50ms", "queue_size": 450},
-    ),
-}
-
-
-@pytest.mark.parametrize(("sources", "options"), HEALTHY.values(), ids=HEALTHY)
-@pytest.mark.parametrize("seed", range(5))
-def test_nothing_is_said_of_a_healthy_rig(sources, options, seed):
-    told = run(*sources, seconds=60, seed=seed, options=options)
-    assert told.warnings == []
-    assert told.ever_found == set()
-
-
-def held_up(kind: str, pauses: list[tuple[float, float]]) -> dict[str, Any]:
-    """The keyword of `run` that makes a relay rest."""
-    return {kind: pauses}
-
-
-@pytest.mark.parametrize(("sources", "options"), HEALTHY.values(), ids=HEALTHY)
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("kind", ["stops", "starved"])
-@pytest.mark.long
-def test_of_a_relay_that_gets_too_little_cpu_only_that_is_said(sources, options, seed, kind):
-    chance = random.Random(seed)
-    at = 5.0
-    pauses: list[tuple[float, float]] = []
-    while at < 55:
-        pauses.append((at, at + chance.choice([0.05, 0.2, 0.6, 1.5])))
-        at = pauses[-1][1] + chance.expovariate(0.5)
-    told = run(*sources, seconds=90, seed=seed, options=options, **held_up(kind, pauses))
-    assert told.codes <= {"too_slow"}, told.warnings
-
-
-@pytest.mark.parametrize("kind", ["stops", "starved"])
-@pytest.mark.parametrize("length", [1.5, 3.0, 8.0, 20.0])
-@pytest.mark.parametrize("hz", [1, 30])
-def test_one_stop_of_the_relay_is_blamed_on_nothing_else(kind, length, hz):
-    sources = Source("/a", hz, **REAL), Source("/b", hz / 3 if hz > 1 else 1, **REAL)
-    told = run(*sources, seconds=120, options={"slop": "30ms"}, **held_up(kind, [(30.25, 30.25 + length)]))
-    assert told.codes <= {"too_slow"}, told.warnings
-    if length >= 3:
-        assert told.codes
-        assert not told.lines[-1].warns
-
-
 def test_a_looped_recording_is_no_conflict_and_no_step():
     told = all_of(stamp=lambda stamp: stamp - (3600 if stamp % (20 * S) < 10 * S else 3610) * S)
     assert told.warnings == []

@@ -1,52 +1,14 @@
 """What is said of a lazy group that sleeps and wakes, in virtual time: nothing but what is wrong while it is awake."""
 
-import pytest
-
 from syncrelay.explain import Code, Endpoint
 from tests.explain.scenario import IMU, Noise, Source, Told, run
 
 REAL: Noise = {"jitter_ms": 1.0, "delay_jitter_ms": 2.0}
-HEALTHY = {
-    "camera and lidar": (
-        [Source("/camera", 30, delay_ms=20, **REAL), Source("/lidar", 10, delay_ms=30, **REAL)],
-        {"slop": "30ms"},
-    ),
-    "a slow one, and one that may be missing": (
-        [Source("/imu", 100, delay_ms=2, **REAL), Source("/gps", 1, **REAL), Source("/extra", 10, required=False)],
-        {"slop": "50ms", "queue_size": 250, "max_wait": "200ms"},
-    ),
-    "one that others are held for": (
-        [Source("/lidar", 10, **REAL), Source("/pose", 2, **REAL)],
-        {"policy": "latest_time", "trigger": "/lidar", "max_age": "1s"},
-    ),
-}
-SLEEPS = {
-    "once, for a minute": [(20, 80)],
-    "from the start": [(0, 30)],
-    "again and again": [(15, 20), (22, 30), (37, 38), (39, 70)],
-    "to the end": [(60, 120)],
-}
 
 
 def lazy(*sources: Source, sleeps, seconds=120, **keys) -> Told:
     options = {"lazy": True, "slop": "30ms", **keys.pop("options", {})}
     return run(*sources, seconds=seconds, options=options, sleeps=sleeps, **keys)
-
-
-def while_asleep(told: Told, sleeps) -> list[list[Code]]:
-    """The codes of each second at which it slept."""
-    return [[each.code for each in found] for second, found in told.found if any(a <= second < b for a, b in sleeps)]
-
-
-@pytest.mark.parametrize(("sources", "options"), HEALTHY.values(), ids=HEALTHY)
-@pytest.mark.parametrize("sleeps", SLEEPS.values(), ids=SLEEPS)
-def test_of_a_healthy_rig_nothing_is_said_whenever_its_group_sleeps(sources, options, sleeps):
-    told = run(*sources, seconds=120, options=options | {"lazy": True}, sleeps=sleeps)
-    assert told.lines == []
-    assert told.ever_found == set()
-    asleep = while_asleep(told, sleeps)
-    assert asleep
-    assert all(Code.NOBODY_LISTENS in codes for codes in asleep)
 
 
 def test_what_happens_while_it_sleeps_is_no_news_when_it_wakes():
