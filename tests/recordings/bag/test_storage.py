@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zstandard
@@ -76,12 +77,25 @@ def served_as(server: FileServer, path: Path, at: str = "/rig.mcap") -> str:
     return server.url(at)
 
 
-@pytest.mark.parametrize("chunk_size", [1_000_000, 50_000], ids=["a chunk of many images", "a chunk an image"])
-def test_of_plain_chunks_only_the_wanted_messages_are_fetched(chunk_size, server, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), chunk_size=chunk_size)
-    url = served_as(server, path)
-    assert read(url, _SMALL) == read(str(path), _SMALL)
-    assert server.sent < 0.06 * path.stat().st_size
+# Options of the writer, what is read, the least and greatest share of the file that is fetched, the most requests.
+_FETCHED: dict[str, tuple[Any, ...]] = {
+    "two topics in chunks of many images": ({"chunk_size": 1_000_000}, _SMALL, 0, 0.06, 70),
+    "two topics in chunks of an image each": ({"chunk_size": 50_000}, _SMALL, 0, 0.06, 70),
+    "the index alone": ({}, set(), 0, 0.05, 5),
+    "all of it": ({"chunk_size": 50_000}, None, 1, 1.1, 10),
+    # An index that cannot be trusted leaves out nothing.
+    "one topic without a checksum": ({"chunk_size": 50_000, "enable_crcs": False}, {"/camera"}, 0.9, 1.1, 10),
+    "one topic without statistics": ({"chunk_size": 50_000, "use_statistics": False}, {"/camera"}, 0.9, 1.1, 10),
+}
+
+
+@pytest.mark.parametrize("case", _FETCHED)
+def test_no_more_is_fetched_than_what_is_wanted_and_in_few_requests(case, server, tmp_path):
+    options, topics, least, most, requests = _FETCHED[case]
+    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), **options)
+    assert read(served_as(server, path), topics) == read(str(path), topics)
+    assert least <= server.sent / path.stat().st_size <= most
+    assert len(server.requests) <= requests
 
 
 def test_of_compressed_chunks_only_those_that_hold_a_wanted_topic_are_fetched(server, tmp_path):
@@ -93,22 +107,6 @@ def test_of_compressed_chunks_only_those_that_hold_a_wanted_topic_are_fetched(se
     url = served_as(server, path)
     assert read(url, {"/camera"}) == read(str(path), {"/camera"})
     assert server.sent < 0.15 * path.stat().st_size
-
-
-def test_to_open_it_takes_the_index_alone(server, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", rig_with_images())
-    with closing(open_recording([served_as(server, path)])) as recording:
-        assert {channel.topic for channel in recording.channels} == {*_SMALL, "/image"}
-        assert recording.end > recording.begin > 0
-    assert len(server.requests) < 6
-    assert server.sent < 0.05 * path.stat().st_size
-
-
-def test_all_of_it_is_fetched_once_and_in_few_requests(server, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), chunk_size=50_000)
-    assert read(served_as(server, path)) == read(str(path))
-    assert server.sent < 1.1 * path.stat().st_size
-    assert len(server.requests) < 8
 
 
 def _with_summary(path: Path, old: bytes, new: bytes) -> None:
@@ -140,13 +138,6 @@ def test_an_index_that_hides_a_channel_is_told_by_the_statistics(server, tmp_pat
         assert (near, near_faults) == (far, far_faults)
         assert near_faults == [] or "of the 30 messages in its statistics" in near_faults[0]
         assert bool(near_faults) == (len(near) < 30)
-
-
-@pytest.mark.parametrize("lack", [{"enable_crcs": False}, {"use_statistics": False}], ids=["checksum", "statistics"])
-def test_without_a_checksum_or_statistics_no_chunk_is_left_out(lack, server, tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), chunk_size=50_000, **lack)
-    assert read(served_as(server, path), {"/camera"}) == read(str(path), {"/camera"})
-    assert server.sent > path.stat().st_size * 0.9
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if "index" not in kind])
@@ -297,18 +288,14 @@ def test_an_empty_file_is_said_to_be_empty(server):
         open_recording([server.url("/rig.mcap")])
 
 
-def test_of_splits_behind_urls_one_recording_is_made(server, tmp_path):
+def test_splits_behind_urls_are_one_recording_of_which_none_may_be_out_of_reach(server, tmp_path):
     for number in range(2):
-        path = write_mcap(tmp_path / f"rig_{number}.mcap", FRAMES[number::2])
-        server.files[f"/rig_{number}.mcap"] = path.read_bytes()
-    with closing(open_recording([server.url(f"/rig_{number}.mcap") for number in range(2)])) as recording:
+        served_as(server, write_mcap(tmp_path / f"rig_{number}.mcap", FRAMES[number::2]), f"/rig_{number}.mcap")
+    urls = [server.url(f"/rig_{number}.mcap") for number in range(3)]
+    with closing(open_recording(urls[:2])) as recording:
         assert len(list(chain.from_iterable(recording.batches(recording.channels)))) == len(FRAMES)
-
-
-def test_one_of_several_that_cannot_be_reached_is_no_fault_to_pass_over(server, tmp_path):
-    url = served_as(server, write_mcap(tmp_path / "rig.mcap", FRAMES))
-    with pytest.raises(StorageError, match=r"none\.mcap: no such file"):
-        open_recording([url, server.url("/none.mcap")])
+    with pytest.raises(StorageError, match=r"rig_2\.mcap: no such file"):
+        open_recording(urls)
 
 
 def test_to_tell_and_to_complete_a_word_nothing_is_fetched(server):
