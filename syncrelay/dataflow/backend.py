@@ -43,7 +43,7 @@ class Source(Protocol):
     waited: int
     """The longest that a message waited from its receipt to the poll that found it, in ns; the reader resets it."""
     pending: int
-    """How many messages it has at most: what was reported, or `ALL` until `take` finds that there is no more."""
+    """At most how many messages it has: those that DDS reported, or `ALL` until `take` finds no more."""
 
     def take(self) -> Payload | None:
         """Take its oldest message, so that one less is pending; None if there is none after all."""
@@ -62,7 +62,7 @@ class Outlet(Protocol):
     """A publisher of payloads as they came. Raises PublishError."""
 
     sent: int
-    """How many messages it has published: what DDS numbers them by."""
+    """How many messages it has published: DDS numbers them alike."""
 
     @property
     def topic(self) -> str:
@@ -82,15 +82,15 @@ class Outlet(Protocol):
         ...
 
     def is_heard(self) -> bool:
-        """Whether anyone subscribes; not where that cannot be told. Raises nothing."""
+        """Whether anyone subscribes; False where rcl cannot say. Raises nothing."""
         ...
 
 
 Ready: TypeAlias = tuple[Sequence[Source], int, bool]
-"""Sources that may have got messages since they were drained, the time of the poll, and whether there was a wake.
+"""Sources that may have messages, the time of the poll, and whether there was a wake.
 
-Whatever was received up to that time, in nanoseconds of the system clock, is in one of them, or in one that was not
-drained, but for what DDS was just about to report. A source is drained when `take` gave None.
+Messages received up to that time, in nanoseconds of the system clock, are in these sources or in others that were not
+drained since; only what DDS was just about to report may be missing. A source is drained when `take` returned None.
 """
 
 
@@ -145,7 +145,7 @@ class Inbox(Protocol):
         ...
 
     def deliver_held(self) -> None:
-        """Deliver what was taken and held, at the end: nothing more is taken."""
+        """Deliver the messages that are held, at the end: nothing more is taken."""
         ...
 
     def wake(self) -> None:

@@ -7,7 +7,7 @@ from typing import Final
 
 _LOG = logging.getLogger("syncrelay")
 
-# An error whose text differs every time is logged no more often than this.
+# An error whose text differs each time is logged at most this often.
 _MOST: Final = 100
 
 
@@ -26,7 +26,7 @@ class Bugs:
             self.log(what, error)
 
     def log(self, what: str, error: Exception) -> None:
-        """Log an exception, the first time."""
+        """Log an exception, the first time that it comes."""
         key = (what, repr(error))
         if key not in self._logged and len(self._logged) < _MOST:
             self._logged.add(key)

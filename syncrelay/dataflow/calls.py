@@ -10,9 +10,9 @@ _Result = TypeVar("_Result")
 
 
 class Calls:
-    """What is to be called on a thread, in the order in which it was asked for.
+    """Functions to be called on one thread, in the order in which other threads asked for it.
 
-    `wake` is called, on the thread that asks, when there is something to carry out.
+    `wake` is called on the asking thread when there is something to carry out.
     """
 
     def __init__(self, wake: Callable[[], None]) -> None:
@@ -26,7 +26,7 @@ class Calls:
     def add(self, function: Callable[[], _Result]) -> "Future[_Result]":
         """Have `function` called; its result, or what it raised, comes in the future. Any thread.
 
-        A call that comes after the end, or that the end comes before, is cancelled.
+        A call is cancelled if the end comes before it is carried out, or has come already.
         """
         future: Future[_Result] = Future()
 
@@ -51,9 +51,9 @@ class Calls:
             self._due.popleft()[1]()
 
     def end(self) -> None:
-        """Cancel what is due, and all that comes."""
+        """Cancel the calls that are due, and all later ones."""
         self._ended = True
-        # Who asks after the end cancels too, maybe at the same moment.
+        # A thread that asks after the end cancels too, perhaps at the same moment.
         with suppress(IndexError):
             while True:
                 self._due.popleft()[0].cancel()

@@ -1,4 +1,4 @@
-"""What stands in for a group's engine while that gives nothing: it failed, is suspended, or the group is paused."""
+"""Stand-ins for a group's engine while no sets may leave: it failed, it is suspended, or the group is paused."""
 
 from collections import deque
 from collections.abc import Collection, Sequence
@@ -8,9 +8,9 @@ from syncrelay.sync.counts import InputCounts
 
 
 class StoppedEngine:
-    """Stands in for an engine that failed or is suspended: gives nothing. The counts stay as they were.
+    """Stands in for an engine that failed or is suspended: it gives no sets, and its counts stay as they were.
 
-    Of what comes it holds the newest `most` messages, with the reason of one that is to be rejected.
+    It holds the newest `most` messages; one that is to be rejected is held with the reason.
     """
 
     def __init__(self, sets: int, counts: tuple[InputCounts, ...], *, most: int = 0) -> None:
@@ -43,10 +43,10 @@ class StoppedEngine:
 
 
 class PausedEngine:
-    """Stands in for an engine whose group is paused: lets go what waits in it, and all that comes, as `paused`.
+    """Stands in for the engine of a paused group: messages that wait in it, and new ones, are dropped as `paused`.
 
-    But the latest message of an input that is `held`, as its latest may be in many sets, is kept: it may be the only
-    one for long, as a map, and is what the first set after the pause needs.
+    An input that is `held` keeps its latest message, which may be in many sets: a map, say, may be sent only once, and
+    the first set after the pause needs it.
     """
 
     def __init__(self, engine: SyncGroup, *, held: Collection[int]) -> None:
@@ -60,7 +60,7 @@ class PausedEngine:
     def add(self, message: Message, *, now: int) -> Sequence[Match | Drop]:
         if message.input not in self._held:
             return (self.engine.reject(message, DropReason.PAUSED),)
-        # No set leaves of it: there is no trigger, and no tick of a clock.
+        # This makes no set: neither a trigger nor a tick of a clock comes.
         self.engine.pass_over(now=now)
         return [*self.engine.add(message, now=now), *self.engine.let_go(DropReason.PAUSED)]
 

@@ -15,7 +15,7 @@ from syncrelay.sync import Drop, DropReason, Match, Message, SyncGroup
 
 Engine: TypeAlias = SyncGroup | PausedEngine | StoppedEngine
 
-# Enough for the widest terminal's strip of recent sets.
+# Enough for the strip of recent sets on the widest terminal.
 RECENT: Final = 256
 # What is kept between two evaluations: at 1 kHz they may be 10 s apart.
 _WATCHED: Final = 10_000
@@ -36,7 +36,8 @@ class Watched(NamedTuple):
 class Flow:
     """Feeds an engine on the receive thread and publishes the sets that it gives. What it raises stops its group.
 
-    It knows nothing of its group: in a circle, what ended would keep its messages until the collector came by.
+    It holds no reference to its group: in a cycle, a group that ended would keep its messages until Python collects
+    garbage.
     """
 
     def __init__(self, config: GroupConfig, *, now: Callable[[], int], refusals: Refusals, tape: Tape) -> None:
@@ -48,7 +49,7 @@ class Flow:
         self.keys: list[Hashable] = [None] * n_inputs
         """What the newest messages are matched by."""
         self.last: deque[Stamps | RecentDrop] = deque(maxlen=RECENT)
-        """What left last, oldest first; of a set the stamps alone, as one is noted for each."""
+        """What left last, oldest first: the stamps of a set, or a message that was dropped."""
         self.n_sets = 0
         """How many sets left: what manifests number them by."""
         self.unpublished = refusals.unpublished
@@ -113,7 +114,7 @@ class Flow:
                     self._tape.note(self._config, drop, time.time_ns(), message.payload.received)
 
     def _send(self, match: Match) -> int:
-        """Publish a set; when its newest message was received."""
+        """Publish a set, and return when its newest message was received."""
         newest = 0
         for message in match.messages:
             if message is None:

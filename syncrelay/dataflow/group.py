@@ -44,7 +44,8 @@ class Batch(NamedTuple):
 class GroupRelay:
     """Feeds a group's engine and publishes the sets that it gives, by its flow.
 
-    An exception stops this group and no other: who feeds the flow calls `fail`, all else does so itself.
+    An exception stops this group and no other. The handlers that feed the flow call `fail`; the methods here do so
+    themselves.
     """
 
     def __init__(
@@ -54,11 +55,11 @@ class GroupRelay:
         self._n_inputs = len(config.topics)
         self.flow = flow(config, now=now, refusals=Refusals(config.name), tape=tape or Tape())
         self.failure: str | None = None
-        """What stopped it; None of one that works."""
+        """What stopped it; None while it works."""
         self.paused_since: int | None = None
-        """Since when it is paused, in nanoseconds of the system clock; None of one that is not."""
+        """Since when it is paused, in nanoseconds of the system clock; None while it is not."""
         self.sleeps = False
-        """Whether nothing is fed, because nobody listens."""
+        """Whether it is fed nothing, because nobody subscribes to its outputs."""
         self.woke: int | None = None
         """When it was last fed again after a sleep, by the system clock in nanoseconds."""
         self._now = now
@@ -86,7 +87,8 @@ class GroupRelay:
 
         `restamped` says that its payloads begin with a Header, whose stamp the set's common stamp replaces.
         """
-        # Whoever joins by them forgets what an output gave before it numbers anew.
+        # An output numbers its messages anew from here. Readers join sets by these numbers, so they must first get the
+        # manifests of the sets before.
         if self._manifests is not None:
             self._manifests.publish_noted()
         self.flow.outlets[index] = outlet
@@ -113,7 +115,7 @@ class GroupRelay:
         self._manifests, self.flow.tell = manifests, manifests.tell
 
     def suspend(self) -> None:
-        """Let nothing leave and forget the outlets, which may end now, until `resume`; what comes is held meanwhile."""
+        """Hold new messages and let no set leave until `resume`; the outlets are forgotten, so they may end now."""
         counts = self.counts()
         self._suspended = self.engine
         self.engine = self._held_by = StoppedEngine(self.engine.sets, counts, most=_HELD)
@@ -121,7 +123,7 @@ class GroupRelay:
         self.flow.outlets = [None] * self._n_inputs
 
     def resume(self) -> None:
-        """Go on with all that was held. Where an outlet is missing now, all is dropped: sets would lack a message."""
+        """Go on with the messages that were held. If an outlet is missing now, drop them: sets would lack a message."""
         if self.failure is not None:
             return
         self.engine = self._suspended
@@ -174,7 +176,7 @@ class GroupRelay:
         return self._guarded(lambda: self.engine.counts())  # noqa: PLW0108  as above
 
     def _guarded(self, step: Callable[[], _Result]) -> _Result:
-        """Take a step; one that fails stops the group, and is taken again with the engine that gives nothing."""
+        """Take a step. If it fails, stop the group, and take the step again with the engine that stands in."""
         try:
             return step()
         except Exception as error:  # noqa: BLE001  it is this group's alone
@@ -196,7 +198,7 @@ class GroupRelay:
         self.engine = StoppedEngine(self.engine.sets, self._last_counts())
 
     def _last_counts(self) -> tuple[InputCounts, ...]:
-        """Count once more, as far as what failed still can."""
+        """Count once more, as far as the engine that failed still can."""
         with suppress(Exception):
             self.engine.flush(DropReason.SHUTDOWN)
         with suppress(Exception):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _NS_PER_SECOND: Final = 1_000_000_000
 _Head: TypeAlias = tuple[int, int, Payload, Source]
 
-# As many are delivered at a time, so that calls and deadlines need not wait for the end of a flood.
+# At most this many are delivered at a time, so that calls and deadlines do not wait for the end of a flood.
 _BATCH: Final = 256
 
 
@@ -28,17 +28,16 @@ class Backlog:
     def __init__(self) -> None:
         self._heads: list[_Head] = []
         self.held: set[Source] = set()
-        """The sources that a held message is of."""
+        """The sources of the messages that are held."""
         self.failed: dict[Source, Exception] = {}
         """The sources that could not be drained, and why."""
         self._ties = count()
 
     def deliver(self, sources: Sequence[Source], until: int) -> None:
-        """Deliver what is the oldest as far as a poll at `until` can tell, a batch at most.
+        """Deliver the messages that were received before the poll at `until`, the oldest first, a batch at most.
 
-        What came after the poll is held: an older message may be in a source that had none at the time. A
-        source of which nothing is held is drained. What was held before is due, though the clock was set back since:
-        all sources have been polled again.
+        A message that came after the poll is held: a source that had none at the poll may have an older one by now.
+        A message that was held before is due even if the clock was set back since: all sources have been polled again.
         """
         due = max([until, *(head[0] for head in self._heads)])
         for source in sources:
@@ -127,7 +126,7 @@ class PolledInbox:
         if source in self._sources:
             del self._sources[source]
             self._watch.remove(source)
-            # Who removes it in the midst of a delivery may destroy it.
+            # Whoever removes it during a delivery may destroy it next: nothing more is taken from it.
             source.pending = 0
 
     def receive(self, longest_ns: int) -> None:

@@ -1,4 +1,4 @@
-"""What the relay observes of itself: pauses, waits, losses, and clocks that step or stop. Times in nanoseconds."""
+"""What the relay observes of itself: standstills, waits, losses, and clocks that step or stop. Times in nanoseconds."""
 
 import time
 from collections import deque
@@ -24,7 +24,7 @@ _CLOCK_STOPPED_NS: Final = 2_500_000_000
 
 
 class Standstills:
-    """How long the process got no turn, as a thread sees it that works in short steps and rests between them."""
+    """How long the process did not run, as seen by a thread that works in short steps and rests between them."""
 
     def __init__(self) -> None:
         self._recent: deque[Standstill | None] = deque(maxlen=_RECENT)
@@ -32,17 +32,17 @@ class Standstills:
         self._began = time.monotonic_ns()
 
     def begin(self) -> None:
-        """Bear that a step begins now."""
+        """Begin a step now."""
         self._began = time.monotonic_ns()
 
     def end(self, *, rest: int = 0) -> None:
-        """Note how much longer a step took than it rested on purpose; the next one begins now."""
+        """Note how long a step took, without the rest that it took on purpose; the next one begins now."""
         before = self._began
         self.begin()
         self.note(Standstill(time.time_ns(), self._began - before - rest, rest))
 
     def note(self, standstill: Standstill) -> None:
-        """Take one that ends now."""
+        """Take a standstill that ends now."""
         if self._longest_now is None or standstill.ns > self._longest_now.ns:
             self._longest_now = standstill
 
@@ -74,12 +74,12 @@ class Waits:
 
 
 class Losses:
-    """What DDS lost of a topic. A new publisher is first heard in mid-stream, which is no loss."""
+    """How many messages of a topic DDS lost. What a new publisher sent before it was found is no loss."""
 
     def __init__(self) -> None:
         self._totals: deque[int] = deque(maxlen=_RECENT)
         self.total = 0
-        """How many were lost in all."""
+        """How many were lost since the relay started."""
         self._publishers = 0
         self._settling = 0
 
@@ -115,7 +115,7 @@ class Discovery:
         self._graph: Hashable = None
 
     def observe(self, graph: Hashable, *, now: float) -> None:
-        """Take what the graph holds, of which it matters only whether it has changed."""
+        """Take what the graph holds, to see whether it has changed."""
         if self._graph not in (None, graph) and self.goes_on(now):
             self._ends = min(now + _UNCHANGED_S, self._latest)
         self._graph = graph
@@ -141,13 +141,13 @@ class SystemClock:
         return abs(by) > _STEP_NS
 
     def last_step(self, now: int) -> Step | None:
-        """Return when it was last set and by how much, for half a minute; half a second at least."""
+        """Return when it was last set and by how much, if that was half a second or more, in the last half minute."""
         return self._step if self._step and 0 <= now - self._step.at < _TOLD_NS else None
 
 
 def _offset() -> int:
     """How far the system's clock is ahead of the monotonic one."""
-    # Of a few readings the quickest: a thread that lost its turn between the two clocks would see a step.
+    # The quickest of a few readings: a thread that was interrupted between the two clocks would see a step.
     return min(_reading() for _ in range(_READINGS))[1]
 
 
@@ -166,7 +166,7 @@ class SimulatedClock:
         self._now = (self._moved_at, 0)
         self._rate = 1.0
         self.is_steady = False
-        """Whether it has run on since the evaluation before: only then is it known what it was in between."""
+        """Whether it ran on since the last evaluation: only then is it known what it was in between."""
         self.state = ClockState(received=False)
 
     def observe(self, simulated: int, *, now: int) -> None:

@@ -26,8 +26,8 @@ class ReceiveLoop:
     """Has an inbox deliver messages on the thread that calls `run`.
 
     Only `call`, `wake`, `stop` and the attributes may be used from other threads. `expire` is called with the time of
-    `now`, in nanoseconds, when that is due, and `on_turn` at least once a second. `contain` takes an
-    exception that nobody else did, and the loop goes on; without it, the loop ends and `run` raises it.
+    `now`, in nanoseconds, when that is due, and `on_turn` at least once a second. `contain` gets exceptions that
+    nothing else caught, and the loop goes on; without it, the loop ends and `run` raises them.
     """
 
     def __init__(
@@ -43,12 +43,12 @@ class ReceiveLoop:
         self._inbox = inbox
         self._now = now
         self.deadline = deadline
-        """Says when `expire` wants to be called next, by the clock of `now`; None while it never does.
+        """Returns when `expire` is to be called next, by the clock of `now`; None while it never is.
 
-        Asked after every delivery; wake the loop after replacing it.
+        It is called after every delivery; wake the loop after replacing it.
         """
         self.turned = time.monotonic()
-        """When the loop last showed that it works: once a second at least."""
+        """When the loop last turned, by time.monotonic(): at least once a second while it works."""
         self._expire = expire
         self._on_turn = on_turn
         self._contain = contain
@@ -75,7 +75,7 @@ class ReceiveLoop:
     def add(self, source: Source, failed: Callable[[Exception], None]) -> None:
         """Drain one more source. On the loop's thread, or before it runs.
 
-        `failed` hears on the loop's thread what kept it from giving its messages; by then it is removed.
+        If it can give no more messages it is removed, and `failed` is called with the error, on the loop's thread.
         """
         self._inbox.add(source)
         self._sources[source] = failed
@@ -137,7 +137,7 @@ class ReceiveLoop:
         self._inbox.close()
 
     def _expire_due(self, deadline: Callable[[], int | None]) -> int:
-        """Let go what is due; give the nanoseconds until the next deadline, a second at most."""
+        """Call `expire` if it is due, and return the nanoseconds until the next deadline, at most a second."""
         due, now = deadline(), self._now()
         if due is not None and now >= due:
             self._expire(now)

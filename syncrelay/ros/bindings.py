@@ -18,7 +18,7 @@ from syncrelay.ros.entities import Entities, Purpose, RefusedError, has_subscrib
 from syncrelay.ros.inputs import InputBinding, TopicInput
 from syncrelay.sync import DropReason
 
-# A subscriber that is restarted, or that waits for publishers of another QoS, is back by then.
+# Within this time, a subscriber that is restarted or waits for publishers of another QoS is back.
 _GRACE_S: Final = 2.0
 
 PublishersOf: TypeAlias = Callable[[GroupRelay], Sequence[Any]]
@@ -56,9 +56,9 @@ class Listeners:
         self._unheard_since: dict[GroupRelay, float] = {}
 
     def count(self, lazy: Sequence[GroupBinding], more: PublishersOf) -> None:
-        """Wake the groups that have a subscriber, and let sleep those that have had none for a while.
+        """Wake the groups that have a subscriber, and put to sleep those that have had none for a while.
 
-        Beside those of their outputs, subscribers of `more` of a group's publishers count.
+        `more` returns a group's publishers beside its outputs', whose subscribers count too.
         """
         now = time.monotonic()
         unheard = [each for each in lazy if not any(map(has_subscriber, (*each.publishers, *more(each.group))))]
@@ -71,7 +71,7 @@ class Listeners:
                 self._switch(binding, group.sleep)
 
     def _switch(self, binding: GroupBinding, switch: Callable[[], None]) -> None:
-        """Have all its inputs be fed, or not, between two messages; then have their topics subscribed, or not."""
+        """Feed all inputs of a group, or none, between two messages; then have their topics subscribed, or not."""
 
         def turn() -> None:
             switch()
@@ -95,7 +95,7 @@ class GroupBindings:
         self._backend = backend
         self._loop = loop
         self._topics: dict[Subscription, TopicInput] = {}
-        # The publishers that types were taken from, by the topics' names, for those that take the place of the held.
+        # By topic, the publishers whose types held groups had taken: their successors keep these types.
         self._taken: dict[str, Endpoint] = {}
         self._listeners = Listeners(loop)
 
@@ -110,18 +110,18 @@ class GroupBindings:
         return list(self._topics.values())
 
     def count_listeners(self, more: PublishersOf) -> None:
-        """Have lazy groups sleep while nobody subscribes to what they give. One that only observes has none.
+        """Put lazy groups to sleep while nobody subscribes to their outputs; a relay that only observes has none.
 
-        `more` are publishers of a group beside its outputs'. On the main thread.
+        `more` returns a group's publishers beside its outputs'. On the main thread.
         """
         if self._entities.purpose is Purpose.RELAY:
             self._listeners.count([binding for binding in self.all if binding.group.config.options.lazy], more)
 
     def run(self, groups: Sequence[GroupRelay]) -> None:
-        """Run these groups and no other; those that ran already are left as they are. On the main thread.
+        """Run these groups and no others; those that ran already are left as they are. On the main thread.
 
-        New groups begin and others end between two messages; but where DDS lets the new have their topics only when
-        the old are gone, those end first. Raises TypeImportError for a field that a type does not have, and
+        New groups begin and others end between two messages. Where DDS gives the new ones their topics only after the
+        old ones are gone, the old ones end first. Raises TypeImportError for a field that a type does not have, and
         ReloadError where DDS does not make a publisher, with all as it was.
         """
         running = {binding.group: binding for binding in self.all}
@@ -135,7 +135,7 @@ class GroupBindings:
             self._exchange(ended, unused, begun)
         else:
             _switch(ended, begun)
-        # From here on these run, whatever becomes of the end of the others.
+        # From here on these run, even if ending the others fails.
         self._topics = {key: topic for key, topic in topics.items() if topic in used}
         self.all = bindings
         self._taken = {}
@@ -146,7 +146,7 @@ class GroupBindings:
             topic.close()
 
     def hold(self) -> None:
-        """Receive nothing until `release`; when all that is buffered has left, `end_publishers` is to follow."""
+        """Receive nothing until `release`. Call `end_publishers` when all that is buffered has left."""
         self.is_held = True
         for topic in self.topics:
             topic.hold()
@@ -183,7 +183,7 @@ class GroupBindings:
             raise
 
     def _has_publisher(self, binding: InputBinding, ending: set[Any]) -> bool:
-        """Make a publisher; False where it can be made only when these end. Raises RefusedError."""
+        """Make a publisher; return False if it can only be made once these have ended. Raises RefusedError."""
         try:
             binding.topic.make_publisher(binding.output)
         except RefusedError:
@@ -195,7 +195,7 @@ class GroupBindings:
     def _free_topics(
         self, ended: Sequence[GroupBinding], unused: Sequence[TopicInput], late: Sequence[InputBinding]
     ) -> None:
-        """End what holds the topics of those who are late, then make their publishers, or else the old ones again."""
+        """End what holds the topics of `late`, then make its publishers; if that fails, make the old ones again."""
         ending = _inputs_of(ended)
         wanted = {self._node.resolve_topic_name(each.output.topic) for each in late}
         self._loop.call(lambda: _suspend(ended)).result()
@@ -227,7 +227,7 @@ class GroupBindings:
         return GroupBinding(group, tuple(topic.bind(group, index) for index, topic in inputs))
 
     def _may_be_heard(self, group: GroupRelay) -> bool:
-        """Whether what it publishes has subscribers, of whatever QoS, as where a reload puts it in another's place."""
+        """Whether its topics have subscribers, of any QoS, as where a reload puts it in the place of another group."""
         names = [topic.output for topic in group.config.topics]
         if group.config.options.manifest:
             names.append(manifest_topic(group.config.name))
@@ -242,7 +242,7 @@ class GroupBindings:
             )
             if self.is_held:
                 topics[key].hold()
-            # What was taken stays, also where another QoS is asked for.
+            # The type that was taken stays, even if the file now says another QoS.
             publisher = (self._taken | _taken(self.topics)).get(name)
             if publisher is not None:
                 topics[key].keep_type(publisher)
@@ -271,13 +271,13 @@ def _switch(ended: Sequence[GroupBinding], begun: Sequence[InputBinding]) -> Non
 
 
 def _suspend(ended: Sequence[GroupBinding]) -> None:
-    """Let nothing more leave by publishers that end before their groups do; what comes is held."""
+    """Hold new messages: the publishers of these groups end before they do."""
     for binding in ended:
         binding.group.suspend()
 
 
 def _resume(ended: Sequence[GroupBinding]) -> None:
-    """Have groups that were to end go on, by the publishers that they have now."""
+    """Have groups that were to end go on, with the publishers that they have now."""
     for each in _inputs_of(ended):
         each.topic.outputs.connect([each.output])
     for binding in ended:

@@ -1,6 +1,7 @@
-"""The clocks of a node: by one messages wait, by the other sets are triggered. Both are ROS time if that is simulated.
+"""The clocks of a node: one measures how long messages wait, the other triggers sets.
 
-Else the first never jumps, and the second tells the time that messages are stamped with.
+Both are ROS time if that is simulated. Otherwise the first is monotonic, and the second is the system clock, with which
+messages are stamped.
 """
 
 import logging
@@ -14,7 +15,7 @@ from rosgraph_msgs.msg import Clock
 
 _LOG = logging.getLogger("syncrelay")
 
-# What a clock may fall by without being a jump: two publishers of /clock, or one that rounds.
+# A clock may fall back by this much without a jump: two publishers of /clock, or one that rounds.
 _JUMP = Duration(nanoseconds=-1_000_000_000)
 _FORWARD = Duration(nanoseconds=1)
 
@@ -56,7 +57,7 @@ class WaitingClock:
 
 
 def _since_1970(take: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Return what takes the messages of /clock but for those of negative times, for which rclpy raises."""
+    """Return a callback for /clock that ignores negative times, for which rclpy raises."""
     was_said = False
 
     def take_valid(message: Any) -> None:

@@ -27,7 +27,7 @@ _NS_PER_SECOND: Final = 1e9
 
 
 class Reporters:
-    """Publishes what the file asks for, as far as DDS lets it; what it refuses is tried again at each report."""
+    """Publishes what the file asks for. A publisher that DDS refuses is tried again at each report."""
 
     def __init__(self, node: Any, entities: Entities) -> None:
         self._node = node

@@ -46,16 +46,15 @@ class _LeftToTheReceiveLoop(CallbackGroup):  # type: ignore[misc]  # CallbackGro
 class Entities:
     """Makes and ends the subscriptions and publishers of a node. On the main thread.
 
-    Fast DDS has one type for each topic in a process. Asked for a second it prints lines of its own, and its reason
-    need not be the true one: so what would be refused for that is not asked for.
+    Fast DDS takes one type for each topic in a process. For a second type it prints lines of its own, and may give a
+    wrong reason: so that is refused here.
     """
 
     def __init__(self, node: Any, purpose: Purpose) -> None:
         self._node = node
         self.purpose = purpose
-        """Where it is to observe, nobody asks for publishers."""
         self._left_to_the_loop = _LeftToTheReceiveLoop()
-        # An entity of the node itself, which never ends, stands for itself.
+        # By topic, our entities on it with their types, and those of the node itself, which never end.
         self._holders: dict[str, dict[Any, str]] = {}
         self._hold(node.resolve_topic_name(_ROSOUT[0]), node, _ROSOUT[1])
         for entity in (*node.publishers, *node.subscriptions):
@@ -65,7 +64,7 @@ class Entities:
         """Make a raw subscription that is left to the receive loop. Raises RefusedError."""
 
         def make() -> Any:
-            # Events would have the executor's thread hold on to it, so that it did not end when it should.
+            # With events, the executor's thread would keep a reference to it, so that it would not end in time.
             return self._node.create_subscription(
                 message_type,
                 topic,
@@ -97,7 +96,7 @@ class Entities:
             self._node.destroy_subscription(entity)
 
     def frees(self, topic: str, ending: set[Any]) -> bool:
-        """Whether there is something of ours on a topic, and nothing any more when these end."""
+        """Whether we have entities on a topic, and none once these have ended."""
         holders = self._holders.get(self._node.resolve_topic_name(topic), {}).keys()
         return bool(holders) and holders <= ending
 

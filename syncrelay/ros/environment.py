@@ -1,4 +1,4 @@
-"""What must be so before rclpy is imported, and what to say when ROS cannot be used here."""
+"""Prepares the process for rclpy, and says what to do when ROS cannot be used here."""
 
 import contextlib
 import importlib
@@ -37,9 +37,9 @@ def require_rclpy() -> None:
 
 
 def keep_stdout() -> None:
-    """Keep stdout for what is asked of us: what Fast DDS prints there goes to stderr from now on.
+    """Keep stdout for our own output: what Fast DDS prints there goes to stderr from now on.
 
-    To be called before rclpy starts. A stdout that is none of the process's own, as under a test, stays as it is.
+    To be called before rclpy starts. A stdout that is not the process's own, as under a test, stays as it is.
     """
     before = sys.stdout
     if before is not sys.__stdout__ or not isinstance(before, io.TextIOWrapper) or before.fileno() != _STDOUT:
@@ -118,7 +118,7 @@ def log_folder(environ: Mapping[str, str]) -> Path | None:
 
 
 def _writable(folder: Path) -> bool:
-    # Asked by making it, as ROS itself would: as root, a look at the permissions proves nothing.
+    # ROS itself would make it. For root, its permissions alone would not tell.
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:

@@ -24,19 +24,19 @@ _LIVELINESS: Final = {
     QoSLivelinessPolicy.AUTOMATIC: "automatic",
     QoSLivelinessPolicy.MANUAL_BY_TOPIC: "manual_by_topic",
 }
-# What rmw_dds_common has in the place of a name that did not arrive.
+# rmw_dds_common gives this name to a node whose own name has not arrived.
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 # Every node publishes these.
 _OF_EVERY_NODE: Final = ("/parameter_events", "/rosout")
 _CLOCK: Final = "/clock"
-# In a namespace of its own a sensor has the same last words.
+# How alike the names of two topics must be, as difflib measures it.
 _ALIKE: Final = 0.5
 
 
 def mismatch(offered: QoSProfile, requested: QoSProfile) -> Mismatch | None:
     """Return the first policy by which a publisher and a subscriber do not connect, None if they do.
 
-    The rules are DDS's: who offers more than is requested is fit (DDS 1.4, section 2.2.3).
+    The rules are those of DDS 1.4, section 2.2.3: a publisher must offer at least what is requested.
     """
     for policy, ranks in (("reliability", _RELIABILITY), ("durability", _DURABILITY), ("liveliness", _LIVELINESS)):
         less, more = ranks
@@ -80,7 +80,7 @@ def _endpoints(infos: Iterable[Any], why: Callable[[QoSProfile], Mismatch | None
 def others(infos: Iterable[Any], *, than: str, own: int) -> tuple[Endpoint, ...]:
     """Return the publishers of other nodes than the one of this full name, which has so many `own` of them.
 
-    What has its name and is not among those is of a second node of that name.
+    Publishers beyond those belong to a second node of that name.
     """
     found = _endpoints(infos, lambda _: None, "publisher")
     namesakes = [replace(each, node=f"another node named {than}") for each in found if each.node == than]
@@ -88,7 +88,7 @@ def others(infos: Iterable[Any], *, than: str, own: int) -> tuple[Endpoint, ...]
 
 
 def is_nameless(info: Any) -> bool:
-    """Whether DDS found an endpoint, but not yet the message that tells its node."""
+    """Whether DDS found an endpoint, but not yet the message that names its node."""
     return bool(info.node_name == _NAMELESS)
 
 
@@ -138,12 +138,12 @@ def _is_hidden(name: str) -> bool:
 def topics_in(node: Any) -> dict[str, tuple[str, ...]]:
     """Return the topics of the graph and their types; but for names against ROS's rules, on which rclpy raises.
 
-    DDS allows any, and who publishes there need not use ROS.
+    DDS allows any name, and a publisher need not use ROS.
     """
     try:
         named = dict(node.get_topic_names_and_types())
     except UnicodeDecodeError:
-        # One name that is no UTF-8 hides all from rclpy; node by node, it hides those of its node.
+        # If one name is not UTF-8, rclpy raises for the whole graph. Asked node by node, it raises for that node alone.
         named = dict(_topics_by_node(node))
     return {name: tuple(map(printable, types)) for name, types in named.items() if is_topic_name(name)}
 
@@ -155,9 +155,9 @@ def _topics_by_node(node: Any) -> Iterator[tuple[str, Sequence[str]]]:
 
 
 def is_relayed(node: Any, publisher: Any, name: str) -> bool:
-    """Tell whether a topic is a relay's output: its publisher subscribes what its name ends with, as that type.
+    """Whether a topic is a relay's output: its publisher subscribes to a topic of that type with which its name ends.
 
-    While a lazy group sleeps, nothing is subscribed: who publishes manifests is a relay too, and they are no input.
+    A lazy group that sleeps subscribes to nothing: a node that publishes manifests is a relay too.
     """
     named = publisher.node_name, publisher.node_namespace
     try:

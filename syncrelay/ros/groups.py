@@ -25,7 +25,7 @@ _GRACE_S: Final = 2.0
 
 
 class Groups:
-    """Runs the groups of a file. On the main thread, where nothing else is said."""
+    """Runs the groups of a file. To be used on the main thread, except where noted."""
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class Groups:
         self._flow = flow
         self._tape = tape
         self._changed = changed
-        # What each group was last said to wait for; None of one that runs.
+        # What each group waits for, as the log last said; None for a group that runs.
         self._announced: dict[str, str | None] = {}
         self._started = time.monotonic()
         self._run(config)
@@ -69,9 +69,9 @@ class Groups:
     def reload(self, config: Config) -> str:
         """Run the groups of a file that was read again, and say what changed.
 
-        Unchanged groups keep their queues; those that failed start again. Whatever it raises, the groups
-        of the file before keep running: ReloadError where the file asks for what needs a restart, or for a publisher
-        that DDS does not make, ConfigError where remaps make its names meet.
+        Unchanged groups keep their queues; those that failed start again. If it raises, the groups of the file before
+        keep running. It raises ReloadError for changes that need a restart and for publishers that DDS does not make,
+        and ConfigError where remaps give two topics one name.
         """
         _require_same_node(self.config, config)
         require_distinct_names(config, self._names, self._resolve)
@@ -149,7 +149,7 @@ class Groups:
         changed = exchange([group.config for group in running.values()], chosen, stopped=stopped)
         self._exchange([running[each.name] if each.name in changed.kept else self._begun(each) for each in chosen])
         limited = self._limited
-        # Asked at every turn. Simulated time does not pass while the loop sleeps: its ticks call expire instead.
+        # This is called at every turn. With simulated time nothing is: its ticks call `expire` instead.
         asks = bool(limited) and not self._clock.is_simulated
         self._loop.deadline = (lambda: self._next_deadline(limited)) if asks else None
         self._loop.wake()
@@ -165,7 +165,7 @@ class Groups:
             self.bindings.run(groups)
         finally:
             self.manifests.end_others(self.bindings.groups)
-        # What DDS made only once others were gone.
+        # DDS may make some only now that others are gone.
         self.manifests.begin(groups)
 
     def _begun(self, config: GroupConfig) -> GroupRelay:
@@ -176,7 +176,7 @@ class Groups:
         return group
 
     def pause(self) -> None:
-        """Let nothing leave any more, when this returns, of these groups and of those that a reload brings."""
+        """Let no set leave once this returns, neither of these groups nor of those that a reload brings."""
         self.is_paused = True
         self._of_each(GroupRelay.pause)
         self.manifests.queue.publish()
@@ -217,7 +217,7 @@ class Groups:
             _LOG.info("%s: %s", name, text, extra={"group": name})
 
     def expire(self, now: int) -> None:
-        """Let go what has waited long enough. On the loop's thread."""
+        """Have the groups give up what has waited long enough. On the loop's thread."""
         for group in self.bindings.groups:
             group.expire(now if group.config.ticks is None else self._clock.stamping())
 

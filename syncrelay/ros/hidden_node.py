@@ -1,4 +1,4 @@
-"""Nodes to look at the graph with, of those that `ros2 node list` hides: without services and topics of their own."""
+"""Nodes that only look at the graph: hidden from `ros2 node list`, without services and topics of their own."""
 
 import os
 import time
@@ -21,7 +21,7 @@ from syncrelay.ros.leaving import leave
 from syncrelay.ros.start import make_node, resolver, start
 
 _NAME: Final = "_syncrelay_observer"
-# The first two overrule the third.
+# The first two override the third.
 _DISCOVERY: Final = ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_AUTOMATIC_DISCOVERY_RANGE")
 
 
@@ -49,9 +49,10 @@ def join(context: Context, name: str, *, namespace: str = "", arguments: Sequenc
 
 
 def join_hidden(config: Config, ros_args: Sequence[str]) -> tuple[Context, Any, str]:
-    """Return a hidden node for which topics have the names, and time is, as for the relay's node, and that one's name.
+    """Return a hidden node with the remaps and the time of the relay's node, its context, and the relay's full name.
 
-    ROS arguments may name the relay's node: so what they mean is asked of a node of that name, whom nobody finds.
+    ROS arguments may address the relay's node by name. So a node of that name, which nobody can find, is asked what
+    they mean.
 
     Raises UsageError where ROS does not take the arguments, RosUnavailableError where it does not start.
     """

@@ -23,9 +23,9 @@ from syncrelay.ros.types import SettlingType, import_type, name_of
 
 _LOG = logging.getLogger("syncrelay")
 
-# What DDS refused is tried again this often, and at once after a reload, which may have freed a topic.
+# Requests that DDS refused are repeated this often, and at once after a reload, which may have freed a topic.
 _TRY_AGAIN_S: Final = 5.0
-# What rcl and the kernel refuse; all else is a bug of ours.
+# Errors of rcl and of the kernel; all others are bugs of ours.
 _OF_RCL: Final = (_rclpy.RCLError, RclCallError, OSError)
 
 
@@ -43,15 +43,15 @@ class TopicInput:
         self.publishers: tuple[Endpoint, ...] = ()
         self.not_importable: str | None = None
         self.type_from: Endpoint | None = None
-        """The publisher whose type was taken, because the file has none; what was taken stays."""
+        """The publisher whose type was taken because the file has none; that type stays."""
         self.missing: str | None = self._publisher_words
         self.outputs = Outputs(entities=entities, backend=backend)
         self.refusal: Refusal | None = None
         """Why DDS does not make the subscription."""
         self.profile: Any = None
-        """The QoS of the subscription and of the outputs; None as long as nothing can come in."""
+        """The QoS of the subscription and of the outputs; None until it is known."""
         self.entity: Any = None
-        """The subscription; None as long as there is none, or all groups that use it sleep."""
+        """The subscription; None while there is none, as when all groups that use it sleep."""
         self._topic = config.topic
         self._qos = config.qos
         self._entities = entities
@@ -69,7 +69,7 @@ class TopicInput:
 
     @property
     def is_due(self) -> bool:
-        """Whether to poll it though the graph is as before: for its type, a node's name, what DDS did not make."""
+        """Whether to poll it though the graph has not changed, because something is missing or was refused."""
         return (
             self._force_poll
             or self._failure is not None
@@ -104,7 +104,7 @@ class TopicInput:
         return InputBinding(self, output)
 
     def keep_type(self, publisher: Endpoint) -> None:
-        """Have the type that was taken from this publisher before, if the file has none."""
+        """Take the type of this publisher, as before a reload, if the file has none."""
         if self.type is None:
             self.type, self.type_from = publisher.type, publisher
 
@@ -143,7 +143,7 @@ class TopicInput:
 
     def poll(self) -> None:
         """Poll the graph and subscribe, again where the publishers' QoS changed; `missing` says what is missing."""
-        # Until all went well it is due again, though the graph is as before.
+        # If something fails here, it is due again though the graph has not changed.
         self._force_poll = True
         if self._failure is not None:
             self._end_failed(self._failure)
@@ -213,7 +213,7 @@ class TopicInput:
         return None
 
     def take_wait(self) -> int:
-        """How long a message at most waited since this was last asked, in nanoseconds. On the loop's thread."""
+        """Return the longest wait of a message since the last call, in nanoseconds. On the loop's thread."""
         source, waited = self.outputs.source, 0
         if source is not None:
             waited, source.waited = source.waited, 0
@@ -272,7 +272,7 @@ class TopicInput:
                 source = self._backend.source(subscription, self.outputs.deliver)
             old = self._loop.call(lambda: self._swap(source, publishers)).result()
         except BaseException as error:
-            # It would hold on to the subscription.
+            # The counter would keep the subscription alive.
             lost = None
             for entity in filter(None, (*publishers.values(), subscription)):
                 self._entities.end(entity)
@@ -289,7 +289,7 @@ class TopicInput:
 
     def _swap(self, source: Source | None, publishers: Mapping[Output, Any]) -> list[Any]:
         """Receive from another source, or none, publish by others; the publishers that end. On the loop's thread."""
-        # First what may fail.
+        # This may fail, so it comes first.
         if source is not None:
             self._loop.add(source, self._fail)
         before = self.outputs.source
@@ -305,7 +305,7 @@ class TopicInput:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputBinding:
-    """An input of a group: the topic that feeds it, and the way its messages leave."""
+    """An input of a group: the topic that feeds it, and the output by which its messages leave."""
 
     topic: TopicInput
     output: Output
@@ -326,7 +326,7 @@ class InputBinding:
 
 
 def _loss_counter(subscription: Any) -> Any:
-    """What counts the messages that DDS loses; None where it does not count them. Raises RCLError."""
+    """Return what counts the messages that DDS loses, None where DDS does not count them. Raises RCLError."""
     try:
         return _rclpy.EventHandle(
             subscription.handle, _rclpy.rcl_subscription_event_type_t.RCL_SUBSCRIPTION_MESSAGE_LOST

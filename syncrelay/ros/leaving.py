@@ -1,7 +1,7 @@
-"""Leaving the ROS graph, in which Fast DDS may hang for ever.
+"""Leaving the ROS graph, although Fast DDS may hang for ever.
 
-It deadlocks where another node's farewell comes just as it takes away its own participant, as when all of a robot ends
-at once: the listener's lock is kept while its last call waits for it (https://github.com/eProsima/Fast-DDS/issues/6513).
+It deadlocks if another node says farewell just as it removes its own participant, as when a whole robot ends at once:
+the listener's lock is held while its last call waits for it (https://github.com/eProsima/Fast-DDS/issues/6513).
 """
 
 import logging
@@ -27,7 +27,7 @@ def leave(node: Any, context: Any) -> None:
         context.try_shutdown()
         return
     held = held_by(os.getpid())
-    # In use for ever, rclpy never takes it from rcl: it would hold Python's lock meanwhile, and nobody could act.
+    # While the handle is in use, rclpy does not destroy the node: it would hold the GIL meanwhile, and block us too.
     handle = node.handle
     handle.__enter__()
     pythonapi.Py_IncRef(py_object(handle))

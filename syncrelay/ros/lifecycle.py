@@ -53,7 +53,7 @@ class Transitions(Protocol):
 
 
 class ManagedNode(LifecycleNode):  # type: ignore[misc]  # LifecycleNode is untyped
-    """A node with the five services and the topic of a managed one; its publishers are those of any node."""
+    """A node with the five services and the topic of a managed node; its publishers are ordinary ones."""
 
     def __init__(self, name: str, *, transitions: Transitions, **keys: Any) -> None:
         """Make it, unconfigured; `keys` as for a Node."""
@@ -91,7 +91,7 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]  # LifecycleNode is unty
         return _carried_out("recover", self._carried_out_by.recover)
 
     def _answer(self, request: Any, response: Any) -> Any:
-        # For some of what the state machine refuses rclpy raises an error: whoever asked would wait for ever.
+        # For some transitions that are not possible rclpy raises an error, and the caller would wait for ever.
         asked = request.transition.label or request.transition.id
         if not any(asked in (each[0], each[1]) for each in self._state_machine.available_transitions):
             state = self._state_machine.current_state[1]

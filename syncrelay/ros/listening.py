@@ -1,4 +1,4 @@
-"""The graph listened to for a while: of every topic that is stamped, when its messages were made and received."""
+"""Listens to the graph for a while, and notes the stamps and receive times of every topic with a header."""
 
 import os
 import time
@@ -124,7 +124,7 @@ class _Listener:
         publishers = self._node.get_publishers_info_by_topic(name)
         if not publishers or any(map(is_nameless, publishers)):
             return
-        # Of a topic with publishers of several types, no group could take more than one.
+        # If publishers have several types, one is taken: a group could not take more either.
         type_name = printable(publishers[0].topic_type)
         try:
             message_type = self._imported(type_name)
@@ -142,7 +142,7 @@ class _Listener:
         self._subscribe(self._topics[name], message_type, input_profile(QosOverrides(), offered))
 
     def _imported(self, type_name: str) -> Any:
-        """Import a type that others name: that runs its package, so none but what is installed as a message."""
+        """Import a type that others name. Importing runs its package, so it must be installed as one with messages."""
         installed, package = self._interfaces, type_name.partition("/")[0]
         if installed is None or package not in installed.packages or type_name not in installed.types(package):
             raise TypeImportError("its type is not installed here, or not sourced")

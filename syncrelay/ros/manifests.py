@@ -42,9 +42,9 @@ class Manifests:
         self._said: set[str] = set()
 
     def begin(self, groups: Iterable[GroupRelay]) -> None:
-        """Have these groups publish manifests, from their first set on where they don't run yet; those that do go on.
+        """Have these groups publish manifests, from their first set on if they do not run yet.
 
-        What DDS refuses is logged once: those groups run without.
+        If DDS refuses a publisher, that is logged once, and the group runs without manifests.
         """
         for group in groups:
             if self._is_wanted(group) and group not in self._begun:
@@ -56,7 +56,7 @@ class Manifests:
                     self._connect(group, outlet)
 
     def end_others(self, groups: Iterable[GroupRelay]) -> None:
-        """End the publishers that none of these groups needs, once no other runs and all manifests are published."""
+        """Publish all manifests, then end the publishers that none of these groups needs; no other group may run."""
         self._begun = {group: self._begun[group] for group in groups if group in self._begun}
         self.queue.keep(self._begun.values())
         wanted = {group.config.name for group in groups if self._is_wanted(group)}

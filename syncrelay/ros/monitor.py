@@ -34,9 +34,9 @@ _LOG = logging.getLogger("syncrelay")
 _LEVELS: Final = {Severity.OK: logging.INFO, Severity.WARN: logging.WARNING, Severity.ERROR: logging.ERROR}
 
 EVALUATE_S: Final = 1.0
-# Of many groups, so many are evaluated at a time: each takes some tenths of a millisecond from the data ...
+# At least this many groups are evaluated at a time: each takes some tenths of a millisecond from the data ...
 _IN_TURN: Final = 10
-# ... and none waits for more than so many evaluations: a group is silent after 5 s.
+# ... and each is evaluated at least every fourth time: a group counts as silent after 5 s.
 _LONGEST_TURN: Final = 4
 
 
@@ -73,7 +73,7 @@ class Monitor:
         self.inactive: str | None = None
         """The node's name, while it is managed and waits to be activated."""
         self.heard: Callable[[str, Sequence[Arrivals]], object] = lambda _group, _arrivals: None
-        """Hears of each group that is evaluated what came since: stamps and times of receipt of each input."""
+        """Called for each group that is evaluated, with what came since: stamps and times of receipt of each input."""
 
     @property
     def reports(self) -> tuple[GroupReport, ...]:
@@ -112,7 +112,7 @@ class Monitor:
         if len(self._reports) < len(self._bindings):
             self._evaluate(self._bindings)
             return
-        # Not by the time of their reports: the clock may be set.
+        # The oldest reports are not looked for by their times: the clock may be set.
         count = max(_IN_TURN, ceil(len(self._turns) / _LONGEST_TURN))
         now = [*islice(self._turns, count)]
         self._turns.rotate(-count)
@@ -120,7 +120,7 @@ class Monitor:
 
     def _evaluate(self, bindings: Sequence[GroupBinding]) -> None:
         waits, batches = self._loop.call(lambda: self._gather(bindings)).result()
-        # Not at the end, which takes its time on purpose.
+        # `conclude` skips this: an end takes its time on purpose.
         self.standstills.end()
         self._judge(bindings, waits, batches)
         self._log()
@@ -141,7 +141,7 @@ class Monitor:
         if self._clock is not None:
             self._clock.observe(self._node.get_clock().now().nanoseconds, now=now)
         for topic, losses in self._losses.items():
-            # A new subscription hears them anew.
+            # A new subscription discovers its publishers anew.
             losses.observe(topic.lost(), publishers=len(topic.publishers) if topic.entity is not None else 0)
         self._empty_graph = self._surroundings.empty_graph()
         if self._discovery.goes_on(time.monotonic()):
@@ -151,7 +151,7 @@ class Monitor:
                 try:
                     self._evaluate_group(binding, batch, now)
                 except Exception:
-                    # Else an old report would stand for ever.
+                    # An old report must not be shown as if it were current.
                     self._reports.pop(binding.group, None)
                     raise
 

@@ -52,12 +52,12 @@ class Output:
 
 
 class Outputs:
-    """Feeds the inputs of groups from one topic. On the main thread, where nothing else is said."""
+    """Feeds the inputs of groups from one topic. To be used on the main thread, except where noted."""
 
     def __init__(self, *, entities: Entities, backend: RclBackend) -> None:
         self.all: list[Output] = []
         self.source: Source | None = None
-        """What feeds them; None as long as nothing does."""
+        """The source that feeds them, None while there is none."""
         self.largest = 0
         """The size of the largest message in bytes; measured only where nothing is published."""
         self._handlers: list[Deliver] = []
@@ -77,7 +77,7 @@ class Outputs:
             output.refusal = None
 
     def remake(self, message_type: Any, profile: Any) -> tuple[dict[Output, Any], list[Refusal]]:
-        """Make publishers of another QoS. What DDS refuses stays as it was."""
+        """Make publishers of another QoS; return them, and what DDS refused. Refused outputs stay as they were."""
         made: dict[Output, Any] = {}
         refused = []
         for output in self.all if self._publishes else ():
@@ -85,7 +85,7 @@ class Outputs:
                 made[output] = self._made(output, message_type, profile)
             except RefusedError as error:
                 output.refusal = None if output.publisher else error.refusal
-                # The error itself would hold on to its callers, and so to what they end.
+                # The error itself would keep its callers' frames alive, and so the entities that they end.
                 refused.append(error.refusal)
         return made, refused
 
@@ -112,7 +112,7 @@ class Outputs:
         self.feed()
 
     def exchange(self, source: Source | None, publishers: Mapping[Output, Any]) -> list[Any]:
-        """Be fed by another source, and publish by these publishers; those that they replace."""
+        """Be fed by another source, publish through these publishers, and return those that they replace."""
         self.source = source
         old = [output.publisher for output in publishers]
         for output, publisher in publishers.items():
@@ -121,7 +121,7 @@ class Outputs:
         return old
 
     def connect(self, outputs: Sequence[Output]) -> None:
-        """Publish by the publishers that they have now, and feed those who lack none."""
+        """Publish through the publishers that these have now, and feed those that lack none."""
         for output in outputs:
             if output.publisher is not None:
                 restamped = begins_with_header(output.publisher.msg_type)

@@ -1,4 +1,4 @@
-"""What the relay's node tells of itself as parameters: for `ros2 param get`, and read-only for all but itself."""
+"""The parameters of the relay's node, for `ros2 param get`; only the relay itself changes them."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
@@ -24,15 +24,15 @@ class Parameters:
             ("version", version, "The version of syncrelay."),
         ):
             _declare(node, name, value, ParameterDescriptor(description=description, read_only=True))
-        # rclpy lets nobody change what is read-only, the node itself neither: others are refused below. From an empty
-        # list it would infer another type.
+        # rclpy lets not even the node itself change a read-only parameter, so `_judged` refuses the changes of others.
+        # The type is given because rclpy would infer another one from an empty list.
         constraints = "Set by the relay alone, at the start and at each reload."
         descriptor = ParameterDescriptor(description="The groups that run.", additional_constraints=constraints)
         _declare(node, _GROUPS, Parameter.Type.STRING_ARRAY, descriptor)
         node.add_on_set_parameters_callback(self._judged)
 
     def name_groups(self, groups: Sequence[str]) -> None:
-        """Tell that these groups run now."""
+        """Set `groups`, which are running now."""
         if list(groups) != self._groups:
             self._groups = list(groups)
             self._node.set_parameters([Parameter(_GROUPS, Parameter.Type.STRING_ARRAY, self._groups)])
@@ -47,7 +47,7 @@ class Parameters:
 
 
 def _declare(node: Any, name: str, value: Any, descriptor: Any) -> None:
-    # What --ros-args or a parameter file says of them is not so.
+    # Values from --ros-args or a parameter file would be wrong, so they are ignored.
     node.declare_parameter(name, value, descriptor, ignore_override=True)
 
 

@@ -15,20 +15,20 @@ from rclpy.qos import (
 
 from syncrelay.config import QosOverrides, QosPreset
 
-# DDS history, not queue_size: deep enough that a hiccup of half a second costs a 200 Hz input nothing.
+# The DDS history, not queue_size: deep enough for an input of 200 Hz to lose nothing in a stall of half a second.
 _DEPTH = 100
 
-# As many as Fast DDS keeps where it is to keep all.
+# Fast DDS keeps as many with keep_all.
 _KEPT = 5000
 
 _Policies: TypeAlias = dict[str, Any]
 
 
 def input_profile(asked: QosPreset | QosOverrides, offered: Sequence[QoSProfile]) -> QoSProfile | None:
-    """What to subscribe with: what the file asks for, and the rest so that every publisher can serve it.
+    """Return the QoS to subscribe with: what the file says, and for the rest what every publisher can serve.
 
-    Reliable only if all publishers are, transient_local only if all are. None as long as that cannot be
-    known, because no publisher is there.
+    It is reliable only if all publishers are, transient_local only if all are. Return None while that is not known,
+    because there is no publisher.
     """
     if isinstance(asked, QosPreset):
         return QoSPresetProfiles.get_from_short_key(asked.name)
@@ -39,9 +39,10 @@ def input_profile(asked: QosPreset | QosOverrides, offered: Sequence[QoSProfile]
 
 
 def output_profile(received: QoSProfile) -> QoSProfile:
-    """What to publish with: what a topic is received with, but so that no subscriber can hold the relay up.
+    """Return the QoS to publish with: that of the input, except for keep_all.
 
-    A publisher that keeps all waits for the slowest subscriber, and fails when that hangs. So the last are kept.
+    A publisher with keep_all waits for its slowest subscriber, and fails if that is stuck. So the output keeps only the
+    last 5000 messages.
     """
     if received.history != QoSHistoryPolicy.KEEP_ALL:
         return received

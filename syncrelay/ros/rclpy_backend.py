@@ -104,7 +104,7 @@ class WaitSetWatch:
         wait_set.add_guard_condition(self._guard.handle)
         for source in self._sources:
             wait_set.add_subscription(source.handle)
-        # Of what comes while it waits, only one source's may be seen: the next poll is sure of it.
+        # If messages come for several sources while it waits, it may see only one of them; the next poll sees all.
         seen_until = time.time_ns()
         wait_set.wait(timeout_ns)
         ready = [source for index, source in enumerate(self._sources) if wait_set.is_ready("subscription", index)]

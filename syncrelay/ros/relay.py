@@ -49,16 +49,16 @@ _Result = TypeVar("_Result")
 _EAGER_POLL_S = 0.1
 # ... and this often when nothing is missing.
 _POLL_S = 1.0
-# While the state is asked for every second or two, all groups are evaluated every second.
+# While the state is requested every second or two, all groups are evaluated every second.
 _ASKED_S = 3.0
-# What fails again at once must not take all of a core.
+# A failure that repeats at once must not take a whole core.
 _AFTER_FAILURE_S = 0.1
-# Who looks for a while looks so much longer at what has just begun.
+# `look` goes on at most this much longer for groups that have just started.
 _LONGER_S = 10.0
 _ACTIVE = (Phase.STARTING, Phase.RUNNING, Phase.PAUSED)
 _WITHOUT_GROUPS = (Phase.UNCONFIGURED, Phase.FINALIZED)
-# How long an end may take to see that reliable subscribers have what was published on all outputs. They say so
-# at the writer's next heartbeat only, which may be 3 s away.
+# How long an end waits for reliable subscribers to acknowledge what was published on all outputs. They do so only at
+# the writer's next heartbeat, which may be 3 s away.
 _ACKNOWLEDGE_NS = 300_000_000
 
 
@@ -85,10 +85,10 @@ class Relay:
 
         One that only observes is hidden from lists of nodes, and publishes nothing.
 
-        Raises ConfigError where remaps give two topics one name, UsageError where ROS rejects `ros_args`.
-        `config_paths` are what `state` and a parameter call the files. `on_turn` is called on the receive thread for as
-        long as that turns, once a second at least. `manage` gives what carries out the transitions of a managed node,
-        which starts without groups; without it the node is none, and all groups run.
+        `config_paths` are the files' names for `state` and a parameter. `on_turn` is called on the receive thread at
+        least once a second, for as long as that works. With `manage` the node is a managed one, which starts without
+        groups; it returns what makes that node. Raises ConfigError where remaps give two topics one name, UsageError
+        where ROS rejects `ros_args`.
         """
         apply_transport(config.node.transport, os.environ)
         if purpose is Purpose.OBSERVE:
@@ -103,7 +103,7 @@ class Relay:
                 make=rclpy.create_node if manage is None else manage(self),
             )
             relay_name = self.node.get_fully_qualified_name()
-        # Of any thread, and after the node: all names are asked for here.
+        # Any thread may ask for a name, also after the node has ended: so all are resolved here.
         resolve = cache(resolver(self.node, ros_args))
         try:
             require_distinct_names(config, groups, resolve)
@@ -142,7 +142,7 @@ class Relay:
         manifests = Manifests(entities=entities, node=self.node, backend=backend, loop=self._loop, bugs=self._bugs)
         self._manifest_queue = manifests.queue
         self.taps = Taps(Tape(), resolve)
-        """Those who follow what leaves."""
+        """The clients that follow what leaves."""
         self._groups = Groups(
             config,
             chosen=groups,
@@ -193,7 +193,7 @@ class Relay:
         return tuple(group.config.name for group in self._groups.bindings.groups)
 
     def offer(self, services: Offered) -> None:
-        """Offer services on the node; what they call is called on a thread that must not wait, or all of them would."""
+        """Offer services on the node. Their functions are called on its executor's thread, and must not wait."""
         self._services = Services(self.node, services, bugs=self._bugs)
 
     def reload(self, config: Config) -> str:
@@ -249,7 +249,7 @@ class Relay:
         return self.evaluate()
 
     def forget_groups(self, phase: Phase) -> None:
-        """Run no groups; `phase` is why. On the main thread."""
+        """Run no groups from now on, in this phase. On the main thread."""
         self._groups.forget()
         self.monitor.inactive = None
         self._enter(phase)
@@ -284,7 +284,7 @@ class Relay:
     def call(self, function: Callable[[], _Result]) -> "Future[_Result]":
         """Have `function` called at the next `step`; its result comes in the future. Any thread.
 
-        A call that the end comes before is cancelled.
+        A call is cancelled if the relay ends before.
         """
         return self._calls.add(function)
 
@@ -293,7 +293,7 @@ class Relay:
         if self._receiving is not None and self._receiving.done():
             self._receiving.result()
         self._calls.carry_out()
-        # What is called may take long, and holds up no message.
+        # A call may take long without holding up a message: it counts as no standstill.
         self.monitor.standstills.begin()
         with self._bugs.contained("polling the graph"):
             self._poll_graph()
@@ -309,10 +309,10 @@ class Relay:
         self.monitor.standstills.end(rest=round(rest_s * 1e9))
 
     def look(self, seconds: float, *, is_over: Callable[[], bool] = lambda: False) -> tuple[GroupReport, ...]:
-        """Run for a time, and return how the groups fare.
+        """Run for a time, and return a report of each group.
 
-        A group without a set to which messages have only just begun to come is given a little longer, and so is one
-        whose publishers may not have been found yet.
+        It takes a little longer where a group without a set has just got its first messages, or where its publishers
+        may not have been found yet.
         """
         end = time.monotonic() + seconds
         latest = end + _LONGER_S
@@ -334,7 +334,7 @@ class Relay:
             self._surroundings.forget()
 
     def _is_watched(self, now: float) -> bool:
-        """Whether all groups are wanted every second: to plot them, or because the state is asked for."""
+        """Whether all groups are to be evaluated every second: to plot them, or because somebody requests the state."""
         plotted = self._groups.config.diagnostics is not None and self._groups.config.diagnostics.scalars
         return plotted or now - self._asked < _ASKED_S
 
@@ -372,9 +372,9 @@ class Relay:
         )
 
     def drain(self) -> tuple[GroupReport, ...]:
-        """Take in what has arrived, let go of what is buffered, stop receiving; report on each group a last time.
+        """Take in what has arrived, drop what is buffered, stop receiving; report on each group a last time.
 
-        What became of the messages of one that is inactive was reported as it was deactivated.
+        A managed node that is inactive has reported on its groups when it was deactivated: here it reports nothing.
         """
         self._calls.end()
         self._services.end()
@@ -396,7 +396,7 @@ class Relay:
         finally:
             self._clock.close()
             self._manifest_queue.stop()
-            # Shut down at once, the executor would wait forever where it was just about to: what wakes it is destroyed.
+            # First let the executor return: if it is shut down just before it waits, nothing is left to wake it.
             self._served.set_result(None)
             self._threads.shutdown()
             self._executor.shutdown()
@@ -417,6 +417,6 @@ class Relay:
 
 
 def _is_early(report: GroupReport) -> bool:
-    """Whether it will soon be known better why a group gives no set."""
+    """Whether more will be known soon about why a group gives no set."""
     facts = report.facts
     return facts.is_new or (facts.is_discovering and not all(each.graph.publishers for each in facts.inputs))

@@ -18,10 +18,10 @@ Offered: TypeAlias = Mapping[str, Callable[[], "Future[str]"]]
 A SyncRelayError is an answer too, of a call that did not succeed.
 """
 
-# As long is the queue of answers that ROS gives a service: of more that are sent at once, some would be lost.
+# ROS gives a service a queue of this many answers: if more are sent at once, some are lost.
 _MOST_WAITING: Final = 10
 _ENDING: Final = "the relay is ending"
-# How long an end may take to tell those who wait that it comes.
+# How long an end may take to answer the callers that still wait.
 _TELL_S: Final = 1.0
 
 
@@ -35,13 +35,13 @@ class Services:
         self._nobody_waits = Event()
         self._nobody_waits.set()
         self._ended = False
-        # A call that waits for its answer keeps away no other, nor those for parameters.
+        # A call that waits for its answer must not block others, nor those for parameters.
         self._group = ReentrantCallbackGroup()
         for name, function in offered.items():
             self._offer(name, function)
 
     def end(self) -> None:
-        """Tell all who wait, and who still call, that the relay is ending. On another thread than the executor's."""
+        """Answer all callers, waiting and new, that the relay is ending. On another thread than the executor's."""
         self._ended = True
         self._node.executor.wake()
         self._nobody_waits.wait(_TELL_S)
@@ -68,7 +68,7 @@ class Services:
             return False, _ENDING
         except SyncRelayError as error:
             return False, str(error)
-        except Exception as error:  # noqa: BLE001  who calls is answered whatever happens
+        except Exception as error:  # noqa: BLE001  a caller gets an answer whatever happens
             self._bugs.log(f"answering ~/{name}", error)
             return False, f"a bug in syncrelay while answering ~/{name}: {error!r}; its traceback is in the log"
         finally:
@@ -78,7 +78,7 @@ class Services:
 
 
 class _Answered:
-    """Waits for a future of another thread as rclpy waits for its own: by being asked again whenever it wakes."""
+    """Waits for a future of another thread as rclpy does for its own: it is polled whenever the executor wakes."""
 
     def __init__(self, future: "Future[str]", has_ended: Callable[[], bool]) -> None:
         self._future = future

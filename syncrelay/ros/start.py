@@ -21,9 +21,9 @@ from syncrelay.ros.parameters import misplaced
 
 _LOG = logging.getLogger("syncrelay")
 
-# Where in rcl's sources it gave up: of use to its authors, not to the user.
+# The place in rcl's sources where it failed, which is of no use to the user.
 _PLACE_IN_RCL: Final = re.compile(r", at [^ ,]+:\d+")
-# What rcl says of arguments, and of nothing else.
+# How rcl's messages about arguments begin.
 _OF_ARGUMENTS: Final = re.compile(
     r"(Couldn't parse|Enclave name is not valid|invalid node name|invalid namespace|[^:]*external configuration).*",
     re.DOTALL,
@@ -35,8 +35,8 @@ def start(ros_args: Sequence[str], *, simulated: bool) -> Context:
 
     Raises UsageError where ROS rejects the arguments, RosUnavailableError where it does not start.
     """
-    # The file's wish comes before the command line's, which has the last word. Our own log is on stderr:
-    # the same lines from rcl would double it.
+    # The command line comes after the file and overrides it. Our own log is on stderr already, so rcl must not print it
+    # again.
     wish = ["-p", "use_sim_time:=true"] if simulated else []
     ours = ["--ros-args", "--disable-stdout-logs", *log_arguments(), *wish, "--"]
     require_domain(os.environ)
@@ -79,9 +79,9 @@ def make_node(
 
 
 def resolver(node: Any, ros_args: Sequence[str]) -> Callable[[str], str]:
-    """Give what makes of a topic's name its name in the graph, after all remaps.
+    """Return a function from a topic's name to its name in the graph, after all remaps.
 
-    It raises UsageError for a name of which they make one that ROS refuses.
+    It raises UsageError if remaps turn the name into one that ROS refuses.
     """
 
     def resolve(name: str) -> str:
@@ -103,7 +103,7 @@ class RosoutHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         try:
             text = one_entry(record.getMessage())
-            # rclpy's own logger would tell this line as the one that logs, and searches all modules for it.
+            # rclpy's own logger would name this line as the source, and search all modules for it.
             if _rclpy.rclpy_logging_logger_is_enabled_for(self._name, record.levelno):
                 _rclpy.rclpy_logging_rcutils_log(
                     record.levelno, self._name, text, record.funcName or "", record.pathname, record.lineno

@@ -13,7 +13,7 @@ from syncrelay.ros.inputs import InputBinding
 
 
 class _Around(NamedTuple):
-    """What is asked of the graph only when that has changed."""
+    """What the graph shows around an input; polled only when the graph has changed."""
 
     output: str
     subscribers: tuple[Endpoint, ...]
@@ -25,7 +25,7 @@ class Surroundings:
     """Keeps what the graph shows around each input until the graph changes. On the main thread."""
 
     def __init__(self, node: Any, purpose: Purpose, *, relay_name: str) -> None:
-        """Ask a node; `relay_name` is the full name of the relay's, another's where it is to observe."""
+        """Poll the graph through a node; `relay_name` is the relay's full name, another one if this node observes."""
         self._node = node
         self._relay_name = relay_name
         self._publishes = purpose is Purpose.RELAY
@@ -81,7 +81,7 @@ class Surroundings:
         node, topic = self._node, binding.topic
         output = node.resolve_topic_name(binding.output.topic)
         publishers = node.get_publishers_info_by_topic(output)
-        # For one that only observes, the relay itself, which has its name, is no rival.
+        # A node that only observes does not count the relay itself as a rival.
         own = int(binding.output.publisher is not None) if self._publishes else len(publishers)
         rivals = graph.others(publishers, than=self._relay_name, own=own)
         if rivals:
@@ -98,7 +98,7 @@ class Surroundings:
         )
 
     def _alike(self, name: str, type_name: str | None) -> tuple[str, ...]:
-        """Find what may have been meant: our own outputs, and those of other relays, are not it."""
+        """Return topics that may have been meant; outputs of relays are none."""
         outputs = {self._node.resolve_topic_name(binding.output.topic) for binding in self._bindings}
         published = graph.published_topics(self._node).items()
         of_type = [each for each in published if type_name in (None, *each[1]) and each[0] not in outputs]

@@ -23,7 +23,7 @@ _SETTLE_S: Final = 0.5
 
 
 class SettlingType:
-    """The type that the publishers of a topic agree on, once they did for long enough."""
+    """The type that the publishers of a topic agree on, once they have agreed for long enough."""
 
     def __init__(self) -> None:
         self._types: frozenset[str] = frozenset()
@@ -42,7 +42,7 @@ class SettlingType:
 def import_type(name: str) -> Any:
     """Import the class of a full type name, `pkg/msg/Name`; raises TypeImportError saying what failed.
 
-    The graph may name any type: of a package without messages nothing is imported.
+    The graph may name any type: nothing is imported from a package without messages.
     """
     try:
         package, kind, message = check_type_name(name).split("/")
@@ -82,7 +82,7 @@ def begins_with_header(message_type: Any) -> bool:
 
 
 def stamp_reader(source: StampSource, message_type: Any) -> StampReader | None:
-    """How to read the stamp that the file asks for; None for the receive time, which no payload holds.
+    """Return how to read the stamp that the file names; None for the receive time, which is not in the payload.
 
     Raises TypeImportError where the type has no such stamp.
     """
@@ -96,7 +96,7 @@ def stamp_reader(source: StampSource, message_type: Any) -> StampReader | None:
 
 
 def value_reader(message_type: Any, path: str) -> Callable[[Content], Any]:
-    """What reads the field at a dotted path: a number, a text, or a time in nanoseconds; None where it cannot.
+    """Return what reads the field at a dotted path: a number, a text, or a time in nanoseconds; None if it cannot.
 
     Raises TypeImportError where the type has no such field.
     """
