@@ -1,4 +1,4 @@
-"""approximate_epsilon_time: the oldest messages are a set if they lie within epsilon, else they go."""
+"""approximate_epsilon_time: the oldest messages are a set if they are within epsilon; if not, they are dropped."""
 
 from collections.abc import Sequence
 
@@ -11,9 +11,9 @@ from syncrelay.sync.queues import Losses, StampQueue
 class ApproximateEpsilonTime(Policy):
     """The oldest messages of all inputs are a set, at once, if none is more than epsilon after the oldest.
 
-    If one is, every input's oldest message within epsilon of the oldest of all is too far. As C++
-    message_filters' ApproximateEpsilonTime, but that queues are in stamp order and that a message of a stamp
-    that is still queued replaces that one.
+    If one is, the oldest message of every input that has one within epsilon of the oldest of all is too far. This is
+    C++ message_filters' ApproximateEpsilonTime, except that queues are in stamp order, and that a message whose stamp is
+    still queued replaces the queued one.
 
         lidar  |ab....c
         camera |..B...C

@@ -11,28 +11,29 @@ from syncrelay.sync.queues import Losses
 _NO_PIVOT = -1
 
 _STEPS = 8
-"""So many steps of a search are taken one by one: most searches take fewer, and a stride costs as much as some."""
+"""A search strides only after this many single steps. Most searches take fewer, and a stride costs as much as several."""
 
 
 class ApproximateTime(Policy):
-    """The set of least span around each pivot leaves as soon as no later message could better it.
+    """The set of least span around each pivot leaves as soon as no later message can make a better one.
 
-    On messages that arrive in stamp order these are the sets of C++ message_filters' ApproximateTime at the
-    same moments, `slop_ns` being its max interval (inclusive), `min_periods_ns` its lower bounds between
-    messages. Beyond it: queues are in stamp order, so that what arrives out of order is used; a message of
-    a stamp that is still queued replaces that one; each message that leaves unmatched is told.
+    On messages that arrive in stamp order, the sets are those of C++ message_filters' ApproximateTime, at the same
+    moments; `slop_ns` is its max interval (inclusive) and `min_periods_ns` its lower bounds between messages. Unlike
+    there, queues are in stamp order, so that messages that arrive out of order are used; a message whose stamp is still
+    queued replaces the queued one; and every message that leaves unmatched is reported.
 
         lidar  |a..b....c
         camera |....B....
         -> B: a superseded
         -> c: bB
 
-    b is nearer to B than a is, but only c shows that nothing nearer follows. With a slop of less than 4, a
-    would be too far from B.
+    b is nearer to B than a is, but only c shows that no nearer message follows. With a slop of less than 4, a would be
+    too far from B.
 
-    Terms as in message_filters: heads are the oldest messages not yet passed; the pivot is the input whose head was the
-    latest when a first candidate was found; the candidate is the best set of this pivot so far, always the
-    front of the queues; what lies between it and the heads is skipped, and comes back when it leaves.
+    The terms are those of message_filters. The heads are the oldest messages that the search has not passed. The pivot
+    is the input whose head was the latest when a first candidate was found. The candidate is the best set with the
+    pivot's message so far; it is always the front of the queues. Messages between it and the heads are skipped. They
+    come back when it leaves.
     """
 
     __slots__ = (
@@ -81,7 +82,7 @@ class ApproximateTime(Policy):
         self._stamps: list[list[int]] = [[] for _ in periods]
         self._messages: list[list[Message]] = [[] for _ in periods]
         self._losses = Losses(n_inputs)
-        # (stamp, place) of the head of each input that has one, in this order: the earliest first, the latest last.
+        # (stamp, place) of the head of each input that has one, the earliest first.
         self._heads: list[tuple[int, int]] = []
         self.waits_started = 0
         self._pivot_stamp = self._candidate_start = self._candidate_end = self._proof_end = 0
@@ -145,7 +146,7 @@ class ApproximateTime(Policy):
         self._forget_candidate()
 
     def _forget_candidate(self) -> None:
-        """Bring back what the candidate skipped, and its members unless they were taken out before."""
+        """Forget the candidate: the search begins again at the front of the queues."""
         self._pivot = _NO_PIVOT
         self._cursors = [0] * self.n_inputs
         heads = []
@@ -185,7 +186,7 @@ class ApproximateTime(Policy):
         return self._search_again(outcomes)
 
     def _search_again(self, outcomes: list[Outcome]) -> list[Outcome]:
-        """Search after a candidate was forgotten: the wait for a better one goes on if there is one again."""
+        """Search after a candidate was forgotten. If there is one again, the wait for a better one goes on."""
         self._search(outcomes)
         if self._pivot == _NO_PIVOT:
             self.waits_ended = self.waits_started
@@ -216,7 +217,7 @@ class ApproximateTime(Policy):
             else:
                 later_end = end - self._candidate_end
                 later_start = start - self._candidate_start
-                # The penalty only lengthens: the first comparison spares most of the products.
+                # The penalty only lengthens, so the first comparison avoids most of the products.
                 if later_end < later_start and later_end * numerator < later_start * denominator:
                     self._drop_skipped(outcomes)
                     self._take_candidate(start, end)
@@ -231,9 +232,9 @@ class ApproximateTime(Policy):
         return outcomes
 
     def _drop_heads(self, outcomes: list[Outcome]) -> None:
-        """Drop the earliest head, and at once those behind it that are too far and would be the earliest.
+        """Drop the earliest head, and the messages behind it that would be dropped next because they are too far.
 
-        After an overflow, that head goes even if it is near enough.
+        After an overflow, the earliest head is dropped even if it is near enough.
         """
         _, place = self._heads[0]
         next_head, _ = self._heads[1]
@@ -245,12 +246,12 @@ class ApproximateTime(Policy):
         self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
 
     def _stride(self, outcomes: list[Outcome]) -> None:
-        """Pass at once all heads that single steps would pass to no other end.
+        """Pass at once all heads that single steps would pass with the same result.
 
-        With a candidate: all that moves no head beyond the latest, up to the pivot. On the way each step is no
-        better than the candidate or, from some step on, better than the step before: the last one decides.
-        Without one: all that is too far from the latest head, or all before it if it is of an input that
-        overflowed; in either case not the last message of any input, which would end the search.
+        With a candidate, these are the messages up to the pivot that do not move a head beyond the latest one. Each of
+        these steps is no better than the candidate or, from some step on, better than the step before, so only the last
+        one matters. Without a candidate, these are the messages that are too far from the latest head, or all before it
+        if its input overflowed. The last message of an input is never passed, as that would end the search.
         """
         end, latest = self._heads[-1]
         if self._pivot != _NO_PIVOT:
@@ -266,7 +267,7 @@ class ApproximateTime(Policy):
                 self._drop_oldest(place, count, DropReason.TOO_FAR, outcomes)
 
     def _last_stamps(self, end: int) -> list[int]:
-        """The last stamp up to `end` of each input that has one."""
+        """Return the last stamp up to `end` of each input that has one."""
         lasts = []
         for head, place in self._heads:
             if head <= end:
@@ -283,11 +284,11 @@ class ApproximateTime(Policy):
         self._heads.sort()
 
     def _excuse_all_but(self, latest: int) -> None:
-        """Forget the overflow of inputs that don't have the latest head: they may be the pivot again."""
+        """Forget the overflow of inputs that do not have the latest head. They may be the pivot again."""
         self._overflowed.intersection_update((latest,))
 
     def _note_missed(self, start: int) -> None:
-        """See whether what would have matched the only message of an input had overflowed."""
+        """Note whether messages that would have matched the only message of an input had overflowed."""
         for head, place in self._heads:
             if head > start:
                 self._losses.miss(place, self._stamps[place], start, before=self._slop, after=self._slop)
@@ -307,7 +308,7 @@ class ApproximateTime(Policy):
         numerator, denominator = self._scale
         self._candidate_start = start
         self._candidate_end = end
-        # Whatever ends here or later and holds the pivot is, with the penalty of its age, no better.
+        # A set with the pivot's message that ends here or later is, with the age penalty, no better.
         self._proof_end = end - (start - self._pivot_stamp) * denominator // numerator
 
     def _drop_skipped(self, outcomes: list[Outcome]) -> None:
@@ -327,11 +328,11 @@ class ApproximateTime(Policy):
         self._forget_candidate()
 
     def _is_proved(self, awaited: int) -> bool:
-        """Whether no message that may still come could better the candidate; that of one input is not here yet.
+        """Tell whether no later message can make a set better than the candidate. Input `awaited` has no head yet.
 
-        The virtual search of message_filters, taken in strides: as long as the end stays, every start up to
-        `reach` is as good as passed. An input's head moves the end at most once, when it leaves the pivot
-        behind: so there are at most as many strides as inputs, however long the queues.
+        This is the virtual search of message_filters, in strides: while the end stays, every start up to `reach` can be
+        passed. The head of an input moves the end at most once, when it passes the pivot. So there are at most as many
+        strides as inputs, however long the queues are.
         """
         numerator, denominator = self._scale
         heads = [*self._heads, (self._bound(awaited), awaited)]
@@ -350,5 +351,5 @@ class ApproximateTime(Policy):
                     heads[index] = (stamps[position] if position < len(stamps) else self._bound(place), place)
 
     def _bound(self, place: int) -> int:
-        """Give the least stamp that matters of the message that this input has yet to show."""
+        """Return the least stamp that the next message of this input can have, but at least the pivot's."""
         return max(self._stamps[place][-1] + self._min_periods[place], self._pivot_stamp)

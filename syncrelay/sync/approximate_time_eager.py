@@ -1,4 +1,4 @@
-"""approximate_time_eager: the soonest match, with no wait for a better one."""
+"""approximate_time_eager: the first match, without waiting for a better one."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
@@ -10,13 +10,13 @@ from syncrelay.sync.queues import Losses
 
 
 class ApproximateTimeEager(Policy):
-    """The tightest set within slop that holds the message just arrived leaves at once.
+    """The tightest set within slop that has the message that has just arrived leaves at once.
 
-    Of sets of one span, the one that starts first, each input in it with its latest message that is not newer
-    than the one just arrived. What is older than a set that leaves is superseded, so sets never go
-    back; what lies further than slop before all messages of another input is too far. Meant for what Python's
-    ApproximateTimeSynchronizer is used for, whose slop is exclusive, whose fit is the first one found, and
-    whose cost is a product of queues.
+    Of sets of the same span, the one that starts first leaves, in which each input has its latest message that is not
+    newer than the arrived one. Messages older than a set that leaves are superseded, so sets never go back. A message
+    that is more than slop older than all messages of another input is too far. This is for users of Python's
+    ApproximateTimeSynchronizer, whose slop is exclusive, which takes the first set that fits, and whose cost is a
+    product of queues.
 
         lidar  |a..b..cd
         camera |..A....D
@@ -55,7 +55,7 @@ class ApproximateTimeEager(Policy):
         else:
             self._insert(place, stamp, message, outcomes)
         if all(self._stamps):
-            # No set was in here before, so this is the first message of its input; all first messages lie
+            # There was no set before, so this is the only message of its input. The first messages of all inputs are
             # within slop of the latest of them, so there is a set now.
             self._match(stamp, outcomes)
         if len(stamps) > self._queue_size:
@@ -79,7 +79,7 @@ class ApproximateTimeEager(Policy):
         return self._losses.needed[place]
 
     def _insert(self, place: int, stamp: int, message: Message, outcomes: list[Outcome]) -> None:
-        """Put in place what is not newer than its whole queue, which is not empty."""
+        """Insert a message that is not newer than all of its queue, which is not empty."""
         stamps = self._stamps[place]
         messages = self._messages[place]
         position = bisect_left(stamps, stamp)
@@ -93,8 +93,8 @@ class ApproximateTimeEager(Policy):
             self._drop_too_far(outcomes)
 
     def _begin(self, stamp: int, outcomes: list[Outcome]) -> None:
-        """Note what the only message of its input has missed, and drop what is too far."""
-        # The first messages of the other inputs lie within slop of each other.
+        """Note which overflowed messages the only message of its input has missed, and drop what is too far."""
+        # The first messages of the other inputs are within slop of each other.
         far = [stamps for stamps in self._stamps if stamps and abs(stamps[0] - stamp) > self._slop]
         if not far:
             return
@@ -104,7 +104,7 @@ class ApproximateTimeEager(Policy):
         self._drop_too_far(outcomes)
 
     def _drop_too_far(self, outcomes: list[Outcome]) -> None:
-        """Drop what no message that any other input still has, or will show, lies within slop of."""
+        """Drop messages that are not within slop of any message that another input has or will send."""
         while (firsts := [stamps[0] for stamps in self._stamps if stamps]) and min(firsts) < max(firsts) - self._slop:
             near = max(firsts) - self._slop
             for place, stamps in enumerate(self._stamps):
@@ -119,7 +119,7 @@ class ApproximateTimeEager(Policy):
 
     def _match(self, stamp: int, outcomes: list[Outcome]) -> None:
         if max(map(len, self._stamps)) == 1:
-            # No choice and nothing left over, as it is most of the time.
+            # The usual case: there is no choice, and nothing is left over.
             outcomes.append(Match(tuple([messages.pop() for messages in self._messages])))
             for stamps in self._stamps:
                 stamps.clear()
@@ -136,18 +136,18 @@ class ApproximateTimeEager(Policy):
 
 
 def _tightest(stamp: int, queues: Sequence[Sequence[int]]) -> list[int]:
-    """Choose a stamp per input around the only one of its input: the least span, of equal spans the first.
+    """Return the stamps of the tightest set with `stamp`, one for each input; of equal spans, the first.
 
-    From each input only its last stamp up to `stamp` or its first after it can be in the tightest set. Starting
-    from those up to it, the earliest is given up for the one after, again and again, until an input has none:
-    that of `stamp` has none.
+    Of each input only its last stamp up to `stamp` or its first one after it can be in the tightest set. The search
+    begins with the last stamps up to `stamp`. It replaces the earliest one by the next of its input, again and again,
+    until an input has no next one, as the input of `stamp` has none.
     """
     after = [bisect_right(stamps, stamp) for stamps in queues]
     best = [stamps[max(position - 1, 0)] for stamps, position in zip(queues, after, strict=True)]
-    given_up = best.copy()
+    candidate = best.copy()
     earliest = iter(sorted(range(len(queues)), key=best.__getitem__))
     while after[place := next(earliest)] < len(queues[place]):
-        given_up[place] = queues[place][after[place]]
-        if max(given_up) - min(given_up) < max(best) - min(best):
-            best = given_up.copy()
+        candidate[place] = queues[place][after[place]]
+        if max(candidate) - min(candidate) < max(best) - min(best):
+            best = candidate.copy()
     return best

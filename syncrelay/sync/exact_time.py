@@ -12,9 +12,9 @@ from syncrelay.sync.queues import Losses
 class ExactTime(Policy):
     """Messages of equal stamps on all inputs are a set, and leave when the last of them is there.
 
-    As C++ message_filters' ExactTime: what is older than a set that leaves is superseded, and `queue_size` is
-    the number of distinct stamps kept over all inputs; above it the oldest stamp overflows, be it the newest
-    arrival.
+    As in C++ message_filters' ExactTime, messages older than a set that leaves are superseded, and `queue_size` is the
+    number of distinct stamps that are kept, over all inputs. Above it the oldest stamp overflows, even if it has just
+    arrived.
 
         left  |ab.d
         right |..CD
