@@ -12,8 +12,8 @@ class ApproximateEpsilonTime(Policy):
     """The oldest messages of all inputs are a set, at once, if none is more than epsilon after the oldest.
 
     If one is, the oldest message of every input that has one within epsilon of the oldest of all is too far. This is
-    C++ message_filters' ApproximateEpsilonTime, except that queues are in stamp order, and that a message whose stamp is
-    still queued replaces the queued one.
+    C++ message_filters' ApproximateEpsilonTime, except that queues are in stamp order, and that a message whose
+    stamp is still queued replaces the queued one.
 
         lidar  |ab....c
         camera |..B...C

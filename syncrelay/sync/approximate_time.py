@@ -11,7 +11,7 @@ from syncrelay.sync.queues import Losses
 _NO_PIVOT = -1
 
 _STEPS = 8
-"""A search strides only after this many single steps. Most searches take fewer, and a stride costs as much as several."""
+"""A search strides only after this many single steps. Most searches take fewer, and a stride costs several steps."""
 
 
 class ApproximateTime(Policy):
