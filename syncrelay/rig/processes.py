@@ -1,4 +1,4 @@
-"""The rig's sensors as child processes of this one."""
+"""Runs the sensors of the simulated rig as child processes."""
 
 import contextlib
 import logging
@@ -16,15 +16,15 @@ from syncrelay.fastdds_files import held_by, remove_unused
 from syncrelay.rig.schedule import SENSORS
 
 UP = "publishes"
-"""What a sensor says as soon as its publisher is there."""
+"""What a sensor prints once its publisher exists."""
 
 LEAVE_WITHIN_S = 50
-"""How long a sensor may take to leave DDS when its stdin has ended; then the kernel ends it."""
+"""How long a sensor may take to leave DDS after its stdin ends; then it is killed."""
 
-# A sensor is up in 3 s and leaves DDS in 0.2 s; on a busy machine both take long.
+# A sensor starts in 3 s and leaves DDS in 0.2 s; on a busy machine both take much longer.
 _UP_WITHIN_S = 60.0
 _END_WITHIN_S = 60.0
-# Whoever waits at a terminal is told by then what for.
+# After this, say what is waited for.
 _SILENT_S = 3.0
 _LOOK_EVERY_S = 1.0
 
@@ -71,12 +71,12 @@ class Rig:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        # A sensor that was dead before is what the error tells.
+        # The error already names a sensor that had died before.
         to_tell = set(self._sensors) if error is None else set(self._running_at(0))
         for process, _ in self._sensors.values():
             assert process.stdin is not None  # noqa: S101 - a pipe was asked for
             process.stdin.close()
-            # One that is still being imported reads no stdin yet: it ends at once, DDS knows nothing of it.
+            # A sensor that is still importing does not read stdin yet. It can end at once, as DDS does not know it.
             process.terminate()
         began = time.monotonic()
         if late := self._note_held(self._running_at(began + _SILENT_S)):
@@ -97,13 +97,13 @@ class Rig:
             remove_unused(left)
 
     def _note_held(self, late: list[str]) -> list[str]:
-        """Note what these sensors have in shared memory: once they are dead, nothing tells. Returns the sensors."""
+        """Note what these sensors hold in shared memory, which cannot be found out once they are dead. Returns them."""
         for name in late:
             self._held[name] |= held_by(self._sensors[name][0].pid)
         return late
 
     def _running_at(self, deadline: float) -> list[str]:
-        """Wait until then at most; give the names of those that run on."""
+        """Wait until a deadline at most, and return the names of the sensors that still run."""
         for process, _ in self._sensors.values():
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(max(0, deadline - time.monotonic()))
@@ -133,5 +133,5 @@ def _end_of(name: str, code: int, talk: IO[bytes]) -> str:
 
 
 def _all_of(talk: IO[bytes]) -> str:
-    # Not by its position, which the sensor writes at too.
+    # Without moving the position, at which the sensor writes.
     return os.pread(talk.fileno(), os.fstat(talk.fileno()).st_size, 0).decode(errors="replace").strip()

@@ -1,4 +1,4 @@
-"""When each message of a simulated sensor is stamped and sent: the same seed and start give the same times."""
+"""When a simulated sensor stamps and sends its messages; the same seed and start give the same times."""
 
 import random
 from collections.abc import Iterator, Mapping
@@ -13,11 +13,11 @@ _MS = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What a sensor does and how badly; all times in nanoseconds.
+    """A sensor and its imperfections; times in nanoseconds.
 
-    It measures at `phase` after each period's begin. Its stamps are `clock_error` off and scatter by `jitter`
-    (standard deviation). A message is sent `latency` later, give or take `latency_jitter`. `loss` is the share
-    of messages that it never sends. `reliable` is its QoS.
+    It measures `phase` after the begin of each period. Its stamps are off by `clock_error`, with a standard deviation
+    of `jitter`. A message is sent `latency` later, with a standard deviation of `latency_jitter`. `loss` is the share
+    of messages that are never sent. `reliable` is its QoS.
     """
 
     topic: str
@@ -31,8 +31,8 @@ class Sensor:
     reliable: bool
 
 
-# The camera is triggered by the lidar, every third frame with a sweep, as on a rig that is wired for fusion: what
-# keeps the two apart is the camera's clock alone. The IMU runs free.
+# The lidar triggers the camera, every third frame with a sweep, as on a rig that is wired for fusion: their stamps
+# differ only because the camera's clock is off. The IMU runs free.
 #
 # Real drivers offer best effort. The IMU does too, but not what is large: through Fast DDS's default segment of
 # shared memory (512 kB) best effort brought 33 of 170 images of 921 kB, reliable 170 of 170.
@@ -76,7 +76,7 @@ SENSORS: Mapping[str, Sensor] = MappingProxyType(
 
 
 class Shot(NamedTuple):
-    """One message: its number from 0, its stamp, and when it is sent, in nanoseconds of the system's clock."""
+    """A message: its number from 0, its stamp, and when it is sent, in nanoseconds of the system clock."""
 
     number: int
     stamp: int
@@ -84,9 +84,9 @@ class Shot(NamedTuple):
 
 
 def schedule(sensor: Sensor, *, seed: int, start: int) -> Iterator[Shot]:
-    """Give the messages that the sensor sends, for ever; lost ones leave a gap in the numbers.
+    """Yield the messages of a sensor without end; lost ones leave a gap in the numbers.
 
-    Messages are sent in the order of their stamps, as by a driver that reads one queue.
+    They are sent in the order in which they are measured, as by a driver that reads one queue.
     """
     chance = random.Random(f"{seed} {sensor.topic}")  # noqa: S311 - repeatable is the point
     sent = number = 0

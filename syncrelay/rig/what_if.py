@@ -1,8 +1,8 @@
-"""Faults that are laid over messages as they come: late, lost, stamped by a clock that is off, or none at all.
+"""Faults that are applied to messages as they arrive: late, lost, stamped by a wrong clock, or none at all.
 
     late: /lidar/points 80ms            drop: /imu/data 10%
     offset: /camera/image_raw -12ms     drift: /camera/image_raw 100ppm
-    dead: /lidar/points from 12s        each with `from 12s` and `until 20s`, if it is to begin or to end
+    dead: /lidar/points from 12s        each with `from 12s` and `until 20s`, to begin later or to end
 
 The same faults, seed and messages give the same messages.
 """
@@ -22,11 +22,11 @@ from syncrelay.config.wording import counted, did_you_mean, one_of, quoted
 
 _MILLION: Final = 1_000_000
 _BILLION: Final = 1_000_000_000
-# No more digits than an amount holds: one that is less would be none, in silence.
+# No more digits than an amount holds, so that no small share silently becomes 0.
 _SHARE: Final = re.compile(r"([0-9]{1,3}(?:\.[0-9]{1,4})?)\s*%")
 _PARTS: Final = re.compile(r"([+-]?[0-9]{1,7}(?:\.[0-9]{1,3})?)\s*ppm")
 MOST_LATE: Final = 60 * _BILLION
-"""Of a topic, in nanoseconds: late messages are held in memory."""
+"""The longest delay of a topic in nanoseconds, as late messages are held in memory."""
 
 _MOST_PARTS: Final = 100_000
 
@@ -45,8 +45,8 @@ class Kind(Enum):
 class Fault:
     """A fault of a topic, as it was `written`.
 
-    `amount` is nanoseconds of `late` and `offset`, millionths of `drop`, billionths of `drift`. It holds from `begin`
-    to before `end`, in nanoseconds after the first message of all; an `end` of None is never.
+    `amount` is in nanoseconds for `late` and `offset`, millionths for `drop`, billionths for `drift`. The fault holds
+    from `begin` until before `end`, in nanoseconds after the first message of all topics; None is no end.
     """
 
     kind: Kind
@@ -57,16 +57,16 @@ class Fault:
     written: str
 
     def of_topic(self, topic: str) -> "Fault":
-        """Return the same fault of a topic by another of its names."""
+        """Return the same fault with another name of its topic."""
         return replace(self, topic=topic)
 
     def holds(self, since: int) -> bool:
-        """Tell whether it holds so many nanoseconds after the first message."""
+        """Return whether it holds at a time in nanoseconds after the first message."""
         return since >= self.begin and (self.end is None or since < self.end)
 
 
 def parse_fault(text: str) -> Fault:
-    """Return the fault that a text says; raises ValueError saying what to write instead."""
+    """Read a fault. Raises ValueError that says what to write instead."""
     name, colon, rest = text.partition(":")
     kinds = {kind.value: kind for kind in Kind}
     kind = kinds.get(name.strip())
@@ -110,7 +110,7 @@ def _late(word: str) -> int:
 
 
 def parse_share(word: str) -> int:
-    """Return the millionths of a text such as 10%; raises ValueError for another."""
+    """Read a share such as 10% as millionths. Raises ValueError for any other text."""
     found = _SHARE.fullmatch(word)
     if found is None or float(found[1]) > 100:  # noqa: PLR2004  all there is
         raise ValueError(f"expected a share such as 10% (0% to 100%, at most 4 decimals), found {quoted(word)}")
@@ -132,7 +132,7 @@ _READERS: Final[Mapping[Kind, Callable[[str], int]]] = MappingProxyType(
 
 
 def _amount(kind: Kind, words: Sequence[str], text: str) -> tuple[int, Sequence[str]]:
-    """Return the amount, and the words behind it. A unit may stand apart from its number."""
+    """Return the amount and the words after it. There may be a space before the unit."""
     reader = _READERS.get(kind)
     if reader is None:
         return 0, words
@@ -155,7 +155,7 @@ def _window(words: Sequence[str], text: str) -> tuple[int, int | None]:
 
 
 def _plainly(drop: Fault) -> str:
-    """Return a loss in the plainest words: what means the same loses the same messages."""
+    """Write a loss in one way, so that losses that mean the same lose the same messages."""
     share = f"{(Decimal(drop.amount) * 100 / _MILLION).normalize():f}"
     begin = f" from {_seconds(drop.begin)}s" if drop.begin else ""
     end = "" if drop.end is None else f" until {_seconds(drop.end)}s"
@@ -167,17 +167,17 @@ def _seconds(nanoseconds: int) -> str:
 
 
 def _told_apart(words: Sequence[str]) -> Sequence[str]:
-    """Return words of which no two are the same: a loss that is there twice loses other messages each time."""
+    """Make repeated words differ: a loss that is given twice loses different messages each time."""
     return [each + " again" * words[:place].count(each) for place, each in enumerate(words)]
 
 
 class Disturbance:
-    """The faults of one topic at work on its messages, in the order in which they are received."""
+    """Applies the faults of one topic to its messages, in order of receipt."""
 
     def __init__(self, faults: Sequence[Fault], *, topic: str, seed: int, began: int) -> None:
-        """`began` is when the first message of all was received, in nanoseconds."""
+        """`began` is when the first message of all topics was received, in nanoseconds."""
         self._faults = [each for each in faults if each.kind is not Kind.DROP]
-        # Of their own each, so that one more fault does not change what another loses.
+        # Each loss has its own randomness, so that another fault does not change which messages it loses.
         drops = [each for each in faults if each.kind is Kind.DROP]
         self._drops = [
             (each, random.Random(f"{seed} {topic} {words}"))  # noqa: S311  repeatable is the point
@@ -185,22 +185,22 @@ class Disturbance:
         ]
         self._topic = topic
         self._of_all = faults
-        # Those that have changed something, as they were written: a text is hashed once, a fault each time.
+        # The faults that changed something, by their text, whose hash is cached.
         self._at_work: set[str] = set()
         self._began = began
         self._last = began
-        # When messages came, after the begin: of all how many, the first and the last.
+        # How many messages came, and when the first and the last did, after the begin.
         self._came, self._first, self._latest = 0, 0, 0
         self.most_late: Final = sum(each.amount for each in faults if each.kind is Kind.LATE)
         self.changes_stamps: Final = any(each.kind in (Kind.OFFSET, Kind.DRIFT) for each in faults)
 
     def received(self, received: int) -> int | None:
-        """Return when a message comes that would have come at a time; None if it is lost. All keep their order."""
+        """Return when a message arrives instead, None if it is lost. Messages keep their order."""
         since = received - self._began
         self._first = since if not self._came else self._first
         self._latest = since
         self._came += 1
-        # Each is asked for each message: what one lost changes nothing of what another loses.
+        # Draw for every loss and message, so that one loss does not change what another loses.
         lost = [
             fault for fault, chance in self._drops if chance.random() * _MILLION < fault.amount and fault.holds(since)
         ]
@@ -216,7 +216,7 @@ class Disturbance:
         return self._last
 
     def stamp(self, stamp: int, received: int) -> int:
-        """Return the stamp of a message that was received at a time, by the clock that is off; 0 stays unset."""
+        """Return a stamp by the wrong clock; an unset stamp of 0 stays 0."""
         if not stamp:
             return stamp
         for fault in self._faults:
@@ -226,7 +226,7 @@ class Disturbance:
         return stamp
 
     def idle(self) -> Iterator[str]:
-        """Yield a sentence for each fault that has changed no message so far."""
+        """Yield a sentence for each fault that has not changed a message."""
         for fault in self._of_all:
             if fault.written not in self._at_work:
                 yield f"{quoted(fault.written)} changed nothing: {self._why_idle(fault)}"
@@ -241,18 +241,18 @@ class Disturbance:
 
 
 def _shift(fault: Fault, since: int) -> int:
-    """Return how far a clock is off so many nanoseconds after the begin."""
+    """Return the error of a clock at a time in nanoseconds after the begin."""
     if fault.kind is Kind.OFFSET and fault.holds(since):
         return fault.amount
     if fault.kind is Kind.DRIFT and since >= fault.begin:
-        # What a clock has gained it keeps.
+        # A clock keeps the error that it has accumulated.
         until = since if fault.end is None else min(since, fault.end)
         return (until - fault.begin) * fault.amount // _BILLION
     return 0
 
 
 def disturbances(faults: Sequence[Fault], topics: Sequence[str], *, seed: int, began: int) -> dict[str, Disturbance]:
-    """Return what faults do to topics; raises ValueError for a fault of a topic that is not among them."""
+    """Return the faults of each topic at work. Raises ValueError for a fault of a topic that is not there."""
     for fault in faults:
         if fault.topic not in topics:
             there = did_you_mean(fault.topic, topics) or f", expected {one_of(dict.fromkeys(topics))}"

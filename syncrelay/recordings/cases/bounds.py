@@ -1,4 +1,4 @@
-"""What a number shall be, as people write it: `980`, `">= 980"`, `"< 20ms"`, `">= 98%"`."""
+"""Bounds of an expected number, as people write them: `980`, `">= 980"`, `"< 20ms"`, `">= 98%"`."""
 
 import operator
 import re
@@ -29,16 +29,16 @@ _COMPARE: Final[Mapping[str, Callable[[Any, Any], bool]]] = MappingProxyType(
         ">=": operator.ge,
     }
 )
-# What no number is below, and no share above.
+# No number is below 0, and no share above 1.
 _LEAST: Final = Decimal(0)
 _WHOLE: Final = Decimal(1)
-# So many digits of a share are told, and those of a duration in its unit.
+# Shares, and durations in their unit, are printed with four decimals.
 _DIGITS: Final = Decimal("0.0001")
 _ROUNDED: Final[Mapping[str, str]] = MappingProxyType({"<=": ROUND_CEILING, ">=": ROUND_FLOOR})
 _SIZES: Final[Mapping[str, Decimal]] = MappingProxyType(
     {"": Decimal(1), "%": Decimal("0.01"), **{unit: Decimal(size) for unit, size in NS_PER_UNIT.items()}}
 )
-# A duration is told in the first of these that is no longer than it, where it is far shorter than the file's own unit.
+# A duration that is far shorter than the unit of the file is printed in the first of these that is no longer than it.
 _UNITS: Final = ("s", "ms", "us", "ns")
 _FAR_SHORTER: Final = Decimal("0.1")
 
@@ -53,9 +53,9 @@ class Quantity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """A number and how what is found shall compare to it; an empty `comparison` is equality.
+    """A number, and how a measured value must compare to it; an empty `comparison` is equality.
 
-    `unit` is that of the file: `%` or none of a share, one of NS_PER_UNIT of a duration.
+    `unit` is as written in the file: `%` or nothing for a share, one of NS_PER_UNIT for a duration.
     """
 
     quantity: Quantity
@@ -64,7 +64,7 @@ class Bound:
     unit: str = ""
 
     def holds(self, found: Decimal) -> bool:
-        """Tell whether what was found is as it shall be. Of a share, so many digits are equal as are told."""
+        """Return whether a measured value is within the bound. Shares are compared with the digits that are printed."""
         if self.quantity is Quantity.SHARE and _COMPARE[self.comparison] is operator.eq:
             return _share(found) == _share(self.value)
         return _COMPARE[self.comparison](found, self.value)
@@ -73,7 +73,7 @@ class Bound:
         return f"{self.comparison} {_written(self.value, self.unit)}".strip()
 
     def told(self, found: Decimal) -> str:
-        """Return what was found as a file would have it, rounded so that it is seen to differ."""
+        """Write a measured value as in a file, rounded so that its difference from the bound shows."""
         return _written(*self._rounded(found))
 
     def _rounded(self, found: Decimal) -> tuple[Decimal, str]:
@@ -82,32 +82,32 @@ class Bound:
             return _share(found), unit
         if self.quantity is Quantity.DURATION:
             unit = _fitting(self.unit, found)
-            # What is to be equal is compared to the nanosecond.
+            # Equality is compared to the nanosecond.
             step = _DIGITS * _SIZES[unit] if self._inclusive in _ROUNDED else Decimal(1)
         rounding = _ROUNDED.get(self._inclusive, ROUND_HALF_EVEN)
         return (found / step).to_integral_value(rounding) * step, unit
 
     def renewed(self, found: Decimal) -> str | int:
-        """Return how a file says that what was found is as it shall be, compared as before."""
+        """Return the bound for the file that a measured value meets, with the same comparison."""
         if self.comparison:
             value, unit = self._rounded(found)
             renewed = Bound(self.quantity, self._inclusive, value, unit)
             if renewed.always_holds:
-                # With it, all would be as it shall be from then on.
+                # The new bound could never fail.
                 renewed = replace(renewed, comparison="==" if value == found else self._inclusive[0])
             return str(renewed)
         return int(found) if self.quantity is Quantity.COUNT else self.told(found)
 
     @property
     def always_holds(self) -> bool:
-        """Whether no number could be found for which it does not hold."""
+        """Whether every possible value meets it."""
         compare = _COMPARE[self.comparison]
         is_whole = self.quantity is Quantity.SHARE and self.value == _WHOLE
         return (compare is operator.ge and self.value == _LEAST) or (compare is operator.le and is_whole)
 
     @property
     def never_holds(self) -> bool:
-        """Whether no number could be found for which it holds."""
+        """Whether no possible value meets it."""
         compare = _COMPARE[self.comparison]
         is_whole = self.quantity is Quantity.SHARE and self.value == _WHOLE
         return (compare is operator.lt and self.value == _LEAST) or (compare is operator.gt and is_whole)
@@ -122,7 +122,7 @@ def _written(number: Decimal, unit: str) -> str:
 
 
 def _share(number: Decimal) -> Decimal:
-    """Return a share with so many digits as are told: of 20,000 messages, all but one are not all."""
+    """Round a share to the digits that are printed, but never to 0 or 1: 19,999 of 20,000 messages are not all."""
     rounded = number.quantize(_DIGITS)
     if rounded == _WHOLE and number < _WHOLE:
         return rounded - _DIGITS
@@ -163,7 +163,7 @@ def _duration(comparison: str, text: str, value: object) -> tuple[Decimal, str]:
     if not text.startswith(_BEGINS_NUMBER):
         raise ValueError(f"expected {Quantity.DURATION.value}, found {describe(value)}")
     if not comparison:
-        # What has no unit could be a number of seconds then: its error says so.
+        # Raises the error for a missing unit.
         parse_duration(text)
     number, unit = parse_duration_text(text)
     return _not_negative(number, value), unit

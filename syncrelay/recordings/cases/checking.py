@@ -1,4 +1,4 @@
-"""A case at work: its messages through the engine and under the judge, and what is not as it shall be."""
+"""Runs a case: feeds its messages to the engine and the judge, and compares the result with what is expected."""
 
 import time
 from collections import Counter
@@ -27,14 +27,14 @@ from syncrelay.sync import Match, Message, Outcome
 _P95: Final = 0.95
 
 Renewal: TypeAlias = str | int | list[str] | tuple[str, ...]
-"""What a file would say in place of what was expected; a tuple of lines for a drawing."""
+"""The value that an updated file would expect; for a drawing a tuple of lines."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mismatch:
-    """What is not as it shall be, and where the file says so.
+    """A difference between what the file expects at `path` and what was found, both as lines.
 
-    `expected` and `found` are lines. `renewed` is None where no file could expect what was found.
+    `renewed` is None if no file could expect what was found.
     """
 
     path: Path
@@ -45,10 +45,10 @@ class Mismatch:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What came of a case, and in how many seconds. `error` says why it could not be run, None where it was.
+    """The result of a case, and how many seconds it took. `error` says why it could not be run.
 
-    `remarks` are what could not be read of a recording, and faults that changed nothing. `updated` is whether its file
-    has been made to expect what was found.
+    `remarks` name damage of a recording, and faults that changed nothing. `updated` says whether the file was updated
+    to expect what was found.
     """
 
     case: LoadedCase
@@ -60,17 +60,17 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """Whether all was as it shall be."""
+        """Whether everything was as expected."""
         return self.error is None and not self.mismatches
 
     @property
     def failed(self) -> bool:
-        """Whether something is not as it shall be by now."""
+        """Whether something differs that was not updated."""
         return not self.passed and not self.updated
 
 
 def check(suite: Suite) -> Iterator[Result]:
-    """Run the cases of a test file, one by one."""
+    """Run the cases of a test file one after another."""
     for case in suite.cases:
         began = time.perf_counter()
         remarks: list[str] = []
@@ -144,7 +144,7 @@ def _left(group: GroupConfig, received: Sequence[Arrival], *, end: int, of: Load
 
 
 def _column(now: int, period: int) -> str:
-    """Return a time as a column of the drawing."""
+    """Return the column of a time in the drawing."""
     return f"{(Decimal(now - START) / period).quantize(Decimal('0.001')).normalize():f}"
 
 

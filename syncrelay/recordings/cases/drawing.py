@@ -40,7 +40,7 @@ class Mark(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """What is wrong with a drawing: at which line from 0, at which column of it and how wide, and what."""
+    """A problem of a drawing: its line and column from 0, its width, and a sentence."""
 
     line: int
     column: int
@@ -50,9 +50,9 @@ class Fault(NamedTuple):
 
 @dataclass(slots=True)
 class Drawing:
-    """What was drawn: letters with their marks, labels in their order; `order` of arrival and `keys` where given.
+    """The content of a drawing: `marks` by letter, and `order` of arrival and `keys` if they are given.
 
-    `expected` are the lines behind `->`; of `label_lines` each is where a label stands first.
+    `expected` are the lines after `->`; `label_lines` has the first line of each label.
     """
 
     marks: dict[str, Mark] = field(default_factory=dict)
@@ -65,7 +65,7 @@ class Drawing:
 
     @property
     def labels(self) -> list[str]:
-        """All labels, in the order in which they stand."""
+        """All labels from top to bottom."""
         return list(self.label_lines)
 
 
@@ -73,27 +73,27 @@ DidYouMean: TypeAlias = Callable[[str, Iterable[str]], str]
 
 
 def parse(text: str, *, did_you_mean: DidYouMean = did_you_mean) -> Drawing:
-    """Return what a text draws, and what is wrong with it."""
+    """Read a drawing; problems are in its `faults`."""
     drawing = Drawing()
-    told: list[tuple[int, str]] = []
+    others: list[tuple[int, str]] = []
     for number, line in enumerate(text.splitlines()):
         stripped = line.strip()
         if stripped.startswith((_ARROW, _ARRIVE, _KEYS)):
-            told.append((number, line))
+            others.append((number, line))
         elif "|" in stripped:
             drawing.faults += _add_lane(drawing, number, line)
         elif stripped:
             drawing.faults.append(
                 _fault(number, line, stripped, "expected a lane such as `lidar |a.bc`, or `-> b: aA`")
             )
-    for number, line in told:
-        # They speak of letters, which may be drawn below them.
+    for number, line in others:
+        # These lines use letters, which may be drawn below them.
         drawing.faults += _add_line(drawing, number, line, did_you_mean)
     return drawing
 
 
 def _add_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean) -> Iterator[Fault]:
-    """Take what is said of the letters that are drawn: what leaves, the order of arrival, their keys."""
+    """Read a line about the drawn letters: what leaves, their order of arrival, or their keys."""
     stripped = line.strip()
     if stripped.startswith(_ARROW):
         drawing.expected.append(_normal(line))
@@ -111,7 +111,7 @@ def _add_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean
             yield _fault(number, line, stripped, text)
         return
     drawing.keys = {letter: word for word in words for letter in word}
-    # A key may be told by more than the letters that have it: `a1 A1`.
+    # A key may contain more than the letters that share it: `a1 A1`.
     of_words = [[letter for letter in word if letter in drawing.marks] for word in words]
     if not words or not all(of_words) or any(count > 1 for count in Counter(chain(*of_words)).values()):
         yield _fault(
@@ -123,7 +123,7 @@ def _add_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean
 
 
 def with_expected(text: str, lines: Sequence[str]) -> str:
-    """Return a drawing's text with other lines behind `->`, where these stood."""
+    """Replace the `->` lines of a drawing's text."""
     kept = text.splitlines()
     places = [number for number, line in enumerate(kept) if line.strip().startswith(_ARROW)]
     at = places[0] if places else len(kept)
@@ -133,7 +133,7 @@ def with_expected(text: str, lines: Sequence[str]) -> str:
 
 
 def lanes(text: str) -> list[str]:
-    """Return the lines of a drawing that say what comes."""
+    """Return the lines of a drawing that draw messages."""
     return [line.strip() for line in text.splitlines() if line.strip() and not line.strip().startswith(_ARROW)]
 
 
@@ -183,7 +183,7 @@ def _faults_of_line(drawing: Drawing, number: int, line: str, did_you_mean: DidY
 
 
 def _wrong(drawing: Drawing, words: Sequence[str], did_you_mean: DidYouMean) -> str | None:
-    """Return what is wrong with a set or a drop, in words."""
+    """Return a sentence about what is wrong with a set or a drop, None if nothing is."""
     match words:
         case [letters]:
             return _undrawn(drawing, letters)

@@ -1,4 +1,4 @@
-"""What errors of a test file are told by."""
+"""What the errors of a test file need to know of its models."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""From a test file to its cases, or to everything that is wrong with it at once."""
+"""Reads a test file into cases, or reports everything that is wrong with it at once."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,10 +35,7 @@ _ONLY_WITH_RATE: Final = ("phase", "jitter", "latency_jitter", "drop")
 
 @dataclass(frozen=True, slots=True)
 class LoadedCase:
-    """A case whose words are all known. `places` has the input of each name that it calls one by.
-
-    `span` is where its name stands. `drawing` is None where nothing is drawn, `recording` where none is read.
-    """
+    """A case whose names are resolved: `places` maps those that it uses to inputs. `span` is that of its own name."""
 
     name: str
     span: Span
@@ -52,7 +49,7 @@ class LoadedCase:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """A test file that is in order: the file that it tests, and its cases."""
+    """A valid test file: the file that it tests, and its cases."""
 
     name: str
     document: Document
@@ -61,15 +58,15 @@ class Suite:
 
 
 def load_suite(path: str, *, environ: Mapping[str, str] = os.environ, patience: Patience | None = None) -> Suite:
-    """Return what a test file says, `-` for standard input; raises ConfigError with everything that is wrong.
+    """Read a test file, `-` for standard input. Raises ConfigError with everything that is wrong.
 
-    A pipe is read as read_source does.
+    A pipe is read as by read_source.
     """
     return _suite(read_source(path, patience=patience), Path(path).parent if path != "-" else Path(), environ)
 
 
 def load_suite_text(text: str, *, name: str, environ: Mapping[str, str] = os.environ) -> Suite:
-    """Return what the text of a test file of this name says; as `load_suite`."""
+    """Read the text of a test file of this name, as `load_suite` does."""
     return _suite(check_text(text, name=name), Path(name).parent, environ)
 
 
@@ -96,7 +93,7 @@ def _refusal(problems: list[Problem]) -> ConfigError:
 
 
 def _tested(name: str, folder: Path, document: Document, environ: Mapping[str, str]) -> Config:
-    """Return the file that is tested. That there is none is told where it is named."""
+    """Load the file that is tested. If it cannot be read, the error is at its name."""
     if name in ("", STDIN):
         raise ConfigError(
             [document.problem(("config",), f"expected a file name, found {describe(name)}", code="bad_value")]
@@ -117,7 +114,7 @@ def _tested(name: str, folder: Path, document: Document, environ: Mapping[str, s
 
 
 class _Reader:
-    """Finds what the words of cases mean, and gathers what means nothing."""
+    """Resolves the names in cases, and gathers problems."""
 
     def __init__(self, document: Document, config: Config, folder: Path) -> None:
         self.problems: list[Problem] = []
@@ -195,7 +192,7 @@ class _Reader:
         return drawing
 
     def _span(self, path: Place, lines: Sequence[str], fault: drawings.Fault) -> Span:
-        """Return where a token of a block of text stands in the file; the whole value, where it is no block."""
+        """Return the place of a token in a block of text; of the whole value if it is not written as a block."""
         span, shown = self._document.value_span(path), lines[fault.line]
         at = span.line + 1 + fault.line
         written = self._document.sources[span.source].line(at)
@@ -256,7 +253,7 @@ class _Reader:
                 self._refuse_key((*path, key), "works only on an input with a `rate`")
 
     def _faults(self, path: Place, case: Case, group: GroupConfig) -> Iterator[Fault]:
-        """Yield faults by the full names of their inputs; of a recording they may be of any of its topics."""
+        """Yield faults with full topic names; with a recording they may be of any of its topics."""
         for index, fault in enumerate(case.what_if):
             if case.recording is not None and fault.topic.startswith("/"):
                 yield fault

@@ -1,4 +1,4 @@
-"""Which input a case means: by its topic, or by a part of it that no other input has."""
+"""Finds the input that a case names by its topic, or by a part that no other topic has."""
 
 from collections.abc import Sequence
 
@@ -8,9 +8,9 @@ from syncrelay.recordings.cases.drawing import DidYouMean
 
 
 def input_named(name: str, group: GroupConfig, *, did_you_mean: DidYouMean) -> int:
-    """Return the index of the input that is called so: `/left/image_raw` also `left`, where no other has that part.
+    """Return the index of an input by a name: `left` names /left/image_raw if no other topic has that part.
 
-    Raises ValueError where none is, or more than one.
+    Raises ValueError if no input or several have it.
     """
     topics = [topic.topic for topic in group.topics]
     for known in (group.inputs.names, topics):

@@ -1,4 +1,4 @@
-"""The messages of a case that is drawn or simulated, in the order in which they are received."""
+"""The messages of a drawn or simulated case, in order of receipt."""
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -16,14 +16,14 @@ from syncrelay.rig.what_if import Fault, disturbances
 
 SECOND: Final = 1_000_000_000
 START: Final = 1_700_000_000 * SECOND
-"""When a case begins; any time would do that is far from 0, which is no stamp."""
+"""When a case begins. Any time far from 0 would do, as 0 is an unset stamp."""
 
 _AS_DRAWN: Final = InputSource()
 _ALL: Final = 1_000_000
 
 
 class Arrival(NamedTuple):
-    """A message: when it is received and its stamp in nanoseconds, its input, its key, its letter if it is drawn."""
+    """A message: time of receipt and stamp in nanoseconds, input, key, and its letter if it is drawn."""
 
     received: int
     input: int
@@ -35,9 +35,9 @@ class Arrival(NamedTuple):
 def arrivals(
     case: Case, drawing: Drawing | None, group: GroupConfig, places: Mapping[str, int], what_if: Sequence[Fault]
 ) -> tuple[list[Arrival], list[str]]:
-    """Return what is received, and a sentence for each fault that has changed nothing.
+    """Return the messages, and a sentence for each fault that changed nothing.
 
-    `places` has the input of each name that the case calls one by.
+    `places` maps the names that the case uses to inputs.
     """
     sources = {places[name]: source for name, source in case.inputs.items()}
     found: list[Arrival] = [] if drawing is None else list(_drawn(drawing, case.period, sources, places, group))
@@ -50,7 +50,7 @@ def arrivals(
 
 
 def streams(received: Sequence[Arrival], group: GroupConfig) -> tuple[Stream, ...]:
-    """Return the messages as recordings are analyzed: a stream for each input."""
+    """Return the messages as the analysis takes them: a stream for each input."""
     made = tuple(
         Stream(topic.topic, topic.type or "", keys=None if topic.key is None else []) for topic in group.topics
     )
@@ -91,7 +91,7 @@ def _drawn(
 def _simulated(source: InputSource, index: int, case: Case, group: GroupConfig) -> Iterator[Arrival]:
     assert source.rate is not None and case.lasts is not None  # noqa: S101, PT018  checked as the file was read
     if source.drop == _ALL:
-        # Whose schedule would never give one.
+        # Its schedule would search for ever for a message that is not lost.
         return
     sensor = Sensor(
         topic=group.inputs.names[index],
@@ -104,18 +104,18 @@ def _simulated(source: InputSource, index: int, case: Case, group: GroupConfig) 
         loss=source.drop / _ALL,
         reliable=True,
     )
-    # 30 Hz for 2 s are 60, though their period is a third of a nanosecond less than it should be.
+    # 30 Hz for 2 s are 60 messages, although the period is rounded down by a third of a nanosecond.
     time = case.lasts - source.phase
     slack = min(time // source.rate // 2 + 1, (source.rate - 1) // 2)
     messages = -(-(time - slack) // source.rate)
     for shot in takewhile(lambda shot: shot.number < messages, schedule(sensor, seed=case.seed, start=START)):
-        # Their numbers are the keys of messages that are not drawn.
+        # Messages that are not drawn have their number as key.
         arrival = Arrival(shot.sent, index, _clamped(shot.stamp), shot.number, "")
         yield _readable(arrival, {index: source}, group)
 
 
 def _readable(arrival: Arrival, sources: Mapping[int, InputSource], group: GroupConfig) -> Arrival:
-    """Return a message as the file reads it: without a key in the field that it goes by, nothing can be read."""
+    """Return a message as the group reads it: one whose key is in another field cannot be read."""
     topic = group.topics[arrival.input]
     there = sources.get(arrival.input, _AS_DRAWN).field
     if topic.key is not None and there is not None and topic.key != there:
@@ -151,5 +151,5 @@ def _stamped(arrival: Arrival, group: GroupConfig) -> Arrival:
 
 
 def _clamped(stamp: int) -> int:
-    """Return a stamp that a Header can hold, whatever the offset."""
+    """Limit a stamp to what a header can hold."""
     return max(0, min(stamp, LATEST_STAMP))

@@ -1,4 +1,4 @@
-"""A test file's text with what is in place of what was expected; comments stay."""
+"""Updates a test file to expect what was found; comments stay."""
 
 import json
 import os
@@ -23,15 +23,15 @@ from syncrelay.recordings.cases.drawing import with_expected
 def updated(
     document: Document, source: Source, mismatches: Sequence[Mismatch], *, environ: Mapping[str, str] = os.environ
 ) -> str:
-    """Return the text of a test file, read as this document, that expects what was found, wherever a file can.
+    """Return the text of a test file, updated to expect what was found wherever a file can.
 
-    Raises SyncRelayError where it would then say something else of what is not to change.
+    Raises SyncRelayError if the update would change the meaning of anything else in the file.
     """
     renewed = [(each.path, each.renewed) for each in mismatches if each.renewed is not None]
     wanted = plain(document.root)
     for path, value in renewed:
         wanted = _with(wanted, path, value)
-    # The editor reads some keys, such as `~`, as what it then writes otherwise.
+    # The editor writes some keys, such as `~`, differently from how they were read.
     with suppress(YAMLError, ConfigError, KeyError):
         text = _edited(document, source.text, renewed)
         read, _ = compose(check_text(text, name=source.name), environ, expected="")
@@ -44,7 +44,7 @@ def updated(
 
 
 def _comparable(tree: Any, renewed: Sequence[tuple[Path, Renewal]]) -> str:
-    """Return all that a file says, the new values as texts: `0.98` may be read as a number."""
+    """Return the content of a file, with the new values as texts: `0.98` may be read as a number."""
     for path, _ in renewed:
         value = tree
         for step in path:
@@ -55,7 +55,7 @@ def _comparable(tree: Any, renewed: Sequence[tuple[Path, Renewal]]) -> str:
 
 
 def _with(tree: Any, path: Path, value: Renewal) -> Any:
-    """Return a tree with another value at a path of mappings."""
+    """Return a copy of a tree with another value at a path of mappings."""
     if path:
         step, *below = path
         return {**tree, step: _with(tree[step], tuple(below), value)}
@@ -64,7 +64,7 @@ def _with(tree: Any, path: Path, value: Renewal) -> Any:
 
 def _edited(document: Document, text: str, renewed: Sequence[tuple[Path, Renewal]]) -> str:
     def edit(whole: Any) -> None:
-        # All found before one is set: from then on a mapping has a merged key of its own.
+        # Find all places before setting any: setting a merged key makes it the mapping's own.
         places = [_place(document, whole, path) for path, _ in renewed]
         for (mapping, key), (_, value) in zip(places, renewed, strict=True):
             mapping[key] = _renewed(mapping[key], value)
@@ -73,9 +73,9 @@ def _edited(document: Document, text: str, renewed: Sequence[tuple[Path, Renewal
 
 
 def _place(document: Document, whole: Any, path: Path) -> tuple[Any, Any]:
-    """Return the mapping and the key at a path, by their order: to the editor the key `1` is a number.
+    """Return the mapping and the key at a path, found by their order because the editor reads the key `1` as a number.
 
-    What a mapping has from others stands in both behind its own.
+    In both trees merged keys come after a mapping's own.
     """
     mapping: Any = whole
     for depth, step in enumerate(path):
@@ -90,7 +90,7 @@ def _place(document: Document, whole: Any, path: Path) -> tuple[Any, Any]:
 
 
 def _renewed(before: Any, renewed: Renewal) -> Any:
-    """Return the new value, written as the one before: quotes, blocks and brackets stay."""
+    """Return the new value in the style of the old one: quotes, blocks and brackets stay."""
     match renewed:
         case tuple():
             return LiteralScalarString(with_expected(before, renewed))
