@@ -64,15 +64,12 @@ def _bind_topic(topic: TopicConfig, config: Config, channels: Sequence[Channel])
     if topic.type is None:
         types = list(dict.fromkeys(channel.type for channel in found if channel.type and _is_ros(channel)))
         if len(types) > 1:
-            return Input(topic, name, output, ()), [_ambiguous(name, types)]
+            which = "and the file has no type for it: write the one that is meant"
+            return Input(topic, name, output, ()), [f"{name} is recorded as {all_of(types)}, {which}"]
         topic = replace(topic, type=next(iter(types), None))
     fitting = tuple(channel for channel in found if channel.type == topic.type and _is_ros(channel))
     misfits = [_misfit(channel, topic) for channel in found if channel not in fitting]
     return Input(topic, name, output, fitting), misfits
-
-
-def _ambiguous(name: str, types: Sequence[str]) -> str:
-    return f"{name} is recorded as {all_of(types)}, and the file has no type for it: write the one that is meant"
 
 
 def _is_ros(channel: Channel) -> bool:

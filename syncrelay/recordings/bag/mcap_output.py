@@ -39,7 +39,10 @@ class McapOutput:
         is_file = str(place).endswith(MCAP_SUFFIX)
         with ExitStack() as opened:
             if not is_file and (path := local_path(place)) is not None:
-                _make_parents(path)
+                try:
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                except OSError as error:
+                    raise cannot_be_written(path, error) from error
             require_new(place)
             scratch = opened.enter_context(written_whole(place))
             self._folder = None if is_file else scratch
@@ -123,13 +126,6 @@ def _close(file: BinaryIO) -> None:
     # On a full disk, closing fails once more.
     with suppress(OSError):
         file.close()
-
-
-def _make_parents(path: Path) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise cannot_be_written(path, error) from error
 
 
 def _topic_metadata(output: Output) -> dict[str, Any]:

@@ -77,11 +77,12 @@ class Parts:
         if spans is None:
             return None
         records = [self._bytes(begin, size) for begin, size in spans]
-        return b"".join(records) if all(map(self._is_wanted, records)) else None
-
-    def _is_wanted(self, record: bytes) -> bool:
-        """Tell whether a record is a wanted message, as the index says."""
-        return record[:1] == bytes([Opcode.MESSAGE]) and int.from_bytes(record[_NUMBER], "little") in self._wanted
+        are_wanted = (
+            record[:1] == bytes([Opcode.MESSAGE]) and int.from_bytes(record[_NUMBER], "little") in self._wanted
+            for record in records
+        )
+        # Otherwise the index is wrong.
+        return b"".join(records) if all(are_wanted) else None
 
     def _plan(self, segments: Sequence[Segment]) -> None:
         chunks = {each: self._plain[each] for each in segments if each in self._plain}

@@ -37,13 +37,9 @@ _OPENERS: Final[Mapping[bytes, Callable[[Path, str], Recording]]] = {
 }
 
 
-def _zstd(path: Path) -> Any:
-    return zstandard.open(path, "rb")
-
-
 _DECOMPRESSORS: Final[Mapping[bytes, Callable[[Path], Any]]] = {
     b"BZh": bz2.open,
-    b"\x28\xb5\x2f\xfd": _zstd,
+    b"\x28\xb5\x2f\xfd": lambda path: zstandard.open(path, "rb"),
     b"\x1f\x8b": gzip.open,
 }
 _LONGEST_MAGIC: Final = 16

@@ -29,7 +29,8 @@ def message_reader(group: GroupConfig, index: int, channel: Channel) -> ReadMess
     Raises BagError where the channel's type has no such stamp or key.
     """
     topic = group.topics[index]
-    read = _stamped_by(stamp_reader(topic.stamp, channel))
+    stamp_of = stamp_reader(topic.stamp, channel)
+    read: ReadMessage = (lambda raw: (raw[1], None)) if stamp_of is None else lambda raw: (stamp_of(raw[2]), None)
     if topic.key is not None:
         read = _with_key(read, value_reader(channel, topic.key))
     # A stamp that was read from a header can also be written to one.
@@ -43,12 +44,6 @@ def message_reader(group: GroupConfig, index: int, channel: Channel) -> ReadMess
         return read(raw) if can_be else (None, None)
 
     return read_if_it_can_be_restamped
-
-
-def _stamped_by(read_stamp: ReadStamp | None) -> ReadMessage:
-    if read_stamp is None:
-        return lambda raw: (raw[1], None)
-    return lambda raw: (read_stamp(raw[2]), None)
 
 
 def _with_key(read: ReadMessage, read_key: Callable[[bytes], Any]) -> ReadMessage:

@@ -60,7 +60,8 @@ class SqliteFile:
             self.channels = tuple(self._channels())
             # sorted: with a damaged index the first time may be the later one.
             self.begin, self.end = sorted(self._end(order) for order in ("ASC", "DESC"))
-            self._is_packed = self._has_packed()
+            first = self._database.execute(_FIRST_PAYLOADS)
+            self._is_packed = any(payload.startswith(_ZSTD) for (payload,) in first)
         except _UNREADABLE as fault:
             self._database.close()
             raise BagError(f"{name}: cannot be read as a rosbag2 recording: {fault}") from fault
@@ -83,7 +84,7 @@ class SqliteFile:
         chosen = {channel.id: channel for channel in self.channels if channel in among}
         others = [channel.id for channel in self.channels if channel.id not in chosen]
         effort, stored, leave_out = Effort(), 0, self._losses.leave_out
-        query = _BY_TIME.format(_marks(len(others)))
+        query = _BY_TIME.format(", ".join("?" * len(others)))
         try:
             for number, time, payload in self._database.execute(query, others):
                 channel = chosen.get(number)
@@ -158,13 +159,6 @@ class SqliteFile:
         """Return the first or the last time of receipt, 0 if there is none."""
         row = self._database.execute(_END_OF.format(order), (LATEST,)).fetchone()
         return int(row[0]) if row else 0
-
-    def _has_packed(self) -> bool:
-        return any(payload.startswith(_ZSTD) for (payload,) in self._database.execute(_FIRST_PAYLOADS))
-
-
-def _marks(count: int) -> str:
-    return ", ".join("?" * count)
 
 
 def _why(channel: Channel | None, time: object, payload: object) -> str:
