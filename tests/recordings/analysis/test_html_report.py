@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from syncrelay.recordings.analysis.html import as_html
+from syncrelay.recordings.analysis.html.drawings import pack
 from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
-from syncrelay.recordings.analysis.html.packing import pack
 from syncrelay.status.fates import CODES, FATES, MATCHED, UNNEEDED
 from syncrelay.sync import DropReason
 from tests.cli.command import run_here

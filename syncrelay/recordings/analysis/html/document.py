@@ -14,7 +14,7 @@ from syncrelay.explain import words
 from syncrelay.printable import printable, printable_lines
 from syncrelay.recordings.analysis import Analysis, file_with_changes
 from syncrelay.recordings.analysis.html.drawings import drawings_of
-from syncrelay.recordings.analysis.html.words import TopicRow, group_words, topic_row
+from syncrelay.recordings.analysis.html.words import TOPIC_COLUMNS, group_words, topic_row
 from syncrelay.status.fates import FATES, Fate
 
 MARK: Final = '<meta name="generator" content="syncrelay">'
@@ -41,7 +41,7 @@ def as_html(name: str, analysis: Analysis) -> str:
         messages=sum(topic.messages for topic in analysis.topics),
         faults=list(map(printable, analysis.faults)),
         topics=[topic_row(topic) for topic in analysis.topics],
-        columns=TopicRow.COLUMNS,
+        columns=TOPIC_COLUMNS,
         groups=told,
         fates={fate.name: fate for fate in FATES},
         drawings={"fates": [_fate(fate) for fate in FATES], "groups": [each.for_script for each in drawings]},

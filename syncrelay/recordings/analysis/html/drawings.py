@@ -1,7 +1,9 @@
-"""What the script of the page draws for a group, and what the words beside it tell of that."""
+"""What the script of the page draws for a group, with long rows of whole numbers packed into few characters."""
 
+import gzip
+from base64 import b64encode
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -9,8 +11,9 @@ from syncrelay.config import GroupConfig
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis
 from syncrelay.recordings.analysis.html.charts import Histogram, histogram, queue_marks, slop_marks
 from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
-from syncrelay.recordings.analysis.html.packing import pack
+from syncrelay.recordings.bag.columns import Nanoseconds
 
+_LARGEST: Final = 2**31 - 1
 # With other stamps, the drawn distances are not those that suggested values are for.
 _OTHER_STAMPS = ("stamp", "offset")
 
@@ -69,3 +72,20 @@ def _timeline(lanes: Lanes) -> dict[str, Any]:
         "each": lanes.each,
         "stretch": lanes.stretch,
     }
+
+
+def pack(values: Nanoseconds) -> dict[str, Any]:
+    """Return how many numbers there are, their unit, and the steps from each to the next.
+
+    The unit is 1, or the least power of ten in which each step fits 32 bits. `steps` is base64 of gzip of the lowest
+    bytes of all steps, then of the next, up to the highest, as equal bytes compress best side by side.
+    """
+    unit = 1
+    steps = np.diff(values, prepend=np.int64(0))
+    while len(steps) and int(np.max(np.abs(steps))) > _LARGEST:
+        unit *= 10
+        steps = np.diff(values // unit, prepend=np.int64(0))
+    planes = steps.astype("<i4").view(np.uint8).reshape(-1, 4).T
+    # gzip's time is left out, so that the same recording makes the same file.
+    packed = gzip.compress(planes.tobytes(), mtime=0)
+    return {"count": len(values), "unit": unit, "steps": b64encode(packed).decode("ascii")}

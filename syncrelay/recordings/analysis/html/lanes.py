@@ -13,11 +13,11 @@ from syncrelay.status.fates import CODES, MATCHED, UNNEEDED
 
 _SECOND: Final = 1_000_000_000
 _STRETCH: Final = 10 * _SECOND
-# So far off the time of receipt, the usual delay aside, a stamp says nothing of when its message was made: it is of
-# another clock, or of a recording that began again.
+# A stamp that differs by more from the time of receipt, less the usual delay, does not say when its message was made.
+# It comes from another clock, or the recording began again.
 _ASTRAY: Final = 2 * _SECOND
 _NONE: Final = -1
-# What is made of it, with any time of receipt and any stamp, fits 64 bits.
+# Sums of it with any time of receipt and any stamp fit 64 bits.
 _LARGEST_OFFSET: Final = 2**61
 _LONGEST: Final = 2**63 - 1
 
@@ -33,11 +33,11 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class Lanes:
-    """A group's messages. A row of `members` is a set: places in the lanes, -1 where an input is missing.
+    """A group's messages and sets.
 
-    Sets are in the order of their earliest messages, `begins`. `astray` is how many messages stand where they were
-    received, because their stamps are unset or seconds off the usual. Of every `each` stretches of 10 s one is
-    kept, whole; 1 if all are.
+    A row of `members` is a set: the index of its message in each lane, -1 where an input is missing. Sets are in the
+    order of their earliest messages, `begins`. `astray` messages are drawn at their time of receipt, because their
+    stamps are unset or seconds off the usual delay. One of every `each` stretches of 10 s is kept whole; 1 keeps all.
     """
 
     lanes: tuple[Lane, ...]
@@ -98,7 +98,7 @@ def lanes_of(group: GroupAnalysis, begin: int, *, most: int) -> Lanes:
 
 
 def _is_new(stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
-    """Tell which stamps, in the order of the sets, are not of the message that served the set before."""
+    """Return which stamps, in the order of the sets, are of another message than that of the set before."""
     is_new: npt.NDArray[np.bool_] = np.diff(stamps, prepend=stamps[:1] - 1) != 0
     return is_new
 
@@ -115,7 +115,7 @@ def _usual_delay(group: GroupAnalysis) -> int:
 
 
 def _offsets(group: GroupAnalysis) -> list[int]:
-    """Return the offsets of the inputs, within what can be drawn: the file may ask for centuries."""
+    """Return the offsets of the inputs, limited to what can be drawn: a file may have offsets of centuries."""
     return [max(-_LARGEST_OFFSET, min(_LARGEST_OFFSET, topic.offset_ns)) for topic in group.group.topics]
 
 
