@@ -142,10 +142,8 @@ class FleetRow(_Facts):
     """Size of the recording; null if it could not be read."""
     version: Text = own_version()
     """Version of syncrelay that analyzed it."""
-    file: Text | None = None
-    """Name of the file given with `--config`; null if topics were given instead."""
     file_hash: Text | None = None
-    """Hash of what the file's groups say. Changes of comments, order or units do not change it."""
+    """Hash of what the file's groups say, whatever its comments, order or units; null if topics were given instead."""
     error: Text | None = None
     """Why the recording could not be analyzed; null if it could."""
     problems: tuple[Text, ...] = ()
@@ -187,7 +185,7 @@ class FleetRow(_Facts):
 
 
 def rows_of(
-    analysis: Analysis, *, recording: str, problems: Iterable[str], file: str | None, file_hash: str | None
+    analysis: Analysis, *, recording: str, problems: Iterable[str], file_hash: str | None
 ) -> Iterator[FleetRow]:
     """Yield a row for each group of an analysis; the robot and the size are added when all rows are put together."""
     topics = {figures.topic: figures for figures in analysis.topics}
@@ -200,7 +198,6 @@ def rows_of(
             day=_day_of(analysis.begin),
             begin_ns=analysis.begin,
             duration_s=(analysis.end - analysis.begin) / _SECOND,
-            file=file,
             file_hash=file_hash,
             problems=told,
             group_name=each.group.name,

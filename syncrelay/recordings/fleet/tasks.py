@@ -75,7 +75,7 @@ class ReplayTask:
 
 @dataclass(frozen=True, slots=True)
 class AnalyzeTask:
-    """Writes the analysis of a recording; see Task. Facts are the sets and the findings of each group."""
+    """Writes the analysis of a recording, and its rows of the table of facts; see Task."""
 
     file: str | None
     text: str | None
@@ -104,17 +104,8 @@ class AnalyzeTask:
                     analysis = settled(analysis)
                 document = as_json(source.shown, analysis)
                 facts = about(recording, bindings)
-                facts["groups"] = [
-                    {
-                        "name": each.group.name,
-                        "sets": len(each.evaluation.sets),
-                        "findings": [lasting.finding.code.value for lasting in each.findings],
-                    }
-                    for each in analysis.groups
-                ]
                 problems = problems_of(recording, bindings)
-                about_file = {"file": self.file, "file_hash": self.file_hash}
-                rows = rows_of(analysis, recording=source.shown, problems=problems, **about_file)
+                rows = rows_of(analysis, recording=source.shown, problems=problems, file_hash=self.file_hash)
                 (folder / FACTS).write_text("".join(f"{row.model_dump_json()}\n" for row in rows), encoding="utf-8")
         (folder / ANALYSIS).write_text(f"{json.dumps(document, indent=2)}\n")
         return facts
