@@ -5,9 +5,9 @@ The models here are the only source of the table's Parquet schema, of its JSON l
 
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime, timedelta
+from math import ceil
 from typing import Annotated, Final
 
-import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from syncrelay import own_version
@@ -192,7 +192,7 @@ def rows_of(
     told = tuple(problems)
     for each in analysis.groups:
         suggestion, sets = each.suggestion, each.evaluation.sets
-        spans, latencies = [one.span for one in sets], [one.latency for one in sets]
+        spans, latencies = sorted(one.span for one in sets), sorted(one.latency for one in sets)
         yield FleetRow(
             recording=recording,
             day=_day_of(analysis.begin),
@@ -238,8 +238,9 @@ def _ms(nanoseconds: int | None) -> float | None:
     return None if nanoseconds is None else nanoseconds / _MS
 
 
-def _quantile_ms(values: list[int], share: float) -> float | None:
-    return float(np.quantile(values, share, method="inverted_cdf")) / _MS if values else None
+def _quantile_ms(ordered: list[int], share: float) -> float | None:
+    # Spans of stamps that make no sense may be longer than any integer of numpy.
+    return ordered[ceil(share * len(ordered)) - 1] / _MS if ordered else None
 
 
 def _inputs(each: GroupAnalysis, topics: dict[str, TopicFigures], begin: int) -> Iterator[InputFacts]:
