@@ -7,9 +7,9 @@ import os
 import signal
 import socket
 import sys
-import threading
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, redirect_stdout
+from types import FrameType
 from typing import Any, Final
 
 from syncrelay.errors import SyncRelayError
@@ -27,6 +27,40 @@ _PATIENCE_S: Final = 10
 _AHEAD: Final = 2
 
 
+class _HeldSignals:
+    """Remembers SIGINT and SIGTERM: Ray may lose an exception that a handler raises inside of its native code.
+
+    A second signal ends the process at once.
+    """
+
+    def __init__(self) -> None:
+        self._former = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        self._came = 0
+
+    def hold(self) -> None:
+        """Install the handlers; once more after ray.init, which installs its own."""
+        for number, former in self._former.items():
+            # A shell that starts us in the background has Ctrl-C ignored.
+            if former is not signal.SIG_IGN and not self._came:
+                signal.signal(number, self._remember)
+
+    def release(self) -> None:
+        """Restore the former handlers."""
+        for number, former in self._former.items():
+            signal.signal(number, former)
+
+    def pass_on(self) -> None:
+        """Give a signal that has come to its former handler, which raises what ends the command."""
+        if self._came:
+            self.release()
+            signal.raise_signal(self._came)
+
+    def _remember(self, number: int, _frame: FrameType | None) -> None:
+        self._came = number
+        for each in self._former:
+            signal.signal(each, signal.SIG_DFL)
+
+
 class RayEngine:
     """Has a Ray cluster do jobs; see Engine."""
 
@@ -41,11 +75,12 @@ class RayEngine:
         """See Engine. Raises SyncRelayError if the cluster cannot be reached."""
         ray = self._ray
         waiting = iter(jobs)
-        with self._connected():
+        with self._connected() as signals:
             task = ray.remote(num_cpus=1, memory=MEMORY, max_retries=TRIES - 1)(_perform)
             running: dict[Any, Job] = {}
             try:
                 while True:
+                    signals.pass_on()
                     # Nodes come and go, and each task that is handed over takes memory here.
                     cores = int(ray.cluster_resources().get("CPU", 0))
                     room = max(1, _AHEAD * cores) - len(running)
@@ -75,8 +110,8 @@ class RayEngine:
             return Finished(job, Failed(given_up(job, why)))
 
     @contextmanager
-    def _connected(self) -> Iterator[None]:
-        ray = self._ray
+    def _connected(self) -> Iterator[_HeldSignals]:
+        ray, signals = self._ray, _HeldSignals()
         # No usage statistics leave the machine, and no port is opened for a dashboard that nobody asked for.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
@@ -86,18 +121,20 @@ class RayEngine:
         try:
             if address:
                 _require_listener(address)
-            with _own_signals():
-                ray.init(address=address or "local", **options)
+            signals.hold()
+            ray.init(address=address or "local", **options)
+            signals.hold()
         except (ConnectionError, OSError, RuntimeError, ValueError) as error:
+            signals.release()
             where = f"the Ray cluster {address} of {ADDRESS} cannot be reached" if address else "Ray cannot be started"
             raise SyncRelayError(f"{where}: {error}") from error
         # Ray prints to stdout what happens to workers; stdout is for data.
         with redirect_stdout(sys.stderr):
             try:
-                yield
+                yield signals
             finally:
-                with _own_signals():
-                    ray.shutdown()
+                ray.shutdown()
+                signals.release()
 
 
 def _perform(job: Job) -> Outcome:
@@ -111,16 +148,3 @@ def _require_listener(address: str) -> None:
     host, _, port = address.rpartition("://")[2].rpartition(":")
     if host and port.isdigit():
         socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE_S).close()
-
-
-@contextmanager
-def _own_signals() -> Iterator[None]:
-    """Restore our handler of SIGTERM: Ray installs one that ends the process with an exit code of Ray's."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    ours = signal.getsignal(signal.SIGTERM)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, ours)
