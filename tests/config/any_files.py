@@ -1,8 +1,11 @@
-"""Files that are in order, drawn at random, and the same in parts."""
+"""Files that are in order, drawn at random, and the same in parts; and all models that a file is made of."""
 
 import json
 import random
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, get_args
+
+from pydantic import BaseModel
 
 from syncrelay.config import Config, ConfigError, load_text
 
@@ -26,6 +29,16 @@ def any_file(chance: random.Random, environ: dict[str, str]) -> tuple[dict[str, 
         except ConfigError:
             # Drawn anew: outputs that meet, a key that a policy does not have.
             continue
+
+
+def models_of(kind: Any) -> Iterator[type[BaseModel]]:
+    """Every model that a model has below it, and itself; some of them more than once."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        yield kind
+        for field in kind.model_fields.values():
+            yield from models_of(field.annotation)
+    for part in get_args(kind):
+        yield from models_of(part)
 
 
 def parts_of(keys: dict[str, Any], chance: random.Random) -> list[str]:

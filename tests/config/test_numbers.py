@@ -86,25 +86,3 @@ def test_more_messages_than_dds_counts_are_refused(place: str, number: str, envi
     with pytest.raises(ConfigError, match="expected 1000000 or less, found the number") as raised:
         load_text(text, environ=environ)
     assert raised.value.problems[0].path == place
-
-
-def test_no_limit_as_rosbag2_writes_it_is_the_longest_duration(environ):
-    endless = {"deadline": {"sec": 9223372036, "nsec": 854775807}, "lifespan": {"sec": 10**399, "nsec": 10**399}}
-    (group,) = load_text(json.dumps(_file(_group("exact_time"), {"qos": endless})), environ=environ).groups
-    qos = group.topics[0].qos
-    assert isinstance(qos, QosOverrides)
-    assert qos.deadline == qos.lifespan == 2**63 - 1
-
-
-@pytest.mark.parametrize(
-    ("slop", "said"),
-    [
-        ("20", "20 without a unit means 20 s: write 20ms if you mean milliseconds, otherwise 20s"),
-        ("1234567.5", "1234567.5 without a unit means 1234567.5 s: write 1234567.5ms if"),
-        ("9223372036", "9223372036 without a unit means 9223372036 s: write 9223372036ms if"),
-    ],
-)
-def test_a_slop_of_whole_seconds_is_noted_with_what_was_written(slop: str, said: str, environ):
-    text = json.dumps(_file(_group("approximate_time", slop="number"))).replace(_NUMBER, slop)
-    (note,) = load_text(text, environ=environ).notes
-    assert note.text.startswith(said)

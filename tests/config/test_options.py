@@ -7,13 +7,10 @@ from typing import Any
 import pytest
 
 from syncrelay.config import Config, load_text
-from syncrelay.config.export import ExportKeys, LerobotKeys, TaskTopic
 from syncrelay.config.file import file_format
-from syncrelay.config.models import StampField
-from syncrelay.config.qos import QosOverrides
-from syncrelay.config.sections import DiagnosticsConfig, MetricsConfig, NodeConfig
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.sync import Match, Message, Outcome
+from tests.config.any_files import models_of
 
 MS = 1_000_000
 IMAGE = "sensor_msgs/msg/Image"
@@ -224,53 +221,18 @@ def test_changing_an_option_changes_what_comes_out(one, other, outcome, environ)
 
 
 def test_every_key_of_the_file_is_an_option_under_test():
-    models = (
-        file_format().file,
-        NodeConfig,
-        MetricsConfig,
-        DiagnosticsConfig,
-        file_format().defaults,
-        file_format().any_group,
-        file_format().any_topic,
-        StampField,
-        QosOverrides,
-        ExportKeys,
-        LerobotKeys,
-        TaskTopic,
-    )
-    keys = {key for model in models for key in model.model_fields}
+    keys = {key for model in models_of(file_format().file) for key in model.model_fields}
     assert keys - OPTIONS.keys() == {"version"}
 
 
-DEFAULTS: dict[str, tuple[Any, ...]] = {
-    "policy": ("approximate_time", "exact_time", NEAR_PAIRS),
-    "queue_size": (10, 1, sets_of((0, 10), (0, 20), (1, 11), (1, 21), (0, 100), (1, 100))),
-    "slop": ("20ms", "5ms", WIDER_PAIRS),
-    "age_penalty": (0, 1, TWO_SPANS_TO_CHOOSE_FROM),
-    "restamp": ("none", "latest", NEAR_PAIRS),
-    "output_prefix": ("/y", "/z", outputs),
-    "manifest": (True, False, own_topics),
-    "max_wait": ("10ms", "1s", OPEN_PAIR),
-    "max_rate": ("1 Hz", "1 kHz", NEAR_PAIRS),
-    "every": (1, 2, NEAR_PAIRS),
-    "lazy": (False, True, lambda config: config.groups[0].options.lazy),
-    "trigger": ("/a", "/b", LATEST_OF_BOTH, LATEST),
-    "max_age": ("10s", "50ms", LATEST_OF_BOTH, LATEST),
-    "key": ("header.stamp", "header.frame_id", of_first_topic("key"), KEYED),
-}
-
-
-@pytest.mark.parametrize("key", DEFAULTS)
-def test_a_default_counts_where_the_group_is_silent_and_only_there(key, environ):
-    one, other, outcome, *others = DEFAULTS[key]
-    (rest,) = others or (APPROXIMATE,)
-
-    def outcome_of(keys: dict[str, Any], default: Any) -> object:
-        return outcome(load_text(file(keys, defaults={**rest, key: default}), environ=environ))
-
-    assert outcome_of({}, one) != outcome_of({}, other)
-    assert outcome_of({key: one}, other) == outcome_of({}, one)
-
-
-def test_every_key_of_defaults_is_a_default_under_test():
-    assert DEFAULTS.keys() == file_format().defaults.model_fields.keys()
+@pytest.mark.parametrize(("key", "field"), file_format().defaults.model_fields.items())
+def test_a_default_counts_where_the_group_is_silent_and_only_there(key, field, environ):
+    one, other, outcome = OPTIONS[key]
+    expected = outcome(load_text(other, environ=environ))
+    group = json.loads(other)["groups"]["front"]
+    unlike = field.examples[0] if field.examples else "equal_key" if key == "policy" else not group[key]
+    overruled = file(group, defaults={key: unlike})
+    assert outcome(load_text(overruled, environ=environ)) == expected
+    silent = {name: value for name, value in group.items() if name != key}
+    assert outcome(load_text(file(silent, defaults={key: group[key]}), environ=environ)) == expected
+    assert expected != outcome(load_text(one, environ=environ))

@@ -9,7 +9,7 @@ import pytest
 
 from syncrelay.config import ConfigError, Problem, load_text
 
-_FILES = sorted((Path(__file__).parent / "invalid").glob("*.yaml"))
+_FILES = sorted((Path(__file__).parent / "invalid").rglob("*.yaml"))
 # Where these are found, there is no tree in which more could be.
 _NO_TREE = ("yaml", "encoding", "empty")
 

@@ -95,19 +95,6 @@ def test_a_file_that_says_nothing_of_it_listens_on_this_machine_alone(environ):
     assert config.listen == Listen("127.0.0.1", range(9464, 9474), is_asked_for=False)
 
 
-def test_outputs_are_named_by_prefix_and_input_unless_they_have_a_name(environ):
-    config = load(str(FOLDER / "all_keys.yaml"), environ=environ)
-    assert [topic.output for group in config.groups for topic in group.topics] == [
-        "synced/camera/image_raw",
-        "~/points",
-        "synced/dock",
-        "synced/chatter",
-        "/fused/back/image",
-        "/fused/back/imu",
-        "/fused/back/task",
-    ]
-
-
 def test_an_optional_input_that_nothing_waits_for_needs_no_max_wait(environ):
     group = load(str(FOLDER / "optional_state.yaml"), environ=environ).groups[0]
     assert [topic.required for topic in group.topics] == [True, False]
