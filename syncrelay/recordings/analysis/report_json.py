@@ -7,7 +7,6 @@ from typing import Any, Final
 import numpy as np
 
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic
-from syncrelay.recordings.analysis.buckets import counted_in_buckets
 from syncrelay.recordings.analysis.nearest import Pair
 from syncrelay.recordings.analysis.suggest import Suggestion
 from syncrelay.recordings.analysis.topics import spread
@@ -66,12 +65,9 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
 
 
 def _quantity(values: Iterable[int]) -> dict[str, Any] | None:
-    """Return the spread of a quantity, and how often it was in which bucket; None where there are no values."""
+    """Return the spread of a quantity; None if there are no values."""
     every = np.array([max(-_LONGEST, min(_LONGEST, value)) for value in values], dtype=np.int64)
-    if not len(every):
-        return None
-    # A bucket goes from its floor, which names it, to the next floor that floor_of gives.
-    return {**asdict(spread(every)), "counts": counted_in_buckets(every.tolist())}
+    return asdict(spread(every)) if len(every) else None
 
 
 def suggestion_as_json(suggestion: Suggestion) -> dict[str, Any]:
