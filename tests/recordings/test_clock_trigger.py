@@ -9,7 +9,7 @@ from syncrelay.cdr import read_stamp
 from syncrelay.config import load_text
 from syncrelay.rig.schedule import SENSORS
 from syncrelay.sync import Match, Message, Ticks
-from tests.cli.command import run
+from tests.cli.command import run_here
 from tests.ros.cdr_messages import stamp_of
 from tests.ros.configs import config
 
@@ -33,13 +33,13 @@ _TEXT = config(
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("clock")
     (made / "f.yaml").write_text(_TEXT)
-    assert run("demo", "--record", "rig.mcap", "--seconds", "4", folder=made).returncode == 0
+    assert run_here("demo", "--record", "rig.mcap", "--seconds", "4", folder=made).returncode == 0
     return made
 
 
 @pytest.fixture(scope="module")
 def lines(folder):
-    done = run("replay", "rig.mcap", "--config", "f.yaml", "--json", "-o", "out.mcap", folder=folder)
+    done = run_here("replay", "rig.mcap", "--config", "f.yaml", "--json", "-o", "out.mcap", folder=folder)
     assert done.returncode == 0
     return [json.loads(line) for line in done.stdout.splitlines()]
 
@@ -78,12 +78,12 @@ def test_what_is_written_has_the_stamps_of_the_ticks(folder, lines):
 
 
 def test_the_drawing_of_a_file_tells_the_clock(folder):
-    assert "trigger 29.97 Hz" in run("graph", "f.yaml", folder=folder).stdout
+    assert "trigger 29.97 Hz" in run_here("graph", "f.yaml", folder=folder).stdout
 
 
 def test_another_rate_is_told_by_diff(folder):
     (folder / "g.yaml").write_text(_TEXT.replace("29.97 Hz", "10 Hz"))
-    assert "trigger: 29.97 Hz -> 10 Hz" in run("diff", "f.yaml", "g.yaml", folder=folder).stdout
+    assert "trigger: 29.97 Hz -> 10 Hz" in run_here("diff", "f.yaml", "g.yaml", folder=folder).stdout
 
 
 def test_a_drawn_case_tells_the_stamp_of_the_tick(folder):
@@ -101,5 +101,5 @@ cases:
     drawn = {"policy": "latest_time", "trigger": "20 Hz", "restamp": "trigger"}
     topics = [{"topic": f"/{name}", "type": "sensor_msgs/msg/Imu"} for name in "ab"]
     (folder / "drawn.yaml").write_text(config({"drawn": {**drawn, "topics": topics}}))
-    done = run("test", "tests.yaml", folder=folder)
+    done = run_here("test", "tests.yaml", folder=folder)
     assert done.returncode == 0, done.stdout + done.stderr
