@@ -8,6 +8,7 @@ from syncrelay.config import load_text
 from syncrelay.explain import (
     Code,
     Endpoint,
+    FindingLog,
     GraphSnapshot,
     GroupWatch,
     InputGraph,
@@ -214,15 +215,14 @@ _STAMPS = st.one_of(
     st.integers(-(2**63), 2**63 - 1),
     st.integers(BEGAN, BEGAN + 20 * S),
 )
-_MESSAGES = st.lists(
-    st.tuples(st.integers(0, 2), _STAMPS, st.integers(-2 * S, 4 * S), st.booleans()), min_size=1, max_size=60
-)
+_STEPS = st.one_of(st.integers(-2 * S, 4 * S), st.integers(-10 * S, 40 * S), st.integers(-(10**18), 10**18))
+_MESSAGES = st.lists(st.tuples(st.integers(0, 2), _STAMPS, _STEPS, st.booleans()), min_size=1, max_size=60)
 
 
 @given(st.sampled_from(_CONFIGS), _MESSAGES, st.integers(0, 4), st.sampled_from([None, lambda at: at // 2]))
 def test_no_arrivals_whatever_break_a_watch_or_a_judge(config, messages, publishers, by_clock):
-    """Stamps of any size in any order; the machine's clock may be set back in between."""
-    watch, a_judge, engine = GroupWatch(config, began=BEGAN), Judge(), config.engine()
+    """Stamps of any size in any order; the machine's clock may be set to any time in between."""
+    watch, a_judge, engine, log = GroupWatch(config, began=BEGAN), Judge(), config.engine(), FindingLog()
     shown = (Endpoint("/a", "sensor_msgs/msg/Imu"),) * publishers
     graph = [InputGraph(topic.topic, topic.output, shown) for topic in config.topics]
     arrived: tuple[list[tuple[int, int]], ...] = ([], [], [])
@@ -237,9 +237,12 @@ def test_no_arrivals_whatever_break_a_watch_or_a_judge(config, messages, publish
             watch.add(arrived, sent, engine.counts(), engine.sets, by_clock=by_clock, now=now)
             arrived, sent = ([], [], []), []
             facts = watch.facts(graph, now=now, waited=MS)
-            found = with_ok(facts, a_judge.judge(facts))
+            judged = a_judge.judge(facts)
+            list(log.remarks(facts, judged, a_judge.explained(facts)))
+            found = with_ok(facts, judged)
             said = {each.code for each in found}
             assert found
+            assert all(finding.text for finding in found)
             if facts.is_silent:
                 assert any(each.severity is Severity.ERROR for each in found)
             for finding in found:

@@ -11,6 +11,9 @@ from tests.scenarios.rigs import Scenario, offers_in_vain
 RIGS = {**rigs.RIGS, **rigs.WELL_IN_EACH_WAY}
 # At these seeds another cause was named once, or the true one without its cure. Of all other rigs, any will do.
 SEEDS: dict[str, tuple[int, ...]] = {
+    **dict.fromkeys(
+        ("drift_of_1_percent", "drift_of_1000_ppm", "drift_of_200_ppm", "stamps_in_pairs"), tuple(range(6))
+    ),
     "camera_halves": (1,),
     "late_camera": (0,),
     "all_in_batches": (2,),

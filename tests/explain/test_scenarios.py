@@ -1,6 +1,5 @@
 """What the log says first, and what it never says, of rigs in virtual time: one cause each, and its many effects."""
 
-import random
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -159,12 +158,6 @@ def test_only_the_cause_is_said(told_of, code, topics):
     assert len(told.warnings) <= 4
 
 
-def test_a_looped_recording_is_no_conflict_and_no_step():
-    told = all_of(stamp=lambda stamp: stamp - (3600 if stamp % (20 * S) < 10 * S else 3610) * S)
-    assert told.warnings == []
-    assert told.findings("time_jump")
-
-
 @pytest.mark.parametrize(("before", "after"), [(30, 15), (10, 5), (10, 6.5), (10, 1)])
 def test_an_input_that_slows_down_is_told_by_its_rates(before, after):
     sources = (
@@ -210,40 +203,6 @@ def test_a_standstill_in_which_nothing_was_due_is_nobodys_fault():
     assert a_pair(more=more).warnings == []
 
 
-def pauses(seed: int, longest: float) -> list[tuple[float, float]]:
-    """When a relay on a busy machine stands still, for as long as that at most."""
-    chance = random.Random(seed)
-    at, found = 1.0, []
-    while at < 80:
-        found.append((at, at + chance.choice([0.02, 0.05, 0.2, longest])))
-        at = found[-1][1] + chance.expovariate(1.5)
-    return found
-
-
-BUSY: dict[str, Callable[[int], dict[str, Any]]] = {
-    "calm": lambda _: {},
-    "starved": lambda seed: {"starved": pauses(seed, 0.45)},
-    "starved for a second": lambda seed: {"starved": pauses(seed, 1.0)},
-    "stopped": lambda seed: {"stops": pauses(seed, 0.45)},
-}
-
-
-@pytest.mark.parametrize(("rate", "slop"), [(0.01, "20ms"), (-0.01, "20ms"), (0.001, "20ms"), (-0.0002, "5ms")])
-@pytest.mark.parametrize("noise", [0.0, 2.0, 10.0])
-@pytest.mark.parametrize("busy", BUSY)
-@pytest.mark.long
-def test_no_slop_and_no_offset_is_offered_for_a_drift(rate, slop, noise, busy):
-    source = partial(Source, delay_jitter_ms=noise)
-    sources = (
-        source("/camera", 10),
-        source("/lidar", 10, clock=lambda second: rate * second),
-        source("/imu", 20),
-    )
-    told = run(*sources, seconds=80, options={"slop": slop}, **BUSY[busy](1))
-    assert told.codes <= {"clock_drift", "too_slow"}, told.warnings
-    assert told.codes
-
-
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(
     "late", [Source("/gps", 1, delay_ms=80, delay_jitter_ms=30), Source("/camera", 5, delay_ms=700, delay_jitter_ms=60)]
@@ -281,25 +240,6 @@ def test_a_driver_that_is_started_again_at_a_lower_rate_has_slowed_down():
 
     told = run(*sources, seconds=70, options={"slop": "20ms"}, publishers=publishers)
     assert "slowed" in told.codes
-
-
-def test_a_recording_that_begins_again_is_no_step():
-    told = all_of(clock=lambda second: 0.0 if second < 20 else -20.0)
-    assert told.warnings == []
-    assert told.ever_found == set()
-    assert told.findings("time_jump")
-
-
-def test_the_offset_of_a_time_scale_is_offered_exactly():
-    told = a_pair(clock=lambda _: 18.0)
-    assert "`offset: -18s`" in told.first.text
-
-
-@pytest.mark.parametrize("busy", BUSY)
-def test_messages_in_pairs_of_a_stamp_are_no_matter_of_slop(busy):
-    told = a_pair(stamp=lambda stamp: stamp - stamp % 200_000_000, more=BUSY[busy](2))
-    assert "duplicates" in told.codes
-    assert told.codes <= {"duplicates", "too_slow"}, told.warnings
 
 
 @pytest.mark.parametrize("slower", [1.0, 0.5])
