@@ -89,6 +89,12 @@ def written_whole(place: Path | str) -> Iterator[Path]:
             shutil.rmtree(scratch)
 
 
+def remove_leftovers(folder: Path) -> None:
+    """Remove what killed commands left of files that they were writing into a folder, see written_whole."""
+    for path in folder.glob(f"{_PREFIX}*"):
+        shutil.rmtree(path, ignore_errors=True)
+
+
 def upload(source: Path, url: str) -> None:
     """Put a file, or all that is in a folder, behind a URL; what tells of the other files comes last.
 

@@ -10,7 +10,7 @@ from typing import Final, Self
 
 from syncrelay import own_version
 from syncrelay.errors import SyncRelayError
-from syncrelay.output_files import cannot_be_written
+from syncrelay.output_files import cannot_be_written, remove_leftovers
 from syncrelay.recordings.fleet.content import size_of, sync_folder
 from syncrelay.recordings.fleet.job import SCRATCH, Done, Engine, Failed, Finished, Job
 from syncrelay.recordings.fleet.ledger import Entry, Ledger, State
@@ -53,6 +53,7 @@ class Run:
         try:
             self._take_over({source.name for source in sources}, others)
             _clear(into / SCRATCH)
+            remove_leftovers(into)
         except BaseException:
             self._ledger.__exit__(None, None, None)
             raise

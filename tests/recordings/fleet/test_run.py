@@ -76,6 +76,9 @@ class Drawn:
         self.has_result.discard(name)
 
     def change(self) -> None:
+        """Do what users and killed commands do to recordings and results."""
+        for left in (".partial", ".syncrelay-killed"):
+            (self.out / left / "half").mkdir(parents=True)
         for name in [*self.texts]:
             change = self.random.choice(_CHANGES)
             if change == "content":
