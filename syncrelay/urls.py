@@ -82,16 +82,19 @@ def file_system(url: str) -> tuple[Any, str]:
     Credentials and endpoints are those of its library's own configuration. Raises UnavailableError where a library is
     missing, and StorageError for a scheme that none knows.
     """
+    scheme = scheme_of(url)
+    # fsspec knows schemes in lower case alone.
+    url = scheme + url[len(scheme) :]
     try:
         import fsspec  # noqa: PLC0415  optional
 
         found: tuple[Any, str] = tried(url, lambda: fsspec.url_to_fs(url, **_options(url)), attempts=1)
     except ImportError as error:
         raise UnavailableError(
-            f"{redacted(url)}: what reads and writes {scheme_of(url)}:// URLs is not installed: "
+            f"{redacted(url)}: what reads and writes {scheme}:// URLs is not installed: "
             "pip install 'syncrelay[fleet]' (in a clone: pip install '.[fleet]')"
         ) from error
-    if scheme_of(url) == "s3":
+    if scheme == "s3":
         # botocore tries again too, as AWS_MAX_ATTEMPTS says: three loops in one another would hardly end.
         found[0].retries = 1
     return found
