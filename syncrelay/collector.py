@@ -5,16 +5,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-# So many new objects make the collector look: a chunk of small messages.
+# New objects between two collections: about a chunk of small messages.
 _NEW_OBJECTS: Final = 50_000
 
 
 @contextmanager
 def resting_collector() -> Iterator[None]:
-    """Collect no garbage meanwhile, and have the collector pass over all that exists by the end.
+    """Collect no garbage during imports, and exclude what they leave from later collections.
 
-    For imports, whose results stay: the collector goes through them again and again otherwise, which takes a sixth of
-    the start of a relay.
+    Modules stay for good. Going through them again and again would take a sixth of the start of a relay.
     """
     usual = gc.isenabled()
     gc.disable()
@@ -28,9 +27,9 @@ def resting_collector() -> Iterator[None]:
 
 @contextmanager
 def eased_collector() -> Iterator[None]:
-    """Have the garbage collector look less often: messages live for a chunk and make no cycles, and are many.
+    """Collect garbage less often: messages are many, live for a chunk, and make no cycles.
 
-    At its usual pace, it takes an eighth of the time of a replay.
+    With the usual threshold the collector takes an eighth of the time of a replay.
     """
     usual = gc.get_threshold()
     gc.set_threshold(_NEW_OBJECTS, *usual[1:])

@@ -37,7 +37,7 @@ def workflow_command(command: str, text: str, *, file: str, span: Span | None) -
 
 
 def inert(line: str) -> str:
-    """Return a line that GitHub takes for no command, whatever the file is called."""
+    """Return a line that GitHub does not take for a command, whatever names it has."""
     return line.replace("::", "%3A%3A").replace("##[", "##%5B")
 
 

@@ -17,7 +17,7 @@ def difference_lines(found: Difference) -> Iterator[str]:
         yield from (f"  {name}: keeps running, loses nothing" for name in gone.kept)
     rebuilt = "changed" if found.restart else "rebuilt; what waits in its queues is dropped"
     for change in found.groups:
-        # At a restart all groups begin anew; those are worth a line of which keys change.
+        # A restart rebuilds all groups; only those with changed keys get lines.
         if lines := list(_group_lines(change)):
             yield f"~ {change.name}: {rebuilt}"
             yield from (f"    {line}" for line in lines)

@@ -1,4 +1,4 @@
-"""What became of every message: the last thing that a relay and a replay say."""
+"""The summary that a relay and a replay end with: what became of every message."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING

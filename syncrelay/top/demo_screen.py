@@ -14,9 +14,9 @@ from syncrelay.top.demo_text import TITLE, Moment
 from syncrelay.top.pieces import line
 from syncrelay.top.strip import COLUMN_NS, UNNEEDED, Sweep, letter_style, mark_of, newest_stamp
 
-# Reports come once a second, and hold what left by then. Shown so much later, the strip moves on between them.
+# Reports come once a second with what has left by then. The strip is drawn this much later, so that it moves steadily.
 _DELAY_NS: Final = 1_250_000_000
-# On a wider strip what a report holds of a 100 Hz input would not reach back to the begin.
+# A report holds too few messages of a 100 Hz input to fill a wider strip.
 WIDEST_STRIP: Final = 65
 
 
@@ -79,7 +79,7 @@ def _legend(groups: Sequence[Group], sweep: Sweep, width: int) -> Iterator[Text]
     yield line(letters, "  each letter is a set: messages matched by time and sent on together")
     drops = [each for group in groups for each in group_blocks.as_matched(group) if isinstance(each, RecentDrop)]
     occurred = {mark_of(each) for each in drops if sweep.column(each.stamp) is not None}
-    # What every newcomer meets, whether it has happened yet or not.
+    # Always explained, as every newcomer meets it.
     yield from group_blocks.side_by_side(group_blocks.marks({UNNEEDED, *occurred}), width)
     column, strip_s = phrases.duration(COLUMN_NS / 1e6), sweep.width * COLUMN_NS / 1e9
     yield line((f"a column is {column}; after {strip_s:.1f} s it starts again on the left; Ctrl-C ends it", "dim"))

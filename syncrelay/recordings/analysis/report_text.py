@@ -64,7 +64,7 @@ def _rhythm(topic: TopicFigures) -> Iterator[str]:
 
 
 def period_text(topic: TopicFigures) -> str:
-    """Return a topic's period, and how far single ones are off it; nothing where there is none."""
+    """Return a topic's period and its jitter; empty without a period."""
     if topic.period is None:
         return ""
     return words.duration(topic.period) + (
@@ -73,9 +73,9 @@ def period_text(topic: TopicFigures) -> str:
 
 
 def delay_line(topic: TopicFigures) -> str:
-    """Return how long after their stamps the messages of a topic were received; asked only where that is known."""
+    """Return how long after their stamps the messages of a topic were received; `topic.delay` must be known."""
     delay = topic.delay
-    assert delay is not None  # noqa: S101  asked for only where there is one
+    assert delay is not None  # noqa: S101  see above
     drift = "" if topic.drift_ppm is None else f"; drift {words.figure(topic.drift_ppm)} ppm"
     if abs(delay.median) >= _SECOND:
         return f"received {_long(abs(delay.median))} {'after' if delay.median > 0 else 'before'} the stamp{drift}"
@@ -108,7 +108,7 @@ def _group(each: GroupAnalysis) -> Iterator[str]:
 
 
 def suggestion_lines(each: GroupAnalysis) -> Iterator[str]:
-    """Yield what better values would give, and where they stand in the file."""
+    """Yield the suggested values as lines of the file, and what they would give."""
     name, suggestion = each.group.name, each.suggestion
     for hint in suggestion.hints:
         yield f"  hint: {hint}"
@@ -142,24 +142,24 @@ def _fates(row: InputFates) -> Iterator[str]:
 
 
 def unneeded_line(row: InputFates) -> str:
-    """Return why messages of an input were not needed; asked only where there are some."""
+    """Return why messages of an input were not needed; some must have been."""
     return why_unneeded(row.lacking)
 
 
 def promise(suggestion: Suggestion) -> str:
-    """Return what suggested values give, and what the file's give."""
+    """Return how many sets the values of the file give, and how many the suggested ones."""
     if suggestion.then == suggestion.now:
         return f"as many sets as now ({suggestion.then} of {suggestion.possible} possible), and the gains listed below,"
     return f"{suggestion.now} -> {suggestion.then} of {counted(suggestion.possible, 'possible set')}"
 
 
 def slop_text(each: GroupAnalysis, point: Point) -> str:
-    """Return a slop of a curve, and whether it is in use or suggested."""
+    """Return a slop of a curve, marked if it is in use or suggested."""
     return _marked(each, slop_key(each.group) or "", point, words.duration(point.value))
 
 
 def size_text(each: GroupAnalysis, point: Point) -> str:
-    """Return a queue size of a curve, and whether it is in use or suggested."""
+    """Return a queue size of a curve, marked if it is in use or suggested."""
     return _marked(each, "queue_size", point, str(point.value))
 
 
@@ -170,20 +170,20 @@ def _marked(each: GroupAnalysis, option: str, point: Point, text: str) -> str:
 
 
 def sampled_line(curves: Curves) -> str:
-    """Return how much of a long recording other values were tried on; nothing where it was all."""
+    """Return on how much of a long recording other values were tried; empty if on all of it."""
     if curves.is_of_all:
         return ""
     return f"tried on the first {words.seconds(curves.lasts)}: {curves.messages} of {curves.recorded} messages"
 
 
 def other_pairs(pairs: Sequence[Pair]) -> str:
-    """Return how far apart pairs are that are not worth a line each."""
+    """Return how far apart the pairs are that get no line of their own."""
     most = words.duration(max(pair.distance.high for pair in pairs))
     return f"{counted(len(pairs), 'more pair')}, less far apart (95 % of the messages within {most})"
 
 
 def pair_line(pair: Pair) -> str:
-    """Return how far the messages of one topic lie from the nearest of another."""
+    """Return how far the messages of one topic are from the nearest ones of another."""
     low, middle, high = (_signed(each) for each in (pair.signed.low, pair.signed.median, pair.signed.high))
     to = f"{pair.first} to the nearest {pair.second}"
     if pair.signed.least == pair.signed.greatest:

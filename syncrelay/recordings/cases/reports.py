@@ -1,4 +1,4 @@
-"""What came of tests, for people and for programs: text, JUnit's XML, JSON, GitHub's annotations."""
+"""The results of tests, for people and for programs: text, JUnit's XML, JSON, GitHub's annotations."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ _BOLD, _RED, _RESET = "\033[1m", "\033[31m", "\033[0m"
 
 @dataclass(frozen=True, slots=True)
 class FileResult:
-    """A test file: what is wrong with it, or what came of its cases."""
+    """A test file: its problems, or the results of its cases."""
 
     name: str
     problems: Sequence[Problem]
@@ -27,7 +27,7 @@ class FileResult:
 
     @property
     def failed(self) -> bool:
-        """Whether something is not as it shall be."""
+        """Whether the file has a problem or a case failed."""
         return bool(self.problems) or any(case.failed for case in self.cases)
 
 
@@ -42,27 +42,27 @@ class Talk(NamedTuple):
 
 
 class Report(Protocol):
-    """Tells of files as they are run, and of all at the end."""
+    """Reports test files while they run, and a summary at the end."""
 
     def begin(self, name: str) -> None:
-        """Tell that the cases of a file are run next."""
+        """Report that the cases of a file run next."""
         ...
 
     def fault(self, result: FileResult) -> None:
-        """Tell of a file that cannot be run."""
+        """Report a file that cannot be run."""
         ...
 
     def case(self, name: str, result: Result) -> None:
-        """Tell of a case of a file."""
+        """Report the result of a case."""
         ...
 
     def end(self, results: Sequence[FileResult]) -> None:
-        """Tell of all."""
+        """Report the summary."""
         ...
 
 
 class Text:
-    """For people: a line a case, of those that fail or are updated what differs, and a closing line."""
+    """For people: a line for each case, the differences of those that fail or were updated, and a summary."""
 
     def __init__(self, talk: Talk) -> None:
         self._talk = talk
@@ -95,7 +95,7 @@ class Text:
 
 
 class Github(Text):
-    """Annotations for a workflow, at the line of the case, and the text."""
+    """Workflow annotations at the lines of failed cases, beside the text."""
 
     def begin(self, name: str) -> None:
         """See Report."""
@@ -118,13 +118,13 @@ class Github(Text):
 
 
 def _remarks(name: str, result: Result) -> Iterator[str]:
-    """Yield what there is to remark on a case, with where that is: what people read of it stands on stderr."""
+    """Yield the remarks on a case with its file and name, for stderr."""
     for sentence in result.remarks:
         yield printable(f"{name}: {result.case.name}: {sentence}")
 
 
 class Json:
-    """One document, when all is done."""
+    """One JSON document at the end."""
 
     def __init__(self, talk: Talk) -> None:
         self._put = talk.put
@@ -146,7 +146,7 @@ class Json:
 
 
 class Junit(Json):
-    """JUnit's XML, as GitLab, Jenkins and others read it, when all is done."""
+    """JUnit's XML at the end, as GitLab, Jenkins and others read it."""
 
     def end(self, results: Sequence[FileResult]) -> None:
         """See Report."""
@@ -173,7 +173,7 @@ def summary(results: Sequence[FileResult]) -> str:
 
 
 def what_differs(result: Result) -> Iterator[str]:
-    """Yield what is not as it shall be, in lines: `-` is expected, `+` is what came."""
+    """Yield the differences as lines: `-` was expected, `+` was found."""
     if result.error is not None:
         yield from one_entry(result.error).split("\n")
     for mismatch in result.mismatches:
@@ -186,7 +186,7 @@ def what_differs(result: Result) -> Iterator[str]:
 
 
 def _headline(result: Result) -> str:
-    """Return what is not as it shall be, in a few words."""
+    """Return the differences in a few words."""
     if result.error is not None:
         return result.error.splitlines()[0]
     is_drawn = [isinstance(each.renewed, tuple) for each in result.mismatches]
