@@ -158,9 +158,9 @@ def _reason(error: Exception, scheme: str) -> tuple[str, bool]:
         may_pass = status in _PASSING or status >= _SERVER_ERRORS
         return _STATUSES.get(status, f"the server answered {status}"), may_pass
     kinds = [kind.__name__ for kind in type(error).__mro__]
-    for told, may_pass in ((_LASTING_ERRORS, False), (_PASSING_ERRORS, True)):
+    for sentences, may_pass in ((_LASTING_ERRORS, False), (_PASSING_ERRORS, True)):
         for kind in kinds:
-            if kind in told:
-                return told[kind], may_pass
+            if kind in sentences:
+                return sentences[kind], may_pass
     why = error.strerror if isinstance(error, OSError) else None
     return f"the store cannot be reached: {why or kinds[0]}", True

@@ -31,7 +31,7 @@ def local_files(word: str) -> list[Path]:
     return [file for file in files_meant([word]) if isinstance(file, Path)]
 
 
-def told_of(word: str, faults: list[str]) -> Metadata | None:
+def listed_in_metadata(word: str, faults: list[str]) -> Metadata | None:
     """Return the metadata.yaml of the folder that a word means, and add to `faults` which of its files are missing.
 
     None if there is no metadata.yaml, or the word names a single file.
@@ -39,16 +39,16 @@ def told_of(word: str, faults: list[str]) -> Metadata | None:
     name = redacted(word)
     try:
         found = _metadata(word)
-        told = None if found is None else parse_metadata(found.content)
+        metadata = None if found is None else parse_metadata(found.content)
     except StorageError:
         raise
     except (BagError, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         faults.append(f"{name}: {METADATA} {why}: missing files would not be noticed")
         return None
-    if found is not None and told is not None and (missing := told.missing(found.files)):
+    if found is not None and metadata is not None and (missing := metadata.missing(found.files)):
         faults.append(f"{name}: {missing}")
-    return told
+    return metadata
 
 
 class _Found(NamedTuple):

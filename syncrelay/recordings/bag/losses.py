@@ -31,12 +31,12 @@ class Losses:
     @property
     def sentences(self) -> list[str]:
         """What was lost so far, a sentence each."""
-        told = [f"{counted(count, 'message')} left out: {why}" for why, count in self._left_out.items() if count]
+        sentences = [f"{counted(count, 'message')} left out: {why}" for why, count in self._left_out.items() if count]
         if self._too_late:
-            told.append(f"{counted(self._too_late, 'message')} out of order: the index has other times")
+            sentences.append(f"{counted(self._too_late, 'message')} out of order: the index has other times")
         if self._more:
-            told.append(f"{counted(self._more, 'more place')} that cannot be read")
-        return [*self._said, *(f"{self._name}: {each}" for each in told)]
+            sentences.append(f"{counted(self._more, 'more place')} that cannot be read")
+        return [*self._said, *(f"{self._name}: {each}" for each in sentences)]
 
     def say(self, what: str) -> None:
         """Add a sentence on what is wrong with the file."""

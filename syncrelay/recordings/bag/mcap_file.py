@@ -62,10 +62,10 @@ class McapFile:
             count += len(found)
             yield found
         self.position = self.size
-        told = sum(index.counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
+        expected = sum(index.counts.get(number, 0) for number, channel in chosen.items() if channel is not None)
         is_chosen = parts is not None or len(needed) < len(index.segments)
-        if is_chosen and count < told and said == self.faults:
-            self._losses.say(f"the index finds {count} of the {told} messages in its statistics")
+        if is_chosen and count < expected and said == self.faults:
+            self._losses.say(f"the index finds {count} of the {expected} messages in its statistics")
 
     def close(self) -> None:
         """See Recording."""

@@ -126,7 +126,7 @@ class McapIndex:
         self._file.expect([(begin, self._size - begin)])
         if checksum not in (0, self._checksum(begin, end + RECORD.size + _FOOTER.size - _CHECKSUM_SIZE)):
             raise ValueError("its checksum is wrong")
-        count = told = 0
+        count = expected = 0
         self.counts = {}
         for opcode, place, stop in self._walk(begin, end):
             match opcode:
@@ -138,10 +138,10 @@ class McapIndex:
                     count += 1
                 case Opcode.STATISTICS:
                     statistics = parsed(Statistics, self._text(place, stop))
-                    told = statistics.chunk_count
+                    expected = statistics.chunk_count
                     # Without a checksum, a flipped bit in the index could hide a channel.
                     self.counts = statistics.channel_message_counts if checksum else {}
-        if told not in (0, count):
+        if expected not in (0, count):
             raise ValueError("chunks are missing in it")
 
     def _checksum(self, begin: int, end: int) -> int:

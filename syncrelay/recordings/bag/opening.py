@@ -21,7 +21,7 @@ from syncrelay.errors import BagError, StorageError
 from syncrelay.recording_files import METADATA, scheme_of
 from syncrelay.recordings.bag import mcap_file, mcap_index, ros1_file, sqlite_file
 from syncrelay.recordings.bag.effort import TOO_MUCH, room_for
-from syncrelay.recordings.bag.listing import files_meant, told_of
+from syncrelay.recordings.bag.listing import files_meant, listed_in_metadata
 from syncrelay.recordings.bag.recording import Channel, RawMessage, Recording, batched, filled
 from syncrelay.recordings.bag.remote_file import RemoteFile
 from syncrelay.recordings.bag.sources import LocalFile, NoIndexError
@@ -56,7 +56,7 @@ def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Reco
         files: list[Recording] = []
         unreadable: list[BagError] = []
         faults: list[str] = []
-        told = [told_of(path, faults) for path in paths]
+        listed = [listed_in_metadata(path, faults) for path in paths]
         for path in files_meant(paths):
             try:
                 if isinstance(path, str):
@@ -72,7 +72,8 @@ def open_recording(paths: Sequence[str], *, tell: Tell = lambda _: None) -> Reco
             files.append(file)
         if not files:
             raise unreadable[0]
-        counts = _counts([each.topics for each in told if each is not None]) if None not in told else {}
+        topics = [each.topics for each in listed if each is not None]
+        counts = sum(map(Counter, topics), Counter()) if None not in listed else {}
         name = redacted(paths[0])
         return Files(name, files, opened.pop_all(), faults=[*map(str, unreadable), *faults], counts=counts)
 
@@ -141,11 +142,6 @@ class Files:
     def close(self) -> None:
         """See Recording."""
         self._opened.close()
-
-
-def _counts(told: Sequence[Mapping[str, int]]) -> Mapping[str, int]:
-    """Return the expected number of messages of each topic in all folders."""
-    return sum(map(Counter, told), Counter())
 
 
 def _open_remote(url: str, opened: ExitStack, faults: list[str], tell: Tell) -> Recording:

@@ -1,4 +1,4 @@
-"""Recordings that take more than they hold, drawn at random: bombs, tails of nothing, tables without an end."""
+"""Recordings that take more than they hold, drawn at random: bombs, empty tails, endless tables."""
 
 # ruff: noqa: S608  the SQL is of ours
 
@@ -26,14 +26,14 @@ from tests.ros.frames import Frame
 
 FRAMES = rig(12)
 LONGEST_RECORD = 2000
-"""No record of the recordings below is longer, before something is done to them."""
+"""No record is longer, before a recording is changed."""
 
 _MCAP_MAGIC, _ROS1_MAGIC = 8, 13
 _Packer: TypeAlias = Callable[[bytes], bytes]
 
 
 def zstd_piecewise(content: bytes) -> bytes:
-    """A zstd frame that does not tell its size."""
+    """Return a zstd frame without a size in its header."""
     stream = zstandard.ZstdCompressor().compressobj()
     return stream.compress(content) + stream.flush()
 
@@ -57,7 +57,7 @@ _VIEW, _GENERATED, _DEFAULT = "a view", "a generated column", "a default in plac
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A recording: how it was drawn, its file, what of it must be read at least, and from where on it holds nothing."""
+    """A recording: how it was drawn, its file, the frames that must be read, and where the file ends or turns empty."""
 
     what: str
     path: Path
@@ -66,7 +66,7 @@ class Drawn:
 
 
 def drawn(folder: Path, *, count: int, seed: int, most: int) -> Iterator[Drawn]:
-    """Yield so many recordings, with bombs and tails of up to so many bytes; each is removed when the next is drawn."""
+    """Yield `count` recordings with bombs and tails of up to `most` bytes; each is removed before the next is drawn."""
     chance = random.Random(seed)
     for number in range(count):
         place = folder / str(number)
@@ -82,7 +82,7 @@ def _size(chance: random.Random, most: int) -> int:
 
 
 def _filling(chance: random.Random, size: int, head: bytes, empty: bytes) -> tuple[str, bytes]:
-    """So many bytes that hold no message: zeros, one record, or records that hold nothing."""
+    """Return about `size` bytes without a message: zeros, one record, or empty records."""
     match chance.randrange(3):
         case 0:
             return f"{size} zeros", bytes(size)
@@ -93,7 +93,7 @@ def _filling(chance: random.Random, size: int, head: bytes, empty: bytes) -> tup
 
 
 def _mcap_bomb(folder: Path, chance: random.Random, most: int) -> Drawn:
-    """An MCAP file with chunks in it that unpack to much and hold no message."""
+    """An MCAP file with chunks that unpack to a lot and hold no message."""
     whole = _mcap(folder, chance)
     size = _size(chance, most)
     private = chance.randrange(0x80, 0x100)
@@ -146,7 +146,7 @@ def _packed_file(folder: Path, chance: random.Random, most: int) -> Drawn:
 
 
 def _tail(folder: Path, chance: random.Random, most: int) -> Drawn:
-    """A file that was cut off and goes on with zeros, as after a loss of power, or with records that hold nothing."""
+    """A file that was cut off and continues with zeros, as after a loss of power, or with empty records."""
     loose = chance.random() < 0.5
     make, name = (_ros1, "rig.bag") if chance.random() < 0.3 else (_mcap, "rig.mcap")
     whole = _loose_mcap(folder) if make is _mcap and loose else make(folder, chance)
@@ -201,7 +201,7 @@ def _sqlite_lie(kind: str, folder: Path, chance: random.Random, most: int) -> Dr
 
 
 def _sqlite_bomb(folder: Path, chance: random.Random, most: int) -> Drawn:
-    """A sqlite3 file of packed messages, some of which unpack to much and then are damaged."""
+    """A sqlite3 file of packed messages, some of which unpack to a lot and then turn out to be damaged."""
     (path,) = write_rosbag2(folder / "rig", FRAMES, mode=CompressionMode.MESSAGE).glob("*.db3")
     size = _size(chance, most)
     packed = chance.choice((zstandard.compress, zstd_piecewise))(bytes(size))[:-3]

@@ -1,4 +1,4 @@
-"""Small recordings of every kind, and what a card that dies makes of them: a bit flipped, an end missing."""
+"""Small recordings of every kind, and damage to them: flipped bits, missing ends, wrong lengths."""
 
 import random
 import sqlite3
@@ -62,9 +62,9 @@ KINDS: Mapping[str, Make] = {
 
 
 def damaged(content: bytes, *, places: int, seed: int) -> Iterator[tuple[str, bytes]]:
-    """A file's content with one bit flipped at so many places, and cut off at as many, each with a word on what is so.
+    """Yield a file's content with one bit flipped, and then cut off, `places` times each, with a description.
 
-    Where nothing is written (as in sqlite3's pages), nothing is flipped.
+    No bits are flipped in empty areas, such as those of sqlite3's pages.
     """
     chance = random.Random(seed)
     written = [at for at in range(len(content)) if any(content[max(0, at - 8) : at + 1])]
@@ -76,7 +76,7 @@ def damaged(content: bytes, *, places: int, seed: int) -> Iterator[tuple[str, by
 
 
 def with_lying_lengths(content: bytes, *, places: int, seed: int) -> Iterator[tuple[str, bytes]]:
-    """A file's content with a number that is far too large at so many places, of 4 and of 8 bytes, both ways round."""
+    """Yield a file's content with a far too large number written at a place: 4 or 8 bytes, in either byte order."""
     chance = random.Random(seed)
     lies = [(value, size) for size in (4, 8) for value in (1 << (8 * size - 2), (1 << 8 * size) - 1, 1 << 29)]
     for at in _chosen(range(8, len(content) - 8), places, chance):
@@ -86,6 +86,6 @@ def with_lying_lengths(content: bytes, *, places: int, seed: int) -> Iterator[tu
 
 
 def _chosen(places: Sequence[int], count: int, chance: random.Random) -> list[int]:
-    """Some of the places; where there are fewer, all of them and some twice, with another bit."""
+    """Return `count` of the places; if there are fewer, some of them twice."""
     whole, rest = divmod(count, len(places))
     return [*places] * whole + chance.sample(places, rest)

@@ -1,7 +1,4 @@
-"""A file server on this machine that counts what it sends, and breaks off, lies or refuses when it is told to.
-
-It speaks as much HTTP as reading by ranges takes, and by that as much of S3 as reading one object takes.
-"""
+"""A local HTTP server of files with range requests, which counts what it sends and fails as a test wants it to."""
 
 import re
 import socket
@@ -13,9 +10,9 @@ from threading import Event, Lock, Thread
 
 
 class FileServer:
-    """Files by their paths; `fault` names what is wrong with the answer to the n-th request, from 0.
+    """Files by path, with their `etags`; `fault` names what is wrong with the answer to request n, from 0.
 
-    `etags` tells files apart. `sent` counts the bytes of contents.
+    `sent` is the number of bytes of content sent so far.
     """
 
     def __init__(self) -> None:

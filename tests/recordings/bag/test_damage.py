@@ -1,4 +1,4 @@
-"""Whatever became of a recording: what can be read is read, the rest is said, and neither time nor memory runs away."""
+"""Of damaged recordings, what can be read is read and the rest is reported, in bounded time and memory."""
 
 import tracemalloc
 from contextlib import closing
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.faults
 _PLACES = chosen(short=500, long=4000)
 _LIES = chosen(short=40, long=500)
 _YEAR_2116 = 2**62
-# Of recordings of 10 kB: what is asked for by a length that lies is a thousand times more.
+# The recordings have 10 kB. A wrong length asks for a thousand times as much as this.
 _MEMORY = 16_000_000
 
 
@@ -51,9 +51,9 @@ def test_a_length_that_lies_does_not_cost_its_memory(kind: str, tmp_path: Path):
 
 
 def _is_read(path: Path, what: str, *, most: int, least: int = 0) -> bool:
-    """Whether there are channels; anything but that and an error with words flies on, with what was done.
+    """Read a recording; False if it is refused with a BagError. Any other error is raised with a note on the damage.
 
-    Of fewer messages than `least` something is said.
+    If fewer than `least` messages are read, a fault has to say so.
     """
     try:
         with closing(open_recording([str(path)])) as recording:

@@ -1,4 +1,4 @@
-"""Recordings that lie, one lie a test: what is true in them is read, what is not is said."""
+"""Recordings with one wrong value each: what is right in them is read, and the rest is reported."""
 
 import os
 import sqlite3
@@ -35,7 +35,7 @@ def _read(path: Path) -> tuple[list[Frame], list[str]]:
 
 
 def _sqlite3(folder: Path, *lies: str) -> Path:
-    """A recording whose tables take any value, as those of a damaged file do, after some statements."""
+    """A recording whose tables take values of any type, after some statements of SQL."""
     (file,) = write_rosbag2(folder / "rig", _RIG).glob("*.db3")
     with closing(sqlite3.connect(file)) as database:
         for table in ("topics", "messages"):
@@ -161,7 +161,7 @@ def test_an_mcap_record_that_is_no_message_and_ends_behind_its_chunk_is_said(len
 @pytest.mark.parametrize("place", [0, 4, 11, 20, -1])
 @pytest.mark.parametrize("number", [0, 5, 11])
 def test_a_chunk_of_a_wrong_checksum_is_left_out(number, place, tmp_path):
-    """What only the checksum tells: the bit is in a payload, of which nothing says what it should be."""
+    """The flipped bit is in a payload, so that only the checksum can show it."""
     path = write_mcap(tmp_path / "rig.mcap", _RIG, chunk_size=300)
     content = bytearray(path.read_bytes())
     payload = _RIG[number].payload
