@@ -1,4 +1,4 @@
-"""The file: read with positions, checked as a whole, and turned into what the relay is told."""
+"""The user's file: read with positions, validated, and resolved into the groups that the relay runs."""
 
 from syncrelay.config.export import ExportFeature, ExportSource, LerobotConfig
 from syncrelay.config.listen import Listen

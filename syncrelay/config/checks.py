@@ -13,17 +13,17 @@ from syncrelay.config.sections import NodeConfig
 from syncrelay.config.units import MAX_NS, NS_PER_UNIT
 from syncrelay.config.wording import all_of, or_nearest, quoted
 
-# Beside those of the ticks that have come: what was held for the tick before, and what is for the next.
+# Beside a message per waiting tick: the one held for the previous tick, and the one for the next.
 _HELD_BESIDE = 2
-# The longest of what every node offers below its name.
+# Every node has this service below its name; it is the longest of them.
 _LONGEST_NODE = LONGEST_TOPIC - len("/set_parameters_atomically")
-# What is longer is refused as out of range.
+# Longer durations are refused as out of range.
 _LONGEST_S = MAX_NS // NS_PER_UNIT["s"]
 _RESTAMP_WORDS = ("none", "earliest", "latest", "trigger")
 
 
 def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[Problem]:
-    """Yield what is wrong between the keys of each group, names and types aside."""
+    """Yield conflicts between the keys of each group. Names and types are checked elsewhere."""
     node = document.find(("groups",))
     if isinstance(node, MappingNode) and not node.entries:
         yield document.problem(("groups",), "expected one group or more, found none", code="too_few")
@@ -41,7 +41,7 @@ def check_groups(groups: Sequence[GroupConfig], document: Document) -> Iterator[
 
 
 def check_node(node: NodeConfig, document: Document) -> Iterator[Problem]:
-    """Yield a name and namespace that are too long together."""
+    """Yield a node name that is too long with its namespace."""
     name = node.absolute("~")
     if len(name) > _LONGEST_NODE:
         path = ("node", "namespace") if document.has(("node", "namespace")) else ("node", "name")
@@ -80,7 +80,7 @@ def _restamp(group: GroupConfig, document: Document) -> Iterator[Problem]:
 
 
 def _unwritten_types(group: GroupConfig, document: Document) -> Iterator[Problem]:
-    """Yield, as one note, topics whose types nothing in the file tells."""
+    """Yield one note for all topics without a type in the file."""
     open_ones = [
         (path, topic.topic)
         for path, topic in group.paths()
@@ -129,7 +129,7 @@ def _clock(group: GroupConfig, document: Document) -> Iterator[Problem]:
 
 
 def _times_of_arrival(group: GroupConfig, document: Document) -> Iterator[Problem]:
-    """Yield an input whose messages can be in no set: no two clocks are read at the same nanosecond."""
+    """Yield an input matched by its time of arrival where stamps must be equal: they never are, to the nanosecond."""
     tolerance = group.options.tolerance
     received = [path for path, topic in group.paths() if topic.stamp == "receive"]
     if not received or tolerance is None or tolerance.takes_times_of_arrival:
@@ -174,7 +174,7 @@ def _optional_inputs(group: GroupConfig, document: Document) -> Iterator[Problem
 
 
 def _unit(group: GroupConfig, document: Document) -> Iterator[Problem]:
-    """Yield a slop of whole seconds that is written without a unit: milliseconds are what people mean."""
+    """Warn of a slop of 1 or more without a unit: it means seconds, but people usually mean milliseconds."""
     tolerance = group.options.tolerance
     if tolerance is None or group.options.distance is not Distance.SPAN:
         return

@@ -1,4 +1,4 @@
-"""Keys from elsewhere: `defaults` in every group that is silent, and what each of several files says in one."""
+"""Merging: `defaults` into the groups, and several files into one."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ _ONE_FOR_ALL = ("node", "metrics", "diagnostics", "export")
 
 
 def with_defaults(document: Document) -> Document:
-    """Return the document with the keys of `defaults` in every group that is silent and whose policy has them.
+    """Return the document with `defaults` copied into every group that lacks a key and whose policy has it.
 
     The keys keep their place, so a fault in one is shown where it was written. Raises ConfigError where they come to
     more than can be looked at.
@@ -48,7 +48,10 @@ def _filled(group: MappingNode, defaults: MappingNode) -> MappingNode:
 
 
 def merged_documents(documents: Sequence[Document]) -> tuple[Document, list[Problem]]:
-    """Return the tree of all files, of several without their `defaults`, and what two have that only one may."""
+    """Return one tree for all files, and a problem for each key that only one of them may have.
+
+    `defaults` are already in the groups, so the tree of several files has none.
+    """
     if len(documents) == 1:
         return documents[0], []
     first = documents[0]
@@ -70,7 +73,7 @@ def merged_documents(documents: Sequence[Document]) -> tuple[Document, list[Prob
 
 
 def merged_files(files: Sequence[FileKeys]) -> FileKeys:
-    """Return the keys of all files in one. What two have of what only one may is the first one's."""
+    """Return the keys of all files in one. Of what only one file may have, the first counts."""
     merged: dict[str, Any] = {"groups": {}}
     for name, group in (each for file in files for each in file.groups.items()):
         merged["groups"].setdefault(name, group)
@@ -86,7 +89,7 @@ def _names(document: Document) -> tuple[str, ...]:
 
 
 def _take(path: Path, document: Document, merged: Document) -> list[Problem]:
-    """Put what stands at a path into the merged tree, or tell where that has it already."""
+    """Copy the entry at a path into the merged tree; yield a problem if the tree already has one."""
     *parents, key = path
     owner, own = merged.node(tuple(parents)), document.node(tuple(parents))
     if not isinstance(owner, MappingNode) or not isinstance(own, MappingNode) or str(key) not in own.entries:

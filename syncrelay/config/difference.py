@@ -1,4 +1,4 @@
-"""What another file changes, key by key, and what a reload would make of it, with the values as they are written."""
+"""The difference between two files, key by key with values as written, and what a reload would do."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ class GroupChange:
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """Topics of the graph with their types and, of subscriptions, QoS: those that go, come, and are made anew."""
+    """Topics with their types, and QoS of subscriptions, that a reload removes, creates and recreates."""
 
     lost: tuple[tuple[str, ...], ...]
     made: tuple[tuple[str, ...], ...]
@@ -52,7 +52,7 @@ class Endpoints:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What a reload from one file to another does; `restart` are keys for which it would be refused."""
+    """What a reload from one file to another does; `restart` are changed keys that it refuses."""
 
     exchange: Exchange
     restart: tuple[str, ...]
@@ -151,7 +151,7 @@ class _Pair:
         for key in dict.fromkeys([*type(before).model_fields, *type(now).model_fields]):
             if key not in ("topic", "topics") and getattr(before, key, None) != getattr(now, key, None):
                 old, new = self.old.written((*old_path, key)), self.new.written((*path, key))
-                # With another policy, keys come and go that nobody has written.
+                # Another policy has other defaults, which nobody has written.
                 if old != new:
                     yield KeyChange(key, old, new)
 
@@ -188,7 +188,7 @@ def _publishers(old: Config, new: Config, *, kept: tuple[str, ...]) -> Endpoints
 def _of(group: GroupConfig, config: Config) -> Iterator[tuple[str, str]]:
     yield from _outputs(group, config)
     if group.options.manifest:
-        # That of a group outlives it where another takes its place.
+        # A group that replaces another of its name keeps the manifest's publisher.
         yield config.node.absolute(manifest_topic(group.name)), MANIFEST_TYPE
 
 

@@ -12,20 +12,20 @@ from syncrelay.printable import printable
 Scalar: TypeAlias = str | int | float | bool | None
 
 EXTENSION: Final = "x-"
-"""What a key begins with that is the user's own, as in Compose files: for anchors, notes and other programs."""
+"""Keys with this prefix are ignored, as in Compose files: users keep anchors and notes there."""
 
 MOST_VALUES: Final = 200_000
-"""In a file, after following every alias and filling in defaults: a thousand groups are a tenth of it."""
+"""The most values a file may have with aliases and defaults expanded. A thousand groups are a tenth of it."""
 
 MOST_GUESSES: Final = 1000
-"""For how many words of a file the nearest valid one is looked for: it takes far longer than to read the word."""
+"""The most suggestions that are searched for in one file: each search is far slower than reading the word."""
 
 
 @dataclass(slots=True)
 class ScalarNode:
-    """A value. `readable` is false where a problem was reported in its place; a long text has the size of several.
+    """A value. `readable` is false if it could not be read and a problem was reported.
 
-    `written` is what stands in the file where variables were filled in, else None.
+    `size` counts a long text as several values. `written` is the text in the file if it has variables, else None.
     """
 
     span: Span
@@ -78,7 +78,7 @@ class Document:
     guesses: int = MOST_GUESSES
 
     def nearest(self, word: str, candidates: Iterable[str], *, likeness: float = LIKENESS) -> str | None:
-        """Return the candidate most like `word`, for as many words of a file as anybody reads of."""
+        """Return the candidate most like `word`, or None; after MOST_GUESSES searches always None."""
         if not self.guesses:
             return None
         self.guesses -= 1
@@ -98,7 +98,7 @@ class Document:
         severity: Severity = Severity.ERROR,
         subject: str = "",
     ) -> Problem:
-        """Return a problem of what stands at a path; it is shown there, or at a span.
+        """Return a problem with the key or value at a path, shown at its value or at `span`.
 
         Values of variables in its text are replaced by the variables. Where a text quotes parts of a value, ask
         `filled_in` first.
@@ -114,15 +114,15 @@ class Document:
         )
 
     def filled_in(self, path: Path) -> FilledIn | None:
-        """Return what to say in place of a value that has variables; None where all of it is written in the file."""
+        """Return what to show instead of a value that has variables; None if it has none."""
         node = self.find(path)
         written = node.written if isinstance(node, ScalarNode) else None
         return None if written is None else FilledIn(written)
 
     def _as_written(self, text: str) -> str:
-        # The longest first: one value may be a part of another.
+        # Longest first, as one value may contain another.
         for value in sorted(self.variables, key=len, reverse=True):
-            # A name that is made absolute loses what it begins with.
+            # Absolute names have lost a leading `~` or `/`.
             for part in (value, value.strip("~/")):
                 for shown in (part, printable(part)):
                     text = without_value(text, shown, self.variables[value])
@@ -134,7 +134,7 @@ class Document:
             raise ConfigError([self.problem((key,), text, code="other_kind", span=self.key_span((key,)))])
 
     def line(self, path: Path, *, beside: Path) -> str:
-        """Return the line of a value, to be said of the value beside it: with its file where that is another.
+        """Return `line 7`, where a value is, for a sentence about the value `beside` it; with its file if that differs.
 
         Both may stand at one place, in a block that is written once.
         """
@@ -181,7 +181,7 @@ class Document:
 
 
 def flow(value: Any) -> str:
-    """Return a plain value on one line, as a file has it, without the user's own keys."""
+    """Return a plain value as YAML on one line, without keys that begin with EXTENSION."""
     match value:
         case dict():
             known = {key: each for key, each in value.items() if not key.startswith(EXTENSION)}
@@ -197,7 +197,7 @@ def flow(value: Any) -> str:
 
 
 def as_written(node: Node) -> Any:
-    """Return the tree as `plain` does, with variables as the file has them, not filled in."""
+    """Return the tree as `plain` does, but with `${NAME}` as written."""
     match node:
         case ScalarNode():
             return node.value if node.written is None else node.written

@@ -1,4 +1,4 @@
-"""The section `export`: what the sets become as a dataset. The relay itself passes over it."""
+"""The section `export`: how `syncrelay export` makes a dataset of the sets. The relay ignores it."""
 
 import re
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _TOKEN: Final = r"[A-Za-z_][A-Za-z0-9_]*"  # noqa: S105  a name's
 _NUMBERS: Final = rf"(~?/)?{_TOKEN}(/{_TOKEN})*:[A-Za-z]\w*(\.[A-Za-z]\w*)*"
 _SOURCE: Final = rf"(~?/)?{_TOKEN}(/{_TOKEN})*(:[A-Za-z]\w*(\.[A-Za-z]\w*)*)?"
 _MOST_FPS: Final = 1000
-# So many frames may show one set until it is taken for a gap.
+# The default of max_gap, in frames.
 _FRAMES_OF_A_GAP: Final = 5
 
 
@@ -155,7 +155,7 @@ class ExportKeys(Keys):
 
 @dataclass(frozen=True, slots=True)
 class ExportSource:
-    """An input by its full name, and a field of its messages; None for the images that they are."""
+    """An input by its full name, and a field of its messages; None if the messages are images."""
 
     topic: str
     field: str | None
@@ -179,7 +179,7 @@ class ExportFeature:
 
 @dataclass(frozen=True, slots=True)
 class LerobotConfig:
-    """How the sets of a group become a LeRobotDataset. `task` is in words, or the string of an input that says so."""
+    """How the sets of a group become a LeRobotDataset. `task` is a text, or the input and field that hold it."""
 
     group: str
     fps: int
@@ -197,7 +197,7 @@ def sources_of(written: str | Sequence[str], node: NodeConfig) -> tuple[ExportSo
 
 
 def resolve_lerobot(keys: ExportKeys | None, node: NodeConfig, groups: Sequence[str]) -> LerobotConfig | None:
-    """Return the section of a file that is in order with every default filled in; None where it has none."""
+    """Return the section of a valid file with its defaults filled in; None if the file has none."""
     lerobot = None if keys is None else keys.lerobot
     if lerobot is None:
         return None

@@ -1,4 +1,4 @@
-"""What single keys of `export` can't tell: topics that are no inputs, fields that are no numbers, no action."""
+"""Checks between the keys of `export` and the groups: unknown inputs, fields of the wrong type, no action."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ def check_export(
     document: Document,
     interfaces: Interfaces | None,
 ) -> Iterator[Problem]:
-    """Yield what is wrong between the keys of `export`, and between them and the groups.
+    """Yield conflicts between the keys of `export`, and between them and the groups.
 
     Fields are looked for in types that the file names, where `interfaces` has them.
     """

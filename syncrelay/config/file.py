@@ -1,4 +1,4 @@
-"""The whole file as a model: for the policies that there are, and in a form for files with faults."""
+"""The model of the whole file for the installed policies, and a lenient one for files with faults."""
 
 from collections.abc import Mapping
 from copy import copy
@@ -25,7 +25,7 @@ AnyKeys = TypeVar("AnyKeys", bound=Keys)
 
 
 def _version(value: Any) -> Any:
-    """Return 1; to Python `true` and 1.0 are that too."""
+    """Accept the integer 1 alone: in Python `True` and 1.0 equal it."""
     if type(value) is not int or value != 1:
         raise ValueError(f"expected 1, the version of the format, found {describe(value)}")
     return value
@@ -73,7 +73,7 @@ class FileFormat:
     file: type[FileKeys]
 
     def group(self, policy: object) -> type[Group]:
-        """Return the model of a policy's groups; that of all policies for one that there is not."""
+        """Return the model of a policy's groups; for an unknown policy, the model with the keys of all."""
         return self.groups.get(policy, self.any_group) if isinstance(policy, str) else self.any_group
 
 
@@ -167,7 +167,7 @@ def _by_policy(groups: Mapping[str, type[Group]], any_group: type[Group]) -> Any
     return Annotated[reduce(or_, branches), Discriminator(tag)]
 
 
-# What a key holds that is needed, and is missing or faulty; any other None.
+# The value of a required key that is missing or faulty; of all others it is None.
 _UNKNOWN: Final[Mapping[str, Any]] = {"topic": ""}
 
 
@@ -196,7 +196,7 @@ def _partial_group(model: type[Group]) -> type[Group]:
 
 
 def relay_form() -> Form:
-    """Return what errors of the relay's file are told by, with the policies that are installed."""
+    """Return what the errors of the relay's file are translated by."""
     known = file_format()
     return Form(
         known.file,

@@ -1,4 +1,4 @@
-"""Message types as the ament index knows them, and their fields: read from files, nothing is imported.
+"""Message types and their fields, read from the ament index and .msg files without importing anything.
 
 The index is a folder `share/ament_index/resource_index` in every prefix of AMENT_PREFIX_PATH. The ROS wheels leave
 that variable unset and put the index into the Python environment's own prefix.
@@ -43,7 +43,7 @@ _INDEX: Final = Path("share/ament_index/resource_index")
 
 
 class Field(NamedTuple):
-    """A field: its type in full, a primitive's by its own name; whether it is an array of that type."""
+    """A field with its type in full (`float64`, `std_msgs/msg/Header`), and whether it is an array of that type."""
 
     name: str
     type: str
@@ -117,7 +117,7 @@ def _names_in(folder: Path) -> Iterator[str]:
 
 
 def parse_fields(text: str, *, package: str) -> tuple[Field, ...]:
-    """Return the fields in order; constants are none."""
+    """Return the fields of a .msg file in order, without constants."""
     fields = []
     for line in text.splitlines():
         found = _FIELD.match(line.partition("#")[0].strip())

@@ -31,7 +31,7 @@ from syncrelay.sync import Ticks
 class Keys(BaseModel):
     """A mapping of the file with the keys that its fields name, and any that begin with EXTENSION."""
 
-    # Built when it is first needed: that of the whole file builds the others along, and those for faults may never be.
+    # Validators are built on first use: the file's builds those below it, and the lenient ones are rarely needed.
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
     @model_validator(mode="before")
@@ -43,7 +43,7 @@ class Keys(BaseModel):
 
 
 def tag_of_mapping(value: Any) -> str:
-    """Tell a union's branch for a mapping from its branch for a word. No key of the file is in <>."""
+    """Return the tag of a union's branch: `<mapping>` for a mapping, `<name>` for a word."""
     return "<mapping>" if isinstance(value, dict | Keys) else "<name>"
 
 
@@ -61,10 +61,10 @@ def _refuse_null(value: Any) -> Any:
 
 
 MOST: Final = 1_000_000
-"""The largest number of messages or sets that a key may name: DDS, which counts in 32 bits, refuses more as it runs."""
+"""The largest number of messages or sets that a key may name. DDS counts in 32 bits and refuses more at run time."""
 
 NOT_NULL: Final = BeforeValidator(_refuse_null)
-"""For a field that is None where its key is absent: `key:` without a value is no way to say so."""
+"""For a field that is None if its key is absent: refuses `key:` without a value."""
 
 ListenAddress = Annotated[str, AfterValidator(check_listen)]
 Host = Annotated[str, AfterValidator(parse_host)]
@@ -145,7 +145,7 @@ Trigger = Annotated[
 """What makes sets: the messages of a topic, or a clock at a rate."""
 
 OutputPrefix = Annotated[str, AfterValidator(check_output_prefix), _text(rf"^(/|~|(~?/)?{_TOKENS})?$")]
-"""What stands before an input's name in its output's."""
+"""The prefix of default output names."""
 
 NodeName = Annotated[str, AfterValidator(check_node_name), _text("^[A-Za-z_][A-Za-z0-9_]*$", maxLength=255)]
 """A node's name without its namespace."""

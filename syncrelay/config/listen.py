@@ -1,4 +1,4 @@
-"""Where the relay listens for HTTP, and by which names it is asked."""
+"""Where the relay listens for HTTP, and the host names that requests may use."""
 
 import re
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ _ADDRESS = re.compile(r"(?P<bracket>\[)?(?P<address>[0-9A-Fa-f:.]+(%[A-Za-z0-9._
 
 @dataclass(frozen=True, slots=True)
 class Listen:
-    """A host, and the ports of which the first free one is taken; port 0 is any that is free.
+    """A host and a range of ports, of which the first free one is taken; port 0 means any free port.
 
-    Where the file asks for nothing, `is_asked_for` is False, and a relay can go without. `hosts` are names and
-    addresses beyond its own by which it is asked, as parse_host returns them.
+    `is_asked_for` is False for the default, which a relay can do without. `hosts` are further names and addresses that
+    requests may use, as parse_host returns them.
     """
 
     host: str
@@ -66,7 +66,7 @@ def parse_host(text: str) -> str:
         raise ValueError(
             f"expected a host name or an address without a port, such as robot.local, found {describe(text)}"
         )
-    # The dot of the root ends an address too, for whoever takes it for a name.
+    # `127.0.0.1.` is an address too.
     name = text.removesuffix(".").lower()
     return _address(name) or name
 

@@ -35,10 +35,10 @@ _NO_INDEX = "message types were not checked: there is no ament index here (sourc
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """A file that is in order. `notes` are what could not be checked, or is hardly meant.
+    """A valid file. `notes` are what could not be checked, and warnings.
 
-    `names` tells what is wrong with it once remaps have made others of its topics' names.
-    `listen` is None where no HTTP, `diagnostics` where nothing about the relay is published. `sources` are its files
+    `names` finds conflicts that remaps of its topics' names cause.
+    `listen` is None without HTTP, `diagnostics` if nothing about the relay is published. `sources` are its files
     as they were read. `lerobot` is for `export` alone.
     """
 
@@ -52,7 +52,7 @@ class Config:
     lerobot: LerobotConfig | None = None
 
     def written(self, path: Path) -> str | None:
-        """Return the value at a path as it is written there or in `defaults`, on one line; None where it is not."""
+        """Return the value at a path as the file or its `defaults` have it, on one line; None if neither has."""
         node = self.names.document.find(path)
         return None if node is None else flow(as_written(node))
 
@@ -62,7 +62,7 @@ def load(
     environ: Mapping[str, str] = os.environ,
     patience_s: float = PATIENCE_S,
 ) -> Config:
-    """Return what a file says, `-` for standard input; of several, or those of a directory, what they say together.
+    """Read a file (`-` is standard input), or several files or directories as one configuration.
 
     Together they have the groups of all and one `node`; `defaults` are for the groups of their own file. All pipes
     together are waited for so many seconds. Raises ConfigError with everything that is wrong.
@@ -89,16 +89,16 @@ def load_text(
     name: str = "<text>",
     environ: Mapping[str, str] = os.environ,
 ) -> Config:
-    """Return what the text of a file says; as `load`."""
+    """Read the text of a file, as `load` does."""
     return _config(_parts([lambda: check_text(text, name=name)], environ), environ)
 
 
 def spelt_out(text: str, *, environ: Mapping[str, str] = os.environ) -> str:
-    """Return the text of a file that is in order with what its aliases and merge keys stand for in their places."""
+    """Return the text of a valid file with its aliases and merge keys expanded."""
     if "*" not in text and "<<" not in text:
         return text
     document, _ = compose(check_text(text, name="<text>"), environ, expected=_LEAST)
-    # Variables are filled in: what looks like one is none.
+    # Variables have been filled in, so every remaining $ is literal.
     return json.dumps(plain(document.root)).replace("$", "$$")
 
 
@@ -112,7 +112,7 @@ class _Part:
 
 
 def _config(parts: Sequence[_Part], environ: Mapping[str, str]) -> Config:
-    """Resolve what could be read of all files and check that: it is what the relay uses if nothing is found."""
+    """Resolve and check what could be read of all files. Without errors, the relay runs exactly that."""
     document, repeated = merged_documents([part.document for part in parts])
     file = merged_files([part.file for part in parts])
     groups = resolve_groups(file)
@@ -153,7 +153,7 @@ def _part(source: Source, environ: Mapping[str, str], *, is_alone: bool) -> _Par
     document = with_defaults(document)
     keys = plain(document.root)
     if isinstance(keys, dict) and not is_alone:
-        # The groups may all be in the others.
+        # Its groups may all be in the other files.
         keys = {"groups": {}, **keys}
     try:
         return _Part(document, file_format().file.model_validate(keys), problems)
@@ -179,7 +179,7 @@ def _types(groups: Sequence[GroupConfig], document: Document, interfaces: Interf
 
 
 def _in_order(problems: Iterable[Problem], *, files: Iterable[str]) -> tuple[Problem, ...]:
-    """Sort by file and place, and show once what one value gives rise to in several groups."""
+    """Sort by file and place, without repeats: a value in `defaults` may be wrong in several groups."""
     order = {name: number for number, name in enumerate(dict.fromkeys(files))}
     by_place = sorted(problems, key=lambda problem: (order[problem.file], problem.span or (0, 0, 0)))
     return tuple({(each.file, each.span, each.text): each for each in reversed(by_place)}.values())[::-1]

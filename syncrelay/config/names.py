@@ -1,4 +1,4 @@
-"""The form of names: of topics, nodes and namespaces as rcl and rmw check them, of message types and their fields.
+"""The syntax of names: topics, nodes and namespaces as rcl and rmw check them, message types and fields.
 
 The rules are those of rcl_validate_topic_name and rmw_validate_full_topic_name.
 """
@@ -32,7 +32,7 @@ def check_topic_name(name: object) -> str:
 
 
 def is_topic_name(name: str) -> bool:
-    """Tell whether ROS takes a topic name: not all who write recordings, or publish over DDS, keep to its rules."""
+    """Return whether ROS accepts a topic name. Recordings and DDS programs may have others."""
     try:
         check_topic_name(name)
     except ValueError:

@@ -1,6 +1,6 @@
-"""The names of a file as its node has them: what is wrong between them, be they the file's own or made by remaps.
+"""Conflicts between the names of a file as they are in the graph, with or without remaps.
 
-What is wrong is said in the file's own sentences, at its own places.
+Problems are the same with remaps, and shown where the file has the name.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -22,19 +22,19 @@ MANIFEST_TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
 
 
 def manifest_topic(group: str) -> str:
-    """Return where a group tells its sets, as a file would name it."""
+    """Return the topic of a group's manifest, relative to the node."""
     return f"~/{group}/sets"
 
 
 Resolve: TypeAlias = Callable[[str], str]
-"""Makes of a name that the file has, relative or not, the one in the graph."""
+"""Turns a name in the file, relative or not, into the one in the graph."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamesInFile:
-    """The names of a file and where they stand, to be asked what is wrong with them, or with what remaps make of them.
+    """The names in a file and their places. Remaps are known only once ROS runs, so it can be checked again then.
 
-    A group or topic of a file with faults has what could be read of it.
+    Of a file with faults it has what could be read.
     """
 
     node: NodeConfig
@@ -44,14 +44,14 @@ class NamesInFile:
 
     @property
     def written(self) -> tuple[str, ...]:
-        """The names that `problems` has resolved, each once."""
-        asked: dict[str, str] = {}
-        for _ in self._problems(lambda name: asked.setdefault(name, name), None):
+        """The names that `problems` resolves, each once."""
+        names: dict[str, str] = {}
+        for _ in self._problems(lambda name: names.setdefault(name, name), None):
             pass
-        return tuple(asked)
+        return tuple(names)
 
     def problems(self, resolve: Resolve, *, groups: Collection[str]) -> tuple[Problem, ...]:
-        """Return what is wrong between the names that `resolve` gives, of the groups with these names, in order."""
+        """Return the conflicts between the resolved names of these groups, in the order of the file."""
         return tuple(sorted(self._problems(resolve, groups), key=_place))
 
     def _problems(self, resolve: Resolve, groups: Collection[str] | None) -> Iterator[Problem]:
@@ -84,9 +84,9 @@ def _place(problem: Problem) -> tuple[int, int, int]:
 
 @dataclass(frozen=True, slots=True)
 class _Name:
-    """A name in the graph, empty where the file does not tell it, and the key that it comes from.
+    """A name in the graph and the key that it comes from; empty if the file does not have it.
 
-    Where a remap made it of another, that is `before`.
+    `before` is the name in the file if a remap changed it.
     """
 
     text: str
@@ -104,7 +104,7 @@ class _Name:
         return f", remapped from {quoted(self.before)}" if self.before else ""
 
     def line(self, document: Document, *, beside: Path) -> str:
-        """Return the line that it comes from, to be said of what stands at `beside`."""
+        """Return the line that it comes from, for a sentence about what is at `beside`."""
         return document.line(self.path, beside=beside) + self.remapped
 
 
@@ -207,7 +207,7 @@ def _outputs(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
 
 
 def _too_long(topics: Sequence[_Topic], document: Document) -> Iterator[Problem]:
-    """Yield names that only their namespace or prefix makes too long."""
+    """Yield names that are too long with their namespace or prefix."""
     for name in (name for topic in topics for name in (topic.input, topic.output)):
         if len(name.text) > LONGEST_TOPIC:
             text = f"the full name {quoted(name.text)} has {_too_many_characters(name)}"
@@ -232,11 +232,11 @@ _OF_EVERY_NODE: Final = {
 }
 
 
-def _own_topics(asked: DiagnosticsConfig | None, groups: Sequence[str], resolve: Resolve) -> dict[str, _OwnTopic]:
+def _own_topics(diagnostics: DiagnosticsConfig | None, groups: Sequence[str], resolve: Resolve) -> dict[str, _OwnTopic]:
     own = {resolve(name): topic for name, topic in _OF_EVERY_NODE.items()}
-    if asked is not None:
+    if diagnostics is not None:
         own[resolve(DIAGNOSTICS)] = _OwnTopic("diagnostic_msgs/msg/DiagnosticArray", "its diagnostics")
-    if asked is not None and asked.scalars:
+    if diagnostics is not None and diagnostics.scalars:
         for group in groups:
             for figure in SCALARS:
                 purpose = f"`{figure}` of the group {group}"

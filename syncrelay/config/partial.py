@@ -1,4 +1,4 @@
-"""What can be used of a faulty file: the keys that are in order. Checks between keys need not wait for the others."""
+"""The valid keys of a file with faults, so that checks between keys run on what is left."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -13,11 +13,11 @@ from syncrelay.config.problems import Path
 
 
 def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Document, FileKeys]:
-    """Return the tree of a file that pydantic refused, with its faulty keys marked, and a file without these.
+    """Return the tree of a file that pydantic refused with its faulty keys marked, and the keys without them.
 
-    In it a missing topic is empty, and another key that is needed None.
+    A required key that is missing is None, a topic's name empty.
     """
-    # A group whose name is refused has its keys all the same.
+    # If only a group's name is refused, its keys are valid.
     locs = (error["loc"] for error in errors if error["loc"][2:] != ("[key]",))
     faulty = frozenset(_key(place(file_format().file, loc).path) for loc in locs)
     usable = _usable(document.root, (), faulty)
@@ -26,7 +26,7 @@ def partial_file(document: Document, errors: Sequence[ErrorDetails]) -> tuple[Do
 
 
 def _key(path: Path) -> Path:
-    """Return the key of the file, a group, a topic or `export` that a path is below of; it is faulty as a whole."""
+    """Return the key of the file, a group, a topic or `export` above a path: it is faulty as a whole."""
     match path:
         case ("groups", _, "topics", *_):
             return path[:5]

@@ -16,10 +16,10 @@ Path: TypeAlias = tuple[str | int, ...]
 
 _PLAIN_KEY = re.compile(r"[A-Za-z_][\w-]*")
 _MOST_SHOWN: Final = 100
-# Of problems by their codes, where the code is no word for it.
+# Words for codes that say too little.
 _KINDS: Final = {"yaml": "not valid YAML"}
 _TAB_WIDTH: Final = 4
-# A longer line is cut to a window round its token.
+# Longer lines are cut around the token.
 _LONGEST_LINE: Final = 100
 _LEAD: Final = 30
 _BOLD, _RED, _BLUE, _RESET = "\033[1m", "\033[31m", "\033[34m", "\033[0m"

@@ -1,4 +1,4 @@
-"""What a reload does with the groups that run: decided here for the relay that does it, and for who asks beforehand."""
+"""What a reload does with the running groups, for the relay and for `diff`."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ class Exchange:
 
     def __str__(self) -> str:
         parts = {"rebuilt": self.rebuilt, "started": self.started, "ended": self.ended}
-        told = [f"{verb} {', '.join(those)}" for verb, those in parts.items() if those]
-        return "; ".join([f"reloaded: {counted(len(self.kept), 'group')} unchanged", *told])
+        changes = [f"{verb} {', '.join(those)}" for verb, those in parts.items() if those]
+        return "; ".join([f"reloaded: {counted(len(self.kept), 'group')} unchanged", *changes])
 
 
 def exchange(
-    running: Sequence[GroupConfig], asked: Sequence[GroupConfig], *, stopped: Collection[str] = ()
+    running: Sequence[GroupConfig], wanted: Sequence[GroupConfig], *, stopped: Collection[str] = ()
 ) -> Exchange:
-    """Return what becomes of the groups that run when these are asked for; those that a bug has stopped begin anew."""
+    """Return what a reload does with the running groups. A group that a bug has `stopped` is rebuilt."""
     before = {group.name: group for group in running}
-    names = [group.name for group in asked]
-    kept = [group.name for group in asked if group.name not in stopped and before.get(group.name) == group]
+    names = [group.name for group in wanted]
+    kept = [group.name for group in wanted if group.name not in stopped and before.get(group.name) == group]
     return Exchange(
         kept=tuple(kept),
         rebuilt=tuple(name for name in names if name in before and name not in kept),
@@ -39,16 +39,16 @@ def exchange(
     )
 
 
-def needs_restart(running: Config, asked: Config) -> tuple[str, ...]:
-    """Return the keys of the file that a running relay cannot take on."""
-    pairs = {"node": (running.node, asked.node), "metrics": (running.listen, asked.listen)}
+def needs_restart(running: Config, wanted: Config) -> tuple[str, ...]:
+    """Return the changed keys that only a restart can apply."""
+    pairs = {"node": (running.node, wanted.node), "metrics": (running.listen, wanted.listen)}
     return tuple(key for key, (before, now) in pairs.items() if before != now)
 
 
 class Subscription(NamedTuple):
-    """What a subscription is for: inputs of which this is equal share one, and it outlives the groups that use it.
+    """The key of a subscription: inputs with equal keys share one, which stays open across a reload.
 
-    `topic` is its name in the graph; `type` is None where the graph tells it.
+    `topic` is its name in the graph; `type` is None if it comes from the graph.
     """
 
     topic: str

@@ -1,4 +1,4 @@
-"""What the relay is told: a file with every default filled in, be it in order or as much of it as could be read."""
+"""Groups with every default filled in; of a file with faults, as far as they could be read."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -61,7 +61,7 @@ class GroupConfig:
 
     @property
     def has_deadlines(self) -> bool:
-        """Whether sets may leave because time passes: else `expire` never has anything to do."""
+        """Whether sets may leave as time passes; if not, `expire` never returns anything."""
         return self.options.max_wait is not None or self.ticks is not None
 
     @property
@@ -71,7 +71,7 @@ class GroupConfig:
 
     @property
     def own_tolerances(self) -> tuple[Tolerance | None, ...]:
-        """The tolerance of each input; None of one that goes by the group's."""
+        """The tolerance of each input; None for those that use the group's."""
         return tuple(None if each.tolerance == self.options.tolerance else each.tolerance for each in self.topics)
 
     def paths(self) -> Iterator[tuple[Path, TopicConfig]]:
@@ -106,7 +106,7 @@ def _named(group: GroupConfig) -> Iterator[tuple[str, TopicConfig]]:
 
 
 def _with_types(group: GroupConfig, types: Mapping[str, str]) -> GroupConfig:
-    """Return a group whose topics have a type where any group writes one: a topic has one subscription for all."""
+    """Fill in types that another group gives for the same topic: all groups share its subscription."""
     topics = (
         topic if topic.type is not None else replace(topic, type=types.get(name)) for name, topic in _named(group)
     )

@@ -18,7 +18,7 @@ _CONSTANTS: Final[dict[str, Scalar]] = {
 _DECIMAL = re.compile(r"[-+]?[0-9]+")
 _OCTAL_OR_HEXADECIMAL = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
-# Python refuses to read longer ones, and no key has a use for them.
+# Python limits the digits of an int, and no key needs so many.
 _LONGEST_NUMBER = 400
 
 _DOLLAR = re.compile(

@@ -13,7 +13,7 @@ from syncrelay.config.file import file_format
 Schema: TypeAlias = dict[str, Any]
 
 ID: Final = "urn:syncrelay:schema:1"
-"""The schema's name, whatever place it is read from; it ends in the `version` of the files that it describes."""
+"""The schema's name, wherever it is read from; it ends in the `version` of the files that it describes."""
 
 DRAFT: Final = "http://json-schema.org/draft-07/schema#"
 REF: Final = "#/definitions/"
@@ -27,7 +27,7 @@ VARIABLE: Final[Schema] = {
 """What may stand in place of any value."""
 
 _EXTENSION: Final[Schema] = {"description": "Yours: syncrelay ignores it."}
-# What is said about a value whatever its kind.
+# Keywords that describe a value of any type.
 _ANNOTATIONS: Final = ("description", "default", "examples")
 
 
@@ -61,7 +61,7 @@ def json_schema() -> Schema:
 
 
 def _take_required(group: Schema) -> list[str]:
-    """Leave a group its topics as the one required key, and return the others, which `defaults` may hold."""
+    """Make `topics` the only required key of a group, and return the others, which may be in `defaults`."""
     required: list[str] = group["required"]
     group["required"] = ["topics"]
     return [key for key in required if key not in ("policy", "topics")]
@@ -115,5 +115,5 @@ def _kinds(schema: Schema) -> list[Schema]:
 
 
 def _is_written_as_one_word(kind: Schema) -> bool:
-    """Tell numbers, truth values and restricted texts, in whose place a variable is another kind of value."""
+    """Return whether `${NAME}` in place of such a value needs a schema of its own."""
     return kind.get("type") in ("integer", "number", "boolean") or (kind.get("type") == "string" and len(kind) > 1)

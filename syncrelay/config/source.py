@@ -16,11 +16,11 @@ from syncrelay.config.wording import nearest
 from syncrelay.yaml_files import MOST_FILES, yaml_files
 
 STDIN: Final = "-"
-# A thousand groups of four topics are half of it.
+# A file of a thousand groups with four topics each is half as large.
 _MOST_BYTES: Final = 1_000_000
 _MOST_LINES: Final = 50_000
 PATIENCE_S: Final = 10.0
-"""How long a pipe may take to come to its end: `<(...)` is one, and a FIFO to which nobody ever writes."""
+"""How long a pipe may take to end, such as `<(...)` or a FIFO that nobody writes to."""
 
 _NO_FILES: Final = {
     stat.S_IFDIR: "directory",
@@ -36,7 +36,7 @@ _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\
 
 @dataclass(slots=True)
 class Patience:
-    """How many seconds pipes that are read together may take to come to their ends, and how many they have taken."""
+    """How many seconds all pipes of one command may take together, and how many have passed."""
 
     seconds: float = PATIENCE_S
     waited: float = 0.0
@@ -70,7 +70,7 @@ class Source:
 
 
 def shown_name(path: str) -> str:
-    """Return what problems call a file that the user named so."""
+    """Return a file's name as problems show it."""
     return "<stdin>" if path == STDIN else path or "''"
 
 
@@ -110,12 +110,12 @@ def read_source(path: str, *, patience: Patience | None = None) -> Source:
 
 
 def _content(path: str, patience: Patience) -> bytes:
-    """Return what a file holds, up to one byte more than it may. Raises TimeoutError for a pipe that does not end."""
+    """Return a file's bytes, at most one more than allowed. Raises TimeoutError for a pipe that does not end."""
     kind = _NO_FILES.get(stat.S_IFMT(Path(path).stat().st_mode))
     if kind is not None:
-        # Not even opened: to open a device may do something.
+        # Opening a device may have side effects.
         raise _unreadable(path, f"is a {kind}, expected a YAML file")
-    # Not to wait until somebody writes to a pipe: the wait has an end below.
+    # A blocking open of a FIFO waits for a writer, without a limit.
     with FileIO(path, opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
         return _read(file, patience)
 
@@ -133,7 +133,7 @@ def _read(file: FileIO, patience: Patience) -> bytes:
         chunk = file.read(_MOST_BYTES + 1 - len(content))
         if chunk == b"":
             break
-        # None where another reader of the pipe was first.
+        # None if another reader took the bytes.
         content += chunk or b""
     return bytes(content)
 

@@ -1,4 +1,4 @@
-"""pydantic's findings as problems: at the key or value that is meant, in words, with the nearest valid word."""
+"""pydantic's errors as problems: at the right key or value, in plain words, with the nearest valid word."""
 
 import re
 from collections.abc import Collection, Mapping, Sequence
@@ -25,13 +25,13 @@ _EXPECTED: Final = {
     "model_attributes_type": "a mapping",
     "finite_number": "a finite number",
 }
-# What a key takes beside single words.
+# The mappings that these keys take in place of a word.
 _MAPPING_FORMS: Final = {"qos": "a mapping", "stamp": "{field: path.to.a.Time}"}
-# So alike is `topic` to `topics`: meant is the key here, although there is such a key elsewhere.
+# `topic` and `topics` are this alike: then suggest the key of this place, although another place has the word.
 _A_SLIP: Final = 0.8
-# What YAML 1.1 and other formats take for a truth value.
+# Booleans in YAML 1.1 and other formats.
 _TRUTH_WORDS: Final = ("yes", "no", "on", "off", "true", "false")
-# What stands in brackets, or behind a key, as it is, and can be read in a line.
+# Needs no quotes in a suggestion such as `[word]`.
 _A_WORD: Final = re.compile(r"[\w./~-]{1,80}")
 
 
@@ -77,8 +77,8 @@ class Form:
 
 
 def translate(errors: Sequence[ErrorDetails], document: Document, form: Form) -> list[Problem]:
-    """Return a problem for every error, but none for what only follows from another problem."""
-    # In the order of the file: what is meant is looked for in the first of many.
+    """Return a problem for every error that is not a consequence of another one."""
+    # In the order of the file, as suggestions are limited in number.
     located = sorted(
         ((form.path(error["loc"]), error) for error in errors), key=lambda each: document.key_span(each[0])[:2]
     )
@@ -124,7 +124,7 @@ def _bad_value(error: ErrorDetails, path: Path, document: Document, form: Form) 
     context: dict[str, Any] = error.get("ctx", {})
     match error["type"]:
         case "value_error" if filled_in is not None:
-            # The error's own words may quote any part of the value.
+            # The error may quote part of the value, which may be secret.
             return f"expected {_example(error['loc'], form)}, found {filled_in}"
         case "value_error":
             return str(context["error"])
@@ -158,7 +158,7 @@ def _no_such_word(found: object, words: Sequence[str], loc: Location, document: 
 
 
 def _rather(error: ErrorDetails, form: Form) -> str:
-    """Say what to write where the value is near enough to tell; nothing elsewhere."""
+    """Suggest what to write if the value shows what was meant; else return nothing."""
     found, loc = error["input"], error["loc"]
     match error["type"]:
         case "tuple_type" if _is_word(found) and loc[-1] != "topics":
@@ -210,5 +210,5 @@ def _owner_span(path: Path, document: Document) -> Any:
         return document.key_span(owner)
     node = document.node(owner)
     first = next(iter(node.entries.values()), None) if isinstance(node, MappingNode) else None
-    # What an item merges stands above it.
+    # Keys that an item merges come from above it.
     return node.span if first is None or first.key < node.span._replace(width=0) else first.key

@@ -1,4 +1,4 @@
-"""Checks of message types against what is installed, importing nothing."""
+"""Checks of message types and fields against the installed interfaces, without importing them."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
@@ -12,7 +12,7 @@ from syncrelay.config.wording import one_of, or_nearest, quoted
 
 
 def check_types(groups: Sequence[GroupConfig], document: Document, interfaces: Interfaces) -> Iterator[Problem]:
-    """Yield types that aren't installed and stamps that aren't in them, and as notes what could not be checked."""
+    """Yield types that are not installed, fields that they do not have, and notes on what could not be checked."""
     for group in groups:
         for path, topic in group.paths():
             if topic.type is not None and (*path, "type") not in document.faulty:
@@ -31,12 +31,12 @@ def _check_topic(
     goes_by_header = topic.stamp == "header" and (*path, "stamp") not in document.faulty
     if fault is not None:
         text, code = fault
-        # A package may be installed where the relay runs, and replay needs none.
+        # The relay may run on another machine, and replay needs no package.
         severity = Severity.NOTE if code == "package_missing" else Severity.ERROR
         subject = package if code == "package_missing" else type_name
         if filled_in := document.filled_in(of_type):
             text, subject = f"this message type is not installed here, or not sourced: {filled_in}", ""
-        # Of a type that another group writes it is said there.
+        # If another group gives the type, the problem is shown there.
         if document.has(of_type):
             yield document.problem(of_type, text, code=code, severity=severity, subject=subject)
     elif asked or goes_by_header:
@@ -54,7 +54,7 @@ def _check_topic(
 
 
 def _check_kinds_of_keys(group: GroupConfig, document: Document, interfaces: Interfaces) -> Iterator[Problem]:
-    """Yield the first key that is text where another is a number or a time, or the other way round."""
+    """Yield the first key that can never equal the others: a text among numbers or times, or the reverse."""
     first: tuple[Path, bool] | None = None
     for path, topic in group.paths():
         asked = next((each for each in _asked_fields(topic, path, document) if each.wanted is _A_KEY), None)
@@ -73,7 +73,7 @@ def _check_kinds_of_keys(group: GroupConfig, document: Document, interfaces: Int
 
 
 def _field_at(type_name: str, steps: Sequence[str], interfaces: Interfaces) -> Field | None:
-    """Return the field at the end of a path, None where that cannot be told."""
+    """Return the field at the end of a path; None if it cannot be found."""
     first, *rest = steps
     field = next((each for each in interfaces.fields(type_name) or () if each.name == first), None)
     if field is None or field.is_array:
@@ -96,7 +96,7 @@ def _not_installed(type_name: str, document: Document, interfaces: Interfaces) -
     if package not in interfaces.packages:
         if package in interfaces.other_packages:
             return f"the package {quoted(package)} defines no messages", "unknown_type"
-        # Half of a package's name is _msgs or _interfaces.
+        # Stricter than usual: most package names share the ending _msgs.
         hint = document.did_you_mean(package, interfaces.packages, likeness=0.8)
         return f"the package {quoted(package)} is not installed here, or not sourced{hint}", "package_missing"
     types = interfaces.types(package)
@@ -169,7 +169,7 @@ class Wanted(NamedTuple):
     name: str
     in_arrays: frozenset[str] = frozenset()
     takes_messages: bool = False
-    """Whether a message will do too: what is in it, the recording tells."""
+    """Whether a message is accepted too: its fields are checked against the recording."""
 
     def takes(self, field: Field) -> bool:
         """Tell whether a field has a type that is wanted."""
@@ -178,7 +178,7 @@ class Wanted(NamedTuple):
 
 
 class _AskedField(NamedTuple):
-    """A field that the file names: where it does, the fields to go through joined by dots, and what it has to be."""
+    """A field that the file names: the key's place, the field's path, and the type it must have."""
 
     path: Path
     steps: str

@@ -18,12 +18,12 @@ NS_PER_UNIT: Final = {
 }
 _HERTZ: Final = {"Hz": 1, "hz": 1, "kHz": 1_000}
 MAX_NS: Final = 2**63 - 1
-# Slower ones are no rate that anything is sampled at; faster ones would leave a relay no time for messages.
+# Nothing is sampled more slowly, and a faster clock would leave the relay no time for messages.
 _SLOWEST_HZ: Final = Decimal("0.001")
 _FASTEST_HZ: Final = 10_000
 _FINEST: Final = 10**9
 _UNITS = "ns, us, ms, s or min"
-# What other programs call the units.
+# Names of units in other programs.
 _MEANT = {
     "nsec": "ns",
     "usec": "us",

@@ -8,17 +8,17 @@ from typing import Final
 from syncrelay.printable import printable
 
 LIKENESS: Final = 0.6
-"""From so much of 1 on a word is taken for another that is misspelt."""
+"""Words at least this alike, from 0 to 1, are taken for misspellings."""
 
 _LONGEST_QUOTE: Final = 60
 _CUT: Final = "…"
-# A shorter value is no secret, and may be part of any word.
+# Shorter values are not secrets, and occur in many words.
 _SHORTEST_VALUE: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
 class FilledIn:
-    """A value in which variables were filled in, in place of which stands what the file has."""
+    """A value with variables, shown as written: the variables may hold secrets."""
 
     written: str
 
@@ -27,7 +27,7 @@ class FilledIn:
 
 
 def without_value(text: str, value: str, written: str) -> str:
-    """Return a text with what is `written` in place of a variable's value, be it cut off as `quoted` does."""
+    """Replace a variable's value in a text by what is `written` in the file, also where `quoted` cut it off."""
     if len(value) < _SHORTEST_VALUE:
         return text
     text = text.replace(value, written)
@@ -37,7 +37,7 @@ def without_value(text: str, value: str, written: str) -> str:
 
 
 def nearest(word: str, candidates: Iterable[str], *, likeness: float = LIKENESS) -> str | None:
-    """Return the candidate most like `word`, whatever its case; None if none is as alike as `likeness` of 1."""
+    """Return the candidate most like `word`, ignoring case; None if none reaches `likeness`."""
     by_lower: dict[str, str] = {}
     for candidate in candidates:
         by_lower.setdefault(candidate.lower(), candidate)
@@ -57,7 +57,7 @@ def or_nearest(found: str | None) -> str:
 
 def quoted(text: str) -> str:
     """Return the text in backticks, or quotes if it has some, on one line and no longer than can be read."""
-    # What is cut off is not looked at: a value may be long, and be quoted often.
+    # Cut first: a value may be very long and quoted often.
     line = printable(text[: _LONGEST_QUOTE + 1])
     if len(line) > _LONGEST_QUOTE:
         line = line[: _LONGEST_QUOTE - 1] + _CUT

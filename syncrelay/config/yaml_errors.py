@@ -1,4 +1,4 @@
-"""PyYAML's errors in words: it names the token that broke its grammar, we name what a person did.
+"""PyYAML's syntax errors in plain words: it names a grammar rule, we name the mistake.
 
 What people meet most has sentences of ours: a tab, a colon or its space, indentation, a bracket, a quote. The rest is
 told in PyYAML's.
@@ -28,7 +28,7 @@ Fault: TypeAlias = tuple[str, Span]
 
 @dataclass(frozen=True, slots=True)
 class _Scene:
-    """Where PyYAML stopped (`row` and `column` from 0), and where what it was reading began."""
+    """Where PyYAML stopped, and where the construct that it was reading began. Rows and columns count from 0."""
 
     lines: tuple[str, ...]
     jargon: str
@@ -76,7 +76,7 @@ class _Scene:
 
 
 def in_words(error: yaml.MarkedYAMLError, lines: tuple[str, ...]) -> Fault:
-    """Return what is wrong with the form of a file, and where."""
+    """Return what is wrong with the syntax of a file, and where."""
     mark: Any = error.problem_mark or error.context_mark
     start: Any = error.context_mark or mark
     scene = _Scene(lines, str(error.problem), mark.line, mark.column, start.line, start.column)

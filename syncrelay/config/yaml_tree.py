@@ -31,7 +31,7 @@ from syncrelay.config.yaml_errors import DEEPEST, TOO_DEEP, in_words
 LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MOST_PROBLEMS: Final = 1_000
 """Of a file with single keys and values, which may be at the end of a long path."""
-# No name of ROS is as long, and every problem below a key tells the key.
+# Longer than any ROS name. Every problem below a key repeats the key, so its length is limited.
 _LONGEST_KEY: Final = 255
 # A text of so many characters counts as one value more.
 _CHARACTERS: Final = 100
