@@ -1,6 +1,6 @@
 """A YAML file as a tree in which every key and value knows where it stands."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -198,13 +198,7 @@ def flow(value: Any) -> str:
 
 def as_written(node: Node) -> Any:
     """Return the tree as `plain` does, but with `${NAME}` as written."""
-    match node:
-        case ScalarNode():
-            return node.value if node.written is None else node.written
-        case SequenceNode():
-            return tuple(as_written(item) for item in node.items)
-        case MappingNode():
-            return {key: as_written(entry.value) for key, entry in node.entries.items()}
+    return plain(node, of_scalar=lambda scalar: scalar.value if scalar.written is None else scalar.written)
 
 
 def _step(node: Node, step: str | int) -> Node | None:
@@ -218,12 +212,12 @@ def _step(node: Node, step: str | int) -> Node | None:
             return None
 
 
-def plain(node: Node) -> Any:
+def plain(node: Node, *, of_scalar: Callable[[ScalarNode], Scalar] = lambda scalar: scalar.value) -> Any:
     """Return the tree as dicts, tuples and scalars."""
     match node:
         case ScalarNode():
-            return node.value
+            return of_scalar(node)
         case SequenceNode():
-            return tuple(plain(item) for item in node.items)
+            return tuple(plain(item, of_scalar=of_scalar) for item in node.items)
         case MappingNode():
-            return {key: plain(entry.value) for key, entry in node.entries.items()}
+            return {key: plain(entry.value, of_scalar=of_scalar) for key, entry in node.entries.items()}
