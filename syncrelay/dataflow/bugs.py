@@ -1,4 +1,4 @@
-"""Unexpected exceptions: each is logged once with its traceback, and the relay keeps running."""
+"""What is logged once: a line that would repeat, and an unexpected exception, after which the relay keeps running."""
 
 import logging
 from collections.abc import Iterator
@@ -9,6 +9,19 @@ _LOG = logging.getLogger("syncrelay")
 
 # An error whose text differs each time is logged at most this often.
 _MOST: Final = 100
+
+
+class OnceLog:
+    """Logs each text the first time that it is given."""
+
+    def __init__(self) -> None:
+        self._logged: set[str] = set()
+
+    def log(self, level: int, text: str) -> None:
+        """Log a text at a level of `logging`, if it is new."""
+        if text not in self._logged:
+            self._logged.add(text)
+            _LOG.log(level, "%s", text)
 
 
 class Bugs:

@@ -5,7 +5,7 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import Distribution, PackageNotFoundError, distributions, version
@@ -16,6 +16,7 @@ from packaging.requirements import InvalidRequirement, Requirement
 
 from syncrelay.config.wording import all_of
 from syncrelay.doctor.diagnosis import Diagnosis, error
+from syncrelay.ros.environment import middlewares
 
 WHEEL_PYTHONS: Final = ((3, 11), (3, 12))
 """The versions of Python for which the ROS 2 Jazzy wheels are built."""
@@ -191,7 +192,7 @@ def look_at_installation(environ: Mapping[str, str]) -> Installation:
         unmet=tuple(_unmet_requirements(wheels)),
         sourced=tuple(prefix for prefix in prefixes if _holds_ros(prefix) and prefix.resolve() != own),
         unsourced=tuple(sorted(path.parent for path in Path("/opt/ros").glob("*/setup.bash"))),
-        middlewares=tuple(_middlewares([*prefixes, own])),
+        middlewares=tuple(middlewares([*prefixes, own])),
         middleware_asked=environ.get("RMW_IMPLEMENTATION") or None,
     )
 
@@ -222,11 +223,6 @@ def _built_for(folder: Path) -> Iterator[tuple[int, int]]:
     for path in sorted(folder.glob("_rclpy_pybind11.*.so")):
         if found := _COMPILED.search(path.name):
             yield int(found[1]), int(found[2])
-
-
-def _middlewares(prefixes: Iterable[Path]) -> list[str]:
-    found = {entry.name for prefix in prefixes for entry in (prefix / _INDEX / "rmw_typesupport").glob("*")}
-    return sorted(found - {"rmw_implementation"})
 
 
 def _is_wheel(distribution: Distribution) -> bool:

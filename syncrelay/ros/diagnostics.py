@@ -9,6 +9,7 @@ from std_msgs.msg import Float64
 
 from syncrelay.config import Config
 from syncrelay.config.names_in_graph import DIAGNOSTICS, SCALARS
+from syncrelay.dataflow.bugs import OnceLog
 from syncrelay.explain import Distribution, DropFates, GroupReport, InputFacts, explanation
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
 from syncrelay.status import Level, level
@@ -21,7 +22,6 @@ _LEVELS: Final = {
 }
 # In the place of a group's name, which is never empty.
 _ALL: Final = ""
-_LOG = logging.getLogger("syncrelay")
 _NS_PER_MS: Final = 1e6
 _NS_PER_SECOND: Final = 1e9
 
@@ -34,7 +34,7 @@ class Reporters:
         self._entities = entities
         self._wanted: tuple[str, ...] = ()
         self._reporters: dict[str, Diagnostics | Scalars] = {}
-        self._said: set[str] = set()
+        self._once = OnceLog()
 
     def configure(self, config: Config, groups: Sequence[str]) -> None:
         """Publish what this file asks for of these groups from now on; what was published before goes on."""
@@ -51,23 +51,17 @@ class Reporters:
             diagnostics.publish(reports, advice=advice)
         for report in reports:
             if isinstance(scalars := self._reporters.get(report.facts.name), Scalars):
-                scalars.publish([report])
+                scalars.publish(report)
 
     def _make(self) -> None:
         for key in self._wanted:
             if key not in self._reporters:
                 try:
-                    self._reporters[key] = self._made(key)
+                    self._reporters[key] = (
+                        Diagnostics(self._node, self._entities) if key == _ALL else Scalars(self._entities, key)
+                    )
                 except RefusedError as error:
-                    self._say_once(str(error))
-
-    def _made(self, key: str) -> "Diagnostics | Scalars":
-        return Diagnostics(self._node, self._entities) if key == _ALL else Scalars(self._entities, key)
-
-    def _say_once(self, text: str) -> None:
-        if text not in self._said:
-            self._said.add(text)
-            _LOG.warning("%s", text)
+                    self._once.log(logging.WARNING, str(error))
 
 
 class Diagnostics:
@@ -121,23 +115,20 @@ class Scalars:
             self.close()
             raise
 
-    def publish(self, reports: Sequence[GroupReport]) -> None:
-        """Publish what there is; span and latency only where sets left."""
-        for report in reports:
-            figures = report.facts.figures
-            self._publish("sets_hz", figures.rate_hz)
-            if figures.last_sets:
-                span, latency = figures.last_sets[0]
-                self._publish("span_ms", span / _NS_PER_MS)
-                self._publish("latency_ms", latency / _NS_PER_MS)
+    def publish(self, report: GroupReport) -> None:
+        """Publish the rate, and span and latency if sets left."""
+        figures = report.facts.figures
+        values = {"sets_hz": figures.rate_hz}
+        if figures.last_sets:
+            span, latency = figures.last_sets[0]
+            values |= {"span_ms": span / _NS_PER_MS, "latency_ms": latency / _NS_PER_MS}
+        for figure, value in values.items():
+            self._publishers[figure].publish(Float64(data=value))
 
     def close(self) -> None:
         """Publish no more."""
         for publisher in self._publishers.values():
             self._entities.end(publisher)
-
-    def _publish(self, figure: str, value: float) -> None:
-        self._publishers[figure].publish(Float64(data=value))
 
 
 def _values(report: GroupReport) -> Iterator[tuple[str, str]]:

@@ -6,7 +6,7 @@ import importlib.util
 import io
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from syncrelay.collector import resting_collector
@@ -54,18 +54,20 @@ def keep_stdout() -> None:
 def _require_middleware(asked: str | None) -> None:
     """Refuse a middleware that is not installed: rcl would end the whole process without an exception."""
     prefixes = [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
-    registered = (
-        entry.name
-        for prefix in prefixes
-        for entry in (prefix / "share/ament_index/resource_index/rmw_typesupport").glob("*")
-    )
-    installed = sorted(set(registered) - {"rmw_implementation"})
+    installed = middlewares(prefixes)
     if asked and installed and asked not in installed:
         distribution = os.environ.get("ROS_DISTRO") or "jazzy"
         raise RosUnavailableError(
             f"RMW_IMPLEMENTATION asks for {asked}, which is not installed here; there is {', '.join(installed)}.\n"
             f"  Install it (ros-{distribution}-{asked.replace('_', '-')}), or `unset RMW_IMPLEMENTATION`."
         )
+
+
+def middlewares(prefixes: Iterable[Path]) -> list[str]:
+    """Return the middlewares that are registered in the ament index of these prefixes."""
+    index = "share/ament_index/resource_index/rmw_typesupport"
+    found = {entry.name for prefix in prefixes for entry in (prefix / index).glob("*")}
+    return sorted(found - {"rmw_implementation"})
 
 
 def _without_rclpy() -> str:

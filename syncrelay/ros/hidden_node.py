@@ -72,17 +72,24 @@ def join_hidden(config: Config, ros_args: Sequence[str]) -> tuple[Context, Any, 
     return hidden, join(hidden, _NAME, namespace=namespace, arguments=arguments), name
 
 
-def watch_graph(*, seconds: float) -> GraphSnapshot:
-    """Join the graph for a time and return what it holds; raises RosUnavailableError where rclpy does not start."""
+@contextmanager
+def hidden_node(name: str) -> Iterator[Any]:
+    """Join the graph with a hidden node, and leave it; raises RosUnavailableError where rclpy does not start."""
     context, node = Context(), None
     try:
-        node = join(context, _NAME)
-        time.sleep(seconds)
-        return snapshot(node)
+        node = join(context, name)
+        yield node
     except _rclpy.RCLError as error:
         raise RosUnavailableError(f"cannot look at the graph: {error}") from error
     finally:
         leave(node, context)
+
+
+def watch_graph(*, seconds: float) -> GraphSnapshot:
+    """Join the graph for a time and return what it holds. Raises as `hidden_node`."""
+    with hidden_node(_NAME) as node:
+        time.sleep(seconds)
+        return snapshot(node)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.config import TopicConfig
 from syncrelay.dataflow.backend import RclBackend, RclCallError, Source
+from syncrelay.dataflow.bugs import OnceLog
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.errors import TypeImportError
@@ -65,7 +66,7 @@ class TopicInput:
         self._is_held = False
         self._force_poll = True
         self._try_again = 0.0
-        self._said: set[str] = set()
+        self._once = OnceLog()
 
     @property
     def is_due(self) -> bool:
@@ -169,7 +170,7 @@ class TopicInput:
         for output in lacking:
             output.find_handler(self._message_type)
             if output.not_readable:
-                self._say_once(logging.ERROR, f"{output.group.config.name}: {self.name}: {output.not_readable}")
+                self._once.log(logging.ERROR, f"{output.group.config.name}: {self.name}: {output.not_readable}")
         if self.outputs.source is not None and any(output.handler for output in lacking):
             self._loop.call(self.outputs.feed).result()
         return None
@@ -185,7 +186,7 @@ class TopicInput:
             self._message_type = import_type(type_name)
         except TypeImportError as error:
             self.not_importable = str(error)
-            self._say_once(logging.ERROR, f"{self.name}: {error}")
+            self._once.log(logging.ERROR, f"{self.name}: {error}")
             return f"the type {type_name} of {self.name}"
         if publisher is not None:
             self.type, self.type_from = type_name, publisher
@@ -201,7 +202,7 @@ class TopicInput:
         expected = f"the relay took {self.type}" if self.type_from else f"the file says {self.type}"
         for stranger in self.publishers:
             if stranger.type != self.type:
-                self._say_once(
+                self._once.log(
                     logging.WARNING,
                     f"{self.name}: {stranger.node} publishes it as {stranger.type}, {expected}",
                 )
@@ -222,11 +223,6 @@ class TopicInput:
     def lost(self) -> int:
         """How many messages DDS lost on the way here since the subscription was made."""
         return int(self._lost.take_event().total_count) if self._lost is not None else 0
-
-    def _say_once(self, level: int, text: str) -> None:
-        if text not in self._said:
-            self._said.add(text)
-            _LOG.log(level, "%s", text)
 
     def _follow(self, profile: Any) -> None:
         """Have a subscription of this QoS, if one is wanted, and all publishers, as far as DDS makes them."""
@@ -252,7 +248,7 @@ class TopicInput:
 
     def _put_off(self, refusal: Refusal) -> None:
         self._try_again = time.monotonic() + _TRY_AGAIN_S
-        self._say_once(logging.ERROR, refusal.text)
+        self._once.log(logging.ERROR, refusal.text)
 
     def _exchange(self, profile: Any) -> None:
         """Replace the subscription, by none if none is wanted; of another QoS, the outputs too.

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from rclpy.context import Context
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.qos import QoSReliabilityPolicy
 
 from syncrelay.cdr import read_stamp
@@ -16,13 +14,12 @@ from syncrelay.config import QosOverrides
 from syncrelay.config.interfaces import Interfaces
 from syncrelay.dataflow.backend import Payload, RclBackend, Source
 from syncrelay.dataflow.receive import ReceiveLoop
-from syncrelay.errors import RosUnavailableError, TypeImportError
+from syncrelay.errors import TypeImportError
 from syncrelay.printable import printable
 from syncrelay.ros.backend_choice import VARIABLE, choose_backend
 from syncrelay.ros.entities import never_called
 from syncrelay.ros.graph import is_nameless, is_relayed, published_topics
-from syncrelay.ros.hidden_node import join
-from syncrelay.ros.leaving import leave
+from syncrelay.ros.hidden_node import hidden_node
 from syncrelay.ros.qos import input_profile
 from syncrelay.ros.types import begins_with_header, import_type
 
@@ -62,22 +59,10 @@ class Heard:
 
 
 def listen(*, seconds: float) -> Heard:
-    """Join the graph and return what came in a time.
-
-    Raises RosUnavailableError where rclpy does not start.
-    """
-    context = Context()
-    node = None
-    try:
-        node = join(context, _NODE)
-        listener = _Listener(
-            node, choose_backend(os.environ.get(VARIABLE), node=node, context=context), seconds=seconds
-        )
-        return listener.run()
-    except _rclpy.RCLError as error:
-        raise RosUnavailableError(f"cannot listen to the graph: {error}") from error
-    finally:
-        leave(node, context)
+    """Join the graph and return what came in a time; raises RosUnavailableError where rclpy does not start."""
+    with hidden_node(_NODE) as node:
+        backend = choose_backend(os.environ.get(VARIABLE), node=node, context=node.context)
+        return _Listener(node, backend, seconds=seconds).run()
 
 
 class _Listener:

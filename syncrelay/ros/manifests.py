@@ -11,14 +11,12 @@ from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile, QoSReli
 
 from syncrelay.config.names_in_graph import manifest_topic
 from syncrelay.dataflow.backend import Outlet, RclBackend
-from syncrelay.dataflow.bugs import Bugs
+from syncrelay.dataflow.bugs import Bugs, OnceLog
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.manifest import MANIFEST_DEPTH, ManifestWriter
 from syncrelay.dataflow.manifest_queue import GroupManifests, ManifestQueue
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.ros.entities import Entities, Purpose, RefusedError
-
-_LOG = logging.getLogger("syncrelay")
 
 _PROFILE: Final = QoSProfile(
     history=QoSHistoryPolicy.KEEP_LAST,
@@ -39,7 +37,7 @@ class Manifests:
         self._loop = loop
         self._publishers: dict[str, tuple[Any, Outlet]] = {}
         self._begun: dict[GroupRelay, GroupManifests] = {}
-        self._said: set[str] = set()
+        self._once = OnceLog()
 
     def begin(self, groups: Iterable[GroupRelay]) -> None:
         """Have these groups publish manifests, from their first set on if they do not run yet.
@@ -51,7 +49,7 @@ class Manifests:
                 try:
                     outlet = self._outlet(group.config.name)
                 except RefusedError as error:
-                    self._say_once(str(error))
+                    self._once.log(logging.WARNING, str(error))
                 else:
                     self._connect(group, outlet)
 
@@ -89,8 +87,3 @@ class Manifests:
         writer = ManifestWriter(group.config, node=self._node.get_fully_qualified_name(), topics=topics)
         begun = self._begun[group] = self.queue.begin(group.config.name, writer, outlet)
         self._loop.call(lambda: group.tell_sets(begun))
-
-    def _say_once(self, text: str) -> None:
-        if text not in self._said:
-            self._said.add(text)
-            _LOG.warning("%s", text)

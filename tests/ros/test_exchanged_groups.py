@@ -17,7 +17,7 @@ from tests.ros.configs import config
 from tests.ros.processes import wait_until
 from tests.ros.stage import BACKENDS
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+own_node = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_node
 entities = pytest.importorskip("syncrelay.ros.entities")
 choose_backend = pytest.importorskip("syncrelay.ros.backend_choice").choose_backend
 GroupBindings = pytest.importorskip("syncrelay.ros.bindings").GroupBindings
@@ -48,23 +48,19 @@ class _Refusing(entities.Entities):  # type: ignore[name-defined]  # of a module
 @pytest.fixture(params=BACKENDS)
 def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
     """GroupBindings of a node of this process, with a loop that runs."""
-    context = rclpy.context.Context()
-    rclpy.init(context=context, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
-    node = rclpy.create_node("here", context=context)
-    backend = choose_backend(request.param, node=node, context=context)
-    loop = ReceiveLoop(backend.inbox(), now=lambda: 0, expire=lambda _: None)
-    refusing = _Refusing(node)
-    thread = Thread(target=loop.run)
-    thread.start()
-    bindings = GroupBindings(entities=refusing, node=node, backend=backend, loop=loop)
-    try:
-        yield SimpleNamespace(node=node, entities=refusing, bindings=bindings, backend=backend)
-    finally:
-        loop.stop()
-        thread.join()
-        loop.close()
-        node.destroy_node()
-        context.try_shutdown()
+    with own_node(ros_domain) as own:
+        own.backend = choose_backend(request.param, node=own.node, context=own.context)
+        own.entities = _Refusing(own.node)
+        loop = ReceiveLoop(own.backend.inbox(), now=lambda: 0, expire=lambda _: None)
+        own.bindings = GroupBindings(entities=own.entities, node=own.node, backend=own.backend, loop=loop)
+        thread = Thread(target=loop.run)
+        thread.start()
+        try:
+            yield own
+        finally:
+            loop.stop()
+            thread.join()
+            loop.close()
 
 
 def _groups(**topics: list[tuple[str, str, str]]) -> list[Any]:

@@ -33,16 +33,6 @@ def test_an_absent_publisher_is_named_once_and_the_group_runs_when_it_comes(stag
     assert len(waits) == 1
 
 
-def test_a_group_runs_while_another_waits(stage: Stage):
-    text = config({"front": _exact("/camera", "/lidar"), "rear": _exact("/camera", "/absent")})
-    recording = merged(at("/camera", 0, 10, 20), at("/lidar", 0, 10, 20))
-    aligned = {"/front/camera": VECTOR, "/front/lidar": VECTOR}
-    relay, collector = relaying.relay(stage, text, recording, aligned)
-    expected = [(frame.payload, frame.payload) for frame in at("/camera", 0, 10, 20)]
-    assert relaying.sets_within(recording, collector, aligned) == expected
-    relay.wait_for_log("rear: waiting for a publisher of /absent")
-
-
 def test_a_publisher_of_another_type_is_named_and_does_not_disturb(stage: Stage):
     stage.player({"/camera": IMAGE})
     text = config({"front": _exact("/camera", "/lidar")})

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-rclpy = pytest.importorskip("rclpy", reason="rclpy is not installed")
+own_node = pytest.importorskip("tests.ros.in_process", reason="rclpy is not installed").own_node
 graph = pytest.importorskip("syncrelay.ros.graph", reason="rclpy is not installed")
 
 _IMAGE, _MANIFEST = "sensor_msgs/msg/Image", "diagnostic_msgs/msg/DiagnosticArray"
@@ -46,13 +46,7 @@ def test_a_manifest_is_no_input_and_what_others_publish_too_is():
 @pytest.mark.ros
 @pytest.mark.parametrize("named", [("_NODE_NAME_UNKNOWN_", "_NODE_NAMESPACE_UNKNOWN_"), ("no name", "/"), ("", "")])
 def test_who_has_no_name_of_ros_is_no_relay(ros_domain: int, named: tuple[str, str]):
-    context = rclpy.context.Context()
-    rclpy.init(context=context, domain_id=ros_domain)
-    node = rclpy.create_node("here", context=context)
-    try:
-        name, namespace = named
-        publisher = SimpleNamespace(node_name=name, node_namespace=namespace, topic_type=_IMAGE)
-        assert not graph.is_relayed(node, publisher, "/front/camera")
-    finally:
-        node.destroy_node()
-        context.try_shutdown()
+    name, namespace = named
+    publisher = SimpleNamespace(node_name=name, node_namespace=namespace, topic_type=_IMAGE)
+    with own_node(ros_domain) as own:
+        assert not graph.is_relayed(own.node, publisher, "/front/camera")

@@ -54,16 +54,6 @@ def test_messages_of_equal_keys_go_together_whatever_their_stamps(stage: Stage):
     assert lidar - camera == 5000 * MS
 
 
-def test_keys_may_stand_in_other_fields_of_other_types(stage: Stage):
-    topics = inputs(_PAIR, qos=LOSSLESS)
-    topics[1]["key"] = "vector.y"
-    group = {"policy": "equal_key", "key": "vector.y", "topics": topics}
-    # A vector's y is its stamp modulo 1000: equal for stamps of whole microseconds, whatever else they are.
-    sets = (at("/camera", offset) + at("/lidar", offset + 40) for offset in itertools.count(0, 100))
-    camera, lidar = stamps_of(_one_set_out(stage, group, sets))
-    assert lidar - camera == 40 * MS
-
-
 def test_a_trigger_takes_along_the_latest_of_the_other_input(stage: Stage):
     group = {"policy": "latest_time", "trigger": "/lidar", "topics": inputs(_PAIR, qos=LOSSLESS)}
     sets = (at("/camera", offset, offset + 30) + at("/lidar", offset + 70) for offset in itertools.count(0, 100))

@@ -2,7 +2,6 @@
 
 import fcntl
 import itertools
-import json
 import os
 import pty
 import re
@@ -79,6 +78,7 @@ def test_a_changed_group_is_built_anew_and_a_new_one_begins(stage: Stage):
     # The state is that of the relay's last look, and all of this may come before the first.
     wait_until(lambda: [each["name"] for each in status(relay)["groups"]] == ["front", "rear"], "both groups")
     assert first_group(relay)["policy"] == "exact_time"
+    assert status(relay)["relay"]["pid"] == relay.pid
     assert not collector.endpoints("/front/camera", kind="publisher")
 
 
@@ -263,8 +263,3 @@ def test_a_relay_ends_with_its_terminal(stage: Stage, tmp_path: Path):
 def _own_terminal() -> None:
     os.setsid()
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-
-
-def test_its_state_tells_which_process_it_is(stage: Stage):
-    file = ReloadedFile(stage, front=_FRONT)
-    assert json.loads(json.dumps(status(file.relay)))["relay"]["pid"] == file.relay.pid

@@ -115,11 +115,14 @@ def test_what_the_foxglove_layout_and_the_grafana_dashboard_draw_is_there_on_a_r
     assert {name for expression in EXPRESSIONS for name, _ in series(expression)} - there == set()
 
 
-def test_nothing_is_published_about_the_relay_if_that_is_asked_for(stage: Stage):
+def test_without_diagnostics_and_metrics_nothing_is_published_and_nothing_listens(stage: Stage):
     collector = stage.collector()
-    relay = stage.relay(front(top={"diagnostics": None}))
-    wait_until(lambda: bool(findings(relay)), "a first look")
+    relay = stage.relay(front(top={"diagnostics": None, "metrics": None}), "--log-format", "json")
+    relay.wait_for_log('"group": "front", "finding": "no_publisher"}')
     assert not collector.endpoints("/diagnostics", kind="publisher", node="/syncrelay")
+    relay.send(signal.SIGTERM)
+    assert relay.wait() == 0
+    assert "http://" not in relay.stderr
 
 
 def test_observe_tells_of_a_healthy_group_and_exits_by_that(stage: Stage):
@@ -153,14 +156,6 @@ def test_a_port_that_is_taken_is_an_error_that_says_so(stage: Stage):
     )
 
 
-def test_without_metrics_nothing_listens(stage: Stage):
-    relay = stage.relay(front(top={"metrics": None}))
-    relay.wait_for_log("front: waiting for")
-    relay.send(signal.SIGTERM)
-    assert relay.wait() == 0
-    assert "http://" not in relay.stderr
-
-
 def test_clients_that_stall_keep_no_message_and_no_answer_back(stage: Stage):
     relay = stage.relay(front())
     play(stage, _RIG)
@@ -174,8 +169,3 @@ def test_clients_that_stall_keep_no_message_and_no_answer_back(stage: Stage):
     finally:
         for client in stalled:
             client.close()
-
-
-def test_json_lines_carry_the_finding(stage: Stage):
-    relay = stage.relay(front(), "--log-format", "json")
-    relay.wait_for_log('"group": "front", "finding": "alone"}')

@@ -172,23 +172,18 @@ def runs(pid):
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, None])
 def test_the_sensors_end_with_the_process_that_started_them_however_that_ends(stage, holder, number):
     sensors = children_of(holder.pid)
     held = set().union(*map(segments_of, sensors))
-    holder.send(number)
-    holder.wait()
-    wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes")
-    assert left_of(stage.domain, held) == set()
-
-
-@pytest.mark.ros
-def test_an_orderly_end_takes_the_sensors_along(stage, holder):
-    sensors = children_of(holder.pid)
-    held = set().union(*map(segments_of, sensors))
-    holder.ask_to_end()
-    assert holder.wait() == 0
-    assert not any(map(runs, sensors))
+    if number is None:
+        holder.ask_to_end()
+        assert holder.wait() == 0
+        assert not any(map(runs, sensors))
+    else:
+        holder.send(number)
+        holder.wait()
+        wait_until(lambda: not any(map(runs, sensors)), "the end of the rig's processes")
     assert left_of(stage.domain, held) == set()
 
 

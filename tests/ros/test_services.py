@@ -9,7 +9,6 @@ from urllib.error import HTTPError
 
 import pytest
 
-from syncrelay.sync import ApproximateTime
 from tests.ros import relaying
 from tests.ros.cdr_messages import VECTOR, stamp_of, stamps_of
 from tests.ros.configs import LOSSLESS, ROOMY, config, inputs
@@ -17,7 +16,7 @@ from tests.ros.processes import wait_until
 from tests.ros.reloaded import ReloadedFile
 from tests.ros.stage import Stage, both_backends
 from tests.ros.status import ANY_PORT, findings, first_group, get, status, wait_for_finding
-from tests.ros.streams import at, jittery, merged
+from tests.ros.streams import at, merged
 
 pytestmark = pytest.mark.ros
 
@@ -68,25 +67,6 @@ def test_services_can_be_switched_off(stage: Stage):
     services = caller.services()
     assert "/syncrelay/get_parameters" in services
     assert set(services).isdisjoint(_OFFERED)
-
-
-def test_an_unchanged_group_loses_nothing_in_a_reload_by_service(stage: Stage):
-    camera = jittery("/camera", period_ms=5, jitter_ms=1, count=1200, seed=1)
-    recording = merged(camera, jittery("/lidar", period_ms=10, jitter_ms=2, count=600, seed=2))
-    file, caller, collector = ReloadedFile(stage, front=_FRONT), stage.caller(), stage.collector(_OUTPUTS)
-    player = stage.player(_PAIR)
-    relaying.connect(player, collector, recording, _OUTPUTS)
-    for begin, rear in ((0, _REAR), (600, {**_REAR, "queue_size": 5}), (1200, None)):
-        player.start(recording[begin : begin + 600], speed=2)
-        file.write(_file(front=_FRONT, **({"rear": rear} if rear else {})))
-        success, text = caller.call("reload")
-        assert success
-        assert "1 group unchanged" in text
-        player.finish()
-    relaying.conclude(player, collector, recording, _OUTPUTS)
-    policy = ApproximateTime(n_inputs=2, queue_size=ROOMY, slop_ns=20_000_000)
-    expected = relaying.expected_sets(policy, recording, list(_PAIR))
-    assert relaying.sets_within(recording, collector, _OUTPUTS) == expected
 
 
 @both_backends
