@@ -15,7 +15,7 @@ from syncrelay.dataflow.group import GroupRelay
 from syncrelay.dataflow.inbox import PolledInbox
 from syncrelay.dataflow.receive import ReceiveLoop
 from syncrelay.sync import DropReason
-from tests.dataflow.payloads import FLOWS, Named
+from tests.dataflow.payloads import FLOWS, Named, Outlet, connect
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.processes import wait_until
@@ -29,14 +29,6 @@ _STEPS = ("add", "reject", "expire", "flush", "counts", "next_deadline")
 def group(request) -> GroupRelay:
     text = config({"front": {"policy": "exact_time", "max_wait": "10ms", "topics": inputs(_PAIR)}})
     return GroupRelay(load_text(text).groups[0], now=lambda: 0, flow=request.param)
-
-
-class _Outlet:
-    def __init__(self) -> None:
-        self.sent: list[object] = []
-
-    def send(self, payload: Named) -> None:
-        self.sent.append(payload.name)
 
 
 class _Failing:
@@ -74,9 +66,9 @@ def _drive(group: GroupRelay, step: str) -> None:
 def test_whichever_step_fails_the_group_is_stopped_and_takes_all_steps_from_then_on(
     failing: str, group: GroupRelay, caplog
 ):
-    outlets = [_Outlet(), _Outlet()]
-    for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
+    outlets = [Outlet(), Outlet()]
+    connect(group, outlets)
+    for index in range(2):
         group.flow.receive(index, Named(b"set"), BEGIN)
     assert [outlet.sent for outlet in outlets] == [[b"set"], [b"set"]]
     group.engine = _Failing(group.engine, failing)  # type: ignore[assignment]  # it passes all on
@@ -114,13 +106,8 @@ def test_what_waits_in_a_group_that_is_stopped_is_dropped_and_counted(failing: s
 
 
 def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_came(group: GroupRelay):
-    outlets = [_Outlet(), _Outlet()]
-
-    def connect() -> None:
-        for index, outlet in enumerate(outlets):
-            group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
-
-    connect()
+    outlets = [Outlet(), Outlet()]
+    connect(group, outlets)
     group.flow.receive(0, Named(b"before"), BEGIN)
     group.suspend()
     group.flow.receive(1, Named(b"meanwhile"), BEGIN)
@@ -128,26 +115,25 @@ def test_a_group_that_is_suspended_lets_nothing_leave_and_goes_on_with_all_that_
     group.expire(BEGIN)
     assert group.next_deadline() is None
     assert [outlet.sent for outlet in outlets] == [[], []]
-    connect()
+    connect(group, outlets)
     group.resume()
     assert [outlet.sent for outlet in outlets] == [[b"before"], [b"meanwhile"]]
     assert [(each.fed, each.matched, sum(each.dropped.values())) for each in group.counts()] == [(1, 1, 0), (2, 1, 1)]
 
 
 def test_a_group_that_lost_an_outlet_while_it_was_suspended_lets_no_set_leave_in_part(group: GroupRelay):
-    outlets = [_Outlet(), _Outlet()]
-    for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
+    outlets = [Outlet(), Outlet()]
+    connect(group, outlets)
     group.flow.receive(0, Named(b"before"), BEGIN)
     group.suspend()
     group.flow.receive(1, Named(b"meanwhile"), BEGIN)
-    group.connect(1, outlets[1], restamped=False)  # type: ignore[arg-type]  # as above
+    group.connect(1, outlets[1], restamped=False)  # type: ignore[arg-type]  # as much of one as is used
     group.resume()
     assert [outlet.sent for outlet in outlets] == [[], []]
     assert [(each.fed, each.dropped) for each in group.counts()] == [(1, {DropReason.SHUTDOWN: 1})] * 2
 
 
-class _FailingOutlet(_Outlet):
+class _FailingOutlet(Outlet):
     """Fails for one message."""
 
     topic = "/front/lidar"
@@ -164,9 +150,8 @@ class _FailingOutlet(_Outlet):
 
 def test_a_message_that_cannot_be_published_is_counted_and_told_and_the_group_goes_on(group: GroupRelay, caplog):
     caplog.set_level("INFO")
-    outlets = [_Outlet(), _FailingOutlet(b"2")]
-    for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
+    outlets = [Outlet(), _FailingOutlet(b"2")]
+    connect(group, outlets)
     told = []
     for n in range(4):
         for index in range(2):

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from syncrelay.config import load_text
 from syncrelay.dataflow.group import GroupRelay
 from syncrelay.sync import DropReason
-from tests.dataflow.payloads import Named
+from tests.dataflow.payloads import Named, Outlet, connect
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.streams import BEGIN, MS
@@ -22,20 +22,11 @@ _KINDS = {
 }
 
 
-class _Outlet:
-    def __init__(self) -> None:
-        self.sent: list[int] = []
-
-    def send(self, payload: Named) -> None:
-        self.sent.append(payload.name)
-
-
-def _group(*, now=lambda: 0, **keys) -> tuple[GroupRelay, list[_Outlet]]:
+def _group(*, now=lambda: 0, **keys) -> tuple[GroupRelay, list[Outlet]]:
     text = config({"front": {"policy": "exact_time", "topics": inputs(_PAIR), **keys}})
     group = GroupRelay(load_text(text).groups[0], now=now)
-    outlets = [_Outlet() for _ in group.config.topics]
-    for index, outlet in enumerate(outlets):
-        group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
+    outlets = [Outlet() for _ in group.config.topics]
+    connect(group, outlets)
     return group, outlets
 
 
@@ -44,7 +35,7 @@ def _give(group: GroupRelay, index: int, ms: int) -> None:
     group.flow.receive(index, Named(stamp, stamp), stamp)
 
 
-def _sent(outlets: list[_Outlet]) -> list[list[int]]:
+def _sent(outlets: list[Outlet]) -> list[list[int]]:
     return [[(stamp - BEGIN) // MS for stamp in outlet.sent] for outlet in outlets]
 
 
@@ -94,7 +85,7 @@ def test_a_group_that_is_suspended_while_paused_stays_paused():
     group.suspend()
     for index in range(2):
         _give(group, index, 0)
-        group.connect(index, outlets[index], restamped=False)  # type: ignore[arg-type]  # as above
+    connect(group, outlets)
     group.resume()
     assert _sent(outlets) == [[], []]
     assert [dict(each.dropped) for each in group.counts()] == [{DropReason.PAUSED: 1}] * 2
@@ -117,12 +108,11 @@ _STEPS = st.lists(
 )
 
 
-def _take(step: str | tuple[int, int], group: GroupRelay, outlets: list[_Outlet], at: int) -> None:
+def _take(step: str | tuple[int, int], group: GroupRelay, outlets: list[Outlet], at: int) -> None:
     match step:
         case "suspend":
             group.suspend()
-            for index, outlet in enumerate(outlets):
-                group.connect(index, outlet, restamped=False)  # type: ignore[arg-type]  # as much of one as is used
+            connect(group, outlets)
             group.resume()
         case "expire":
             group.expire(at * MS)
