@@ -3,7 +3,7 @@ from functools import partial
 import pytest
 
 from syncrelay.sync import ApproximateTime, Message
-from tests.sync.support.timeline import TICK_NS, policy_cases
+from tests.sync.support.timeline import TICK_NS, play_policy, policy_cases
 
 
 def approximate(inputs=2, queue=10, slop=20, periods=None, **options):
@@ -101,6 +101,39 @@ test_drawn = policy_cases(
         ),
     }
 )
+
+
+def test_an_overflow_is_excused_in_a_long_search_too_once_another_input_has_the_latest_head():
+    # Camera and radar take turns, so that each drop is a step of its own.
+    drawing = """
+        lidar  |..............ABCDEFGHIJK
+        camera |..c.e.g.i.......k........
+        radar  |.b.d.f.h..l.m............
+        imu    |..............n..........
+        arrive: A B C D E F G H I J K b c d e f g h i k l m n
+    """
+    (overflow, search), _ = play_policy(approximate(4, slop=8), drawing)
+    assert overflow == "K: A overflow"
+    # The lidar may not be the pivot before k is the latest; then l is no longer too far.
+    assert search == "n: " + "".join(f"{letter} too_far, " for letter in "bcdefghi") + "l superseded"
+
+
+def test_a_search_never_goes_back_to_what_it_has_passed():
+    # Long enough to pass many heads at once: those beyond the aim must stay, or they would be passed for ever.
+    policy = approximate(3, queue=10, slop=30)
+    arriving = [(0, 22), (1, 22), (0, 25), (0, 28), (1, 28), (0, 29), (0, 32), (0, 33), (1, 29), (1, 32)]
+    for place, stamp in arriving:
+        assert not policy.add(Message(place, stamp * TICK_NS, None))
+    dropped = [each.message for each in policy.add(Message(2, 34 * TICK_NS, None))]
+    assert [(each.input, each.stamp // TICK_NS) for each in dropped] == [
+        (0, 22),
+        (1, 22),
+        (0, 25),
+        (0, 28),
+        (1, 28),
+        (0, 29),
+        (1, 29),
+    ]
 
 
 def test_a_message_with_others_behind_it_does_not_ask_for_a_longer_queue():

@@ -74,6 +74,14 @@ test_drawn = group_cases(
             -> a: a expired
             """,
         ),
+        "a message of just the greatest age still serves": (
+            partial(by_clock, age=4),
+            """
+            lidar |.a....
+            odom  |.A....
+            -> @5: aA
+            """,
+        ),
         "of the messages between two ticks only the last is kept": (
             partial(by_clock, queue=1),
             """

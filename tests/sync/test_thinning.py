@@ -1,6 +1,6 @@
 from functools import partial
 
-from syncrelay.sync import DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
+from syncrelay.sync import ApproximateTimeEager, DropReason, EqualKey, ExactTime, LatestTime, Message, SyncGroup
 from tests.sync.support.timeline import START_NS, TICK_NS, group_cases, stamp
 
 
@@ -153,3 +153,22 @@ def test_sets_without_stamps_are_thinned_by_the_clock():
             tick for outcome in group.add(Message(1, 0, tick, key=tick), now=now) if hasattr(outcome, "messages")
         ]
     assert passed == [0, 2, 4]
+
+
+def test_the_period_is_of_the_stamps_that_sets_are_matched_by():
+    group = exact(period=2, offsets_ns=(0, 10 * TICK_NS))
+    for column in range(4):
+        group.add(Message(0, stamp(column), None), now=0)
+        group.add(Message(1, stamp(column - 10), None), now=0)
+    assert group.sets == 2
+
+
+def test_the_period_is_of_the_latest_required_stamp_of_a_set():
+    # Both sets end within a period of each other, but for their earliest stamps, the optional one, or no offset.
+    policy = ApproximateTimeEager(n_inputs=3, queue_size=9, slop_ns=3 * TICK_NS)
+    offsets_ns = (0, 10 * TICK_NS, 0)
+    group = grouped(policy, period=4, required=(True, True, False), max_wait_ns=0, offsets_ns=offsets_ns)
+    for index, column in ((0, 0), (1, 3), (2, 7), (0, 4), (1, 5)):
+        group.add(Message(index, stamp(column) - offsets_ns[index], None), now=0)
+    assert group.sets == 1
+    assert [counts.dropped for counts in group.counts()] == [{DropReason.THINNED: 1}] * 3
