@@ -7,9 +7,10 @@ from syncrelay.sync import (
     DropReason,
     InputCounts,
     Message,
+    Restamp,
 )
 from tests.sync.support.grouped import GAP, approximate, by_key, exact, latest
-from tests.sync.support.timeline import START_NS, group_cases, play_group, stamp
+from tests.sync.support.timeline import START_NS, TICK_NS, group_cases, play_group, stamp
 
 test_disorder = group_cases(
     {
@@ -127,6 +128,23 @@ def test_offsets_of_required_inputs_count_for_the_optional_ones():
         group.add(Message(index, time, None), now=0)
     (match,) = group.add(Message(1, START_NS + 5, None), now=0)
     assert [message.input for message in match.messages] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("restamp", "expected"), [(None, None), (Restamp.EARLIEST, 0), (Restamp.LATEST, 3), (1, 3), (0, 0)]
+)
+def test_restamp_gives_the_set_a_common_stamp(restamp, expected):
+    group = approximate(slop=5, restamp=restamp, offsets_ns=(0, -3 * TICK_NS))
+    group.add(Message(0, stamp(0), "a"), now=0)
+    (match,) = group.add(Message(1, stamp(3), "A"), now=0)
+    assert match.stamp == (None if expected is None else stamp(expected))
+
+
+def test_restamp_by_a_missing_input_gives_the_earliest_stamp():
+    group = approximate(3, required=(True, True, False), slop=5, restamp=2, max_wait=0)
+    group.add(Message(0, stamp(2), "a"), now=0)
+    (match,) = group.add(Message(1, stamp(2), "A"), now=0)
+    assert (match.messages[2], match.stamp) == (None, stamp(2))
 
 
 def test_counts_say_where_every_message_went():

@@ -5,13 +5,14 @@ from functools import partial
 import pytest
 
 from syncrelay.sync import (
+    ApproximateEpsilonTime,
     ApproximateTime,
     Drop,
     DropReason,
     LatestTime,
     Message,
 )
-from tests.sync.support.grouped import approximate, by_key, exact, grouped, paced, third_optional
+from tests.sync.support.grouped import approximate, by_key, eager, exact, grouped, paced, third_optional
 from tests.sync.support.timeline import START_NS, TICK_NS, group_cases, stamp
 
 test_optional = group_cases(
@@ -96,6 +97,29 @@ test_optional = group_cases(
             imu    |....v...
             gps    |x......y
             -> y: x too_far, bBv-
+            """,
+        ),
+        "epsilon counts for them as slop does": (
+            lambda: grouped(
+                ApproximateEpsilonTime(n_inputs=3, queue_size=2, epsilon_ns=TICK_NS),
+                required=(True, False, True),
+                max_wait=9,
+            ),
+            """
+            lidar  |a....b...
+            imu    |.x......y
+            camera |.A...B...
+            -> A: axA
+            -> y: b-B
+            """,
+        ),
+        "slop counts from the ends of a set": (
+            partial(eager, slop=4),
+            """
+            lidar  |..a.....
+            camera |.....A..
+            imu    |x......y
+            -> y: x too_far, aA-
             """,
         ),
         "of two sets that wait, a message as near to both goes to the first": (

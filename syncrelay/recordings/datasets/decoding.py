@@ -87,8 +87,6 @@ def _struct(node: Struct, rows: Rows) -> pa.Array:
             columns.append(_column(field.node, rows))
         else:
             rows.skip(field.node)
-    if not node.fields:
-        rows.skip(node)
     return pa.Array.from_buffers(arrow_type(node), len(rows), [None], children=columns)
 
 

@@ -127,7 +127,7 @@ def size_of_many(each: tuple[int, ...], count: int, place: int) -> int:
 
 
 def _size_of_all(parts: Sequence[Sizes]) -> Sizes:
-    """Return the sizes of fields that follow each other. A message without fields is one byte (rosidl)."""
+    """Return the sizes of fields that follow each other. To rosbags, as to rosidl, each message has at least one."""
     sizes = []
     for place in range(_LARGEST_ALIGNMENT):
         end = place
@@ -135,7 +135,7 @@ def _size_of_all(parts: Sequence[Sizes]) -> Sizes:
             if part is None:
                 return None
             end += part[end % _LARGEST_ALIGNMENT]
-        sizes.append(end - place if parts else 1)
+        sizes.append(end - place)
     return tuple(sizes)
 
 

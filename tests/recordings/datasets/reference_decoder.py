@@ -42,25 +42,13 @@ def decode(store: Any, name: str, payload: bytes) -> Any:
     return message if reader.at <= len(reader.body) <= reader.at + 3 else None
 
 
-def is_left_out(store: Any, kind: Any) -> bool:
-    """Whether a field has no column: a message without fields, or an array of such."""
-    what, of = kind
-    if what == Nodetype.NAME:
-        return all(is_left_out(store, each) for _, each in store.fielddefs[of][1])
-    return what != Nodetype.BASE and is_left_out(store, of[0])
-
-
 class _Reader:
     def __init__(self, store: Any, body: bytes, order: str) -> None:
         self.store, self.body, self.order = store, body, order
         self.at = 0
 
     def message(self, name: str) -> dict[str, Any]:
-        fields = self.store.fielddefs[name][1]
-        if not fields:
-            self.at += 1
-        values = {field: self.value(kind) for field, kind in fields}
-        return {field: values[field] for field, kind in fields if not is_left_out(self.store, kind)}
+        return {field: self.value(kind) for field, kind in self.store.fielddefs[name][1]}
 
     def value(self, kind: Any) -> Any:
         what, of = kind
