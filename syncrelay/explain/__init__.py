@@ -8,7 +8,7 @@ from syncrelay.explain.cause_log import CauseLog
 from syncrelay.explain.clocks import STEP_NS, Step
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import BOUNDS_NS, Distribution, Histogram
-from syncrelay.explain.dry_run import UNREADABLE, DryRun, EngineDriver, dry_run
+from syncrelay.explain.dry_run import UNREADABLE, EngineDriver
 from syncrelay.explain.facts import (
     ClockState,
     Endpoint,
@@ -48,7 +48,6 @@ __all__ = [
     "Code",
     "Distribution",
     "DropFates",
-    "DryRun",
     "Endpoint",
     "EngineDriver",
     "Finding",
@@ -82,7 +81,6 @@ __all__ = [
     "Tolerance",
     "TryBudget",
     "drop_fates",
-    "dry_run",
     "explanation",
     "in_words",
     "judge",

@@ -1,11 +1,10 @@
 """A group's engine driven through messages in the order of their receipt, each at its time, as the relay drives it."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Final, Protocol, TypeAlias
 
 from syncrelay.config import GroupConfig
-from syncrelay.sync import DropReason, InputCounts, Match, Message, Outcome
+from syncrelay.sync import DropReason, Message, Outcome
 
 Take: TypeAlias = Callable[[Sequence[Outcome], int], None]
 """Told of what leaves together, and at what time, in nanoseconds of receipt."""
@@ -88,36 +87,3 @@ class EngineDriver:
 
 def _take_nothing(_outcomes: Sequence[Outcome], _now: int) -> None:
     """Stand in for who is told."""
-
-
-@dataclass(frozen=True, slots=True)
-class DryRun:
-    """What a group would have made of messages.
-
-    `spans` are those of its sets, offsets added, in nanoseconds; `held` is how many of them have each input.
-    """
-
-    sets: int
-    counts: tuple[InputCounts, ...]
-    spans: tuple[int, ...]
-    held: tuple[int, ...]
-
-
-def dry_run(group: GroupConfig, messages: Iterable[Message]) -> DryRun:
-    """Return what a group would have made of messages as `run` takes them, with nobody waiting at the end."""
-    spans: list[int] = []
-    held = [0] * len(group.topics)
-    offsets = [topic.offset_ns for topic in group.topics]
-
-    def take(outcomes: Sequence[Outcome], _now: int) -> None:
-        for outcome in outcomes:
-            if isinstance(outcome, Match):
-                there = [each for each in outcome.messages if each is not None]
-                stamps = [each.stamp + offsets[each.input] for each in there]
-                spans.append(max(stamps) - min(stamps))
-                for each in there:
-                    held[each.input] += 1
-
-    driver = EngineDriver(group, take)
-    driver.run(messages)
-    return DryRun(driver.engine.sets, driver.engine.counts(), tuple(spans), tuple(held))

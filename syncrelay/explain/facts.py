@@ -8,7 +8,7 @@ from syncrelay.config import Distance, Tolerance
 from syncrelay.explain.clocks import Step
 from syncrelay.explain.figures import GroupFigures, InputFigures
 from syncrelay.explain.standing import Standing
-from syncrelay.explain.suggestions import Evaluator
+from syncrelay.explain.suggester import Suggester
 from syncrelay.explain.unneeded import DropFates, drop_fates, may_set_pace
 from syncrelay.sync.counts import InputCounts
 
@@ -189,7 +189,7 @@ class GroupFacts:
     since when it is paused, and `unpaused` when the last pause ended; `asleep` that it is lazy and nobody subscribes to
     what it gives; `empty_graph` the graph, where it holds no node but our own.
     `is_discovering` says that nodes that run may not be in the graph yet, because this one has just joined it.
-    `evaluator` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
+    `suggester` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
     the name of a managed node that waits to be activated. `standing` is how many of the possible sets leave.
     """
 
@@ -216,7 +216,7 @@ class GroupFacts:
     pause: Pause | None = None
     unpaused: int | None = None
     asleep: bool = False
-    evaluator: Evaluator | None = field(default=None, compare=False, repr=False)
+    suggester: Suggester | None = field(default=None, compare=False, repr=False)
     empty_graph: GraphSnapshot | None = None
     is_discovering: bool = False
     inactive: str | None = None

@@ -152,7 +152,7 @@ class FindingLog:
 
 
 def _awaits_a_try(facts: GroupFacts, finding: Finding) -> bool:
-    return facts.evaluator is not None and facts.evaluator.awaits((finding.code, finding.input))
+    return facts.suggester is not None and facts.suggester.awaits((finding.code, finding.input))
 
 
 def _lasting(facts: GroupFacts, finding: Finding) -> int:

@@ -1,103 +1,274 @@
-"""The tightest set that each message of one input could have had, whatever the slop and the queues."""
+"""Which messages are nearest to which, on arrays: the sets that there could be, whatever the slop and the queues."""
 
-from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Mapping, Sequence
-from typing import Final, TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple, TypeAlias
 
-from syncrelay.config import Distance
-from syncrelay.explain.distribution import Distribution
+import numpy as np
+import numpy.typing as npt
 
-# More than comes between two looks, at 1 kHz; what an input piles up while another is silent is cut to this.
-_KEPT = 5_000
+from syncrelay.config import Distance, GroupConfig
+from syncrelay.explain.dry_run import UNREADABLE
+from syncrelay.sync import Message
 
-Sides: TypeAlias = Sequence[tuple[int | None, int]]
-"""For each other input: how far before the message its nearest one is, None where there is none, and how far after."""
+Nanoseconds: TypeAlias = npt.NDArray[np.int64]
 
-
-def tightest_span(sides: Sides) -> int | None:
-    """Return the span of the tightest set around a message."""
-    if len(sides) == 1:
-        before, after = sides[0]
-        return after if before is None else min(before, after)
-    return min(_span_from(left, sides) for left in {0, *(before for before, _ in sides if before is not None)})
-
-
-def _span_from(left: int, sides: Sides) -> int:
-    """Give the span of the set that begins `left` before its message: what does not lie within comes after it."""
-    return left + max(0 if before is not None and before <= left else after for before, after in sides)
-
-
-def greatest_age(sides: Sides) -> int | None:
-    """Return how much older than a message the latest not newer one of the others is at most, None if one has none."""
-    ages = [before for before, _ in sides if before is not None]
-    return max(ages) if len(ages) == len(sides) else None
+# More than arrives between two polls at 1 kHz. Of an input whose partner is silent, no more are kept.
+_KEPT: Final = 5_000
+# Stands for "no message on this side". Twice this still fits into 64 bits.
+_FAR: Final = 2**61
+_LATEST: Final = 2**62 - 1
+# Stamps are meant to be equal if this share of them is. One that is not has lost its partner.
+_EQUAL: Final = 0.8
+# A set that spans more periods of its slowest input, or more times the usual span, pairs messages of two moments.
+_PERIODS: Final = 1.5
+_FAR_OFF: Final = 4
+# Of a steady input, the nearest message is at most half a period away, and its jitter, unless it was lost.
+_NOT_NEAREST: Final = 0.6
 
 
-_MEASURES: Final[Mapping[Distance, Callable[[Sides], int | None]]] = {
-    Distance.SPAN: tightest_span,
-    Distance.AGE: greatest_age,
-}
+class Received(NamedTuple):
+    """One input's messages as they arrived: stamps, times of receipt, and their places among those of all inputs."""
+
+    stamps: Nanoseconds
+    received: Nanoseconds
+    places: Nanoseconds
 
 
-def signed_distances(stamps: Sequence[int], others: Sequence[int]) -> Distribution:
-    """Return how far after each stamp the nearest of the others is, less than 0 where it is before; in order both.
+class InOrder(NamedTuple):
+    """An input's distinct stamps in order, offset added, the place of each message, and all places in order."""
 
-    Only of stamps that have one on either side.
+    stamps: Nanoseconds
+    places: Nanoseconds
+    arrivals: Nanoseconds
+
+
+class Sides(NamedTuple):
+    """For each stamp of one input: how far before and after it the nearest of another is, and the first not older."""
+
+    before: Nanoseconds
+    after: Nanoseconds
+    at: Nanoseconds
+
+
+@dataclass(frozen=True, slots=True)
+class PossibleSets:
+    """The sets of one moment: a set for each message of the pivot whose partners belong to it.
+
+    `stamps` are those of the pivot's messages without offset, `spans` those of the sets, `queues` how many messages the
+    fullest queue must hold until the set is complete. `is_exact` says that the stamps of a set are meant to be equal.
+    Where `is_alone`, one input is required, and each of its messages is a set with a span of 0.
     """
-    places = [bisect_left(others, stamp) for stamp in stamps]
-    return Distribution(
-        [
-            min(others[place] - stamp, others[place - 1] - stamp, key=abs)
-            for stamp, place in zip(stamps, places, strict=True)
-            if 0 < place < len(others)
-        ]
+
+    among: tuple[int, ...]
+    pivot: int
+    stamps: Nanoseconds
+    spans: Nanoseconds
+    queues: Nanoseconds
+    is_exact: bool = False
+    is_alone: bool = False
+
+    def __len__(self) -> int:
+        return len(self.spans)
+
+    @property
+    def widest(self) -> int:
+        """The span of the widest, 0 where there is none."""
+        return int(self.spans.max(initial=0))
+
+
+def as_arrays(messages: Sequence[Message], n_inputs: int) -> tuple[Received, ...]:
+    """Return messages, in the order of receipt and with the time of receipt as payload, as arrays for each input."""
+    columns = np.array([(each.stamp, each.payload, each.input) for each in messages], dtype=np.int64).reshape(-1, 3)
+    places = [np.nonzero(columns[:, 2] == index)[0] for index in range(n_inputs)]
+    return tuple(Received(columns[at, 0], columns[at, 1], at) for at in places)
+
+
+def in_order(messages: Received, offset: int) -> InOrder:
+    """Sort an input's messages by stamp. Of messages with one stamp the last counts, as it does in the engine."""
+    is_set = (messages.stamps != 0) & (messages.stamps != UNREADABLE)
+    stamps, places = messages.stamps[is_set], messages.places[is_set]
+    _, last = np.unique(stamps[::-1], return_index=True)
+    at = len(stamps) - 1 - last
+    return InOrder(shifted(stamps[at], offset), places[at], np.sort(messages.places))
+
+
+def shifted(stamps: Nanoseconds, offset: int) -> Nanoseconds:
+    """Add an offset to stamps, and keep them so far from the ends of 64 bits that they can be subtracted."""
+    moved: Nanoseconds = np.clip(stamps + max(-_LATEST, min(_LATEST, offset)), -_LATEST, _LATEST)
+    return moved
+
+
+def sides(stamps: Nanoseconds, others: Nanoseconds) -> Sides:
+    """Find the nearest of other stamps, in order, on both sides of each stamp."""
+    at = np.searchsorted(others, stamps, side="left")
+    if not len(others):
+        far = np.full(len(stamps), _FAR, dtype=np.int64)
+        return Sides(far, far, at)
+    after = np.where(at < len(others), others[np.minimum(at, len(others) - 1)] - stamps, _FAR)
+    before = np.where(at > 0, stamps - others[np.maximum(at - 1, 0)], _FAR)
+    before, after = np.minimum(before, _FAR), np.minimum(after, _FAR)
+    return Sides(np.where(after == 0, 0, before), after, at)
+
+
+def signed_distances(stamps: Nanoseconds, others: Nanoseconds) -> Nanoseconds:
+    """Return how far after each stamp the nearest of the others is, less than 0 where it is before; both in order.
+
+    Only stamps with one of the others on either side count.
+    """
+    found = sides(stamps, others)
+    signed = np.where(found.after < found.before, found.after, -found.before)
+    between: Nanoseconds = signed[(found.at > 0) & (found.at < len(others))]
+    return between
+
+
+def quantile(values: Nanoseconds, share: float) -> int:
+    """Return the value that `share` of all do not exceed; it occurred. Floats would lose an epoch's nanoseconds."""
+    return int(np.quantile(values, share, method="inverted_cdf"))
+
+
+def possible_sets(
+    config: GroupConfig, inputs: Sequence[Received], among: Sequence[int], *, is_window: bool
+) -> PossibleSets | None:
+    """Return the sets of one moment of some inputs, by their indices; None where one of them has no stamps.
+
+    A window cuts partners off: in one, only those messages count that have something of each input on either side.
+    """
+    ordered = [in_order(inputs[index], config.topics[index].offset_ns) for index in among]
+    if not all(len(each.stamps) for each in ordered):
+        return None
+    pivot = min(range(len(among)), key=lambda at: len(ordered[at].stamps))
+    if config.trigger is not None:
+        pivot = list(among).index(config.trigger)
+    pivots, others = ordered[pivot], [each for at, each in enumerate(ordered) if at != pivot]
+    found = [sides(pivots.stamps, each.stamps) for each in others]
+    is_age = config.options.distance is Distance.AGE
+    spans, left = _ages(len(pivots.stamps), found) if is_age else tightest_spans(len(pivots.stamps), found)
+    partners = [
+        np.clip(np.where((each.before <= left) & (each.after != 0), each.at - 1, each.at), 0, len(other.stamps) - 1)
+        for each, other in zip(found, others, strict=True)
+    ]
+    waits = config.options.waits_for_next and config.options.max_wait is None
+    chosen = [(pivots, np.arange(len(spans))), *zip(others, partners, strict=True)]
+    queues = _queues(chosen, successors=int(waits))
+    belong = spans < _FAR
+    if is_window:
+        begin, end = max(each.stamps[0] for each in ordered), min(each.stamps[-1] for each in ordered)
+        belong &= (pivots.stamps >= begin) & (pivots.stamps <= end)
+    is_alone = len(among) == 1
+    is_exact = not is_alone and not is_age and float(np.mean(spans == 0)) >= _EQUAL
+    if is_exact:
+        belong &= spans == 0
+    elif not is_alone and not is_age:
+        for side, other in zip(found, others, strict=True):
+            belong &= ~_is_lost(side, other.stamps)
+        periods = [_period(each.stamps) for each in others]
+        usual = quantile(spans[belong], 0.75) if belong.any() else 0
+        belong &= spans <= min(_PERIODS * max(periods), _FAR_OFF * usual)
+        if not config.options.repeats:
+            belong &= _disjoint(spans, partners)
+    unshifted = shifted(pivots.stamps, -config.topics[among[pivot]].offset_ns)
+    return PossibleSets(
+        tuple(among), among[pivot], unshifted[belong], spans[belong], queues[belong], is_exact, is_alone
     )
 
 
+def tightest_spans(count: int, found: Sequence[Sides]) -> tuple[Nanoseconds, Nanoseconds]:
+    """Return the span of the tightest set around each of so many messages, and how far before it that set begins."""
+    best = np.full(count, 2 * _FAR if found else 0, dtype=np.int64)
+    best_left = np.zeros(count, dtype=np.int64)
+    for left in [np.zeros(count, dtype=np.int64), *(each.before for each in found)] if found else ():
+        reach = np.zeros(count, dtype=np.int64)
+        for before, after, _ in found:
+            reach = np.maximum(reach, np.where(before <= left, 0, after))
+        is_less = left + reach < best
+        best, best_left = np.where(is_less, left + reach, best), np.where(is_less, left, best_left)
+    return best, best_left
+
+
+def _ages(count: int, found: Sequence[Sides]) -> tuple[Nanoseconds, Nanoseconds]:
+    """Return how much older the oldest of the latest not newer messages is than each of so many; twice, as the left."""
+    oldest = np.zeros(count, dtype=np.int64)
+    for each in found:
+        oldest = np.maximum(oldest, each.before)
+    return oldest, oldest
+
+
+def _queues(chosen: Sequence[tuple[InOrder, Nanoseconds]], *, successors: int) -> Nanoseconds:
+    """Return how long the fullest queue is when each set is complete, or so many messages of each input later."""
+    complete = np.zeros(len(chosen[0][1]), dtype=np.int64)
+    for each, at in chosen:
+        complete = np.maximum(complete, each.places[np.minimum(at + successors, len(each.places) - 1)])
+    longest = np.ones(len(complete), dtype=np.int64)
+    for each, at in chosen:
+        since = np.searchsorted(each.arrivals, each.places[at])
+        longest = np.maximum(longest, np.searchsorted(each.arrivals, complete, side="right") - since)
+    return longest
+
+
+def _is_lost(found: Sides, stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
+    """Tell around which messages the partner of a steady input is missing: they are amid a gap, far from its ends."""
+    period = _period(stamps)
+    if not period or quantile(np.diff(stamps), 0.75) > _PERIODS * period:
+        return np.zeros(len(found.at), dtype=np.bool_)
+    gap = found.before + found.after
+    return (gap > _PERIODS * period) & (np.minimum(found.before, found.after) > _NOT_NEAREST * period)
+
+
+def _period(stamps: Nanoseconds) -> float:
+    return float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+
+
+def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArray[np.bool_]:
+    """Tell which sets share no message with a tighter one: only these are nearest to each other mutually."""
+    order = np.argsort(spans, kind="stable")
+    rows = np.stack(partners, axis=1)[order].tolist()
+    taken: list[set[int]] = [set() for _ in partners]
+    free = np.zeros(len(spans), dtype=np.bool_)
+    for place, row in zip(order.tolist(), rows, strict=True):
+        if not any(each in used for each, used in zip(row, taken, strict=True)):
+            free[place] = True
+            for each, used in zip(row, taken, strict=True):
+                used.add(each)
+    return free
+
+
+def _as_array(stamps: Sequence[int]) -> Nanoseconds:
+    return np.array([max(-_LATEST, min(_LATEST, stamp)) for stamp in stamps], dtype=np.int64)
+
+
 class NearestSpans:
-    """Measures, in nanoseconds, over the stamps that come in, as soon as it is certain, each message once."""
+    """Measures the tightest set of each message of one input once, as soon as no later message can change it."""
 
     def __init__(self, n_inputs: int, distance: Distance = Distance.SPAN) -> None:
-        self._stamps: list[list[int]] = [[] for _ in range(n_inputs)]
-        self._measure = _MEASURES[distance]
+        self._measure = _ages if distance is Distance.AGE else tightest_spans
+        self._stamps = [np.zeros(0, dtype=np.int64)] * n_inputs
         self._measured_until: int | None = None
 
     def clear(self) -> None:
         """Start afresh: the stamps to come are of another time."""
-        self._stamps = [[] for _ in self._stamps]
+        self._stamps = [each[:0] for each in self._stamps]
         self._measured_until = None
 
     def add(self, stamps: Sequence[Sequence[int]], *, pivot: int) -> list[int]:
-        """Take the stamps of each input that came since the last call; give the spans that are certain now.
+        """Take the stamps of each input since the last call; give the spans, of messages of `pivot`, that are certain.
 
-        They are those of the messages of the `pivot`, an input's index.
+        A span is certain once every input has a stamp on either side of the message.
         """
-        for kept, new in zip(self._stamps, stamps, strict=True):
-            kept.extend(new)
-            kept.sort()
-            del kept[: max(0, len(kept) - _KEPT)]
-        if not all(self._stamps):
+        self._stamps = [
+            np.sort(np.concatenate((kept, _as_array(new))))[-_KEPT:] if new else kept
+            for kept, new in zip(self._stamps, stamps, strict=True)
+        ]
+        if not all(len(each) for each in self._stamps):
             return []
-        begin, end = self._stretch()
+        begin, end = int(max(each[0] for each in self._stamps)), int(min(each[-1] for each in self._stamps))
+        if self._measured_until is not None:
+            begin = max(begin, self._measured_until + 1)
         pivots = self._stamps[pivot]
-        others = [kept for index, kept in enumerate(self._stamps) if index != pivot]
-        measured = pivots[bisect_left(pivots, begin) : bisect_right(pivots, end)]
-        measure = self._measure
-        spans = [measure([_sides(kept, stamp) for kept in others]) for stamp in measured]
+        pivots = pivots[(pivots >= begin) & (pivots <= end)]
+        found = [sides(pivots, each) for index, each in enumerate(self._stamps) if index != pivot]
+        spans, _ = self._measure(len(pivots), found)
         self._measured_until = end
-        for kept in self._stamps:
-            # One before the stretch to come may be the nearest to its first message.
-            del kept[: max(0, bisect_right(kept, end) - 1)]
-        return [span for span in spans if span is not None]
-
-    def _stretch(self) -> tuple[int, int]:
-        """Give the first and the last stamp that can be measured now: every input has something on either side."""
-        first = max(kept[0] for kept in self._stamps)
-        begin = first if self._measured_until is None else max(first, self._measured_until + 1)
-        return begin, min(kept[-1] for kept in self._stamps)
-
-
-def _sides(kept: Sequence[int], stamp: int) -> tuple[int | None, int]:
-    after = bisect_left(kept, stamp)
-    distance = kept[after] - stamp
-    return 0 if distance == 0 else stamp - kept[after - 1] if after else None, distance
+        # One before the next stretch may be the nearest to its first message.
+        self._stamps = [each[max(0, int(np.searchsorted(each, end, side="right")) - 1) :] for each in self._stamps]
+        return [int(span) for span in spans if span < _FAR]

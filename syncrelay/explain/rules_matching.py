@@ -1,9 +1,10 @@
 """Findings about matching: sets too wide, queues too short, optional inputs left out, sets that do not leave."""
 
-from collections.abc import Callable, Iterator
-from itertools import islice
+from collections.abc import Callable
 from statistics import median_low
 from typing import Final
+
+import numpy as np
 
 from syncrelay.config import Distance, Tolerance
 from syncrelay.config.units import parse_duration
@@ -12,20 +13,11 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Finding, Found, absence, counted, nodes
-from syncrelay.explain.nearest import signed_distances
+from syncrelay.explain.nearest import quantile, signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
 from syncrelay.explain.standing import Standing
-from syncrelay.explain.suggestions import (
-    UNTRIED,
-    Change,
-    Changes,
-    Trials,
-    Tried,
-    Verdict,
-    constant_offsets,
-    with_headroom,
-)
+from syncrelay.explain.suggester import REQUIRED, UNTRIED, Changes, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # A share of the slowest input's messages that could have no set, and from how many on it means something.
@@ -49,6 +41,9 @@ _OFF: Final = 0.15
 _CONSTANT: Final = 0.05
 _WHOLE: Final = 0.1
 _OTHER_CLOCK: Final = SECOND
+# Keys that cure what a queue overflowed, and what came too late for its set.
+_QUEUE: Final = frozenset({"queue_size"})
+_WAITING: Final = frozenset({"queue_size", "max_wait"})
 
 
 def over_slop(facts: GroupFacts) -> Found:
@@ -65,7 +60,7 @@ def over_slop(facts: GroupFacts) -> Found:
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
-    found = _tried(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
+    found = _asked(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
     yield Finding(
         Code.OVER_SLOP,
         severity,
@@ -98,21 +93,17 @@ def _too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) ->
     return f"the nearest sets span {widths}, over {limit}"
 
 
-def _wide_enough(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution, trials: Trials) -> Iterator[Tried]:
-    """Yield a wider tolerance and constant offsets that help."""
-    if not trials.spans:
-        return
-    wider = with_headroom(trials.spans)
+def _wide_enough(
+    facts: GroupFacts, tolerance: Tolerance, nearest: Distribution, trials: Trials, target: int | None = REQUIRED
+) -> Verdict:
+    """Find a wider tolerance and constant offsets that help."""
+    tried = trials.verdict(target, {tolerance.key, "policy", "queue_size"})
+    wider = [parse_duration(each.value) for one in tried.tried for each in one.changes if each.key == tolerance.key]
     # What is far apart although others are near has no partner: a wider slop would pair what does not belong together.
-    is_far = trials.spans.quantile(0.99) > tolerance.ns and not next(constant_offset(facts), None)
-    if is_far and nearest.share_over(parse_duration(wider)) <= _MISSED:
-        others = (tolerance.wider_policy, trials.config.options.patient_policy)
-        policies: list[Changes] = [] if tolerance.wider_policy else [()]
-        policies += [(Change("policy", each),) for each in others if each]
-        values = ((*policy, Change(tolerance.key, wider)) for policy in policies)
-        yield from islice(filter(None, map(trials.try_out, values)), 1)
-    if facts.distance is Distance.SPAN:
-        yield from filter(None, (trials.gives_enough((each,)) for each in dict.fromkeys(constant_offsets(trials))))
+    if not wider or nearest.share_over(wider[0]) > _MISSED or next(constant_offset(facts), None):
+        tried = Verdict((), tried.may_miss)
+    offsets = filter(None, map(trials.by_offset, dict.fromkeys(trials.offsets())))
+    return tried._replace(tried=(*tried.tried, *offsets))
 
 
 def constant_offset(facts: GroupFacts) -> Found:
@@ -157,10 +148,10 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
     if abs(one.figures.pace_hz * period / SECOND - 1) > _CONSTANT:
         return None
     shifted = [[stamp + each.offset for stamp in each.figures.stamps] for each in (one, two)]
-    signed = signed_distances(*shifted)
-    if len(signed) < _ENOUGH or signed.quantile(0.95) - signed.quantile(0.05) > _CONSTANT * period:
+    signed = signed_distances(*(np.sort(np.array(each, dtype=np.int64)) for each in shifted))
+    if len(signed) < _ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _CONSTANT * period:
         return None
-    distance = signed.quantile(0.5)
+    distance = quantile(signed, 0.5)
     later = (two.figures.delay or 0) - two.offset - (one.figures.delay or 0) + one.offset
     apart = distance + later
     whole = round(apart / period)
@@ -183,8 +174,7 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         return
     if next(other_clock(facts), None):
         return  # what waits for a partner of another clock overflows any queue
-    within = facts.tolerance.ns if facts.tolerance else None
-    found = _tried(facts, (Code.SHORT_QUEUE, index), lambda trials: _long_enough(needed, trials), within=within)
+    found = _asked(facts, (Code.SHORT_QUEUE, index), lambda trials: trials.verdict(REQUIRED, _QUEUE))
     if not found.may_miss:
         return
     yield Finding(
@@ -195,12 +185,6 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         _advice(facts, found),
         index,
     )
-
-
-def _long_enough(needed: int | None, trials: Trials) -> Iterator[Tried]:
-    """Yield a longer queue that helps."""
-    if tried := trials.try_out((), need=needed):
-        yield tried
 
 
 def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -235,13 +219,11 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
     """Tell stamps that fit no set, and messages that come after theirs has left."""
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
     about, behind = (Code.WAITING_FOR_OPTIONAL, index), _behind(facts, an_input)
-    within = tolerance.ns if tolerance else None
     if tolerance is None or len(nearest) < _FEWEST:
-        found = _tried(facts, about, lambda trials: _long_enough(None, trials), optional=index, within=within)
+        found = _asked(facts, about, lambda trials: trials.verdict(index, _QUEUE))
         return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
     if abs(behind) > max(SECOND, tolerance.ns):
-        offset = Change("offset", words.exactly(behind + an_input.offset), index)
-        found = _tried(facts, about, lambda trials: filter(None, [trials.gives_enough((offset,))]), optional=index)
+        found = _asked(facts, about, lambda trials: _in_time(index, trials))
         side = "behind" if behind > 0 else "ahead of"
         return (
             f": its stamps are {words.duration(abs(behind))} {side} those of the others",
@@ -249,30 +231,26 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
         )
     if nearest.quantile(0.5) > tolerance.ns:
         widths = f"{words.duration(nearest.quantile(0))} to {words.duration(nearest.quantile(0.95))}"
-        found = _tried(facts, about, lambda trials: _wide_enough(facts, tolerance, nearest, trials), optional=index)
+        found = _asked(facts, about, lambda trials: _wide_enough(facts, tolerance, nearest, trials, index))
         return (
             f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
             _advice(facts, found, name) or f"check how {nodes(an_input)} stamps its messages",
         )
     if facts.max_wait is not None and behind > facts.max_wait:
-        found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=tolerance.ns)
+        found = _asked(facts, about, lambda trials: trials.verdict(index, _WAITING))
         return (
             f": it arrives {words.duration(behind)} after the others, too late",
             f"check what delays {name}{_or(_advice(facts, found, name))}",
         )
-    found = _tried(facts, about, lambda trials: _waits_enough(index, trials), optional=index, within=within)
+    found = _asked(facts, about, lambda trials: trials.verdict(index, _WAITING))
     return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
 
 
-def _waits_enough(index: int, trials: Trials) -> Iterator[Tried]:
-    """Yield a wait for an optional input that helps: what it is later by, and what that scatters by."""
-    others = [median_low(each) for other, each in enumerate(trials.delays) if other != index and each]
-    if not others or not trials.delays[index]:
-        return
-    late = Distribution([delay - min(others) for delay in trials.delays[index]])
-    wait = parse_duration(with_headroom(late))
-    values: list[Changes] = [(Change("max_wait", words.at_least(times * wait)),) for times in (1, 2) if wait > 0]
-    yield from islice(filter(None, map(trials.try_out, [*values, ()])), 1)
+def _in_time(index: int, trials: Trials) -> Verdict:
+    """Find an offset for an optional input of another clock."""
+    offset = trials.clock_offset(index)
+    tried = None if offset is None else trials.by_offset(offset, index)
+    return Verdict(() if tried is None else (tried,))
 
 
 def _away(facts: GroupFacts, an_input: InputFacts) -> tuple[str, str] | None:
@@ -335,32 +313,14 @@ def has_few_sets(facts: GroupFacts) -> bool:
 
 def more_sets(facts: GroupFacts, code: Code) -> str | None:
     """Say what to write where a finding of this code has no cause that is known; None where nothing was found."""
-    within = facts.tolerance.ns if facts.tolerance and not facts.is_silent else None
-    return _advice(facts, _tried(facts, (code, None), lambda trials: _more_sets(facts, trials), within=within))
+    keys = {*_WAITING, "policy"}
+    if facts.is_silent and facts.tolerance:
+        keys.add(facts.tolerance.key)
+    return _advice(facts, _asked(facts, (code, None), lambda trials: trials.verdict(REQUIRED, keys)))
 
 
-def _more_sets(facts: GroupFacts, trials: Trials) -> Iterator[Tried]:
-    """Yield the first that helps: a longer queue, a policy that waits for what comes late, a longer wait, and more."""
-    patient_policy = trials.config.options.patient_policy
-    patient = ((Change("policy", patient_policy),),) if patient_policy else ()
-    waits = (2 * facts.max_wait, 4 * facts.max_wait) if facts.max_wait else ()
-    longer = tuple((Change("max_wait", words.at_least(wait)),) for wait in waits)
-    wider = ((Change(facts.tolerance.key, with_headroom(trials.spans)),),) if facts.tolerance and trials.spans else ()
-    values = ((), *patient, *longer, *(wider if facts.is_silent else ()))
-    yield from islice(filter(None, map(trials.try_out, values)), 1)
-
-
-def _tried(
-    facts: GroupFacts,
-    about: tuple[Code, int | None],
-    propose: Callable[[Trials], Iterator[Tried]],
-    *,
-    within: int | None = None,
-    optional: int | None = None,
-) -> Verdict:
-    if facts.evaluator is None:
-        return UNTRIED
-    return facts.evaluator.best(about, propose, now=facts.figures.now, within=within, optional=optional)
+def _asked(facts: GroupFacts, about: tuple[Code, int | None], question: Callable[[Trials], Verdict]) -> Verdict:
+    return UNTRIED if facts.suggester is None else facts.suggester.ask(about, question, now=facts.figures.now)
 
 
 def _advice(facts: GroupFacts, verdict: Verdict, optional: str | None = None) -> str | None:

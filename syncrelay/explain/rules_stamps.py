@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from statistics import median_low
 from typing import Final
 
+from syncrelay.config.units import parse_duration
 from syncrelay.explain import words
-from syncrelay.explain.clocks import Drift, apart
+from syncrelay.explain.clocks import BOOT_NS, Drift, apart, time_scale
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Finding, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
-from syncrelay.explain.suggestions import Change
+from syncrelay.explain.suggester import Change, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Stamps that are off by more come from another clock, or are older than a queue should hold.
@@ -26,16 +27,6 @@ _SOME: Final = 0.02
 _MOST: Final = 0.5
 # What a computation may take; stamps that are older are those of another clock.
 _LATENCY: Final = 10 * SECOND
-# No machine runs for longer without a boot, nor has its clock been set before 1971.
-_BOOT: Final = 365 * 86_400 * SECOND
-# How close, how far behind UTC, and what it is. GPS time began in 1980 and has no leap seconds, TAI has 37 more.
-_EPOCHS: Final = (
-    (30 * SECOND, 315_964_800 * SECOND, "GPS time, which counts from 1980"),
-    (SECOND // 2, -37 * SECOND, "TAI, the time of PTP clocks, which is 37 s ahead of UTC"),
-    (SECOND // 2, -18 * SECOND, "GPS time, which is 18 s ahead of UTC"),
-)
-_ZONE: Final = 1800 * SECOND
-_MOST_ZONES: Final = 28
 # Stamps that swing there and back are those of two clocks.
 _FEWEST_SWINGS: Final = 2
 # Drift tells sooner if it is great.
@@ -55,6 +46,8 @@ _EVIDENTLY: Final = 0.2
 # A drift explains what is apart if it made so great a part of the tolerance.
 _MATTERS: Final = 0.5
 _STEPPED_ALIKE: Final = SECOND // 2
+# Two ways to measure one offset agree within this share of it.
+_SAME_OFFSET: Final = 0.1
 _SLEW: Final = "check what set the clock {where}; NTP and chrony can be told to slew it instead"
 
 
@@ -126,10 +119,11 @@ def other_clock(facts: GroupFacts) -> Found:
     whose = others[0] if len(others) == 1 else "the other inputs"
     apart_by = f"are {words.span_of_time(abs(behind))} {'behind' if behind > 0 else 'ahead of'} those of {whose}"
     shifted = f", with its offset of {words.exactly(offset)}," if offset else ""
-    if epoch := _epoch(an_input, behind):
-        what, exactly = epoch
+    newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
+    if scale := time_scale(newest, behind):
+        what, exactly = scale
         text = f"stamps of {an_input.name}{shifted} {apart_by}: they {what}"
-        instead = _or_by_arrival(facts, an_input) if abs(behind) > _BOOT else _or_offset(facts, odd, exactly + offset)
+        instead = _or_by_arrival(facts, an_input) if abs(behind) > BOOT_NS else _or_offset(facts, odd, exactly + offset)
         suggestion = f"have {nodes(an_input)} stamp with the host's time{instead}"
     else:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"
@@ -142,14 +136,24 @@ def other_clock(facts: GroupFacts) -> Found:
 
 def offered_offset(facts: GroupFacts, code: Code, index: int, by: int) -> str:
     """Say what offset to write and what it gives, tried where there are messages; nothing where it does not help."""
-    change, gives = Change("offset", words.exactly(by), index), ""
-    if facts.evaluator is not None:
-        tried = facts.evaluator.offset((code, index), change, now=facts.figures.now)
-        if tried is None:
-            return ""
-        (change,) = tried.changes
-        gives = f", which would give {tried.given} of {tried.possible} possible sets"
-    return f"write `offset: {change.value}` at {facts.inputs[index].name}{gives}"
+    name = facts.inputs[index].name
+    if facts.suggester is None:
+        return f"write `offset: {words.exactly(by)}` at {name}"
+
+    def question(trials: Trials) -> Verdict:
+        near = by_clock if code is Code.OTHER_CLOCK and (by_clock := trials.clock_offset(index)) else None
+        near = near or next((each for each in trials.offsets() if each.input == index), None)
+        if near is None or abs(parse_duration(near.value) - by) > _SAME_OFFSET * abs(by):
+            near = Change("offset", words.exactly(by), index)
+        tried = trials.by_offset(near)
+        return Verdict(() if tried is None else (tried,))
+
+    found = facts.suggester.ask((code, index), question, now=facts.figures.now).tried
+    if not found:
+        return ""
+    (change,) = found[0].changes
+    gives = f"which would give {found[0].given} of {found[0].possible} possible sets"
+    return f"write `offset: {change.value}` at {name}, {gives}"
 
 
 def _or_offset(facts: GroupFacts, index: int, by: int) -> str:
@@ -161,20 +165,6 @@ def _wait_for_it(facts: GroupFacts, behind: int, name: str) -> str:
     needed = max((each.counts.needed_queue or 0 for each in facts.inputs), default=0)
     may_be_late = needed > facts.queue_size and 0 < behind < _LATENCY
     return f"; if {name} really takes that long to arrive, write `queue_size: {needed}`" if may_be_late else ""
-
-
-def _epoch(an_input: InputFacts, behind: int) -> tuple[str, int] | None:
-    """Say which time stamps seem to tell that are so far behind those of others, and how far that one is behind."""
-    newest = an_input.figures.stamps[-1] if an_input.figures.stamps else 0
-    if 0 < newest < _BOOT and behind > _BOOT:
-        return "count from boot or the start of a simulation, not from 1970", behind
-    for epoch, off, what in _EPOCHS:
-        if abs(behind - off) < epoch:
-            return f"look like {what}", off
-    zones, rest = divmod(abs(behind) + _ZONE // 2, _ZONE)
-    if 0 < zones <= _MOST_ZONES and abs(rest - _ZONE // 2) < SECOND:
-        return "look like local time, not UTC", zones * _ZONE if behind > 0 else -zones * _ZONE
-    return None
 
 
 def no_common_key(facts: GroupFacts) -> Found:

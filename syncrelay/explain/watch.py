@@ -18,7 +18,7 @@ from syncrelay.explain.facts import (
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.standing import StandingWatch
-from syncrelay.explain.suggestions import Evaluator
+from syncrelay.explain.suggester import Suggester, Trials
 from syncrelay.explain.try_budget import TryBudget
 from syncrelay.sync.counts import InputCounts
 
@@ -27,9 +27,17 @@ class GroupWatch:
     """Gathers what is known of a group, from `began` on; times are nanoseconds of one clock.
 
     `budget` bounds what is tried out for suggestions, together with other groups; without it each try is bounded alone.
+    `whole` gives trials on a whole recording, whose values are then suggested.
     """
 
-    def __init__(self, config: GroupConfig, *, began: int, budget: TryBudget | None = None) -> None:
+    def __init__(
+        self,
+        config: GroupConfig,
+        *,
+        began: int,
+        budget: TryBudget | None = None,
+        whole: Callable[[], Trials] | None = None,
+    ) -> None:
         self.config = config
         self._ticks_hz = None if config.ticks is None else config.ticks.hz
         self._counts: tuple[InputCounts, ...] = config.engine().counts()
@@ -54,7 +62,7 @@ class GroupWatch:
         # Keys are not kept: what is matched by them cannot be run again. Nor can what a clock triggered: it may have
         # been a simulated one, and times of receipt are this machine's.
         can_run = config.options.by_stamp and config.ticks is None
-        self._evaluator = Evaluator(config, self._observation.recent, budget) if can_run else None
+        self._suggester = Suggester(config, self._observation.recent, budget, whole) if can_run else None
 
     def add(
         self,
@@ -158,7 +166,7 @@ class GroupWatch:
             pause=pause,
             unpaused=self._unpaused,
             asleep=asleep,
-            evaluator=self._evaluator,
+            suggester=self._suggester,
             empty_graph=empty_graph,
             is_discovering=is_discovering,
             inactive=inactive,

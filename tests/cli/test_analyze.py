@@ -39,7 +39,7 @@ def test_it_prints_figures_curves_fates_findings_and_a_suggestion(folder):
         "  0 of 100 possible sets",
         "  /lidar: 100 received, 0 in sets, 100 dropped (too_far 100)",
         "  /camera to the nearest /lidar: always -3 ms",
-        "  sets by slop: 0 at 1 ms (in use), 99 at 3 ms (suggested), 99 at 3.3 ms, 99 at 4.5 ms, 99 at 6 ms",
+        "  sets by slop: 0 at 1 ms (in use), 100 at 3 ms (suggested), 100 at 3.3 ms, 100 at 4.5 ms, 100 at 6 ms",
         f"  {_HINT}",
         "  suggestion: 0 -> 100 of 100 possible sets with",
         "        slop: 3ms",
@@ -68,7 +68,7 @@ def test_the_json_holds_the_same_for_programs(folder):
     assert group["pairs"][0]["distance"]["median"] == 3_000_000
     assert group["by_slop"][:2] == [
         {"slop": 1_000_000, "sets": 0, "matched": 0.0, "median_span": 0},
-        {"slop": 3_000_000, "sets": 99, "matched": 0.99, "median_span": 3_000_000},
+        {"slop": 3_000_000, "sets": 100, "matched": 1.0, "median_span": 3_000_000},
     ]
     assert group["tried"] == {"messages": 200, "recorded": 200, "lasts": 9_903_000_000}
     assert [each["unneeded"] for each in group["inputs"]] == [0, 0]

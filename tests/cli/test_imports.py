@@ -9,10 +9,10 @@ from tests.cli.command import GOOD, run_python
 
 # What only other commands need: packages, and the parts of ours that they are for.
 _OF_OTHERS = {
-    *("argcomplete", "jinja2", "lz4", "mcap", "numpy", "packaging", "prometheus_client", "rich", "rosbags", "ruamel"),
+    *("argcomplete", "jinja2", "lz4", "mcap", "packaging", "prometheus_client", "rich", "rosbags", "ruamel"),
     *("textual", "zstandard", "syncrelay.recordings", "syncrelay.doctor", "syncrelay.rig", "syncrelay.top"),
 }
-_OF_THE_RELAY = {"rclpy", "std_msgs", "waitress", "syncrelay.explain", "syncrelay.ros", "syncrelay.status"}
+_OF_THE_RELAY = {"numpy", "rclpy", "std_msgs", "waitress", "syncrelay.explain", "syncrelay.ros", "syncrelay.status"}
 _OF_FILES = {"pydantic", "yaml", "syncrelay.config"}
 _SCRIPT = """
 import json, sys
@@ -52,8 +52,7 @@ def test_the_demos_file_is_shown_without_ros(tmp_path):
 
 @pytest.mark.ros
 def test_the_relay_imports_nothing_that_only_other_commands_need(tmp_path):
-    # All that it imports is there when ROS refuses the argument, before there is a node. A node's own services and most
-    # message packages bring numpy along.
+    # All that it imports is there when ROS refuses the argument, before there is a node.
     found, told = imported(["--config", "f.yaml", "--ros-args", "--nonsense"], folder=tmp_path)
     assert "--nonsense" in told
     assert found >= _OF_THE_RELAY

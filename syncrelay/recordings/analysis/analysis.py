@@ -9,12 +9,14 @@ import yaml
 
 from syncrelay.config import GroupConfig, load_text
 from syncrelay.config.load import spelt_out
+from syncrelay.explain.nearest import PossibleSets
+from syncrelay.explain.suggester import Trials
 from syncrelay.recordings.analysis.changes import Change, with_changes
 from syncrelay.recordings.analysis.curves import Curves, curves_of
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
-from syncrelay.recordings.analysis.nearest import Pair, PossibleSets, pair
-from syncrelay.recordings.analysis.streams import Stream, read_streams
-from syncrelay.recordings.analysis.suggest import Suggestion, possible_sets, stamped, suggest
+from syncrelay.recordings.analysis.pairs import Pair, pair
+from syncrelay.recordings.analysis.streams import Stream, read_streams, stamped
+from syncrelay.recordings.analysis.suggest import Suggestion, suggest, trials_of
 from syncrelay.recordings.analysis.topics import TopicFigures, figures_of
 from syncrelay.recordings.analysis.unneeded import InputFates, Unneeded, find_unneeded, input_fates
 from syncrelay.recordings.analysis.watching import LastingFinding, watch_group
@@ -28,26 +30,34 @@ from syncrelay.recordings.bag.recording import Channel, Recording
 class GroupAnalysis:
     """One group, and the group with the suggested values.
 
-    `possible` is None where no measure tells which messages belong together, or a required input has no stamps.
+    `trials` are those of the group's engine on the whole recording: from them come all values that are suggested.
     """
 
     group: GroupConfig
     suggested: GroupConfig
     streams: tuple[Stream, ...]
     pairs: tuple[Pair, ...]
-    possible: PossibleSets | None
+    trials: Trials
     evaluation: Evaluation
     suggestion: Suggestion
 
     @cached_property
     def findings(self) -> tuple[LastingFinding, ...]:
         """What the running relay would have found, the worst first: it judges once a second of the recording."""
-        return watch_group(self.group, self.streams)
+        return watch_group(self.group, self.streams, whole=lambda: self.trials)
+
+    @property
+    def possible(self) -> PossibleSets | None:
+        """The sets of one moment.
+
+        None where no measure tells which messages belong together, or a required input has no stamps.
+        """
+        return None if self.group.options.matched_by else self.trials.possible()
 
     @cached_property
     def unneeded(self) -> Unneeded:
         """Which dropped messages cost no set."""
-        if self.possible is None or not self.possible.spans:
+        if self.possible is None or not len(self.possible):
             return find_unneeded(self.group, self.evaluation, None)
         slop = self.group.options.tolerance.ns if self.group.options.tolerance else 0
         return find_unneeded(self.group, self.evaluation, slop if self.possible.is_alone else self.possible.widest)
@@ -60,9 +70,7 @@ class GroupAnalysis:
     @cached_property
     def curves(self) -> Curves | None:
         """What other values would give; None where possible sets are not known."""
-        if self.possible is None:
-            return None
-        return curves_of(self.group, self.suggested, self.streams, self.possible)
+        return curves_of(self.group, self.suggested, self.streams)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,13 +145,14 @@ def analyze_group(group: GroupConfig, streams: tuple[Stream, ...], text: str) ->
     def changed(changes: Sequence[Change]) -> GroupConfig:
         return group_of(with_changes(apart, changes), group.name) if changes else group
 
-    suggestion = suggest(group, streams, evaluation, changed)
+    trials = trials_of(group, streams)
+    suggestion = suggest(group, streams, trials, evaluation, changed)
     return GroupAnalysis(
         group=group,
         suggested=changed(suggestion.changes),
         streams=streams,
         pairs=tuple(each for each in pairs if each is not None),
-        possible=possible_sets(group, streams),
+        trials=trials,
         evaluation=evaluation,
         suggestion=suggestion,
     )

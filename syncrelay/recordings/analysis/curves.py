@@ -1,28 +1,22 @@
 """How many sets a group would give with other values: the engine is run with each of them, nothing is estimated."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
-import numpy as np
-
 from syncrelay.config import GroupConfig
-from syncrelay.explain import dry_run
-from syncrelay.recordings.analysis.evaluation import completed
-from syncrelay.recordings.analysis.nearest import PossibleSets
-from syncrelay.recordings.analysis.streams import Stream, messages
-from syncrelay.sync import Message
+from syncrelay.explain.nearest import PossibleSets, as_arrays, quantile
+from syncrelay.explain.suggester import Change, Trials, changed
+from syncrelay.recordings.analysis.streams import Stream, messages, stamped
+from syncrelay.sync.queues import LONGEST_QUEUE
 
 MOST_MESSAGES: Final = 50_000
 """Of a longer recording, these first ones are used: some 20 runs of the engine on them take seconds."""
-LARGEST_QUEUE: Final = 1000
-"""Longer queues are neither tried nor suggested."""
-
 _SHARES: Final = (0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 # Beyond the widest possible set more slop may still help: a queue may hold the second best partner only.
 _WIDER: Final = (1.1, 1.5, 2)
-_SIZES: Final = (1, 2, 5, 10, 20, 50, 100, 200, 500, LARGEST_QUEUE)
+_SIZES: Final = (1, 2, 5, 10, 20, 50, 100, 200, 500, LONGEST_QUEUE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,22 +50,26 @@ class Curves:
 
 
 def curves_of(
-    group: GroupConfig,
-    suggested: GroupConfig,
-    streams: Sequence[Stream],
-    possible: PossibleSets,
-    *,
-    most: int = MOST_MESSAGES,
-) -> Curves:
-    """Return what a group gives with other values, with its own and with the suggested ones among them."""
-    used = list(islice(messages(streams), most))
-    pivot, slop = possible.tightest.pivot, slop_key(group)
+    group: GroupConfig, suggested: GroupConfig, streams: Sequence[Stream], *, most: int = MOST_MESSAGES
+) -> Curves | None:
+    """Return what a group gives with other values, with its own and with the suggested ones among them.
+
+    Each slop is tried with the suggested queue_size, and each queue_size with the suggested slop. None where it is not
+    known which messages belong together.
+    """
+    # Of what another policy needs, this one has the queue alone.
+    base = suggested if suggested.options.policy == group.options.policy else changed(group, (_queue(suggested),))
+    used = tuple(islice(messages(stamped(base, streams)), most))
+    trials = Trials(base, lambda: used, as_arrays(used, len(streams)), is_window=False)
+    possible, slop = trials.possible(), slop_key(group)
+    if possible is None or group.options.matched_by:
+        return None
 
     def points(option: str, values: set[int]) -> tuple[Point, ...]:
         values |= {getattr(each.options, option) for each in (group, suggested) if hasattr(each.options, option)}
         if len(values) == 1:
             return ()
-        return tuple(_point(group, option, value, used, pivot) for value in sorted(values))
+        return tuple(_point(trials, option, value) for value in sorted(values))
 
     return Curves(
         by_slop=() if slop is None or possible.is_alone else points(slop, _slops(possible)),
@@ -79,7 +77,7 @@ def curves_of(
         messages=len(used),
         recorded=sum(len(stream.places) for stream in streams),
         lasts=used[-1].payload - used[0].payload if used else 0,
-        of=sum(message.input == pivot for message in used),
+        of=sum(message.input == possible.pivot for message in used),
     )
 
 
@@ -89,25 +87,28 @@ def slop_key(group: GroupConfig) -> str | None:
     return tolerance.key if tolerance is not None and tolerance.is_key else None
 
 
-def _point(group: GroupConfig, option: str, value: int, used: Sequence[Message], pivot: int) -> Point:
-    tried = replace(group, options=group.options.model_copy(update={option: value}))
-    run = dry_run(tried, used)
-    span = int(np.quantile(run.spans, 0.5, method="inverted_cdf")) if run.spans else 0
-    return Point(value, completed(run.counts, pivot), span)
+def _queue(group: GroupConfig) -> Change:
+    return Change("queue_size", str(group.options.queue_size))
+
+
+def _point(trials: Trials, option: str, value: int) -> Point:
+    written = str(value) if option == "queue_size" else f"{value}ns"
+    spans = trials.spans_given((Change(option, written),))
+    return Point(value, len(spans), quantile(spans, 0.5) if len(spans) else 0)
 
 
 def _slops(possible: PossibleSets) -> set[int]:
     """Return slops that give ever more of the possible sets, and some that are wider than the widest of them."""
-    if not possible.spans:
+    if not len(possible):
         return set()
-    narrow = np.quantile(possible.spans, _SHARES, method="inverted_cdf").tolist()
-    return {*narrow, *(round(factor * possible.widest) for factor in _WIDER)}
+    return {
+        *(quantile(possible.spans, share) for share in _SHARES),
+        *(round(factor * possible.widest) for factor in _WIDER),
+    }
 
 
 def _sizes(group: GroupConfig, suggested: GroupConfig, possible: PossibleSets) -> set[int]:
     """Return queue sizes up to twice what is in use, suggested or needed by nearly all of the possible sets."""
-    found = possible.tightest
-    queues = found.queues[found.spans <= possible.widest]
-    needed = int(np.quantile(queues, 0.99, method="inverted_cdf")) if len(queues) else 1
+    needed = quantile(possible.queues, 0.99) if len(possible) else 1
     most = 2 * max(needed, group.options.queue_size, suggested.options.queue_size)
     return {size for size in _SIZES if size <= most}

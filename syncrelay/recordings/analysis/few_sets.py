@@ -6,9 +6,10 @@ from typing import Final
 
 from syncrelay.config import GroupConfig
 from syncrelay.config.wording import counted
-from syncrelay.explain import dry_run, words
-from syncrelay.explain.suggestions import Change, changed
-from syncrelay.recordings.analysis.streams import Stream, messages, read_streams
+from syncrelay.explain import words
+from syncrelay.explain.suggester import Change, changed
+from syncrelay.recordings.analysis.evaluation import evaluate
+from syncrelay.recordings.analysis.streams import Stream, read_streams
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.recording import Recording
 from syncrelay.sync import InputCounts
@@ -90,5 +91,5 @@ def _with(group: GroupConfig, **keys: object) -> GroupConfig:
 
 def _complete(group: GroupConfig, streams: tuple[Stream, ...], among: Collection[int]) -> int:
     """Return how many sets have a message of all these inputs: no more than of the one that the fewest have."""
-    held = dry_run(group, messages(streams)).held
-    return min(held[index] for index in among)
+    sets = evaluate(group, streams).sets
+    return min(sum(each.stamps[index] is not None for each in sets) for index in among)

@@ -12,12 +12,12 @@ from syncrelay.explain import words
 from syncrelay.printable import printable
 from syncrelay.recordings.analysis.analysis import analyze_group, group_of, proposed_text
 from syncrelay.recordings.analysis.changes import Change, with_changes, with_evidence
-from syncrelay.recordings.analysis.curves import LARGEST_QUEUE
 from syncrelay.recordings.analysis.evaluation import completed, evaluate
 from syncrelay.recordings.analysis.inventory import FEWEST, Topic, inventory
-from syncrelay.recordings.analysis.nearest import pair
+from syncrelay.recordings.analysis.pairs import pair
 from syncrelay.recordings.analysis.topics import TopicFigures
 from syncrelay.recordings.bag.recording import Recording
+from syncrelay.sync.queues import LONGEST_QUEUE
 
 # Topics of one rate whose stamps lie within a tenth of a period of each other come from one epoch.
 _TOGETHER: Final = 0.1
@@ -116,7 +116,7 @@ def _with_room(name: str, members: Sequence[Topic], changes: Sequence[Change], t
     fastest = max(members, key=lambda each: each.figures.rate_hz).figures
     wait = (slowest.period or 0) + _latency(slowest)
     come = ceil(wait * fastest.rate_hz / _SECOND)
-    size = min(2 * come, LARGEST_QUEUE)
+    size = min(2 * come, LONGEST_QUEUE)
     narrow = group_of(with_changes(text, changes), name)
     if size <= narrow.options.queue_size:
         return changes

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic
-from syncrelay.recordings.analysis.nearest import Pair
+from syncrelay.recordings.analysis.pairs import Pair
 from syncrelay.recordings.analysis.suggest import Suggestion
 from syncrelay.recordings.analysis.topics import spread
 from syncrelay.recordings.analysis.watching import LastingFinding

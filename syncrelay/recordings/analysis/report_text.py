@@ -10,7 +10,7 @@ from syncrelay.explain.summary import why_unneeded
 from syncrelay.printable import aligned, printable
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic, patch
 from syncrelay.recordings.analysis.curves import Curves, Point, slop_key
-from syncrelay.recordings.analysis.nearest import Pair, worth_seeing
+from syncrelay.recordings.analysis.pairs import Pair, worth_seeing
 from syncrelay.recordings.analysis.suggest import Suggestion
 from syncrelay.recordings.analysis.topics import TopicFigures
 from syncrelay.recordings.analysis.unneeded import InputFates

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from syncrelay.config import StampSource
+from syncrelay.config import GroupConfig, StampSource
 from syncrelay.recordings.bag.bindings import GroupBinding
 from syncrelay.recordings.bag.columns import (
     Batch,
@@ -114,6 +114,14 @@ def messages(streams: Sequence[Stream]) -> Iterator[Message]:
     for begin in range(0, len(order), _AT_ONCE):
         among = slice(begin, begin + _AT_ONCE)
         yield from map(Message, inputs[among].tolist(), stamps[among].tolist(), received[among].tolist(), keys)
+
+
+def stamped(group: GroupConfig, streams: Sequence[Stream]) -> list[Stream]:
+    """Return the streams with times of receipt in place of stamps where the group goes by them."""
+    return [
+        stream.by_receipt() if topic.stamp == "receive" else stream
+        for topic, stream in zip(group.topics, streams, strict=True)
+    ]
 
 
 def _pour(recording: Recording, filled: _Filled) -> None:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain import FOR_WANT_OF_A_PARTNER
+from syncrelay.explain.nearest import shifted
 from syncrelay.recordings.analysis.evaluation import Evaluation
-from syncrelay.recordings.analysis.nearest import shifted
 from syncrelay.recordings.bag.columns import Nanoseconds
 from syncrelay.sync import DropReason
 

@@ -1,6 +1,6 @@
 """What the running relay would have reported of a recording: the same watch, fed by the times of receipt."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +16,7 @@ from syncrelay.explain import (
     Judge,
     Severity,
 )
+from syncrelay.explain.suggester import Trials
 from syncrelay.recordings.analysis.evaluation import Outcomes
 from syncrelay.recordings.analysis.streams import Stream, messages
 from syncrelay.sync import Message
@@ -46,9 +47,15 @@ def alike(found: Sequence[LastingFinding]) -> list[list[LastingFinding]]:
 
 
 def watch_group(
-    group: GroupConfig, streams: Sequence[Stream], *, until: int | None = None
+    group: GroupConfig,
+    streams: Sequence[Stream],
+    *,
+    until: int | None = None,
+    whole: Callable[[], Trials] | None = None,
 ) -> tuple[LastingFinding, ...]:
     """Return what the running relay would have found, judging once a second, the worst and longest first.
+
+    Where `whole` gives trials on the whole recording, the suggested values are theirs.
 
     It is judged to the last message, or `until` later than that in nanoseconds of receipt.
     However long nothing is received, that takes no more than some tens of judgements.
@@ -56,7 +63,7 @@ def watch_group(
     watch = None
     for message in messages(streams):
         if watch is None:
-            watch = _Watch(group, streams, began=message.payload)
+            watch = _Watch(group, streams, began=message.payload, whole=whole)
         watch.add(message)
     return () if watch is None else watch.lasting(until)
 
@@ -75,10 +82,12 @@ def judged_seconds(seconds: int) -> list[int]:
 class _Watch:
     """Drives a group and watches it, as the running relay does; remembers each finding and for how long it held."""
 
-    def __init__(self, group: GroupConfig, streams: Sequence[Stream], *, began: int) -> None:
+    def __init__(
+        self, group: GroupConfig, streams: Sequence[Stream], *, began: int, whole: Callable[[], Trials] | None
+    ) -> None:
         self._outcomes = Outcomes(group)
         self._driver = EngineDriver(group, self._outcomes.take)
-        self._watch = GroupWatch(group, began=began)
+        self._watch = GroupWatch(group, began=began, whole=whole)
         self._judge_of = Judge()
         self._due = began + _SECOND
         self._arrivals: list[list[tuple[int, int]]] = [[] for _ in streams]

@@ -2,7 +2,7 @@
 
 import random
 from array import array
-from itertools import product
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from syncrelay.explain import UNREADABLE
 from syncrelay.recordings.analysis.analysis import analyze_group, group_of
 from syncrelay.recordings.analysis.curves import curves_of
-from syncrelay.recordings.analysis.evaluation import completed, evaluate
-from syncrelay.recordings.analysis.nearest import pair, tightest
+from syncrelay.recordings.analysis.evaluation import evaluate
+from syncrelay.recordings.analysis.pairs import pair
 from syncrelay.recordings.analysis.streams import Stream
 from syncrelay.recordings.analysis.topics import figures_of
 from syncrelay.recordings.analysis.watching import judged_seconds, watch_group
@@ -76,31 +76,6 @@ def test_a_pair_is_measured_from_the_slower_to_the_faster():
     assert pair(slow, Stream("/c", VECTOR), (0, 0)) is None
 
 
-_STAMPS = st.lists(st.integers(1, 60), min_size=1, max_size=8, unique=True).map(sorted)
-
-
-@given(st.lists(_STAMPS, min_size=2, max_size=4))
-def test_the_tightest_sets_are_those_of_all_combinations(topics):
-    streams = streams_of(*topics, latency=0)
-    found = tightest(streams, [0] * len(topics))
-    assert found is not None
-    others = [stamps for index, stamps in enumerate(topics) if index != found.pivot]
-    expected = [
-        min(max(stamp, *a_set) - min(stamp, *a_set) for a_set in product(*others)) for stamp in topics[found.pivot]
-    ]
-    assert found.spans.tolist() == expected
-
-
-def test_a_queue_must_hold_what_comes_until_the_set_can_leave():
-    # The slow input's message comes 5 messages of the fast one after its partner.
-    slow, fast = streams_of([BEGIN + 100 * MS], every(10 * MS, 40))
-    slow.places = array("q", [16])
-    fast.places = array("q", [place for place in range(41) if place != 16])
-    found = tightest([slow, fast], (0, 0))
-    assert found is not None
-    assert found.queues.tolist() == [6]
-
-
 def _pair_of(policy="approximate_time", **keys):
     topics = inputs({"/a": VECTOR, "/b": VECTOR})
     group = {"policy": policy, "slop": "10ms", "topics": topics, **keys}
@@ -111,7 +86,7 @@ def _analyzed(streams, text):
     return analyze_group(group_of(text, "front"), tuple(streams), text)
 
 
-_POLICIES = ("approximate_time", "approximate_time_eager", "approximate_epsilon_time", "exact_time")
+_POLICIES = ("approximate_time", "approximate_time_eager", "approximate_epsilon_time")
 
 
 @pytest.mark.parametrize("policy", _POLICIES)
@@ -122,45 +97,40 @@ _POLICIES = ("approximate_time", "approximate_time_eager", "approximate_epsilon_
     period=st.sampled_from([20, 50, 100]),
     late=st.integers(0, 300),
 )
-def test_a_curve_at_the_value_in_use_is_the_count_beside_it(policy, keys, period, late):
+def test_a_curve_at_the_suggested_value_is_what_the_suggestion_promises(policy, keys, period, late):
     streams = streams_of(
         every(100 * MS, 20, jitter=3 * MS), every(period * MS, 2000 // period, jitter=MS, seed=2), late=late * MS
     )
-    slop = None if policy == "exact_time" else f"{keys['slop']}ms"
-    found = _analyzed(streams, _pair_of(policy, **{**keys, "slop": slop}))
-    count = completed(found.evaluation.counts, 0)
-    in_use = {point.value: point.sets for point in found.curves.by_queue_size}
-    assert in_use[keys["queue_size"]] == count
-    if slop is None:
-        assert found.curves.by_slop == ()
-    else:
-        in_use = {point.value: point.sets for point in found.curves.by_slop}
-        assert in_use[found.group.options.slop] == count
+    found = _analyzed(streams, _pair_of(policy, **{**keys, "slop": f"{keys['slop']}ms"}))
+    if found.suggested.options.policy == policy:
+        by_queue = {point.value: point.sets for point in found.curves.by_queue_size}
+        by_slop = {point.value: point.sets for point in found.curves.by_slop}
+        assert by_queue[found.suggested.options.queue_size] == found.suggestion.then
+        assert by_slop[found.suggested.options.slop] == found.suggestion.then
     assert found.curves.is_of_all
 
 
-def test_each_point_of_a_curve_is_what_a_file_with_that_value_gives():
+def test_each_point_of_a_curve_is_what_a_file_with_that_value_and_the_rest_of_the_suggestion_gives():
     streams = streams_of(every(100 * MS, 200, jitter=MS), every(10 * MS, 2000, jitter=MS, seed=2), late=30 * MS)
-    curves = _analyzed(streams, _pair_of(slop="7ms", queue_size=3)).curves
-    for point in curves.by_queue_size:
-        text = _pair_of(slop="7ms", queue_size=point.value)
-        assert len(evaluate(group_of(text, "front"), streams).sets) == point.sets
-    assert [point.value for point in curves.by_queue_size] == sorted({point.value for point in curves.by_queue_size})
-    for point in curves.by_slop:
-        sets = evaluate(group_of(_pair_of(slop=f"{point.value}ns", queue_size=3), "front"), streams).sets
-        assert len(sets) == point.sets
-        assert point.median_span == (sorted(each.span for each in sets)[(len(sets) - 1) // 2] if sets else 0)
+    found = _analyzed(streams, _pair_of(slop="4ms", queue_size=3))
+    for points, key in ((found.curves.by_queue_size, "queue_size"), (found.curves.by_slop, "slop")):
+        for point in points:
+            options = found.suggested.options.model_copy(update={key: point.value})
+            made = evaluate(replace(found.suggested, options=options), streams).sets
+            sets = [each for each in made if each.span <= found.possible.widest]
+            assert len(sets) == point.sets
+            assert point.median_span == (sorted(each.span for each in sets)[(len(sets) - 1) // 2] if sets else 0)
 
 
 def test_of_a_long_recording_values_are_tried_on_its_begin_and_that_is_said():
     streams = tuple(streams_of(every(100 * MS, 100), every(100 * MS, 100)))
     found = _analyzed(streams, _pair_of(queue_size=5))
-    curves = curves_of(found.group, found.suggested, streams, found.possible, most=50)
+    curves = curves_of(found.group, found.suggested, streams, most=50)
+    assert curves is not None
     assert (curves.messages, curves.recorded, curves.is_of_all, curves.of) == (50, 200, False, 25)
     assert curves.lasts == 24 * 100 * MS
     first = streams_of(every(100 * MS, 25), every(100 * MS, 25))
-    count = len(evaluate(found.group, first).sets)
-    assert {point.value: point.sets for point in curves.by_queue_size}[5] == count
+    assert {point.value: point.sets for point in curves.by_queue_size}[5] == len(evaluate(found.group, first).sets)
 
 
 def test_a_gps_beside_fast_odometry_has_no_needless_loss_to_show():
@@ -172,7 +142,7 @@ def test_a_gps_beside_fast_odometry_has_no_needless_loss_to_show():
     assert found.evaluation.counts[1].dropped[DropReason.OVERFLOW] > 500
     assert (odometry.matched, odometry.unneeded, odometry.dropped, odometry.lacking) == (60, 1140, {}, ("/a",))
     assert (gps.matched, gps.unneeded, gps.dropped) == (60, 0, {})
-    assert {point.value: point.sets for point in found.curves.by_queue_size}[10] == 60
+    assert {point.value: point.sets for point in found.curves.by_queue_size}[10] == found.suggestion.then
     assert not [each for each in found.findings if each.finding.severity.name != "OK"]
 
 
@@ -242,7 +212,7 @@ def test_what_was_not_needed_is_as_defined(topics, slop, queue_size, optional):
     )
     found = _analyzed(streams, text)
     assert found.possible is not None
-    expected = [bool(found.possible.spans) and _costs_nothing(drop, found) for drop in found.evaluation.drops]
+    expected = [bool(len(found.possible)) and _costs_nothing(drop, found) for drop in found.evaluation.drops]
     assert found.unneeded.flags.tolist() == expected
     for row, counts in zip(found.fates, found.evaluation.counts, strict=True):
         assert row.received == row.matched + row.unneeded + sum(row.dropped.values()) == counts.fed

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from syncrelay.config import load_text
 from syncrelay.recordings.analysis import analyze
-from syncrelay.recordings.analysis.evaluation import DropOut, completed, evaluate
+from syncrelay.recordings.analysis.evaluation import DropOut, evaluate
 from syncrelay.recordings.analysis.html import as_html
 from syncrelay.recordings.analysis.report_json import as_json
 from syncrelay.recordings.analysis.report_text import report
@@ -183,11 +183,7 @@ def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(policy, da
         assert f"<code>{topic}</code> {each['received']} received" in page
     by_value = {point["queue_size"]: point["sets"] for point in group["by_queue_size"]}
     if by_value:
-        options = analysis.groups[0].group.options
-        possible = analysis.groups[0].possible
-        assert possible is not None
-        pivot = possible.tightest.pivot
-        assert by_value[options.queue_size] == completed(analysis.groups[0].evaluation.counts, pivot)
+        assert max(by_value.values()) <= group["suggestion"]["possible"]
 
 
 def test_what_waited_in_one_group_leaves_before_later_messages_of_another():

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from syncrelay.config import GroupConfig
-from syncrelay.recordings.analysis.nearest import Pair
+from syncrelay.recordings.analysis.pairs import Pair
 
 _BINS: Final = 60
 # What lies so many times farther out than most do is counted, not drawn: it would press all others into one bar.

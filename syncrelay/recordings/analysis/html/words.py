@@ -7,7 +7,7 @@ from syncrelay.config.wording import all_of, counted
 from syncrelay.explain import Severity, in_words, words
 from syncrelay.recordings.analysis import GroupAnalysis, patch
 from syncrelay.recordings.analysis.html.drawings import Drawings
-from syncrelay.recordings.analysis.nearest import worth_seeing
+from syncrelay.recordings.analysis.pairs import worth_seeing
 from syncrelay.recordings.analysis.report_text import (
     delay_line,
     faults_of,

@@ -1,7 +1,6 @@
 """Suggestions: each was tried on the messages that came, cures what it is said of, and gives what it promises."""
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
@@ -10,7 +9,8 @@ from hypothesis import strategies as st
 
 from syncrelay.config.units import parse_duration
 from syncrelay.explain import Code, Finding, FindingLog, Severity
-from syncrelay.explain.suggestions import Change, Evaluator, Trials, Tried, constant_offsets
+from syncrelay.explain.nearest import as_arrays
+from syncrelay.explain.suggester import REQUIRED, Change, Suggester, Trials, Tried, Verdict
 from syncrelay.explain.try_budget import OutOfTimeError, TryBudget
 from syncrelay.sync import Message
 from tests.explain.scenario import BEGAN, MS, Source, Told, group_of, run
@@ -185,27 +185,31 @@ def test_no_offset_is_offered_for_another_clock_whose_stamps_would_not_match_by_
     assert cured == []
 
 
-def evaluator(budget: TryBudget | None = None) -> Evaluator:
+def a_suggester(budget: TryBudget | None = None) -> Suggester:
     """Of a group whose stamps lie 30 ms apart, with a slop of 20 ms."""
     config = group_of([CAMERA, LIDAR], {"slop": "20ms"})
     stamps = [BEGAN + number * 100 * MS for number in range(60)]
     arrivals = [[(stamp + shift, stamp + 40 * MS) for stamp in stamps] for shift in (0, 30 * MS)]
-    return Evaluator(config, lambda: arrivals, budget)
+    return Suggester(config, lambda: arrivals, budget)
 
 
-def wider(trials: Trials) -> Iterator[Tried]:
-    yield from filter(None, [trials.try_out((Change("slop", "35ms"),))])
+def wider(trials: Trials) -> Verdict:
+    return trials.verdict(REQUIRED, {"slop"})
+
+
+def nothing(_: Trials) -> Verdict:
+    return Verdict(())
 
 
 def test_what_was_tried_says_what_it_gives():
-    assert evaluator().best("a", wider, now=BEGAN).tried == (Tried((Change("slop", "35ms"),), 59, 0, 59),)
+    assert a_suggester().ask("a", wider, now=BEGAN).tried == (Tried((Change("slop", "30ms"),), 58, 0, 59),)
 
 
 def test_what_was_tried_is_not_tried_again_at_once():
-    asked = evaluator()
-    first = asked.best("a", wider, now=BEGAN)
-    assert asked.best("a", lambda _: iter(()), now=BEGAN + 999 * MS) is first
-    assert asked.best("a", lambda _: iter(()), now=BEGAN + 1000 * MS).tried == ()
+    asked = a_suggester()
+    first = asked.ask("a", wider, now=BEGAN)
+    assert asked.ask("a", nothing, now=BEGAN + 999 * MS) is first
+    assert asked.ask("a", nothing, now=BEGAN + 1000 * MS).tried == ()
 
 
 class Processor:
@@ -221,11 +225,11 @@ class Processor:
 
 def test_nothing_is_tried_for_any_group_once_the_budget_is_spent_until_it_is_refilled():
     budget = TryBudget(clock := Processor())
-    asked, other = evaluator(budget), evaluator(budget)
+    asked, other = a_suggester(budget), a_suggester(budget)
     clock.now += 40 * MS
-    assert asked.best("a", wider, now=BEGAN).tried == other.best("a", wider, now=BEGAN).tried == ()
+    assert asked.ask("a", wider, now=BEGAN).tried == other.ask("a", wider, now=BEGAN).tried == ()
     budget.refill()
-    assert asked.best("a", wider, now=BEGAN).tried != ()
+    assert asked.ask("a", wider, now=BEGAN).tried != ()
 
 
 TOO_WIDE = (Code.OVER_SLOP, None)
@@ -236,8 +240,8 @@ def told_at(seconds, asked, severity, last_set):
     log, told = FindingLog(), []
     for second in seconds:
         now = NOW + second * S
-        asked(second).best(TOO_WIDE, wider, now=now)
-        facts = a_group(figures={"now": now, "last_set": last_set(now)}, evaluator=asked(second))
+        asked(second).ask(TOO_WIDE, wider, now=now)
+        facts = a_group(figures={"now": now, "last_set": last_set(now)}, suggester=asked(second))
         finding = Finding(Code.OVER_SLOP, severity, "too wide")
         told += [second for _ in log.remarks(facts, (finding,))]
     return told
@@ -247,37 +251,39 @@ def told_at(seconds, asked, severity, last_set):
 def test_the_log_waits_until_there_was_time_to_try_something_but_not_for_ever(severity, last_set):
     budget = TryBudget(clock := Processor())
     clock.now += 40 * MS
-    asked = evaluator(budget)
+    asked = a_suggester(budget)
 
     def free_at(second):
         if second == 8:
             budget.refill()
         return asked
 
-    assert told_at(range(10), lambda _: evaluator(), severity, last_set) == [5]
+    assert told_at(range(10), lambda _: a_suggester(), severity, last_set) == [5]
     assert told_at(range(10), free_at, severity, last_set) == [8]
     clock.now += 40 * MS
-    hopeless = evaluator(budget)
+    hopeless = a_suggester(budget)
     assert told_at(range(18), lambda _: hopeless, severity, last_set) == [15]
 
 
-def slops(trials: Trials) -> Iterator[Tried]:
-    yield from filter(None, [trials.try_out((Change("slop", f"{slop}ms"),)) for slop in range(21, 36)])
+def slops(trials: Trials) -> Verdict:
+    for slop in range(21, 90):
+        trials.given((Change("slop", f"{slop}ms"),))
+    return wider(trials)
 
 
 def test_a_poll_interrupts_what_takes_long_and_the_next_goes_on_from_there():
     budget = TryBudget(clock := Processor())
-    asked = evaluator(budget)
+    asked = a_suggester(budget)
     polls = 0
     found: tuple[Tried, ...] = ()
     while not found and polls < 100:
         began = clock.now
-        found = asked.best("a", slops, now=BEGAN).tried
+        found = asked.ask("a", slops, now=BEGAN).tried
         assert clock.now - began < 100 * MS
         budget.refill()
         polls += 1
     assert polls > 1
-    assert found == evaluator().best("a", slops, now=BEGAN).tried
+    assert found == a_suggester().ask("a", slops, now=BEGAN).tried
 
 
 def test_the_first_run_of_a_poll_ends_however_slow_the_processor_is():
@@ -292,15 +298,15 @@ def test_the_first_run_of_a_poll_ends_however_slow_the_processor_is():
 
 def test_what_was_never_tried_comes_before_what_was():
     budget = TryBudget(clock := Processor())
-    asked, other = evaluator(budget), evaluator(budget)
-    before = asked.best("a", wider, now=BEGAN)
+    asked, other = a_suggester(budget), a_suggester(budget)
+    before = asked.ask("a", wider, now=BEGAN)
     clock.now += 40 * MS
-    other.best("a", wider, now=BEGAN)
+    other.ask("a", wider, now=BEGAN)
     budget.refill()
-    assert asked.best("a", lambda _: iter(()), now=BEGAN + 2000 * MS) is before
-    assert other.best("a", wider, now=BEGAN + 2000 * MS).tried != ()
+    assert asked.ask("a", nothing, now=BEGAN + 2000 * MS) is before
+    assert other.ask("a", wider, now=BEGAN + 2000 * MS).tried != ()
     budget.refill()
-    assert asked.best("a", lambda _: iter(()), now=BEGAN + 3000 * MS).tried == ()
+    assert asked.ask("a", nothing, now=BEGAN + 3000 * MS).tried == ()
 
 
 def test_an_offset_is_found_where_each_stamp_comes_three_times():
@@ -310,12 +316,14 @@ def test_an_offset_is_found_where_each_stamp_comes_three_times():
         [(stamp, stamp + 45 * MS) for stamp in stamps],
         [(stamp + 30 * MS, stamp + (40 + nth) * MS) for stamp in stamps for nth in range(3)],
     ]
-    trials = Trials(config, arrivals, TryBudget(clock=None))
-    assert list(constant_offsets(trials)) == [Change("offset", "30ms", 0)]
+    came = sorted((received, index, stamp) for index, each in enumerate(arrivals) for stamp, received in each)
+    messages = [Message(index, stamp, received) for received, index, stamp in came]
+    trials = Trials(config, lambda: messages, as_arrays(messages, 2), is_window=True)
+    assert list(trials.offsets()) == [Change("offset", "30ms", 0)]
 
 
 def test_what_does_not_help_is_not_offered():
-    assert evaluator().best("a", lambda t: filter(None, [t.try_out((Change("slop", "25ms"),))]), now=BEGAN).tried == ()
+    assert a_suggester().ask("a", lambda trials: trials.verdict(REQUIRED, {"queue_size"}), now=BEGAN).tried == ()
 
 
 _RATES = st.sampled_from([1, 2, 5, 7, 10, 15, 20, 30, 50, 100, 200])
@@ -353,3 +361,20 @@ def test_whatever_is_suggested_gives_what_it_promises_and_cures(sources, slop_ms
 
 def test_a_value_holds_what_its_text_says():
     assert parse_duration("85ms") == 85 * MS
+
+
+_OPTIONAL = st.sampled_from([None, 200, 600])
+
+
+@settings(suppress_health_check=list(HealthCheck))
+@given(_sources(), st.sampled_from([1, 5, 20]), st.sampled_from([2, 10]), _OPTIONAL)
+@pytest.mark.long
+def test_all_findings_of_a_moment_name_one_value_for_a_key(sources, slop_ms, queue_size, late_ms):
+    """The log, `observe` and /status show these findings: whatever they take from them is the same."""
+    options = {"slop": f"{slop_ms}ms", "queue_size": queue_size}
+    if late_ms:
+        options["max_wait"] = "100ms"
+        sources = [*sources, *(Source(f"/o{n}", hz=10, delay_ms=n * late_ms, required=False) for n in (1, 2))]
+    for _, found in run(*sources, seconds=20, options=options).found:
+        values = {value for finding in found for value in _VALUE.findall(finding.suggestion or "")}
+        assert len({(key, topic) for key, _, topic in values}) == len(values), values
