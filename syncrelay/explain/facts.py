@@ -177,50 +177,64 @@ class ClockState(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class GroupFacts:
-    """A group. Durations in nanoseconds.
-
-    `tolerance` is None where stamps may be any distance apart, as where keys are matched; `distance` is how it is
-    measured how far apart they are. `by_stamp` says whether stamps are what is matched, `repeats` whether a message may
-    be in more than one set. `trigger` is the index of the input whose every message makes a set; `ticks_hz` is the rate
-    of the clock that does, where one does. `clock`
-    is the simulated one, None without use_sim_time; `clock_set` when and by how much this machine's clock was set of
-    late; `is_recorded` says that a recording is judged and no live graph; `waited` how long its messages at most lay of
-    late before the relay took them; `standstills` those of late; `failure` what stopped the group for good; `pause`
-    since when it is paused, and `unpaused` when the last pause ended; `asleep` that it is lazy and nobody subscribes to
-    what it gives; `empty_graph` the graph, where it holds no node but our own.
-    `is_discovering` says that nodes that run may not be in the graph yet, because this one has just joined it.
-    `suggester` tries other values of the file on the last messages, None where they cannot be run again. `inactive` is
-    the name of a managed node that waits to be activated. `standing` is how many of the possible sets leave.
-    """
+    """A group at one moment; times and durations in nanoseconds. `GroupWatch.facts` fills it in."""
 
     name: str
+    """The group's name in the file."""
     policy: str
+    """The name of its policy."""
     queue_size: int
+    """How many messages the file keeps per input."""
     inputs: tuple[InputFacts, ...]
+    """Its inputs, in the order of the file."""
     figures: GroupFigures
+    """What was observed of it."""
     tolerance: Tolerance | None = None
+    """How far apart the stamps of a set may be. None: any distance, as where keys are matched."""
     distance: Distance = Distance.SPAN
+    """How it is measured how far apart they are."""
     by_stamp: bool = True
+    """Whether messages are matched by their stamps."""
     repeats: bool = False
+    """Whether a message may be in more than one set."""
     trigger: int | None = None
+    """The index of the input whose every message makes a set."""
     ticks_hz: float | None = None
+    """The rate of the clock that makes the sets, where one does."""
     max_wait: int | None = None
+    """How long a set may wait."""
     every: int = 1
+    """Of so many sets, one leaves."""
     least_period: int | None = None
+    """The least time between two sets."""
     clock: ClockState | None = None
+    """The simulated clock. None without use_sim_time."""
     clock_set: Step | None = None
+    """When this machine's clock was recently set, and by how much."""
     is_recorded: bool = False
+    """Whether a recording is judged, and no live graph."""
     waited: int = 0
+    """The longest recent wait of its messages in the receive queue."""
     standstills: tuple[Standstill, ...] = ()
+    """When the process recently got no turn."""
     failure: str | None = None
+    """What stopped the group for good."""
     pause: Pause | None = None
+    """Since when it is paused."""
     unpaused: int | None = None
+    """When the last pause ended."""
     asleep: bool = False
+    """Whether it is lazy, and nobody subscribes to its outputs."""
     suggester: Suggester | None = field(default=None, compare=False, repr=False)
+    """Tries other values of the file on the last messages. None where they cannot be run again."""
     empty_graph: GraphSnapshot | None = None
+    """The graph, where it holds no node but our own."""
     is_discovering: bool = False
+    """Whether running nodes may be missing from the graph, because this one has just joined it."""
     inactive: str | None = None
+    """The name of a managed node that waits to be activated."""
     standing: Standing = Standing.ENOUGH
+    """How many of the possible sets leave."""
 
     @property
     def required_first(self) -> Sequence[int]:

@@ -16,41 +16,55 @@ _SHOWN_SETS: Final = 100
 
 @dataclass(frozen=True, slots=True)
 class InputFigures:
-    """One input; times and durations in nanoseconds, counts over the window.
+    """One input; times and durations in nanoseconds, counts over the window. `InputObservation.figures` fills it in.
 
-    `usual_hz` is the rate of the last messages while they came, 0 of too few to tell. `pace_hz` is the rate by the
-    median period, `slowed_from_hz` the steady pace that the input had before it slowed down, None if it has not.
-    `flows_since` is when the first message of all came, or the first after a silence. Of the last messages, oldest
-    first, `received` holds when they came, `stamps` and `delays`, the times of receipt minus the stamps, leave out
-    stamps of 0. `nearest` holds, of an optional input, the spans of the tightest sets with it, whenever its messages
-    came. `bursts` counts how often messages were held up and came at once, `held` is for how long at most, `held_up`
-    from when to when, each time. `fell_by` and `fell_at` tell of the last backward jump of its stamps, `stepped` of a
-    lasting step of them against the times of receipt in the last half minute; `swings` counts how often they stepped
-    there and back, `swung_by` is how far.
+    Of its last messages, the oldest is first.
     """
 
     rate_hz: float = 0.0
+    """Its rate over the window."""
     usual_hz: float = 0.0
+    """The rate of its last messages while they came. 0 if they are too few."""
     pace_hz: float = 0.0
+    """The rate by the median period."""
     slowed_from_hz: float | None = None
+    """The steady rate that it had before it slowed down. None if it has not."""
     fed: int = 0
+    """How many messages arrived."""
     dropped: Mapping[DropReason, int] = field(default_factory=dict)
+    """How many were dropped, by reason."""
     flows_since: int | None = None
+    """When its first message came, or the first after a silence."""
     received: Sequence[int] = ()
+    """When its last messages were received."""
     stamps: Sequence[int] = ()
+    """Their stamps, without those of 0."""
     delays: Sequence[int] = ()
+    """Their times of receipt minus their stamps, without stamps of 0."""
     drift: Drift | None = None
+    """How its stamps drift against the times of receipt."""
     duplicates: int = 0
+    """How many repeated a stamp."""
     out_of_order: int = 0
+    """How many had an older stamp than the one before."""
     nearest: Distribution = NOTHING
+    """Of an optional input: the spans of the tightest sets with it, whenever its messages came."""
     bursts: int = 0
+    """How often messages were held up and came at once."""
     held: int = 0
+    """For how long at most they were held up."""
     held_up: Sequence[tuple[int, int]] = ()
+    """From when to when they were held up, each time."""
     fell_by: int | None = None
+    """By how much its stamps last jumped backwards."""
     fell_at: int | None = None
+    """When they did."""
     stepped: Step | None = None
+    """A lasting step of its stamps against the times of receipt in the last half minute."""
     swings: int = 0
+    """How often its stamps stepped there and back."""
     swung_by: int = 0
+    """How far they did."""
 
     # Worked out when they are asked for, which is not at every look.
 
@@ -85,32 +99,42 @@ def _steps(times: Sequence[int]) -> Sequence[int]:
 
 @dataclass(frozen=True, slots=True)
 class GroupFigures:
-    """A group. `best_hz` is the rate of the input, or of the clock, that sets the pace: no more sets are possible.
-
-    `spans` and `latencies` are those of the last sets. `nearest` holds the span of the tightest set that each of the
-    last messages of the input that sets the pace could have had, measured since `nearest_from`, and since an input last
-    changed its pace; `nearest_since` those measured after the last set. `missing` is the share of the window's sets, 0
-    to 1, that each input was missing from, `sets_since_without` how many sets had it since. `resumed` is when the first
-    set left after a silence. `share` says how many of the possible sets left.
-    """
+    """A group; times and durations in nanoseconds. `Observation.figures` fills it in."""
 
     now: int
+    """The time of this moment."""
     began: int
+    """When it began to be observed."""
     sets: int = 0
+    """How many sets left in all."""
     rate_hz: float = 0.0
+    """The sets a second, over the window."""
     best_hz: float = 0.0
+    """The rate of the input, or of the clock, that sets the pace: no more sets are possible."""
     last_set: int | None = None
+    """When the last set left."""
     resumed: int | None = None
+    """When the first set left after a silence."""
     share: Share = NOT_KNOWN
+    """How many of the possible sets left."""
     span_histogram: Histogram = EMPTY
+    """The spans of all sets, counted."""
     latency_histogram: Histogram = EMPTY
+    """The latencies of all sets, counted."""
     spans: Distribution = NOTHING
+    """The spans of the last sets."""
     latencies: Distribution = NOTHING
+    """The latencies of the last sets."""
     nearest: Distribution = NOTHING
+    """The span of the tightest set of each of the last messages of the input that sets the pace."""
     nearest_since: Distribution = NOTHING
+    """Those of them that were measured after the last set."""
     nearest_from: int = 0
+    """Since when `nearest` is measured: at the latest since an input changed its pace."""
     missing: tuple[float, ...] = ()
+    """The share, 0 to 1, of the window's sets that each input is missing from."""
     sets_since_without: tuple[int, ...] = ()
+    """How many sets there were since the last one without each input."""
 
     @property
     def last_sets(self) -> tuple[tuple[int, int], ...]:
