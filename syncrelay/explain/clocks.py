@@ -10,15 +10,16 @@ from typing import Final, NamedTuple
 
 _FEWEST = 5
 _PARTS = 4
-# A slope from few points may be off by more than its standard error tells.
+# A slope from few points may be off by more than its standard error says.
 _MORE_OF_FEW = 8
-# So many times as far off the line as the median point: held up on its way.
+# A point this many times as far off the line as the median point was held up on its way.
 _HELD_UP = 6
 _LEAST_HELD_UP = 1_000_000
 _SECOND: Final = 1_000_000_000
 BOOT_NS: Final = 365 * 86_400 * _SECOND
 """No machine runs for longer without a boot, nor has its clock been set before 1971."""
-# How close, how far behind UTC, and what it is. GPS time began in 1980 and has no leap seconds, TAI has 37 more.
+# For each time scale: how close stamps must be, how far it is behind UTC, and its name. GPS time began in 1980 and has
+# no leap seconds; TAI has 37 more.
 _TIME_SCALES: Final = (
     (30 * _SECOND, 315_964_800 * _SECOND, "GPS time, which counts from 1980"),
     (_SECOND // 2, -37 * _SECOND, "TAI, the time of PTP clocks, which is 37 s ahead of UTC"),
@@ -115,17 +116,17 @@ def apart(one: Drift, other: Drift) -> Drift:
 
 STEP_NS: Final = 500_000_000
 """What is less may be a delay."""
-# A message that lay somewhere comes late; a clock that is set takes no time.
+# A message that was held up arrives late; setting a clock takes no time.
 _SOON: Final = 0.5
 _SOON_PERIODS: Final = 1.5
-# What lay and then comes at once is a period apart by its stamps.
+# Messages that were held up and then came at once have stamps a period apart.
 _LAY_PERIODS: Final = 3
-# Two clocks in turn: the next step back is as long, and comes this soon.
+# Two clocks in turn: the step back is as large, and comes within this time.
 _COMES_BACK: Final = 5 * _SECOND
 _ALIKE: Final = 0.25
-# A step stays if the delays of so many polls say so.
+# A step is lasting if the delays of this many polls confirm it.
 _LEVELS: Final = 3
-# What was late and is in time again had the same delay before: the polls of the last minute.
+# Late messages that are in time again have the delay of before: that of the polls of the last minute.
 _USUAL: Final = 60
 # A live clock is this close to the machine's after the step. A looped recording is not.
 _LIVE: Final = 10 * _SECOND

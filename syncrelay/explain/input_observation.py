@@ -18,17 +18,17 @@ Arrivals: TypeAlias = Sequence[tuple[int, int]]
 WINDOW_NS: Final = 10_000_000_000
 """Rates, drops and faults are those of about this long."""
 _SECOND: Final = 1_000_000_000
-# A fall by more is a jump, as for the engine.
+# Stamps that fall by more have jumped, as in the engine.
 _JUMP_NS: Final = 1_000_000_000
 _SILENT_NS: Final = 5_000_000_000
 _SILENT_PERIODS: Final = 5
 _LAST_MESSAGES: Final = 200
-# So many are kept to try values on.
+# This many messages are kept to try values on.
 _TRIED_MESSAGES: Final = 2_000
-# Of a slow input, so many messages tell the rate, however long ago they came.
+# A slow input's rate is that of this many messages, however old they are.
 _RATE_FROM: Final = 5
 _DRIFT_POINTS: Final = 300
-# It costs more than all the rest, and of many points it changes slowly.
+# Drift costs more than all other figures, and from many points it changes slowly.
 _DRIFT_EVERY: Final = 5
 _FEW_POINTS: Final = 12
 _PERIODS: Final = 20

@@ -21,10 +21,10 @@ SentSets: TypeAlias = Sequence[tuple[tuple[int | None, ...], int]]
 _SECOND: Final = 1_000_000_000
 _LAST_SETS: Final = 500
 _SILENCE: Final = 5 * _SECOND
-# Of a slow input so many of the last messages tell, however long ago they came.
+# Keep at least this many of a slow input's last messages, however old they are.
 _NEAREST_WINDOW: Final = 60 * _SECOND
 _FEWEST_NEAREST: Final = 20
-# An input whose period is a smaller share of the longest comes faster, and does not set the pace.
+# An input whose period is below this share of the longest does not set the pace.
 _AS_SLOW: Final = 0.7
 
 

@@ -36,26 +36,26 @@ def bursts(arrivals: Sequence[tuple[int, int]]) -> Iterator[Burst]:
 
 
 _SECOND: Final = 1_000_000_000
-# The median of so many periods is the pace of now: neither a pause nor a burst changes it.
+# The current pace is the median of this many periods: neither a pause nor a burst changes it.
 _PERIODS: Final = 20
 _PACES: Final = 120
 _FEWEST_PACES: Final = 6
-# What varies by more than this share of its median has no pace to fall from ...
+# An input whose pace varies by more than this share of its median is not steady, so it cannot have slowed down ...
 _STEADY: Final = 0.25
-# ... but for one poll in so many at either end, in which a busy machine held messages up.
+# ... without counting one poll in this many at either end, in which a busy machine held messages up.
 _ODD: Final = 10
-# Slower than this share of its pace it has slowed down, until it is faster than the other.
+# It has slowed down below the first share of its steady pace, until it is above the second.
 _SLOWED: Final = 0.7
 _RECOVERED: Final = 0.85
 
 
-# Of so many of the last periods, or half as many at least, most are about as long as their median ...
+# A steady input: of this many last periods, or at least half as many, most are about as long as their median ...
 _LAST_PERIODS: Final = 40
 _ABOUT: Final = 0.25
-# ... and hardly any is far longer: else they come several at once.
+# ... and hardly any is far longer. Otherwise messages come several at a time.
 _FAR: Final = 4
 _HARDLY: Final = 0.1
-# What comes faster than this comes at once.
+# Messages closer together than this came at once.
 _LEAST_PERIOD: Final = 1_000_000
 
 

@@ -10,10 +10,10 @@ from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Finding, Found, nodes
 
 _TOO_SLOW: Final = 500_000_000
-# What would not have brought so many messages in the time of a burst cannot show one.
+# An input too slow to send this many messages in the time of a burst cannot show one.
 _SHOWN_BY: Final = 5
 _PAUSE_PERIODS: Final = 3
-# What reliable publishers sent while the relay stood still, they send again this much later at most.
+# Reliable publishers send what the relay missed in a standstill again within this time.
 _SENT_AGAIN: Final = 4 * SECOND
 
 

@@ -10,16 +10,17 @@ from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFa
 from syncrelay.explain.findings import SECOND, Finding, Found, absence, blocks
 
 _NO_MESSAGE: Final = 5 * SECOND
-# Fast DDS's lease: for so long one that was killed is still in the graph.
+# Fast DDS's lease: a killed node stays in the graph this long.
 _LEASE: Final = 20 * SECOND
-# A relay that ends in order while its successor starts is gone by then.
+# A relay that ends in order while its successor starts is gone after this time.
 _ENDING: Final = 3 * SECOND
-# What stopped so nearly as long ago as the sets did, and by more than a period or two, has stopped them.
+# Sets stopped with an input that has been silent for this share of the time without a set, and for more periods than
+# the second number.
 _AS_LONG: Final = 0.8
 _MISSED_PERIODS: Final = 2
 # Inputs that fell silent within this time did so together.
 _TOGETHER: Final = 2 * SECOND
-# A pause that is so many times the longest before it is news.
+# A pause is reported if it is this many times the longest before.
 _PAUSES: Final = 3
 
 

@@ -20,28 +20,29 @@ from syncrelay.explain.standing import Standing
 from syncrelay.explain.suggester import REQUIRED, UNTRIED, Changes, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
-# A share of the slowest input's messages that could have no set, and from how many on it means something.
+# Sets are too wide if this share of the slowest input's messages has no set, and at least this many were measured.
 _MISSED: Final = 0.05
 _FEWEST: Final = 5
-# Where messages were held up, what is apart tells of slop only if it is most.
+# Where messages were held up, wide spans say something about slop only if most are wide.
 _MOST: Final = 0.5
 _MISSING: Final = 0.05
-# An input is back when so many times as many sets have it as had one without it on average before.
+# An input is back after this many times as many sets with it as usually came between two sets without it.
 _BACK: Final = 3
-# It is away when so many of its messages did not come.
+# It is away when this many of its messages are overdue.
 _AWAY: Final = 3
-# Of an input that sent one message, no period is known; so long a one is not waited for.
+# An input that sent a single message has no known period. Wait for it no longer than this.
 _UNKNOWN: Final = 2 * SECOND
-# Nearly all sets that were possible: then what a queue dropped was not missed.
+# If this share of the possible sets left, no set was missed for what a queue dropped.
 _NEARLY_ALL: Final = 0.95
 _WATCHED: Final = 10 * SECOND
-# Stamps off by so much of a period, and so constantly, may pair the wrong messages; so near is a whole period.
+# Stamps a constant distance apart may pair wrong messages: at least this many, at least this share of a period apart,
+# scattering by no more than this share, and within this share of a whole number of periods by their times of receipt.
 _ENOUGH: Final = 20
 _OFF: Final = 0.15
 _CONSTANT: Final = 0.05
 _WHOLE: Final = 0.1
 _OTHER_CLOCK: Final = SECOND
-# Keys that cure what a queue overflowed, and what came too late for its set.
+# The keys that help where a queue overflowed, and where a message came too late for its set.
 _QUEUE: Final = frozenset({"queue_size"})
 _WAITING: Final = frozenset({"queue_size", "max_wait"})
 

@@ -14,36 +14,36 @@ from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.suggester import Change, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
-# Stamps that are off by more come from another clock, or are older than a queue should hold.
+# Stamps further off than this come from another clock, or are older than a queue should hold.
 _OTHER_CLOCK: Final = SECOND
 _TOLD_JUMP: Final = 30 * SECOND
-# Below this drift is noise: so much apart since it was watched, so long watched, so much more than it bends.
+# A drift is reported after this much change, over at least this time, and only if the delays bend far less than that.
 _DRIFTED: Final = 5_000_000
 _DRIFT_WATCHED: Final = 20 * SECOND
 _DRIFT_BENDS: Final = 8
-# A message in a hundred whose stamp repeats or comes late is no reason to call anyone.
+# One message in a hundred with a repeated or late stamp is not worth a finding.
 _FAULTY: Final = 0.01
 _SOME: Final = 0.02
 _MOST: Final = 0.5
-# What a computation may take; stamps that are older are those of another clock.
+# A computation may take this long. Older stamps come from another clock.
 _LATENCY: Final = 10 * SECOND
-# Stamps that swing there and back are those of two clocks.
+# Stamps that step there and back this often come from two clocks.
 _FEWEST_SWINGS: Final = 2
-# Drift tells sooner if it is great.
+# A large drift can be reported earlier.
 _DRIFTED_SOON: Final = 25_000_000
 _DRIFT_SOON: Final = 4 * SECOND
-# A slope of so many standard errors is no chance, one within so many may be all there is.
+# Call a slope significant at this many standard errors; within _MAY_BE, treat it as zero.
 _EVIDENT: Final = 5
-# As Student's distribution has it: of five points it takes ten times as many errors for that.
+# Student's distribution: from few points, the same certainty takes far more standard errors.
 _EVIDENT_OF_FEW: Final = 240
 _MAY_BE: Final = 2
 _USUAL: Final = 0.95
-# So long is waited for a drift to be proven, in a silence only so long unless it looks like one.
+# Wait this long for proof of a drift; in a silence only the second time, unless the stamps look like a drift.
 _DRIFT_PROVEN: Final = 60 * SECOND
 _DRIFT_PROVEN_SILENT: Final = 15 * SECOND
-# An input that drifts by so much less than another has the better clock.
+# Of two inputs, one with less than this share of the other's drift has the better clock.
 _EVIDENTLY: Final = 0.2
-# A drift explains what is apart if it made so great a part of the tolerance.
+# A drift explains wide spans if it accounts for this share of the tolerance.
 _MATTERS: Final = 0.5
 _STEPPED_ALIKE: Final = SECOND // 2
 # Two ways to measure one offset agree within this share of it.
