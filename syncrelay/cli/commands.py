@@ -14,7 +14,7 @@ from syncrelay.cli.parser import Parser
 from syncrelay.errors import UnavailableError
 
 EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
-    "recordings": ("jinja2", "lz4", "mcap", "numpy", "rich", "rosbags", "ruamel.yaml", "zstandard"),
+    "recordings": ("jinja2", "lz4", "mcap", "rich", "rosbags", "ruamel.yaml", "zstandard"),
     "datasets": ("PIL", "av", "pyarrow"),
     "fleet": ("ray",),
     "top": ("rich", "textual"),
