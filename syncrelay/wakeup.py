@@ -9,7 +9,7 @@ class Wakeup:
     """What threading.Event is in all other places.
 
     A handler runs on the main thread in the midst of anything. In the midst of Event's own `wait` that thread may hold
-    the lock that `set` takes, and would wait for itself for ever.
+    the lock that `set` takes, and would wait for itself forever.
     """
 
     def __init__(self) -> None:

@@ -81,14 +81,14 @@ def _field_at(type_name: str, steps: Sequence[str], interfaces: Interfaces) -> F
     return _field_at(field.type, rest, interfaces) if rest else field
 
 
-def _asked_fields(topic: TopicConfig, path: Path, document: Document) -> Iterator["_AskedField"]:
+def _asked_fields(topic: TopicConfig, path: Path, document: Document) -> Iterator["_WantedField"]:
     """Yield the fields of its messages that the file names for a topic."""
     if isinstance(topic.stamp, StampField):
-        yield _AskedField((*path, "stamp", "field"), topic.stamp.field, _A_TIME)
+        yield _WantedField((*path, "stamp", "field"), topic.stamp.field, _A_TIME)
     own = (*path, "key")
     written = own if document.has(own) else (*path[:2], "key")
     if topic.key is not None and written not in document.faulty:
-        yield _AskedField(written, topic.key, _A_KEY)
+        yield _WantedField(written, topic.key, _A_KEY)
 
 
 def _not_installed(type_name: str, document: Document, interfaces: Interfaces) -> tuple[str, str] | None:
@@ -177,7 +177,7 @@ class Wanted(NamedTuple):
         return field.type in self.in_arrays if field.is_array else field.type in self.types or is_message
 
 
-class _AskedField(NamedTuple):
+class _WantedField(NamedTuple):
     """A field that the file names: the key's place, the field's path, and the type it must have."""
 
     path: Path

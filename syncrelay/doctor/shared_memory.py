@@ -108,7 +108,7 @@ def _empty(found: SharedMemory) -> Iterator[Diagnosis]:
         yield error(
             "shm_empty",
             f"{', '.join(empty)}: empty, and Fast DDS waits for its content",
-            impact="a node that comes to such a port hangs as it starts, for ever, and only SIGKILL ends it",
+            impact="a node that comes to such a port hangs as it starts, forever, and only SIGKILL ends it",
             fix=f"rm -f {' '.join(empty)}\nand kill -9 what hangs",
         )
 

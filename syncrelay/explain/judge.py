@@ -338,7 +338,7 @@ def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
         # A silence is told by what comes now, or does not: a cause that is long over is no reason for it.
         since = max(since, facts.figures.now - facts.silent_after)
     elif rules_matching.has_few_sets(facts):
-        # Nor is it one for sets that are missing of late, however far back the stamps are compared.
+        # Nor is it one for recently missing sets, however far back the stamps are compared.
         since = max(since, _seen_since(Code.FEW_SETS, facts))
     return cause.at >= since
 

@@ -167,7 +167,7 @@ class Observation:
         return [each.recent() for each in self._inputs]
 
     def _begin_anew(self, now: int) -> None:
-        """Bear that this machine's clock was set back: what lies in the future now would count for ever."""
+        """Forget what lies in the future after this machine's clock was set back: it would count forever."""
         self._polls.clear()
         self._share.clear()
         self._forget_nearest()

@@ -61,7 +61,7 @@ def over_slop(facts: GroupFacts) -> Found:
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
-    found = _asked(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
+    found = _verdict(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
     yield Finding(
         Code.OVER_SLOP,
         severity,
@@ -175,7 +175,7 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
         return
     if next(other_clock(facts), None):
         return  # what waits for a partner of another clock overflows any queue
-    found = _asked(facts, (Code.SHORT_QUEUE, index), lambda trials: trials.verdict(REQUIRED, _QUEUE))
+    found = _verdict(facts, (Code.SHORT_QUEUE, index), lambda trials: trials.verdict(REQUIRED, _QUEUE))
     if not found.may_miss:
         return
     yield Finding(
@@ -221,10 +221,10 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
     name, tolerance, nearest = an_input.name, facts.tolerance, an_input.figures.nearest
     about, behind = (Code.WAITING_FOR_OPTIONAL, index), _behind(facts, an_input)
     if tolerance is None or len(nearest) < _FEWEST:
-        found = _asked(facts, about, lambda trials: trials.verdict(index, _QUEUE))
+        found = _verdict(facts, about, lambda trials: trials.verdict(index, _QUEUE))
         return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
     if abs(behind) > max(SECOND, tolerance.ns):
-        found = _asked(facts, about, lambda trials: _in_time(index, trials))
+        found = _verdict(facts, about, lambda trials: _in_time(index, trials))
         side = "behind" if behind > 0 else "ahead of"
         return (
             f": its stamps are {words.duration(abs(behind))} {side} those of the others",
@@ -232,18 +232,18 @@ def _why_without(facts: GroupFacts, index: int, an_input: InputFacts) -> tuple[s
         )
     if nearest.quantile(0.5) > tolerance.ns:
         widths = f"{words.duration(nearest.quantile(0))} to {words.duration(nearest.quantile(0.95))}"
-        found = _asked(facts, about, lambda trials: _wide_enough(facts, tolerance, nearest, trials, index))
+        found = _verdict(facts, about, lambda trials: _wide_enough(facts, tolerance, nearest, trials, index))
         return (
             f": the nearest sets with it span {widths}, over {tolerance.key} {words.duration(tolerance.ns)}",
             _advice(facts, found, name) or f"check how {nodes(an_input)} stamps its messages",
         )
     if facts.max_wait is not None and behind > facts.max_wait:
-        found = _asked(facts, about, lambda trials: trials.verdict(index, _WAITING))
+        found = _verdict(facts, about, lambda trials: trials.verdict(index, _WAITING))
         return (
             f": it arrives {words.duration(behind)} after the others, too late",
             f"check what delays {name}{_or(_advice(facts, found, name))}",
         )
-    found = _asked(facts, about, lambda trials: trials.verdict(index, _WAITING))
+    found = _verdict(facts, about, lambda trials: trials.verdict(index, _WAITING))
     return "", _advice(facts, found, name) or f"check whether messages of {name} arrive late or are lost"
 
 
@@ -317,10 +317,10 @@ def more_sets(facts: GroupFacts, code: Code) -> str | None:
     keys = {*_WAITING, "policy"}
     if facts.is_silent and facts.tolerance:
         keys.add(facts.tolerance.key)
-    return _advice(facts, _asked(facts, (code, None), lambda trials: trials.verdict(REQUIRED, keys)))
+    return _advice(facts, _verdict(facts, (code, None), lambda trials: trials.verdict(REQUIRED, keys)))
 
 
-def _asked(facts: GroupFacts, about: tuple[Code, int | None], question: Callable[[Trials], Verdict]) -> Verdict:
+def _verdict(facts: GroupFacts, about: tuple[Code, int | None], question: Callable[[Trials], Verdict]) -> Verdict:
     return UNTRIED if facts.suggester is None else facts.suggester.ask(about, question, now=facts.figures.now)
 
 

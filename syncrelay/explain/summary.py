@@ -1,17 +1,15 @@
 """The summary that a relay and a replay end with: what became of every message."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from syncrelay.config.wording import counted
+from syncrelay.explain.report import GroupReport
+from syncrelay.explain.unneeded import DropFates
 from syncrelay.logs import LOGGER
 from syncrelay.sync.counts import InputCounts
 
-if TYPE_CHECKING:
-    from syncrelay.explain import DropFates, GroupReport
 
-
-def log_summary(reports: "Iterable[GroupReport]") -> None:
+def log_summary(reports: Iterable[GroupReport]) -> None:
     """Log what became of every message of groups."""
     for report in reports:
         facts = report.facts
@@ -21,7 +19,7 @@ def log_summary(reports: "Iterable[GroupReport]") -> None:
 
 
 def summarize(
-    group: str, sets: int, inputs: Sequence[tuple[str, InputCounts]], fates: Sequence["DropFates"]
+    group: str, sets: int, inputs: Sequence[tuple[str, InputCounts]], fates: Sequence[DropFates]
 ) -> Iterator[str]:
     """Return a line for a group, and one for each of its inputs, which are named by their topics."""
     yield f"{group}: {counted(sets, 'set')}"
@@ -35,7 +33,7 @@ def why_unneeded(lacking: Sequence[str]) -> str:
     return f"no message of {' or '.join(lacking)} left to pair with" if lacking else "a newer one served"
 
 
-def _fates(counts: InputCounts, fates: "DropFates", lacking: Sequence[str]) -> str:
+def _fates(counts: InputCounts, fates: DropFates, lacking: Sequence[str]) -> str:
     text = f"{counts.fed} received, {counts.matched} in sets"
     if fates.unneeded:
         text += f", {fates.unneeded} not needed ({why_unneeded(lacking)})"

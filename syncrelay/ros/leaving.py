@@ -1,4 +1,4 @@
-"""Leaving the ROS graph, although Fast DDS may hang for ever.
+"""Leaving the ROS graph, although Fast DDS may hang forever.
 
 It deadlocks if another node says farewell just as it removes its own participant, as when a whole robot ends at once:
 the listener's lock is held while its last call waits for it (https://github.com/eProsima/Fast-DDS/issues/6513).

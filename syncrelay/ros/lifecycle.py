@@ -91,7 +91,7 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]  # LifecycleNode is unty
         return _carried_out("recover", self._carried_out_by.recover)
 
     def _answer(self, request: Any, response: Any) -> Any:
-        # For some transitions that are not possible rclpy raises an error, and the caller would wait for ever.
+        # For some transitions that are not possible rclpy raises an error, and the caller would wait forever.
         asked = request.transition.label or request.transition.id
         if not any(asked in (each[0], each[1]) for each in self._state_machine.available_transitions):
             state = self._state_machine.current_state[1]

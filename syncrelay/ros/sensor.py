@@ -43,7 +43,7 @@ def _stop_at_end_of_stdin(stop: Wakeup) -> None:
     # Not sys.stdin: a daemon thread that holds its lock would abort the interpreter's exit.
     while os.read(0, 4096):
         pass
-    # Where a process was killed, DDS may wait for ever for what that held. The kernel needs no turn of ours to end it.
+    # Where a process was killed, DDS may wait forever for what that held. The kernel needs no turn of ours to end it.
     signal.alarm(LEAVE_WITHIN_S)
     stop.set()
 

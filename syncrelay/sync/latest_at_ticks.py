@@ -38,7 +38,7 @@ class LatestAtTicks(Policy):
     the sets that were given live. A tick at which a required input has no message that is young enough gives no set,
     and the set is not made up for later.
 
-    Ticks give no sets once no input has sent anything for REST_NS. So sensors that died do not give sets for ever, and
+    Ticks give no sets once no input has sent anything for REST_NS. So sensors that died do not give sets forever, and
     a machine that was suspended overnight does not give the sets of the night when it wakes. Ticks that give no set
     cost nothing.
 

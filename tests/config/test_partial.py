@@ -67,20 +67,20 @@ def _problems(text: str, environ: dict[str, str]) -> list[Problem]:
         return list(error.problems)
 
 
-def _told(problems: list[Problem]) -> set[tuple[str, int, str]]:
+def _sentences(problems: list[Problem]) -> set[tuple[str, int, str]]:
     return {(each.code, each.span.line if each.span else 0, each.text) for each in problems}
 
 
 def test_faults_together_are_told_as_each_alone(environ):
-    assert _told(_problems(_BASE, environ)) == set()
-    alone = [_told(_problems(_BASE.replace(*fault), environ)) for fault in _FAULTS]
+    assert _sentences(_problems(_BASE, environ)) == set()
+    alone = [_sentences(_problems(_BASE.replace(*fault), environ)) for fault in _FAULTS]
     assert all(alone)
     for seed in range(60):
         chosen = random.Random(seed).sample(range(len(_FAULTS)), k=seed % len(_FAULTS) + 1)
         text = _BASE
         for index in chosen:
             text = text.replace(*_FAULTS[index])
-        assert _told(_problems(text, environ)) == set().union(*(alone[index] for index in chosen)), text
+        assert _sentences(_problems(text, environ)) == set().union(*(alone[index] for index in chosen)), text
 
 
 @pytest.mark.parametrize("file", _FILES, ids=lambda file: file.stem)
@@ -90,7 +90,7 @@ def test_one_more_fault_at_the_end_of_a_file_hides_none_above(file: Path, enviro
     if any(problem.code in _NO_TREE for problem in before) or all(problem.path == "" for problem in before):
         return
     more = f"{text.rstrip()}\none_more_fault: 1\n"
-    assert _told(before) <= _told(_problems(more, environ))
+    assert _sentences(before) <= _sentences(_problems(more, environ))
 
 
 _ABSENT = object()

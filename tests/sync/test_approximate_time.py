@@ -119,7 +119,7 @@ def test_an_overflow_is_excused_in_a_long_search_too_once_another_input_has_the_
 
 
 def test_a_search_never_goes_back_to_what_it_has_passed():
-    # Long enough to pass many heads at once: those beyond the aim must stay, or they would be passed for ever.
+    # Long enough to pass many heads at once: those beyond the aim must stay, or they would be passed forever.
     policy = approximate(3, queue=10, slop=30)
     arriving = [(0, 22), (1, 22), (0, 25), (0, 28), (1, 28), (0, 29), (0, 32), (0, 33), (1, 29), (1, 32)]
     for place, stamp in arriving:

@@ -114,7 +114,7 @@ def proposed_text(name: str, channels: Sequence[Channel]) -> str:
     return yaml.safe_dump({"version": 1, "groups": {name: group}}, sort_keys=False)
 
 
-def settled(analysis: Analysis) -> Analysis:
+def with_suggestions(analysis: Analysis) -> Analysis:
     """Return the analysis of the file with all that was suggested."""
     text = with_changes(analysis.text, analysis.changes)
     groups = []

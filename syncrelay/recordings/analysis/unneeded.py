@@ -97,7 +97,7 @@ def find_unneeded(group: GroupConfig, evaluation: Evaluation, reach: int | None)
             continue
         is_unneeded = np.any(np.stack(list(lacks.values())), axis=0)
         flags[places] = is_unneeded
-        lacking[index] = _told(lacks, is_unneeded)
+        lacking[index] = _lacking_inputs(lacks, is_unneeded)
     return Unneeded(flags, tuple(lacking))
 
 
@@ -121,7 +121,7 @@ def _has_near(stamps: Nanoseconds, others: Nanoseconds, reach: int) -> _Flags:
     return near
 
 
-def _told(lacks: dict[int, _Flags], is_unneeded: _Flags) -> tuple[int, ...]:
+def _lacking_inputs(lacks: dict[int, _Flags], is_unneeded: _Flags) -> tuple[int, ...]:
     lacking = [index for index, flags in lacks.items() if flags.any()]
     enough = [index for index in lacking if np.array_equal(lacks[index], is_unneeded)]
     return tuple(enough[:1] or lacking)

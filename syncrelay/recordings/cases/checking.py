@@ -123,9 +123,9 @@ def _left(group: GroupConfig, received: Sequence[Arrival], *, end: int, of: Load
 
     def take(outcomes: Sequence[Outcome], now: int) -> None:
         because = moment if now == at and moment else f"@{_column(now, of.case.period)}"
-        told = [text for outcome in outcomes if (text := _told(outcome))]
-        if told:
-            lines.append((because, told))
+        texts = [text for outcome in outcomes if (text := _outcome_text(outcome))]
+        if texts:
+            lines.append((because, texts))
 
     driver = EngineDriver(group, take)
     at = 0
@@ -148,7 +148,7 @@ def _column(now: int, period: int) -> str:
     return f"{(Decimal(now - START) / period).quantize(Decimal('0.001')).normalize():f}"
 
 
-def _told(outcome: Outcome) -> str:
+def _outcome_text(outcome: Outcome) -> str:
     """Return a set or a drop by its letters; nothing for what was not drawn."""
     if not isinstance(outcome, Match):
         return f"{outcome.message.payload} {outcome.reason.value}" if outcome.message.payload else ""

@@ -91,7 +91,7 @@ def _drawn(
 def _simulated(source: InputSource, index: int, case: Case, group: GroupConfig) -> Iterator[Arrival]:
     assert source.rate is not None and case.lasts is not None  # noqa: S101, PT018  checked as the file was read
     if source.drop == _ALL:
-        # Its schedule would search for ever for a message that is not lost.
+        # Its schedule would search forever for a message that is not lost.
         return
     sensor = Sensor(
         topic=group.inputs.names[index],

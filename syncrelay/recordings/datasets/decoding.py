@@ -83,7 +83,7 @@ def _column(node: Node, rows: Rows) -> pa.Array:
 def _struct(node: Struct, rows: Rows) -> pa.Array:
     columns = []
     for field in node.fields:
-        if field.is_asked and not is_empty(field.node):
+        if field.is_wanted and not is_empty(field.node):
             columns.append(_column(field.node, rows))
         else:
             rows.skip(field.node)

@@ -51,7 +51,7 @@ class Field:
 
     name: str
     node: "Node"
-    is_asked: bool = True
+    is_wanted: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +182,7 @@ def only(tree: Struct, paths: Sequence[str], topic: str) -> Struct:
         fields=tuple(
             replace(field, node=_narrowed(field, asked[field.name], topic))
             if field.name in asked
-            else replace(field, is_asked=False)
+            else replace(field, is_wanted=False)
             for field in tree.fields
         ),
     )
@@ -204,7 +204,7 @@ def is_empty(node: Node) -> bool:
     """Tell whether a tree has no field that is asked for."""
     if isinstance(node, Array | Run):
         return is_empty(node.element)
-    return isinstance(node, Struct) and not any(field.is_asked and not is_empty(field.node) for field in node.fields)
+    return isinstance(node, Struct) and not any(field.is_wanted and not is_empty(field.node) for field in node.fields)
 
 
 def arrow_type(node: Node) -> pa.DataType:
@@ -220,7 +220,11 @@ def arrow_type(node: Node) -> pa.DataType:
             return pa.binary() if node.is_bytes else pa.list_(arrow_type(node.element))
         case Struct():
             return pa.struct(
-                [_arrow_field(node.type, field) for field in node.fields if field.is_asked and not is_empty(field.node)]
+                [
+                    _arrow_field(node.type, field)
+                    for field in node.fields
+                    if field.is_wanted and not is_empty(field.node)
+                ]
             )
 
 

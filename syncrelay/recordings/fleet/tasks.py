@@ -9,7 +9,7 @@ from typing import Final, Self
 
 from syncrelay.collector import eased_collector
 from syncrelay.config import Config, load_text
-from syncrelay.recordings.analysis import analyze, inventory, settled
+from syncrelay.recordings.analysis import analyze, inventory, with_suggestions
 from syncrelay.recordings.analysis.binding import bind_file_or_topics
 from syncrelay.recordings.analysis.few_sets import why_few_sets
 from syncrelay.recordings.analysis.report_json import as_json, inventory_as_json
@@ -101,7 +101,7 @@ class AnalyzeTask:
                 text, bindings = bind_file_or_topics(recording, file=self.file, text=self.text, topics=self.topics)
                 analysis = analyze(recording, text, bindings)
                 if self.text is None:
-                    analysis = settled(analysis)
+                    analysis = with_suggestions(analysis)
                 document = as_json(source.shown, analysis)
                 facts = about(recording, bindings)
                 problems = problems_of(recording, bindings)

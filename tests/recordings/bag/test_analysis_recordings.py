@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import load_text
-from syncrelay.recordings.analysis import Analysis, analyze, proposed_text, settled
+from syncrelay.recordings.analysis import Analysis, analyze, proposed_text, with_suggestions
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
 from tests.recordings.bag.making import write_mcap
@@ -33,7 +33,7 @@ def _analyzed(bag: Path, topics: tuple[str, ...]) -> Analysis:
         channels = {channel.topic: channel for channel in recording.channels}
         text = proposed_text("matched", [channels[topic] for topic in topics])
         bindings = bind(load_text(text), recording)
-        return settled(analyze(recording, text, bindings))
+        return with_suggestions(analyze(recording, text, bindings))
 
 
 @pytest.fixture(scope="module")

@@ -62,7 +62,7 @@ def lines(out):
 
 @contextmanager
 def at_work(folder):
-    """A command with two recordings done and two that take for ever; its workers on them."""
+    """A command with two recordings done and two that take forever; its workers on them."""
     for name in ("a", "b"):
         (folder / f"{name}.mcap").write_text(f"longer than the others: {name}")
     for name in ("x", "y"):
