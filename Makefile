@@ -139,7 +139,7 @@ $(VENV)/colcon/done: $(BIN)/python
 	touch $@
 
 $(VENV)/lint: $(BIN)/python pyproject.toml .ci/constraints.txt
-	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[lint]'
+	$(BIN)/python -m pip install -q $(CONSTRAINTS) -e '.[lint,recordings,top]'
 	touch $@
 
 $(VENV)/docs: $(BIN)/python pyproject.toml .ci/constraints.txt
