@@ -17,7 +17,7 @@ from syncrelay.explain.nearest import quantile, signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
 from syncrelay.explain.standing import Standing
-from syncrelay.explain.suggester import REQUIRED, UNTRIED, Changes, Trials, Verdict
+from syncrelay.explain.trials import REQUIRED, UNTRIED, Changes, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Sets are too wide if this share of the slowest input's messages has no set, and at least this many were measured.

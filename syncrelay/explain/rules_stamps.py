@@ -11,7 +11,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Finding, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
-from syncrelay.explain.suggester import Change, Trials, Verdict
+from syncrelay.explain.trials import Change, Trials, Verdict
 from syncrelay.sync.messages import DropReason
 
 # Stamps further off than this come from another clock, or are older than a queue should hold.

@@ -18,7 +18,8 @@ from syncrelay.explain.facts import (
 from syncrelay.explain.input_observation import Arrivals
 from syncrelay.explain.observation import Observation, SentSets
 from syncrelay.explain.standing import StandingWatch
-from syncrelay.explain.suggester import Suggester, Trials
+from syncrelay.explain.suggester import Suggester
+from syncrelay.explain.trials import Trials
 from syncrelay.explain.try_budget import TryBudget
 from syncrelay.sync.counts import InputCounts
 

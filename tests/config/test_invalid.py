@@ -1,6 +1,7 @@
 """Every file in invalid/ begins with a comment that holds the errors it gives, in full.
 
-`{policies}` stands for the names of all policies. In those in by_no_schema/ the JSON Schema finds nothing.
+Lists of policies and of keys come from the models, and stand there in braces. In the files in by_no_schema/ the JSON
+Schema finds nothing.
 """
 
 from itertools import takewhile
@@ -9,15 +10,28 @@ from pathlib import Path
 import pytest
 
 from syncrelay.config import ConfigError, load
-from syncrelay.config.installed import installed_policies
-from syncrelay.config.wording import one_of
+from syncrelay.config.installed import installed_policies, shared_keys
+from syncrelay.config.wording import all_of, one_of
 
 FOLDER = Path(__file__).parent / "invalid"
 
 
 def expected_errors(file: Path) -> str:
     comment = takewhile(lambda line: line.startswith("#"), file.read_text(encoding="utf-8").splitlines())
-    return "\n".join(line[2:] for line in comment).replace("{policies}", one_of(installed_policies().models))
+    text = "\n".join(line[2:] for line in comment)
+    for name, names in _names().items():
+        text = text.replace(f"{{{name}}}", names)
+    return text
+
+
+def _names() -> dict[str, str]:
+    models = installed_policies().models
+    return {
+        "policies": one_of(models),
+        "policies with slop": all_of(name for name, model in models.items() if "slop" in model.model_fields),
+        "keys of a group": one_of(models["exact_time"].model_fields),
+        "keys of defaults": one_of(key for key in shared_keys(models.values()) if key != "topics"),
+    }
 
 
 @pytest.mark.parametrize("file", sorted(FOLDER.rglob("*.yaml")), ids=lambda file: file.stem)

@@ -2,7 +2,9 @@
 
 import random
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+
+from syncrelay.config.schema import json_schema
 
 # What a value may be in place of what it is: of other kinds, sizes and signs, and what YAML and templates make of it.
 _ODD = """\
@@ -118,13 +120,23 @@ def mutated(content: bytes, chance: random.Random) -> bytes:
     return content
 
 
+def _names(schema: object) -> Iterator[str]:
+    """Yield the keys and the fixed values of a JSON Schema."""
+    if isinstance(schema, dict):
+        for key, value in schema.items():
+            yield from value if key == "properties" else ()
+            yield from (each for each in value if isinstance(each, str)) if key == "enum" else ()
+            yield from [value] if key == "const" and isinstance(value, str) else ()
+            yield from _names(value)
+    elif isinstance(schema, list):
+        yield from (name for each in schema for name in _names(each))
+
+
 # Words that mean something somewhere in the file, and some that never do.
-_NAMES = """\
-version node metrics diagnostics defaults groups name namespace use_sim_time transport listen scalars front rear
-policy queue_size slop age_penalty max_wait max_rate every restamp lazy output_prefix trigger max_age key topics topic
-type output qos required offset stamp min_period field history depth reliability durability deadline lifespan liveliness
-sec nsec exact_time latest_time equal_key approximate_time earliest /a /b sensor_msgs/msg/Image /clock << ? $ frnot"""
-_WORDS = _NAMES.split()
+_WORDS = [
+    *sorted({name for name in _names(json_schema()) if name.isidentifier()}),
+    *["sec", "nsec", "front", "rear", "/a", "/b", "sensor_msgs/msg/Image", "/clock", "<<", "?", "$", "frnot"],
+]
 
 
 def made_up(chance: random.Random) -> bytes:

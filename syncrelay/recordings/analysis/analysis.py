@@ -10,7 +10,7 @@ import yaml
 from syncrelay.config import GroupConfig, load_text
 from syncrelay.config.load import spelt_out
 from syncrelay.explain.nearest import PossibleSets
-from syncrelay.explain.suggester import Trials
+from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change, with_changes
 from syncrelay.recordings.analysis.curves import Curves, curves_of
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate

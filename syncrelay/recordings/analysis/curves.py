@@ -7,7 +7,7 @@ from typing import Final
 
 from syncrelay.config import GroupConfig
 from syncrelay.explain.nearest import PossibleSets, as_arrays, quantile
-from syncrelay.explain.suggester import Change, Trials, changed
+from syncrelay.explain.trials import Change, Trials, changed
 from syncrelay.recordings.analysis.streams import Stream, messages, stamped
 from syncrelay.sync.queues import LONGEST_QUEUE
 

@@ -10,8 +10,8 @@ from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import all_of
 from syncrelay.explain import words
 from syncrelay.explain.nearest import Received, quantile
-from syncrelay.explain.suggester import Change as TriedChange
-from syncrelay.explain.suggester import Trials
+from syncrelay.explain.trials import Change as TriedChange
+from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.changes import Change
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
 from syncrelay.recordings.analysis.streams import Stream, messages, stamped

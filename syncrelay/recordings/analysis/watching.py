@@ -16,7 +16,7 @@ from syncrelay.explain import (
     Judge,
     Severity,
 )
-from syncrelay.explain.suggester import Trials
+from syncrelay.explain.trials import Trials
 from syncrelay.recordings.analysis.evaluation import Outcomes
 from syncrelay.recordings.analysis.streams import Stream, messages
 from syncrelay.sync import Message

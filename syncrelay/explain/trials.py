@@ -1,0 +1,426 @@
+"""Which values of the file would give more sets: the engine itself tries them on the messages that were received.
+
+One `Trials` answers all questions about a group and a moment, so that a key has one value in every view of it. What
+is counted is sets of one moment: a wider slop that pairs messages of two moments gives more sets, and cures nothing.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import chain, combinations
+from math import ceil
+from statistics import median_low
+from typing import Any, Final, NamedTuple, TypeAlias
+
+import numpy as np
+
+from syncrelay.config import Distance, GroupConfig
+from syncrelay.config.file import file_format
+from syncrelay.config.units import parse_duration
+from syncrelay.explain import words
+from syncrelay.explain.clocks import time_scale
+from syncrelay.explain.dry_run import EngineDriver
+from syncrelay.explain.nearest import (
+    Nanoseconds,
+    PossibleSets,
+    Received,
+    in_order,
+    possible_sets,
+    quantile,
+    signed_distances,
+)
+from syncrelay.sync import Match, Message, Outcome
+from syncrelay.sync.queues import LONGEST_QUEUE
+
+# Fewer possible sets are no evidence.
+_FEWEST: Final = 5
+# Values are good if they give all possible sets but one, or but this share: the ends of a window cut more sets off.
+_LEFT_OUT_OF_WINDOW: Final = 0.05
+_LEFT_OUT: Final = 0.01
+_HEADROOM: Final = 1.25
+_MOST_QUEUE: Final = 4
+# A tolerance this many times what is needed pairs messages of two moments as soon as one is missing.
+_TOO_WIDE: Final = 4
+# Less cannot be distinguished from what a driver takes.
+_LEAST_DISTANCE: Final = 1_000_000
+# Messages of one moment are received within this share of a period.
+_SAME: Final = 0.15
+_SAME_RATE: Final = 0.05
+
+REQUIRED: Final = None
+"""Stands for the sets of the required inputs, where an index stands for those with that optional input."""
+
+
+class Change(NamedTuple):
+    """A value to write: of a group, or of one of its inputs."""
+
+    key: str
+    value: str
+    input: int | None = None
+
+
+Changes: TypeAlias = tuple[Change, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """What changes would give: `given` of the `possible` sets of one moment, in place of `now`."""
+
+    changes: Changes
+    given: int
+    now: int
+    possible: int
+
+
+class Verdict(NamedTuple):
+    """The values that help, if any; and whether the file's values may miss sets at all."""
+
+    tried: tuple[Tried, ...]
+    may_miss: bool = True
+
+
+UNTRIED: Final = Verdict(())
+
+
+class _Run(NamedTuple):
+    """The sets of one moment that a run of the engine gave: the spans that were possible, and those that they had."""
+
+    possible: Nanoseconds
+    given: Nanoseconds
+
+
+_NOTHING: Final = _Run(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Runs of a group's engine on messages, received at their payload's time; `inputs` holds the same as arrays.
+
+    A window is of a live group: it ends where the next messages are still to come.
+    """
+
+    config: GroupConfig
+    messages: Callable[[], Iterable[Message]]
+    inputs: Sequence[Received]
+    is_window: bool
+    _targets: dict[int | None, PossibleSets | None] = field(default_factory=dict)
+    _runs: dict[Changes, dict[int | None, _Run]] = field(default_factory=dict)
+
+    @property
+    def runs(self) -> int:
+        """How many runs there were."""
+        return len(self._runs)
+
+    @cached_property
+    def optional(self) -> tuple[int, ...]:
+        """The indices of the optional inputs."""
+        return tuple(index for index, topic in enumerate(self.config.topics) if not topic.required)
+
+    @cached_property
+    def required(self) -> tuple[int, ...]:
+        """The required inputs that the group's tolerance is for; all required ones where each has its own."""
+        required = [index for index, topic in enumerate(self.config.topics) if topic.required]
+        own = self.config.own_tolerances
+        shared = tuple(index for index in required if own[index] is None or index == self.config.trigger)
+        return shared or tuple(required)
+
+    def possible(self, target: int | None = REQUIRED) -> PossibleSets | None:
+        """Return the sets of one moment that the required inputs allow, or those with an optional one."""
+        if target not in self._targets:
+            among = self.required if target is None else (*self.required, target)
+            self._targets[target] = possible_sets(self.config, self.inputs, among, is_window=self.is_window)
+        return self._targets[target]
+
+    def spans(self, target: int | None = REQUIRED) -> Nanoseconds:
+        """Return the spans of the possible sets."""
+        possible = self.possible(target)
+        return np.zeros(0, dtype=np.int64) if possible is None else possible.spans
+
+    def given(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> int:
+        """Return how many of the possible sets come together with changes; of those `within` a span, where one is."""
+        run = self._run(changes).get(target, _NOTHING)
+        return len(run.given) if within is None else int(np.count_nonzero(run.possible <= within))
+
+    def is_enough(self, changes: Changes, target: int | None = REQUIRED, *, within: int | None = None) -> bool:
+        """Tell whether changes give nearly all possible sets."""
+        possible = self._count(target, within)
+        left_out = max(1, int((_LEFT_OUT_OF_WINDOW if self.is_window else _LEFT_OUT) * possible))
+        return possible >= _FEWEST and self.given(changes, target, within=within) >= possible - left_out
+
+    def _count(self, target: int | None, within: int | None) -> int:
+        spans = self.spans(target)
+        return len(spans) if within is None else int(np.count_nonzero(spans <= within))
+
+    def _run(self, changes: Changes) -> dict[int | None, _Run]:
+        if changes in self._runs:
+            return self._runs[changes]
+        config = changed(self.config, changes)
+        # Thinning leaves sets out that came together.
+        config = replace(config, options=config.options.model_copy(update={"every": 1, "max_rate": None}))
+        offsets = [topic.offset_ns for topic in config.topics]
+        counted: dict[int | None, tuple[PossibleSets, dict[int, int], tuple[list[int], list[int]]]] = {
+            target: (possible, dict(zip(possible.stamps.tolist(), possible.spans.tolist(), strict=True)), ([], []))
+            for target in (REQUIRED, *self.optional)
+            if (possible := self.possible(target)) is not None
+        }
+
+        def take(outcomes: Sequence[Outcome], _now: int) -> None:
+            for stamps in (outcome.stamps for outcome in outcomes if isinstance(outcome, Match)):
+                for possible, span_of, (expected, spans) in counted.values():
+                    pivot = stamps[possible.pivot]
+                    allowed = None if pivot is None else span_of.get(pivot)
+                    of_set = [
+                        stamp + offsets[index] for index in possible.among if (stamp := stamps[index]) is not None
+                    ]
+                    if allowed is not None and len(of_set) == len(possible.among):
+                        span = max(of_set) - min(of_set)
+                        if span <= possible.widest:
+                            expected.append(allowed)
+                            spans.append(span)
+
+        EngineDriver(config, take).run(self.messages())
+        self._runs[changes] = {
+            target: _Run(*(np.array(each, dtype=np.int64) for each in spans))
+            for target, (_, _, spans) in counted.items()
+        }
+        return self._runs[changes]
+
+    def spans_given(self, changes: Changes) -> Nanoseconds:
+        """Return the spans of the sets of one moment that come together with changes."""
+        return self._run(changes).get(REQUIRED, _NOTHING).given
+
+    @cached_property
+    def plan(self) -> Changes:
+        """The values that fit the group: what cures the targets that miss sets, or a tolerance that is not too wide.
+
+        Each later target is cured with the values of those before, which only grow: one value serves all.
+        """
+        chosen: Changes = ()
+        for target in (REQUIRED, *self.optional):
+            best, best_given = chosen, 0
+            for cure in self._cures(target, chosen):
+                within = None if any(each.key in self._widening for each in cure) else self._limit
+                given = self.given(cure, target)
+                # What is enough of the narrow sets may be less than a wider tolerance gives.
+                if self.is_enough(cure, target, within=within) and given >= best_given:
+                    best = cure
+                    break
+                if target is REQUIRED and given > max(best_given, self.given(())):
+                    best, best_given = cure, given
+            chosen = best
+        return chosen or self._tidier()
+
+    @property
+    def _limit(self) -> int | None:
+        tolerance = self.config.options.tolerance
+        return None if tolerance is None else tolerance.ns
+
+    @property
+    def _widening(self) -> set[str]:
+        """The keys that let wider sets leave."""
+        tolerance = self.config.options.tolerance
+        return set() if tolerance is None else {tolerance.key, "policy"} if tolerance.wider_policy else {tolerance.key}
+
+    def _cures(self, target: int | None, chosen: Changes) -> Iterator[Changes]:
+        """Yield values to try for a target that misses sets, the likeliest first, and each with longer queues."""
+        possible = self.possible(target)
+        if possible is None or len(possible) < _FEWEST or self.is_enough(chosen, target):
+            return
+        attempts = list(self._attempts(possible, target))
+        for attempt in attempts:
+            merged = self._merged(chosen, attempt)
+            yield merged
+            for size in self._queue_sizes(possible, merged):
+                yield self._merged(merged, (Change("queue_size", str(size)),))
+
+    def _attempts(self, possible: PossibleSets, target: int | None) -> Iterator[Changes]:
+        options, tolerance = self.config.options, self.config.options.tolerance
+        patient = ((Change("policy", options.patient_policy),),) if options.patient_policy else ()
+        if possible.is_exact and target is REQUIRED:
+            yield from self._exact()
+        if tolerance is not None and quantile(possible.spans, 0.99) > tolerance.ns and not self.pairs_neighbours:
+            policies: list[Changes] = [(Change("policy", tolerance.wider_policy),)] if tolerance.wider_policy else [()]
+            # With headroom, some sets may lose messages to those that are nearly as near.
+            for wider in dict.fromkeys((with_headroom(possible.spans), words.at_least(possible.widest))):
+                yield from ((*policy, Change(tolerance.key, wider)) for policy in (*policies, *patient))
+        if target is not REQUIRED and (late := self._lateness(target)) > 0:
+            yield from ((Change("max_wait", words.at_least(times * late)),) for times in (1, 2))
+        yield ()
+        if target is REQUIRED:
+            yield from patient
+            waits = (2 * options.max_wait, 4 * options.max_wait) if options.max_wait else ()
+            yield from ((Change("max_wait", words.at_least(wait)),) for wait in waits)
+
+    def _exact(self) -> Iterator[Changes]:
+        is_by_stamp = all(topic.stamp != "receive" for topic in self.config.topics)
+        if is_by_stamp and self.config.options.policy != "exact_time" and self.config.options.distance is Distance.SPAN:
+            yield (Change("policy", "exact_time"),)
+
+    def _tidier(self) -> Changes:
+        """Return a tolerance no wider than needed, where the file's is much wider and all sets come together."""
+        possible, tolerance = self.possible(), self.config.options.tolerance
+        if possible is None or possible.is_alone or tolerance is None or not self.is_enough(()):
+            return ()
+        if possible.is_exact:
+            tidier = next(self._exact(), ()) if tolerance.ns else ()
+        elif tolerance.ns > _TOO_WIDE * possible.widest and self.config.options.distance is Distance.SPAN:
+            targets = (REQUIRED, *(index for index in self.optional if len(self.spans(index))))
+            widest = max(parse_duration(with_headroom(self.spans(target))) for target in targets)
+            tidier = (Change(tolerance.key, words.at_least(widest)),) if widest < tolerance.ns else ()
+        else:
+            tidier = ()
+        return tidier if tidier and self.is_enough(tidier) else ()
+
+    def _merged(self, chosen: Changes, more: Changes) -> Changes:
+        """Return changes with more of them; where both have a key, the greater value."""
+        merged = {each.key: each for each in chosen}
+        for each in more:
+            before = merged.get(each.key)
+            if before is None or each.key == "policy" or _parsed(before) < _parsed(each):
+                merged[each.key] = each
+        return tuple(merged.values())
+
+    def _queue_sizes(self, possible: PossibleSets, changes: Changes) -> Iterator[int]:
+        """Yield ever longer queues: from what nearly all possible sets need, to some times as much."""
+        need, current = quantile(possible.queues, 0.995), changed(self.config, changes).options.queue_size
+        size, most = ceil(_HEADROOM * need) + 1, min(LONGEST_QUEUE, _MOST_QUEUE * max(need, current))
+        while size <= most:
+            if size > current:
+                yield size
+            size *= 2
+
+    def _lateness(self, index: int) -> int:
+        """Return how much later than the required inputs' an optional input's messages come, with headroom."""
+        delays = [self._delays(other) for other in self.required]
+        others, own = [int(np.median(each)) for each in delays if len(each)], self._delays(index)
+        return parse_duration(with_headroom(own - min(others))) if others and len(own) else 0
+
+    def _delays(self, index: int) -> Nanoseconds:
+        """Return how long after its stamp, offset added, each message of an input came."""
+        stamps, received, _ = self.inputs[index]
+        is_set = (stamps != 0) & (stamps > -(2**62))
+        return np.asarray(received[is_set] - stamps[is_set] - self.config.topics[index].offset_ns)
+
+    def verdict(self, target: int | None, keys: Collection[str], *, all_widths: bool = False) -> Verdict:
+        """Return the fewest values of the plan, of these keys, that cure a target.
+
+        The possible sets are those that the file's tolerance allows, or all where a key widens it or with `all_widths`.
+        """
+        tolerance = self.config.options.tolerance
+        limit = None if all_widths or self._widening & set(keys) else self._limit
+        now, possible = self.given((), target, within=limit), self._count(target, limit)
+        sets = self.possible(target)
+        is_certain = sets is not None and len(in_order(self.inputs[sets.pivot], 0).stamps) >= 2 * _FEWEST
+        is_enough = self.is_enough((), target, within=limit)
+        may_miss = not (is_certain and (possible < _FEWEST or is_enough))
+        if is_enough or possible < _FEWEST:
+            return Verdict((), may_miss)
+        offered = [each for each in self.plan if each.key in keys]
+        for some in chain.from_iterable(combinations(offered, count) for count in range(1, len(offered) + 1)):
+            named = {each.key for each in some}
+            if tolerance is not None and tolerance.wider_policy and "policy" in named and tolerance.key not in named:
+                # The other policy cannot do without its tolerance.
+                continue
+            if self.is_enough(some, target, within=limit):
+                return Verdict((Tried(some, self.given(some, target, within=limit), now, possible),), may_miss)
+        return Verdict((), may_miss)
+
+    @cached_property
+    def pairs_neighbours(self) -> bool:
+        """Whether the nearest stamps belong to messages of two moments: an offset would help, and no tolerance."""
+        return any(is_other for _, is_other in self._constant_offsets())
+
+    def offsets(self) -> Iterator[Change]:
+        """Yield the offsets that bring the stamps of an input, a constant distance off, to those of the pivot."""
+        if self.config.options.distance is Distance.SPAN:
+            yield from (change for change, _ in self._constant_offsets())
+
+    def _constant_offsets(self) -> Iterator[tuple[Change, bool]]:
+        """Yield offsets, and whether an input of the pivot's rate has another partner than the nearest.
+
+        The times of receipt say so: its messages come whole periods earlier or later than the pivot's nearest do.
+        """
+        possible = self.possible()
+        if possible is None:
+            return
+        pivot = possible.pivot
+        for index in possible.among:
+            if index == pivot:
+                continue
+            one, other = (in_order(self.inputs[at], self.config.topics[at].offset_ns).stamps for at in (pivot, index))
+            distances = signed_distances(one, other)
+            if len(distances) < _FEWEST or len(other) < 2:  # noqa: PLR2004  two make a period
+                continue
+            middle = quantile(distances, 0.5)
+            scatter = quantile(distances, 0.95) - quantile(distances, 0.05)
+            if abs(middle) < _LEAST_DISTANCE or 2 * scatter > abs(middle):
+                continue
+            delays = [float(np.median(self._delays(at))) for at in (index, pivot)]
+            period = float(np.median(np.diff(other)))
+            whole = round((delays[0] - delays[1] + middle) / period) * period
+            is_whole = bool(whole) and abs(delays[0] - delays[1] + middle - whole) <= _SAME * period
+            shift = whole - middle if is_whole else -middle
+            # Of two, the one that is farther from this machine's time is odd.
+            at, shift = (index, shift) if abs(delays[0]) >= abs(delays[1]) else (pivot, -shift)
+            is_same_rate = abs(float(np.median(np.diff(one))) / period - 1) <= _SAME_RATE if len(one) > 1 else False
+            offset = round(self.config.topics[at].offset_ns + shift)
+            yield Change("offset", words.exactly(offset), at), is_whole and is_same_rate
+
+    def by_offset(self, change: Change, target: int | None = REQUIRED) -> Tried | None:
+        """Return what another offset gives if it brings messages together that are possible sets by then, else None."""
+        shifted = replace(self, config=changed(self.config, (change,)), _targets={}, _runs={})
+        if not shifted.is_enough((), target):
+            return None
+        return Tried((change,), shifted.given((), target), self.given((), target), len(shifted.spans(target)))
+
+    def clock_offset(self, index: int) -> Change | None:
+        """Return the offset that brings an input of another clock to the time of the required inputs."""
+        by = self.apart(index)
+        offset = self.config.topics[index].offset_ns
+        stamps = self.inputs[index].stamps
+        scale = time_scale(int(stamps[-1]) if len(stamps) else 0, by)
+        return Change("offset", words.exactly((by if scale is None else scale[1]) + offset), index) if by else None
+
+    def apart(self, index: int) -> int:
+        """Return how much later after its stamp an input's message comes than the required ones' do; 0 if unknown."""
+        among = {*(at for at, topic in enumerate(self.config.topics) if topic.required), index}
+        delays = {at: int(quantile(each, 0.5)) for at in among if len(each := self._delays(at))}
+        if index not in delays or len(delays) < 2:  # noqa: PLR2004  one alone has no other clock
+            return 0
+        # Of two, the one that is farther from this machine's time is odd.
+        usual = median_low(delays.values()) if len(delays) > 2 else min(delays.values(), key=abs)  # noqa: PLR2004
+        return delays[index] - usual
+
+
+def with_headroom(spans: Nanoseconds) -> str:
+    """Return the duration, as it stands in the file, that 99 % of spans keep to, and half of what they scatter by."""
+    most = quantile(spans, 0.99)
+    return words.at_least(most + (most - quantile(spans, 0.5)) // 2)
+
+
+def changed(config: GroupConfig, changes: Changes) -> GroupConfig:
+    """Return a group as it would be with other values in the file."""
+    options, topics = config.options, list(config.topics)
+    values = {each.key: _parsed(each) for each in changes if each.input is None}
+    if "policy" in values:
+        form, policy = file_format(), values["policy"]
+        of_policy = tuple(form.topics[policy].model_construct(**dict(topic)) for topic in options.topics)
+        known = {key: value for key, value in dict(options).items() if key in form.groups[policy].model_fields}
+        options = form.groups[policy].model_construct(**{**known, **values, "topics": of_policy})
+    elif values:
+        options = options.model_copy(update=values)
+    for each in changes:
+        if each.input is not None:
+            topics[each.input] = replace(topics[each.input], offset_ns=_parsed(each))
+    return replace(config, options=options, topics=tuple(topics))
+
+
+def _parsed(change: Change) -> Any:
+    match change.key:
+        case "policy":
+            return change.value
+        case "queue_size":
+            return int(change.value)
+        case _:
+            # A policy's tolerance, whatever its key, `max_wait` or `offset`.
+            return parse_duration(change.value)
