@@ -18,10 +18,7 @@ OURS = (
     "typing_inspection",
     "yaml",
     "packaging",
-    "rich",
-    "markdown_it",
-    "mdurl",
-    "pygments",
+    "numpy",
 )
 
 
