@@ -184,6 +184,9 @@ def test_every_view_of_an_analysis_counts_alike_whatever_was_recorded(policy, da
     by_value = {point["queue_size"]: point["sets"] for point in group["by_queue_size"]}
     if by_value:
         assert max(by_value.values()) <= group["suggestion"]["possible"]
+        if not group["suggestion"]["changes"]:
+            queue_size = load_text(text).groups[0].options.queue_size
+            assert by_value[queue_size] == group["suggestion"]["now"]
 
 
 def test_what_waited_in_one_group_leaves_before_later_messages_of_another():
