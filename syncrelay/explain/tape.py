@@ -74,8 +74,11 @@ class Tape:
     def _newest_since(self, number: int) -> list[Left]:
         """Return what left after that number, the newest first, and maybe some that left before."""
         while (count := self.last + 1 - number) > 1:
-            # One call into C, so that nothing is noted meanwhile; before it, something may be.
-            newest = [*islice(reversed(self._kept), count)]
+            # The list is filled in one call into C, but a message may be noted between the calls before that.
+            try:
+                newest = [*islice(reversed(self._kept), count)]
+            except RuntimeError:
+                continue
             if len(newest) < count or newest[-1].number <= number + 1:
                 return newest
         return []

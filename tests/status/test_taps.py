@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import sys
 import threading
 from contextlib import ExitStack
 from itertools import pairwise
@@ -239,11 +240,17 @@ def test_fifty_taps_that_stall_keep_nobody_from_an_answer_and_hold_back_no_set()
 def test_what_is_noted_while_it_is_read_is_neither_lost_nor_told_twice(taps):
     reader, count = Reader(taps), 20_000
     noting = threading.Thread(target=note, args=(taps, count))
-    noting.start()
-    lines = []
-    while noting.is_alive():
-        lines += reader.read()
-    noting.join()
+    usual = sys.getswitchinterval()
+    # The threads take turns at every step that they can.
+    sys.setswitchinterval(1e-6)
+    try:
+        noting.start()
+        lines = []
+        while noting.is_alive():
+            lines += reader.read()
+        noting.join()
+    finally:
+        sys.setswitchinterval(usual)
     lines += reader.read()
     stamps = [line["stamps"]["/robot/camera"] for line in lines]
     assert all(one < other for one, other in pairwise(stamps))
