@@ -145,8 +145,9 @@ def _require_bearable(types: Mapping[str, Any]) -> None:
         if kind == Nodetype.BASE:
             return 1
         element, count = what
-        if kind == Nodetype.ARRAY and count > _LONGEST_ARRAY:
-            raise ValueError(f"an array of {count} elements is longer than a message can be")
+        # rosidl refuses arrays of no elements. pyarrow divides by their number, which ends the process.
+        if kind == Nodetype.ARRAY and not 0 < count <= _LONGEST_ARRAY:
+            raise ValueError(f"an array of {count} elements is not one that a message can have")
         # Numbers side by side are skipped at once; everything else is visited one by one.
         is_plain = kind == Nodetype.SEQUENCE or (element[0] == Nodetype.BASE and element[1][0] != "string")
         return weight_of_field(element, depth) * (1 if is_plain else count)
