@@ -14,7 +14,8 @@ COMPRESSED: Final = (".bz2", ".zstd", ".zst", ".gz")
 """What the name of a file that is compressed as a whole ends in."""
 
 
-_SCHEME: Final = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
+# With the protocols that fsspec chains before it, as in `simplecache::s3://`.
+_SCHEME: Final = re.compile(r"((?:[a-z][a-z0-9+.-]*::)*[a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 
 
 def scheme_of(word: str) -> str:

@@ -14,6 +14,9 @@ SERVERS: Final = ("http", "https")
 LOCAL: Final = ("file", "local")
 """Schemes of files of this machine."""
 
+# Schemes whose libraries the extra `fleet` brings.
+_BROUGHT: Final = (*SERVERS, "s3", "s3a", "gs", "gcs")
+
 REPLACED: Final = "was replaced or removed while it was being read: read it again"
 """What is wrong with a file that is not the one that was opened."""
 
@@ -27,6 +30,7 @@ _ANSWER_WITHIN: Final = 140.0
 _Done = TypeVar("_Done")
 # A name and a password before the host; a password may hold a slash that should have been %2F.
 _LOGIN: Final = re.compile(r"[^/?#]*@|[^/?#:\[]*:(?!\d*(?:[/?#]|$))[^?#]*@")
+_NEXT_LINK: Final = re.compile(r"::(?=[a-z][a-z0-9+.-]*://)", re.IGNORECASE)
 _DENIED: Final = "access denied: check the credentials (docs/howto/storage.md), and whether a signed URL has expired"
 _DENIALS: Final = ("Forbidden", "Anonymous caller", "Invalid Credentials")
 _NO_CREDENTIALS: Final = (
@@ -65,6 +69,10 @@ class IncompleteError(Exception):
 
 def redacted(word: str) -> str:
     """Return a URL without a name and password, and without the query that may sign it; any other word as it is."""
+    return "::".join(map(_link_redacted, _NEXT_LINK.split(word)))
+
+
+def _link_redacted(word: str) -> str:
     scheme = scheme_of(word)
     if not scheme:
         return word
@@ -80,8 +88,13 @@ def file_system(url: str) -> tuple[Any, str]:
     """Return fsspec's file system for a URL, and the path in it.
 
     Credentials and endpoints are those of its library's own configuration. Raises UnavailableError where a library is
-    missing, and StorageError for a scheme that none knows.
+    missing, and StorageError for a scheme that none knows and for a chain of URLs.
     """
+    if "::" in url:
+        raise StorageError(
+            f"{redacted(url)}: `::` in a URL is not supported, because fsspec takes it for a chain of URLs: name the"
+            " file's own URL, or copy it here"
+        )
     scheme = scheme_of(url)
     # fsspec knows schemes in lower case alone.
     url = scheme + url[len(scheme) :]
@@ -90,9 +103,11 @@ def file_system(url: str) -> tuple[Any, str]:
 
         found: tuple[Any, str] = tried(url, lambda: fsspec.url_to_fs(url, **_options(url)), attempts=1)
     except ImportError as error:
+        extra = "pip install 'syncrelay[fleet]' (in a clone: pip install '.[fleet]')"
+        # Of other schemes, fsspec says which library to install.
+        advice = extra if scheme in _BROUGHT or error.name == "fsspec" else error
         raise UnavailableError(
-            f"{redacted(url)}: what reads and writes {scheme}:// URLs is not installed: "
-            "pip install 'syncrelay[fleet]' (in a clone: pip install '.[fleet]')"
+            f"{redacted(url)}: what reads and writes {scheme}:// URLs is not installed: {advice}"
         ) from error
     if scheme == "s3":
         # botocore tries again too, as AWS_MAX_ATTEMPTS says: three loops in one another would hardly end.

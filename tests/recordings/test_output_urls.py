@@ -116,6 +116,14 @@ def test_a_server_takes_no_files_and_that_is_said(words, folder):
     assert "hush" not in done.stderr
 
 
+@pytest.mark.parametrize("name", ["out", "out.mcap"])
+def test_a_chain_of_urls_is_refused_and_makes_no_folder(name, folder):
+    before = sorted(folder.iterdir())
+    done = run("replay", "rig.mcap", "--config", "f.yaml", "-o", f"simplecache::s3://bucket/{name}", folder=folder)
+    assert (done.returncode, "`::` in a URL is not supported" in done.stderr) == (1, True)
+    assert sorted(folder.iterdir()) == before
+
+
 def test_an_analysis_is_written_to_a_store_and_over_its_own_report_alone(folder):
     words = ["analyze", "rig.mcap", "--config", "f.yaml", "--html", "store://day/report.html"]
     for _ in range(2):

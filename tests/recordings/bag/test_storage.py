@@ -320,6 +320,8 @@ def test_to_tell_and_to_complete_a_word_nothing_is_fetched(server):
         ("https://host/a.mcap?user=me@x:y", "https://host/a.mcap?..."),
         ("s3://AKIA:hush@bucket/a/run?.mcap", "s3://bucket/a/run?.mcap"),
         ("/data/a?b@c.mcap", "/data/a?b@c.mcap"),
+        ("simplecache::https://me:hush@host/a.mcap?AKIA", "simplecache::https://host/a.mcap?..."),
+        ("zip://a.mcap::https://me:hush@host/a.zip?AKIA", "zip://a.mcap::https://host/a.zip?..."),
     ],
 )
 def test_what_is_secret_in_a_url_is_never_shown(word, shown):
@@ -329,6 +331,14 @@ def test_what_is_secret_in_a_url_is_never_shown(word, shown):
 def test_a_url_of_no_library_is_refused_with_those_that_are_usual():
     with pytest.raises(StorageError, match="no library reads what:// URLs: expected s3://, gs://"):
         open_recording(["what://host/rig.mcap"])
+
+
+@pytest.mark.parametrize(
+    "word", ["simplecache::s3://bucket/rig.mcap", "zip://rig.mcap::file:///x.zip", "memory://a::b.mcap"]
+)
+def test_a_chain_of_urls_is_refused(word):
+    with pytest.raises(StorageError, match="`::` in a URL is not supported"):
+        open_recording([word])
 
 
 @pytest.mark.parametrize("kind", ["rig.mcap", "rig.bag", "folder"])
@@ -350,6 +360,13 @@ def test_where_the_library_is_missing_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "aiohttp", None)
     with pytest.raises(UnavailableError, match=r"https:// URLs is not installed: pip install 'syncrelay\[fleet\]'"):
         open_recording(["https://host/rig.mcap"])
+
+
+def test_where_a_library_is_missing_that_the_extra_does_not_bring_fsspec_says_which(monkeypatch):
+    monkeypatch.setitem(sys.modules, "paramiko", None)
+    monkeypatch.delitem(sys.modules, "fsspec.implementations.sftp", raising=False)
+    with pytest.raises(UnavailableError, match='sftp:// URLs is not installed: SFTPFileSystem requires "paramiko"'):
+        open_recording(["sftp://host/rig.mcap"])
 
 
 def in_memory(content: bytes) -> RemoteFile:
