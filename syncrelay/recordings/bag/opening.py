@@ -7,7 +7,6 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from errno import ENOSPC
 from itertools import chain, pairwise
 from operator import itemgetter
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any, Final, TypeAlias
 import zstandard
 
 from syncrelay.config.wording import counted
-from syncrelay.errors import BagError, StorageError
+from syncrelay.errors import NO_SPACE, BagError, StorageError
 from syncrelay.recording_files import METADATA, scheme_of
 from syncrelay.recordings.bag import mcap_file, mcap_index, ros1_file, sqlite_file
 from syncrelay.recordings.bag.effort import TOO_MUCH, room_for
@@ -214,16 +213,15 @@ def _decompressed(
     folder = _temporary(name, "decompress it in", opened)
     content = folder / path.stem
     room = room_for(path.stat().st_size)
-    with decompressor(path) as packed, content.open("wb") as plain:
-        try:
+    try:
+        # Closing writes what is still buffered.
+        with decompressor(path) as packed, content.open("wb") as plain:
             while piece := packed.read(_PIECE):
                 if len(piece) > room:
                     return content, [f"{name}: {TOO_MUCH}; read up to there: decompress it yourself to have all of it"]
                 room -= plain.write(piece)
-        except (EOFError, OSError, zlib.error, zstandard.ZstdError) as error:
-            if isinstance(error, OSError) and error.errno == ENOSPC:
-                raise BagError(
-                    f"{name}: no space in {folder} to decompress it, set TMPDIR to another folder"
-                ) from error
-            return content, [f"{name}: cut off or damaged; read up to there: {error}"]
+    except (EOFError, OSError, zlib.error, zstandard.ZstdError) as error:
+        if isinstance(error, OSError) and error.errno in NO_SPACE:
+            raise BagError(f"{name}: no space in {folder} to decompress it, set TMPDIR to another folder") from error
+        return content, [f"{name}: cut off or damaged; read up to there: {error}"]
     return content, []

@@ -3,6 +3,7 @@
 import bz2
 import gzip
 import os
+import resource
 import shutil
 import sqlite3
 import subprocess
@@ -288,3 +289,16 @@ def test_memory_does_not_grow_with_the_recording(write, tmp_path):
         done = subprocess.run([sys.executable, "-c", _PEAK, path], capture_output=True, text=True, check=True)
         peaks.append(int(done.stdout))
     assert peaks[1] - peaks[0] < 20
+
+
+@pytest.mark.parametrize("size", [5000, 50_000], ids=["noticed as it is closed", "noticed as it is written"])
+def test_where_there_is_no_space_to_decompress_a_file_that_is_said(size, tmp_path):
+    (tmp_path / "rig.bag.gz").write_bytes(gzip.compress(bytes(size)))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    # As on a disk whose quota is used up: the system refuses to write on.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(BagError, match=r"rig\.bag\.gz: no space in .* to decompress it, set TMPDIR"):
+            open_recording([str(tmp_path / "rig.bag.gz")])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
