@@ -60,7 +60,10 @@ def ailment(path: Path) -> str | None:
         return f"no relay is running, or it cannot write its heartbeat: {path}: {error.strerror}"
     if not written:
         return "the relay is not receiving yet"
-    age = time.monotonic_ns() - int(written)
+    try:
+        age = time.monotonic_ns() - int(written)
+    except ValueError:
+        return f"{path} is not a heartbeat of syncrelay"
     if 0 <= age <= _STALE_NS:
         return None
     return f"the receive loop last turned {age / 1e9:.0f} s ago" if age > 0 else "the heartbeat is from an earlier run"

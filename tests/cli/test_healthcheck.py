@@ -43,6 +43,11 @@ def test_a_beat_from_before_the_machine_started_is_not_believed(tmp_path):
     assert ailment(tmp_path / "beat") == "the heartbeat is from an earlier run"
 
 
+def test_another_file_is_no_heartbeat(tmp_path):
+    (tmp_path / "beat").write_bytes(b"root:x:0:0\n\xff")
+    assert ailment(tmp_path / "beat") == f"{tmp_path}/beat is not a heartbeat of syncrelay"
+
+
 def test_nothing_is_left_after_the_end(tmp_path):
     with Heartbeat(tmp_path / "beat") as heartbeat:
         heartbeat.beat()
