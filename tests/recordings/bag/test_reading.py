@@ -291,7 +291,7 @@ def test_memory_does_not_grow_with_the_recording(write, tmp_path):
     assert peaks[1] - peaks[0] < 20
 
 
-@pytest.mark.parametrize("size", [5000, 50_000], ids=["noticed as it is closed", "noticed as it is written"])
+@pytest.mark.parametrize("size", [2000, 50_000], ids=["noticed as it is closed", "noticed as it is written"])
 def test_where_there_is_no_space_to_decompress_a_file_that_is_said(size, tmp_path):
     (tmp_path / "rig.bag.gz").write_bytes(gzip.compress(bytes(size)))
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
