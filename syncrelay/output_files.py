@@ -45,7 +45,7 @@ def begins_with(place: Path | str, size: int) -> bytes:
     if path is None:
         files, where = _store(str(place))
         about = _about(str(place), where, files)
-        end = min(size, about.get("size") or 0)
+        end = min(size, about.get("size") or 0) if about.get("type") == "file" else 0
         return bytes(_written(str(place), lambda: files.cat_file(where, start=0, end=end))) if end else b""
     if not path.is_file():
         return b""
@@ -71,7 +71,7 @@ def written_whole(place: Path | str) -> Iterator[Path]:
         target = None if path is None else path.absolute()
         scratch = Path(tempfile.mkdtemp(dir=None if target is None else target.parent, prefix=_PREFIX))
     except OSError as error:
-        raise cannot_be_written(place, error) from error
+        raise (cannot_be_written(place, error) if path is not None else _no_scratch(place, error)) from error
     try:
         finished = scratch / PurePosixPath(place).name
         yield finished
@@ -81,9 +81,9 @@ def written_whole(place: Path | str) -> Iterator[Path]:
             finished.replace(target)
     except OSError as error:
         # What is read meanwhile may fail, too.
-        if error.errno in NO_SPACE or str(error.filename).startswith(str(scratch)):
-            raise cannot_be_written(place, error) from error
-        raise
+        if error.errno not in NO_SPACE and not str(error.filename).startswith(str(scratch)):
+            raise
+        raise (_no_scratch(place, error) if target is None else cannot_be_written(place, error)) from error
     finally:
         with suppress(OSError):
             shutil.rmtree(scratch)
@@ -128,6 +128,11 @@ def cannot_be_written(place: Path | str, error: OSError) -> OutputError:
     return OutputError(f"{redacted(str(place))}: cannot be written: {error.strerror or error}")
 
 
+def _no_scratch(place: Path | str, error: OSError) -> OutputError:
+    why = f"cannot be written to a temporary folder of this machine before the upload: {error.strerror or error}"
+    return OutputError(f"{redacted(str(place))}: {why}: set TMPDIR to another folder")
+
+
 def _store(url: str) -> tuple[Any, str]:
     if scheme_of(url) in SERVERS:
         raise OutputError(f"{redacted(url)}: a server takes no files: expected a path, s3://, gs:// or another store")
@@ -139,6 +144,9 @@ def _written(url: str, work: Callable[[], _Done]) -> _Done:
         return tried(url, work)
     except StorageError as error:
         raise OutputError(str(error)) from error
+    except OSError as error:
+        # The store is full: tried() passes on no other.
+        raise cannot_be_written(url, error) from error
 
 
 def _about(url: str, where: str, files: Any) -> dict[str, Any]:

@@ -136,7 +136,7 @@ def tried(url: str, work: Callable[[], _Done], *, attempts: int = ATTEMPTS) -> _
             time.sleep(wait)
             wait *= 2
         elif attempts > 1:
-            why += f" ({attempts} attempts): try again later, or copy it here and read the copy"
+            why += f" ({attempts} attempts): try again later"
     # Without what was caught: errors of the libraries quote the URL with its secrets, and tracebacks travel.
     raise StorageError(f"{redacted(url)}: {why}") from None
 

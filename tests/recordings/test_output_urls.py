@@ -24,7 +24,7 @@ groups:
       - {{topic: /camera, type: {VECTOR}}}
       - {{topic: /lidar, type: {VECTOR}}}
 """
-# As a bucket: it has no folders of its own, and `wrong` files are refused so often.
+# As a bucket: it has no folders of its own, and `wrong` files are refused so often; it is full where that is negative.
 _STORE = """
 import shutil, sys
 import fsspec
@@ -46,6 +46,8 @@ class Store(LocalFileSystem):
 
     def put_file(self, source, target, **options):
         global wrong
+        if wrong < 0:
+            raise OSError(28, "No space left on device")
         if wrong and not target.endswith("_ledger.jsonl"):
             wrong -= 1
             raise ConnectionResetError(104, "Connection reset by peer")
@@ -96,9 +98,33 @@ def test_what_a_store_refuses_ends_the_command_and_leaves_nothing_behind(folder)
     words = ["replay", "rig.mcap", "--config", "f.yaml", "-o", "store://day/out"]
     done = stored(folder, *words, wrong=100)
     assert done.returncode == 1
-    assert "store://day/out: the store cannot be reached: Connection reset by peer (5 attempts)" in done.stderr
+    why = "the store cannot be reached: Connection reset by peer (5 attempts): try again later\n"
+    assert f"store://day/out: {why}" in done.stderr
     assert names(folder / "store") == []
     assert not [path for path in folder.iterdir() if path.name.startswith(".syncrelay")]
+
+
+_FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+
+
+@pytest.mark.parametrize(
+    ("script", "wrong", "why"),
+    [
+        (_STORE, -1, "cannot be written: No space left on device\n"),
+        (
+            _FULL + _STORE,
+            0,
+            "cannot be written to a temporary folder of this machine before the upload: File too large: set TMPDIR to"
+            " another folder\n",
+        ),
+    ],
+    ids=["in the store", "here"],
+)
+def test_where_there_is_no_space_is_said(script, wrong, why, folder):
+    words = ["replay", "rig.mcap", "--config", "f.yaml", "-o", "store://day/out"]
+    done = run_python("-c", script, str(folder / "store"), str(wrong), *words, folder=folder)
+    assert (done.returncode, done.stderr) == (1, f"syncrelay: store://day/out: {why}")
+    assert names(folder / "store") == []
 
 
 @pytest.mark.parametrize(
@@ -133,6 +159,8 @@ def test_an_analysis_is_written_to_a_store_and_over_its_own_report_alone(folder)
     report.write_text("mine")
     assert "already exists" in stored(folder, *words).stderr
     assert report.read_text() == "mine"
+    done = stored(folder, *words[:-1], "store://day")
+    assert (done.returncode, "store://day: already exists and is not overwritten" in done.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(("command", "option"), [("export", "-o"), ("replay", "--into")])
