@@ -2,10 +2,12 @@
 
 import logging
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from syncrelay.dataflow.backend import BackendName, RclBackend, RclCallError
 from syncrelay.errors import RosUnavailableError, UsageError
+from syncrelay.ros.compiled import source_fingerprint
 from syncrelay.ros.rclpy_backend import RclpyBackend
 
 VARIABLE: Final = "SYNCRELAY_RECEIVE"
@@ -31,6 +33,10 @@ _NOT_BUILT: Final = CompiledFault(
     "the compiled path was not built",
     "install a C compiler (apt install gcc libc6-dev python3-dev) and then syncrelay again,"
     " or install a release's wheel, which has it built",
+)
+# Only a clone has the source beside what was built from it.
+_OUTDATED: Final = CompiledFault(
+    "the compiled path was built from another version of path.pyx", "run `pip install -e .` in the clone of syncrelay"
 )
 
 
@@ -64,13 +70,18 @@ def find_backend(asked: str | None, *, node: Any, context: Any) -> tuple[RclBack
 
 
 def _compiled(node: Any) -> RclBackend | CompiledFault:
-    if find_spec("syncrelay.ros.compiled.path") is None:
+    spec = find_spec("syncrelay.ros.compiled.path")
+    if spec is None:
         return _NOT_BUILT
     try:
+        fingerprint = source_fingerprint()
+        # Looked for in the file: code of another version is not even loaded.
+        if fingerprint is not None and fingerprint.encode() not in Path(str(spec.origin)).read_bytes():
+            return _OUTDATED
         from syncrelay.ros.compiled.backend import proven_backend  # noqa: PLC0415  it may not be there
 
         return proven_backend(node)
-    # Built from another source, it may lack a name that is imported from it.
+    # OSError and AttributeError: librcl, or a function of it, is missing.
     except (OSError, ImportError, AttributeError, RclCallError) as error:
         return CompiledFault(
             f"the compiled path does not work here ({error})",

@@ -35,6 +35,7 @@ import rclpy
 from geometry_msgs.msg import Vector3Stamped
 from rclpy.qos import HistoryPolicy, QoSProfile
 
+from syncrelay.ros import backend_choice
 from syncrelay.ros.backend_choice import choose_backend
 from syncrelay.ros.compiled import backend as compiled_backend
 from syncrelay.ros.compiled import path
@@ -355,7 +356,17 @@ def test_where_a_message_does_not_come_back_as_it_was_rclpy_is_used(here, monkey
         choose_backend("compiled", node=here.node, context=here.context)
 
 
-def test_where_it_was_built_of_a_source_that_lacked_something_rclpy_is_used(here, monkeypatch, caplog):
+def test_one_that_was_built_from_another_source_is_not_loaded_and_the_log_says_what_to_do(here, monkeypatch, caplog):
+    monkeypatch.setattr(backend_choice, "source_fingerprint", lambda: "0" * 64)
+    # Were it loaded now, it would be found to lack something.
+    monkeypatch.delitem(sys.modules, "syncrelay.ros.compiled.backend")
+    monkeypatch.delattr(path, "Outlet")
+    assert choose_backend(None, node=here.node, context=here.context).name is BackendName.RCLPY
+    (record,) = caplog.records
+    assert "the compiled path was built from another version of path.pyx; run `pip install -e .`" in record.message
+
+
+def test_one_that_cannot_be_loaded_is_not_used_and_the_log_says_why(here, monkeypatch, caplog):
     monkeypatch.delitem(sys.modules, "syncrelay.ros.compiled.backend")
     monkeypatch.delattr(path, "Outlet")
     assert choose_backend(None, node=here.node, context=here.context).name is BackendName.RCLPY

@@ -15,7 +15,7 @@ from builtin_interfaces.msg import Time
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 
 from syncrelay.dataflow.backend import BackendName, Deliver, Inbox, RclCallError
-from syncrelay.ros.compiled import path, source_fingerprint
+from syncrelay.ros.compiled import path
 from syncrelay.ros.entities import has_subscriber, never_called
 
 _FUNCTIONS: Final = {
@@ -119,8 +119,6 @@ def proven_backend(node: Any) -> CompiledBackend:
 
     Raises OSError, AttributeError or RclCallError where librcl is not as expected.
     """
-    if source_fingerprint() not in (None, path.SOURCE):
-        raise RclCallError("it was built from another path.pyx")
     backend = CompiledBackend(path.Librcl(addresses()))
     changes = backend.graph_changes(node)
     changes.seen()
