@@ -80,12 +80,13 @@ def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
         while not stop.requested:
             try:
                 told = tap.read()
+                lines = [json.dumps(line) if arguments.json else plain_line(line) for line in told.lines]
             except (NoAnswerError, OtherServerError) as error:
                 raise SyncRelayError(f"the relay at {relay.url} cannot be followed any more: {error}") from error
             _say_lost(told)
-            lines = told.lines if arguments.number is None else told.lines[: arguments.number - printed]
+            lines = lines if arguments.number is None else lines[: arguments.number - printed]
             for line in lines:
-                put(json.dumps(line) if arguments.json else plain_line(line))
+                put(line)
             flush()
             printed += len(lines)
             if printed == arguments.number:

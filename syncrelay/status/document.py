@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Final, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, PlainSerializer, TypeAdapter, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, TypeAdapter, ValidationError
 
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import RecentDrop, RecentSet
@@ -18,6 +18,15 @@ from syncrelay.printable import printable
 
 Text: TypeAlias = Annotated[str, AfterValidator(printable)]
 """A text that is safe to show: what answers at a port may be anything."""
+
+Number: TypeAlias = Annotated[float, Field(ge=-1e18, le=1e18, allow_inf_nan=False)]
+"""A number that can be rounded and drawn, whatever a relay may have made of stamps that make no sense."""
+
+Rate: TypeAlias = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
+"""A rate in Hz."""
+
+# A field of 64 bits may hold a stamp, and offsets are added.
+_STAMPS: Final = range(-(1 << 80), 1 << 80)
 
 
 class Phase(Enum):
@@ -63,7 +72,7 @@ class Relay:
     """Where it is in its life."""
     ready: bool
     """The same as `/readyz`."""
-    uptime_s: float
+    uptime_s: Number
     """Seconds since its start."""
     receives_by: Text = ""
     """How messages are taken and published."""
@@ -81,11 +90,11 @@ class Relay:
 class Percentiles:
     """Percentiles of durations, in milliseconds."""
 
-    p50: float
+    p50: Number
     """The median."""
-    p95: float
+    p95: Number
     """Larger than 95 % of them."""
-    max: float
+    max: Number
     """The largest."""
 
 
@@ -93,9 +102,9 @@ class Percentiles:
 class SetFigures:
     """One set that left."""
 
-    span_ms: float
+    span_ms: Number
     """Its latest stamp minus its earliest, offsets added."""
-    latency_ms: float
+    latency_ms: Number
     """From the receipt of its last message until it was published."""
 
 
@@ -105,7 +114,7 @@ class Tolerance:
 
     key: Text
     """The key of the file that says so, such as `slop`."""
-    ms: float
+    ms: Number
     """Its value."""
 
 
@@ -145,17 +154,17 @@ class Input:
     """The topic that its messages are republished on."""
     required: bool
     """Whether every set needs a message of it."""
-    offset_ms: float = 0.0
+    offset_ms: Number = 0.0
     """What the file adds to its stamps for matching."""
-    rate_hz: float
+    rate_hz: Rate
     """Messages a second by receipt, 0 while it is silent."""
-    age_ms: float | None = None
+    age_ms: Number | None = None
     """How long ago its last message arrived."""
-    lag_ms: float | None
+    lag_ms: Number | None
     """Time of receipt minus stamp, median."""
-    jitter_ms: float | None
+    jitter_ms: Number | None
     """How far the time between its stamps is from the median, 95th percentile."""
-    drift_ppm: float | None = None
+    drift_ppm: Number | None = None
     """How much its clock is slower than the clock of this machine, in parts per million."""
     received: int
     """Messages received: those in sets, those dropped and those still waiting."""
@@ -177,7 +186,7 @@ class Input:
     """As `other_drops`."""
     lost: int
     """Messages that DDS lost on their way to the relay, lately."""
-    missing: float
+    missing: Number
     """The share of the last sets that left without it, 0 to 1."""
     publishers: tuple[Endpoint, ...]
     """Who publishes the topic."""
@@ -244,19 +253,19 @@ class Group:
     """Messages kept for each input."""
     tolerance: Tolerance | None
     """How far apart the stamps of a set may be; null where no key of the file says so."""
-    max_wait_ms: float | None
+    max_wait_ms: Number | None
     """How long a set may wait."""
     sets: int
     """Sets published since the start."""
-    rate_hz: float
+    rate_hz: Rate
     """Sets a second."""
-    possible_hz: float
+    possible_hz: Rate
     """Sets a second that the slowest required input allows."""
-    since_last_set_ms: float | None
+    since_last_set_ms: Number | None
     """How long ago the last set left."""
     span_ms: Percentiles | None
     """Spans of the last sets."""
-    span_without_offsets_ms: float | None = None
+    span_without_offsets_ms: Number | None = None
     """The median span without the offsets of the file; null without offsets."""
     latency_ms: Percentiles | None
     """Latencies of the last sets."""
@@ -311,11 +320,31 @@ class Status:
 def read_status(document: bytes) -> Status:
     """Return the status that a document holds. Raises NotAStatusError."""
     try:
-        return _of_status().validate_json(document)
+        status = _of_status().validate_json(document)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"])) or "the document"
         raise NotAStatusError(printable(f"{where}: {first['msg']}")) from error
+    _require_consistent(status)
+    return status
+
+
+def _require_consistent(status: Status) -> None:
+    names = [group.name for group in status.groups]
+    if len(set(names)) < len(names):
+        raise NotAStatusError("groups: two have the same name")
+    for index, group in enumerate(status.groups):
+        if not group.inputs:
+            raise NotAStatusError(f"groups.{index}.inputs: there is none")
+        if not all(_fits(recent, len(group.inputs)) for recent in group.recent):
+            raise NotAStatusError(f"groups.{index}.recent: a set or drop does not fit the inputs")
+
+
+def _fits(recent: RecentSet | RecentDrop, n_inputs: int) -> bool:
+    if isinstance(recent, RecentDrop):
+        return 0 <= recent.input < n_inputs and recent.stamp in _STAMPS
+    stamps = [stamp for stamp in recent.stamps if stamp is not None]
+    return len(recent.stamps) == n_inputs and bool(stamps) and all(stamp in _STAMPS for stamp in stamps)
 
 
 # Made when first needed, as a relay may never be asked.

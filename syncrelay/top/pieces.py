@@ -21,7 +21,7 @@ def sparkline(values: Sequence[float], width: int) -> str:
     """Draw each of the last values as a bar from 0 to the largest of them, padded to the width."""
     shown = values[-width:]
     top = max(shown, default=0)
-    heights = (round(value / top * (len(_HEIGHTS) - 1)) if top else 0 for value in shown)
+    heights = (round(max(0.0, value / top) * (len(_HEIGHTS) - 1)) if top > 0 else 0 for value in shown)
     return "".join(_HEIGHTS[height] for height in heights).ljust(width)
 
 

@@ -4,7 +4,7 @@ import json
 import secrets
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, TypeAlias
 from urllib.parse import urlencode, urlsplit
 
 from pydantic import Field, TypeAdapter, ValidationError
@@ -14,17 +14,23 @@ from syncrelay.top.client import NoAnswerError, OtherServerError, connection_to,
 
 _NAME_BYTES: Final = 8
 
+Time: TypeAlias = Annotated[int, Field(ge=-(1 << 63), lt=1 << 63)]
+"""A time that has a date."""
+
+Nanoseconds: TypeAlias = Annotated[int, Field(ge=-(1 << 80), lt=1 << 80)]
+"""A stamp, which may come from a field of 64 bits, or a duration."""
+
 
 @dataclass(frozen=True, slots=True)
 class SetLine:
     """A set; times and durations in nanoseconds. Its stamps do not include the `offsets` of the inputs."""
 
     group: Text
-    time: int
-    stamps: Mapping[Text, int | None]
-    offsets: Mapping[Text, int]
-    span: int
-    latency: int
+    time: Time
+    stamps: Mapping[Text, Nanoseconds | None]
+    offsets: Mapping[Text, Nanoseconds]
+    span: Nanoseconds
+    latency: Nanoseconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +38,10 @@ class DropLine:
     """A dropped message; times in nanoseconds. `unneeded` says that it cost no set, as far as the relay knows."""
 
     group: Text
-    time: int
+    time: Time
     topic: Text
-    stamp: int
-    received: int
+    stamp: Nanoseconds
+    received: Time
     reason: Text
     unneeded: bool = False
 

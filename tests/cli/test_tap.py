@@ -19,6 +19,7 @@ from syncrelay.top.tap_text import plain_line
 from tests.cli.command import run
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.top import states
+from tests.top.relay_server import serving
 
 _MS = 1_000_000
 _AT = 1_700_000_000 * 1000 * _MS
@@ -147,6 +148,21 @@ def test_names_are_shown_safely_whatever_they_are():
         shown = plain_line(line)
         assert "\n" not in shown
         assert_shown_safely(shown)
+
+
+@pytest.mark.parametrize("key", ["time", "span", "latency", "stamps"])
+def test_a_line_of_another_server_ends_it_with_a_sentence(tmp_path, key):
+    sane = {"group": "front", "time": _AT, "stamps": {"/a": _AT}, "offsets": {}, "span": 0, "latency": 0}
+    line = sane | {key: {"/a": 10**400} if key == "stamps" else 10**400}
+    body = json.dumps({"after": 1, "more": False, "lost": 0, "lines": [line]}).encode()
+    with serving(states.healthy()) as server:
+        server.paths["/tap"] = body
+        done = run("tap", "--url", server.url, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == (
+        f"syncrelay: the relay at {server.url} cannot be followed any more: what listens there is not a relay, or runs"
+        " another version\n"
+    )
 
 
 def test_the_pages_show_what_is_printed():

@@ -12,13 +12,14 @@ from syncrelay.status import Level, Phase, group_of, level, read_status, status_
 from syncrelay.status.document import NotAStatusError
 from tests.status.support.states import BEGAN, relay, started, working
 
+_SECOND = replace(started(), facts=replace(started().facts, name="rear"))
 STATES = {
     "no group": relay(),
     "starting": relay(started(), phase=Phase.STARTING),
     "nobody publishes": relay(started(camera=(), lidar=())),
     "working": relay(working()),
     "unconfigured": relay(phase=Phase.UNCONFIGURED),
-    "draining, two groups": relay(working(), started(), phase=Phase.DRAINING, reloads=2),
+    "draining, two groups": relay(working(), _SECOND, phase=Phase.DRAINING, reloads=2),
 }
 
 

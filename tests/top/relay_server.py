@@ -9,13 +9,14 @@ from syncrelay.status import RelayState, status_of
 
 
 class RelayServer:
-    """Serves the document of `state` at /status, and counts how often it was asked.
+    """Serves the document of `state` at /status, and counts how often it was asked; `paths` has what is elsewhere.
 
     `stop` and `start` are a relay that goes and comes back.
     """
 
     def __init__(self, state: RelayState) -> None:
         self.body = status_of(state).as_json()
+        self.paths: dict[str, bytes] = {}
         self.port = 0
         self.asked = 0
         self.start()
@@ -33,11 +34,11 @@ class RelayServer:
 
         class Handler(BaseHTTPRequestHandler):
             def do_GET(self) -> None:
-                found = self.path == "/status"
+                found = {"/status": owner.body, **owner.paths}.get(self.path.partition("?")[0])
                 owner.asked += 1
-                self.send_response(200 if found else 404)
+                self.send_response(404 if found is None else 200)
                 self.end_headers()
-                self.wfile.write(owner.body if found else b"not here")
+                self.wfile.write(b"not here" if found is None else found)
 
             def log_message(self, *_words: object) -> None:
                 pass

@@ -1,5 +1,6 @@
 """Asking for the state over real sockets: a relay, nobody, somebody else, somebody who never answers."""
 
+import re
 import socket
 from contextlib import closing
 
@@ -83,6 +84,30 @@ def test_a_relay_of_another_shape_is_said_by_the_field_that_it_lacks():
     with serving(states.nothing()) as server:
         server.body = b'{"relay": {}, "groups": []}'
         with pytest.raises(OtherServerError, match=r"runs another version \(relay.node: Field required\)"):
+            ask(server.url)
+
+
+@pytest.mark.parametrize(
+    ("written", "by", "why"),
+    [
+        (rb'"rate_hz":[0-9.]+', b'"rate_hz":NaN', "groups.0.rate_hz: Input should be a finite number"),
+        (rb'"offset_ms":[0-9.]+', b'"offset_ms":1e999', "groups.0.inputs.0.offset_ms: Input should be a finite number"),
+        (rb'"span_ms":[0-9.]+', b'"span_ms":-1e300', "groups.0.last_sets.0.span_ms: Input should be greater"),
+        (rb'"possible_hz":[0-9.]+', b'"possible_hz":-1', "groups.0.possible_hz: Input should be greater"),
+        (rb'"inputs":\[.*?\],"findings"', b'"inputs":[],"findings"', "groups.0.inputs: there is none"),
+        (rb'{"set":\[[0-9]+,', b'{"set":[', "groups.0.recent: a set or drop does not fit the inputs"),
+        (rb'{"set":\[[0-9]+,', b'{"set":[1%s,' % (b"0" * 400), "groups.0.recent: a set or drop does not fit"),
+        (rb'{"set":\[[0-9]+,[0-9]+\]', b'{"set":[null,null]', "groups.0.recent: a set or drop does not fit"),
+        (rb'{"drop":{"input":[01]', b'{"drop":{"input":2', "groups.0.recent: a set or drop does not fit"),
+        (rb'"groups":\[({.*})\]', rb'"groups":[\1,\1]', "groups: two have the same name"),
+    ],
+)
+def test_a_state_that_cannot_be_drawn_is_said_by_its_field(written, by, why):
+    with serving(states.healthy()) as server:
+        changed = re.sub(written, by, server.body, count=1)
+        assert changed != server.body
+        server.body = changed
+        with pytest.raises(OtherServerError, match=rf"runs another version \({re.escape(why)}"):
             ask(server.url)
 
 

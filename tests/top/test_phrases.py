@@ -3,6 +3,7 @@
 import pytest
 
 from syncrelay.top import phrases
+from syncrelay.top.pieces import sparkline
 
 
 @pytest.mark.parametrize(
@@ -29,3 +30,8 @@ def test_a_duration_fits_its_column(milliseconds, text):
 )
 def test_drops_are_named_the_most_frequent_first(dropped, text):
     assert phrases.drops(dropped) == text
+
+
+@pytest.mark.parametrize("values", [(-100.0, 0.0, 10.0), (-100.0, 0.0, -10.0)])
+def test_a_value_below_zero_is_drawn_as_zero(values):
+    assert sparkline(values, 3)[:2] == "▁▁"
