@@ -33,7 +33,11 @@ def parser() -> Parser:
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
     parser.add_argument(
-        "more", metavar="BAG|TOPIC", nargs="*", help="more recordings; topics to match, if there is no file yet"
+        "more",
+        metavar="BAG|TOPIC",
+        nargs="*",
+        default=[],
+        help="more recordings; topics to match, if there is no file yet",
     )
     parser.add_argument("--config", metavar="FILE", action="append", help="the file with the groups")
     parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")

@@ -107,7 +107,8 @@ def require_extras(command: Command, arguments: Namespace) -> None:
     missing = {each.extra: _missing(each.extra) for each in command.needs if each.applies(arguments)}
     if packages := [package for of_extra in missing.values() for package in of_extra]:
         line = line_to_install(",".join(extra for extra, of_extra in missing.items() if of_extra))
-        raise UnavailableError(f"{command.name} needs {', '.join(packages)}, not installed here\n  {line}")
+        named = ", ".join(packages)
+        raise UnavailableError(f"{command.name} needs Python packages that are not installed: {named}\n  {line}")
 
 
 def line_to_install(extras: str) -> str:

@@ -165,7 +165,7 @@ def _view() -> Iterator[Show]:
             yield show
         return
     if can_draw:
-        remark(f"this is drawn where `rich` is installed: {line_to_install('top')}")
+        remark(f"this is text, as the packages that draw it are not installed\n  {line_to_install('top')}")
     from syncrelay.top.demo_text import plain_line
 
     next_s = _LINE_S

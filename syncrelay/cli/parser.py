@@ -14,6 +14,8 @@ from syncrelay.yaml_files import yaml_files
 
 ROS_ARGS: Final = "--ros-args"
 _WIDTH: Final = 78
+# 31 years: timers take it, and so do stamps.
+_MOST_S: Final = 1_000_000_000
 IMAGE_FORMATS: Final = ("png", "jpeg")
 """What `export --images` can make of an image."""
 
@@ -134,13 +136,15 @@ def _listed(path: str) -> Sequence[str]:
 
 
 def positive(text: str) -> float:
-    """Read a number above 0."""
+    """Read a number of seconds above 0."""
     try:
         number = float(text)
     except ValueError:
         number = 0.0
-    if not 0 < number < float("inf"):
+    if not number > 0:
         raise argparse.ArgumentTypeError(f"expected a number above 0, found {text}")
+    if number > _MOST_S:
+        raise argparse.ArgumentTypeError(f"expected a number of at most {_MOST_S}, found {text}")
     return number
 
 

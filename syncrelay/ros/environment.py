@@ -13,7 +13,7 @@ from syncrelay.collector import resting_collector
 from syncrelay.errors import RosUnavailableError
 
 _STDOUT, _STDERR = 1, 2
-_WHEELS = "pip install '.[ros]'                 in a clone of syncrelay: x86_64, Python 3.11 or 3.12, no other ROS"
+_WHEELS = "pip install '.[ros]'                in a clone of syncrelay: x86_64, Python 3.11 or 3.12, no other ROS"
 _SOURCED = "source /opt/ros/jazzy/setup.bash    where ROS 2 is installed; then start syncrelay from that shell"
 
 

@@ -63,6 +63,12 @@ def test_the_version_is_that_of_the_package(tmp_path):
         (["doctor", "--seconds", "3"], "--seconds N needs --live: it is how long to observe the graph"),
         (["doctor", "--live", "--seconds", "0"], "argument --seconds: expected a number above 0, found 0"),
         (["demo", "--seconds", "soon"], "argument --seconds: expected a number above 0, found soon"),
+        (["demo", "--seconds", "nan"], "argument --seconds: expected a number above 0, found nan"),
+        (
+            ["demo", "--record", "rig.mcap", "--seconds", "1e308"],
+            "argument --seconds: expected a number of at most 1000000000, found 1e308",
+        ),
+        (["analyze"], "the following arguments are required: BAG\n"),
     ],
 )
 def test_a_wrong_word_is_a_usage_error_that_helps(words, said, tmp_path):

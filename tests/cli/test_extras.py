@@ -100,6 +100,7 @@ def _missing(name: str, *words: str) -> list[str]:
 def test_a_command_whose_extra_is_missing_says_what_to_type_before_anything_slow_is_imported(words, tmp_path):
     done = _run(words, tmp_path)
     assert (done.returncode, done.stdout) == (69, ""), done.stderr
+    assert done.stderr.startswith(f"syncrelay: {words[0]} needs Python packages that are not installed: ")
     assert _TOLD.findall(done.stderr) == [",".join(_missing(*words))]
     if _BARE is None:
         assert done.stderr.splitlines()[-1] == "slow:"
