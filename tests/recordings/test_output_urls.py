@@ -107,16 +107,14 @@ def test_what_a_store_refuses_ends_the_command_and_leaves_nothing_behind(folder)
 _FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
 
 
+_NOT_HERE = "cannot be written to a temporary folder of this machine before the upload: File too large"
+
+
 @pytest.mark.parametrize(
     ("script", "wrong", "why"),
     [
         (_STORE, -1, "cannot be written: No space left on device\n"),
-        (
-            _FULL + _STORE,
-            0,
-            "cannot be written to a temporary folder of this machine before the upload: File too large: set TMPDIR to"
-            " another folder\n",
-        ),
+        (_FULL + _STORE, 0, f"{_NOT_HERE}: set TMPDIR to another folder\n"),
     ],
     ids=["in the store", "here"],
 )

@@ -133,7 +133,13 @@ def _why_not_opened(error: Exception, name: str) -> str:
     )
 
 
-def _reason(error: Exception) -> str:
+def _reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "there is not enough memory"
-    return (str(error) or type(error).__name__).rstrip(".")
+    if isinstance(error, ReaderError) and error.__cause__ is not None:
+        # rosbags quotes the arguments of what it caught.
+        return _reason(error.__cause__)
+    # Its other exceptions say nothing to a reader: failed assertions, keys and offsets.
+    has_words = isinstance(error, ReaderError | EOFError | OSError | RuntimeError | ValueError)
+    why = getattr(error, "strerror", None) or str(error)
+    return why.rstrip(".") if has_words and why else "its records do not fit together"
