@@ -20,12 +20,10 @@ def parser() -> Parser:
         description="Finds out why messages may not arrive: what is wrong, what follows from it, how to fix it. "
         "Exit code 1 if something must be fixed.",
     )
-    parser.add_argument(
+    parser.add_repeatable(
         "--config",
         metavar="FILE",
-        action="append",
-        default=[],
-        help="check FILE or the files of a directory too, and whether their types can be used here; may be repeated",
+        help="check FILE or the files of a directory too, and whether their types can be used here",
     )
     parser.add_argument(
         "--live",

@@ -29,12 +29,8 @@ def parser() -> Parser:
         "required topic, or part of it is missing or cannot be read.",
     )
     parser.add_argument("bags", metavar="BAG", nargs="+", help="a recording as for replay; each is exported by itself")
-    parser.add_argument(
-        "--config",
-        metavar="FILE",
-        action="append",
-        required=True,
-        help="the file with the groups, or a directory of files; may be repeated",
+    parser.add_repeatable(
+        "--config", metavar="FILE", required=True, help="the file with the groups, or a directory of files"
     )
     parser.add_argument(
         "--format",
@@ -44,24 +40,17 @@ def parser() -> Parser:
         help="parquet (default): BAG/GROUP.parquet in FOLDER; mcap: the sets as a recording, as replay -o writes them;"
         " lerobot: FOLDER is one LeRobotDataset v3.0, as `export:` in the file says",
     )
-    parser.add_argument(
-        "--group", metavar="NAME", action="append", default=[], help="export this group only; may be repeated"
-    )
-    parser.add_argument(
+    parser.add_repeatable("--group", metavar="NAME", help="export this group only")
+    parser.add_repeatable(
         "--fields",
         metavar="TOPIC:FIELD,...",
-        action="append",
-        default=[],
-        help="of this input's messages write these fields only, such as /imu/data:linear_acceleration,header.stamp; may"
-        " be repeated",
+        help="of this input's messages write these fields only, such as /imu/data:linear_acceleration,header.stamp",
     )
-    parser.add_argument(
+    parser.add_repeatable(
         "--images",
         metavar="[TOPIC=]FORMAT",
-        action="append",
-        default=[],
-        help="write images as png or jpeg instead of raw pixels: those of this input, or all that no --images names;"
-        " may be repeated, as in --images jpeg --images /depth=png",
+        help="write images as png or jpeg instead of raw pixels: those of this input, or all that no --images names, as"
+        " in --images jpeg --images /depth=png",
     )
     parser.add_argument("--raw", action="store_true", help="write each message as the CDR bytes that were recorded")
     add_fleet_options(parser, "-o", "--output")
@@ -81,9 +70,13 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         why = whole if arguments.format == "mcap" else "`export:` in the file says what LeRobot gets"
         parser.error(f"--fields, --images and --raw are for tables: {why}")
     from syncrelay.cli.fleet import do_on_many
+    from syncrelay.cli.run import require_groups
     from syncrelay.config import load
 
-    config = _of_groups(load(*arguments.config), arguments.group)
+    config = load(*arguments.config)
+    require_groups(arguments.group, config, arguments.config)
+    chosen = tuple(group for group in config.groups if not arguments.group or group.name in arguments.group)
+    config = replace(config, groups=chosen)
     if arguments.format == "mcap":
         from syncrelay.recordings.fleet.tasks import ReplayTask
 
@@ -127,17 +120,6 @@ def _export_lerobot(config: "Config", arguments: Namespace) -> int:
 
     into = Namespace(**{**vars(arguments), "into": str(out / EPISODES)})
     return do_on_many(task, arguments.bags, into, finish=finish)
-
-
-def _of_groups(config: "Config", names: Sequence[str]) -> "Config":
-    """Return a file with these of its groups alone, all where none is named."""
-    from syncrelay.config.wording import all_of, did_you_mean
-
-    known = [group.name for group in config.groups]
-    for name in names:
-        if name not in known:
-            raise UsageError(f"--group {name}: no such group{did_you_mean(name, known)}; the file has {all_of(known)}")
-    return replace(config, groups=tuple(group for group in config.groups if not names or group.name in names))
 
 
 def _parsed(words: Sequence[str]) -> dict[str, list[str]]:

@@ -39,16 +39,8 @@ def parser() -> Parser:
         "what its groups make of what comes. Ends with what would have left, why not more, and the values that would "
         "fit. Exit code 1 unless all groups are healthy.",
     )
-    parser.add_argument(
-        "--config",
-        metavar="FILE",
-        action="append",
-        required=True,
-        help="the file to try, or a directory of files; may be repeated",
-    )
-    parser.add_argument(
-        "--group", metavar="NAME", action="append", default=[], help="try this group only; may be repeated"
-    )
+    parser.add_repeatable("--config", metavar="FILE", required=True, help="the file to try, or a directory of files")
+    parser.add_repeatable("--group", metavar="NAME", help="try this group only")
     parser.add_argument("--seconds", metavar="N", type=positive, help="end after N s, and print text only")
     parser.add_argument("--json", action="store_true", help="print JSON at the end, for programs")
     parser.add_argument("--write", metavar="NEW", help="write the file with the suggested values; keeps its comments")

@@ -63,6 +63,11 @@ class Parser(argparse.ArgumentParser):
         """Raise UsageError with argparse's message."""
         raise UsageError(f"{message}\n  see {self.prog} --help")
 
+    def add_repeatable(self, option: str, *, metavar: str, help: str, **more: Any) -> None:  # noqa: A002  as argparse
+        """Add an option that may be given several times; its value is a list, which may be empty."""
+        text = f"{help}; may be repeated"
+        self.add_argument(option, metavar=metavar, action="append", default=[], help=text, **more)
+
     def read(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the arguments, with what follows --ros-args, which the parser may have, as `ros_args`.
 

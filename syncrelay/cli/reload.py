@@ -30,7 +30,7 @@ def parser() -> Parser:
         description="Makes the relay on this machine read its file again. Groups that did not change keep running and "
         "lose nothing. If the file has an error, the relay keeps its running configuration: exit code 1.",
     )
-    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host:port or URL")
+    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host, host:port or URL")
     return parser
 
 

@@ -35,12 +35,8 @@ def parser() -> Parser:
         nargs="+",
         help="a rosbag2 folder, or an MCAP, sqlite3 or ROS 1 bag file, compressed or not; several are read as one",
     )
-    parser.add_argument(
-        "--config",
-        metavar="FILE",
-        action="append",
-        required=True,
-        help="the file with the groups, or a directory of files; may be repeated",
+    parser.add_repeatable(
+        "--config", metavar="FILE", required=True, help="the file with the groups, or a directory of files"
     )
     parser.add_argument(
         "-o",
@@ -50,13 +46,11 @@ def parser() -> Parser:
     )
     parser.add_argument("--json", action="store_true", help="print a line of JSON for each set")
     parser.add_argument("--drops", action="store_true", help="print a line of JSON for each message that is dropped")
-    parser.add_argument(
+    parser.add_repeatable(
         "--what-if",
         metavar="FAULT",
-        action="append",
-        default=[],
         help="lay a fault over the recording, such as 'late: TOPIC 80ms' or 'drop: TOPIC 10%% from 12s'; also offset,"
-        " drift, dead; may be repeated",
+        " drift, dead",
     )
     parser.add_argument("--seed", metavar="N", type=seed, default=0, help="with --what-if: which messages are lost (0)")
     add_fleet_options(parser)

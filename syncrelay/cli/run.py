@@ -44,15 +44,9 @@ def parser() -> Parser:
         usage="syncrelay --config FILE [option ...] | syncrelay COMMAND ...",
         epilog=f"commands:\n{commands_help()}\n\n{folded(exit_codes)}",
     )
+    parser.add_repeatable("--config", metavar="FILE", help="run groups of FILE, or a directory")
+    parser.add_repeatable("--group", metavar="NAME", help="run this group only")
     add = parser.add_argument
-    add(
-        "--config",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="run groups of FILE, or a directory; may be repeated",
-    )
-    add("--group", metavar="NAME", action="append", default=[], help="run this group only; may be repeated")
     add(
         "--watch",
         action="store_true",
@@ -67,7 +61,7 @@ def parser() -> Parser:
     )
     add("--log-format", choices=("text", "json"), default="text", metavar="FORMAT", help="text (default) or json")
     add("--ros-args", action="store_true", help="pass what follows to ROS, such as -r __ns:=/robot1")
-    parser.add_argument("--version", action="store_true", help="print the version")
+    add("--version", action="store_true", help="print the version")
     return parser
 
 
@@ -103,7 +97,7 @@ def command(parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
         from syncrelay.ros.managed import Managed
 
         def require(config: "Config") -> None:
-            _require_groups(groups, config, config_paths)
+            require_groups(groups, config, config_paths)
 
         return partial(
             ManagedNode,
@@ -160,7 +154,7 @@ def loaded(config_paths: Sequence[str], groups: Sequence[str]) -> "Config":
     for note in config.notes:
         if note.severity is Severity.WARNING:
             LOGGER.warning("%s: %s: %s", where(note), note.path, note.text)
-    _require_groups(groups, config, config_paths)
+    require_groups(groups, config, config_paths)
     return config
 
 
@@ -189,7 +183,7 @@ def _reload(relay: "Relay", read: "Reading", config_paths: Sequence[str], groups
 
     try:
         config = read.config.result()
-        _require_groups(groups, config, config_paths)
+        require_groups(groups, config, config_paths)
         changed = relay.reload(config)
     except SyncRelayError as error:
         refusal = f"{_FAILED if relay.groups else _FAILED_WITHOUT_GROUPS}\n{error}"
@@ -238,7 +232,8 @@ def listening(listen: "Listen | None") -> "AbstractContextManager[Server | None]
         return nullcontext()
 
 
-def _require_groups(asked: Sequence[str], config: "Config", config_paths: Sequence[str]) -> None:
+def require_groups(asked: Sequence[str], config: "Config", config_paths: Sequence[str]) -> None:
+    """Raise UsageError if files lack one of these groups."""
     from syncrelay.config.wording import did_you_mean
 
     there = [group.name for group in config.groups]

@@ -32,25 +32,15 @@ def parser() -> Parser:
         "slow loses lines and is told how many.",
     )
     parser.add_argument("group", metavar="GROUP", nargs="?", help="print this group only")
-    parser.add_argument(
-        "--url", metavar="URL", help="which relay, if there are several: its host, host:port or URL, as for top"
-    )
+    parser.add_argument("--url", metavar="URL", help="which relay, if there are several: its host, host:port or URL")
     parser.add_argument("--json", action="store_true", help="print lines of JSON, as replay does")
     parser.add_argument("--drops", action="store_true", help="print dropped messages only")
-    parser.add_argument(
-        "--input",
-        metavar="TOPIC",
-        action="append",
-        default=[],
-        help="print only sets and drops of TOPIC; may be repeated",
-    )
-    parser.add_argument(
+    parser.add_repeatable("--input", metavar="TOPIC", help="print only sets and drops of TOPIC")
+    parser.add_repeatable(
         "--reason",
         metavar="REASON",
-        action="append",
-        default=[],
         choices=tuple(each.value for each in DropReason),
-        help="print messages dropped for this reason, such as late or overflow; may be repeated",
+        help="print messages dropped for this reason, such as late or overflow",
     )
     parser.add_argument("-n", "--number", metavar="N", type=count, help="end after N lines")
     return parser

@@ -188,7 +188,7 @@ def test_messages_that_cannot_be_decoded_are_told(tmp_path):
         (["--fields", "/camera"], 2, "--fields /camera: expected TOPIC:FIELD,FIELD"),
         (["--fields", "/camra:x"], 2, "/camra is no input of the file, did you mean `/camera`?"),
         (["--fields", "/camera:vectr"], 1, "has no field `vectr`, did you mean `vector`?"),
-        (["--group", "frnt"], 2, "--group frnt: no such group, did you mean `front`?; the file has front"),
+        (["--group", "frnt"], 2, "--group frnt: pair.yaml has no such group, did you mean `front`?"),
         (["--images", "jpg"], 2, "--images jpg: expected png or jpeg, or TOPIC=png or TOPIC=jpeg"),
         (["--images", "/camra=png"], 2, "/camra is no input of the file, did you mean `/camera`?"),
         (["--images", "/camera=png", "--images", "/camera=jpeg"], 2, "a format is named twice for /camera: name one"),
