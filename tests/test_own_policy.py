@@ -174,6 +174,7 @@ class Mine(Group):
     [
         ("import no_such_module", "Mine", "ModuleNotFoundError: No module named 'no_such_module'"),
         ("1 / 0", "Mine", "ZeroDivisionError: division by zero"),
+        ("raise SystemExit(3)", "Mine", "SystemExit: 3"),
         ("", "Mine", "AttributeError: module 'robot_policies' has no attribute 'Mine'"),
         ("Mine = 3", "Mine", "robot_policies:Mine is no subclass of syncrelay.config.models.Group"),
         (_MODEL.replace('["mine"]', '["other"]'), "Mine", "`policy` of robot_policies:Mine has to be Literal['mine']"),
@@ -198,6 +199,22 @@ def test_a_broken_package_is_an_error_of_the_files_that_use_it_alone(text: str, 
         assert problem.text.splitlines()[0] in run_here("schema", folder=tmp_path).stderr
     assert problem.path == "groups.fused.policy"
     assert problem.text.startswith(f"the policy `mine` of robot-policies 1.0 cannot be used: {why}")
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [
+        ("entry_points.txt", b"[syncrelay.policies]\nmine\n"),
+        ("entry_points.txt", b"[syncrelay.policies]\nmine = \xff:Mine\n"),
+        ("METADATA", b"Name: robot-policies\xff\n"),
+    ],
+)
+def test_a_damaged_package_offers_nothing_and_harms_no_file(file: str, content: bytes, tmp_path: Path):
+    offer(tmp_path, "robot-policies", {"mine": "Mine"}, text=_MODEL)
+    (tmp_path / "robot_policies-1.0.dist-info" / file).write_bytes(content)
+    with on_path(tmp_path):
+        assert load_text(_exact()).groups
+        assert "mine" not in installed_policies().models
 
 
 def _exact() -> str:
