@@ -2,7 +2,6 @@
 
 import json
 import re
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -145,13 +144,6 @@ def _excerpt(source: str, span: Span, *, colour: bool) -> str:
 
 
 def _shown(text: str) -> str:
-    """Replace what would move the cursor or hide in a terminal."""
-    return "".join(_shown_character(character) for character in text)
-
-
-def _shown_character(character: str) -> str:
-    if character == "\t":
-        return " " * _TAB_WIDTH
-    if unicodedata.category(character) in ("Cc", "Cf", "Cs"):
-        return "\N{REPLACEMENT CHARACTER}"
-    return character
+    """Replace what would move the cursor or hide in a terminal, by one character each: `printable` takes several."""
+    text = text.replace("\t", " " * _TAB_WIDTH)
+    return "".join(each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in text)

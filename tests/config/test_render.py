@@ -18,6 +18,7 @@ def rendered(source, column, width):
         pytest.param("a: 名前", 4, 2, ["    3 | a: 名前", "      |    ^^^^"], id="wide characters"),
         pytest.param("e\u0301: x", 5, 1, ["    3 | e\u0301: x", "      |    ^"], id="a combining accent before"),
         pytest.param("a: \u202eb", 5, 1, ["    3 | a: \ufffdb", "      |     ^"], id="a change of direction"),
+        pytest.param("a:\xa0\u3000b", 5, 1, ["    3 | a:\ufffd\ufffdb", "      |     ^"], id="spaces like no other"),
         pytest.param("a: b  ", 4, 1, ["    3 | a: b", "      |    ^"], id="spaces at the end"),
         pytest.param("a:", 3, 1, ["    3 | a:", "      |   ^"], id="behind the end"),
         pytest.param("ab", 1, 99, ["    3 | ab", "      | ^^"], id="wider than the line"),
