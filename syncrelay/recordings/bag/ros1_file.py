@@ -136,10 +136,10 @@ def _why_not_opened(error: Exception, name: str) -> str:
 def _reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "there is not enough memory"
-    if isinstance(error, ReaderError) and error.__cause__ is not None:
-        # rosbags quotes the arguments of what it caught.
-        return _reason(error.__cause__)
-    # Its other exceptions say nothing to a reader: failed assertions, keys and offsets.
+    # Of an index, rosbags raises an error that quotes the arguments of its own first one.
+    error = error.__context__ if isinstance(error.__context__, ReaderError) else error
+    # Its other exceptions say nothing to a reader: failed assertions, keys, offsets.
     has_words = isinstance(error, ReaderError | EOFError | OSError | RuntimeError | ValueError)
+    has_words &= not isinstance(error, UnicodeError)
     why = getattr(error, "strerror", None) or str(error)
-    return why.rstrip(".") if has_words and why else "its records do not fit together"
+    return why.rstrip(".") if has_words and why else "the records do not fit together"

@@ -6,6 +6,7 @@ import os
 import resource
 import shutil
 import sqlite3
+import struct
 import subprocess
 import sys
 import tempfile
@@ -148,6 +149,24 @@ def test_a_ros1_bag_without_an_index_is_refused_with_the_command_that_makes_one(
     at = content.index(b"index_pos=") + len(b"index_pos=")
     path.write_bytes(content[:-200] if change == "cut off" else content[:at] + bytes(8) + content[at + 8 :])
     with pytest.raises(BagError, match=r"rig\.bag: its index cannot be read: .* run `rosbag reindex .*rig\.bag`"):
+        _read(path)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "why"),
+    [
+        (b"index_pos=", struct.pack("<Q", 1 << 40), "Header could not be read from file"),
+        (b"index_pos=", struct.pack("<Q", 13), "Record of type 'BAGHEADER' is unexpected"),
+        (b"topic=", b"\xff", "the records do not fit together"),
+    ],
+)
+def test_why_the_index_of_a_ros1_bag_cannot_be_read_is_said_in_words(field, value, why, tmp_path):
+    path = ros1()(tmp_path)
+    content = path.read_bytes()
+    # The last one is in the index.
+    at = content.rindex(field) + len(field)
+    path.write_bytes(content[:at] + value + content[at + len(value) :])
+    with pytest.raises(BagError, match=rf"its index cannot be read: {why}\. A bag that was not closed"):
         _read(path)
 
 
