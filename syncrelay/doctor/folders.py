@@ -65,7 +65,7 @@ def look_at_folders(environ: Mapping[str, str], *, heartbeat_variable: str) -> W
 
 
 def _folder_fault(folder: Path, *, may_make: bool = False) -> str | None:
-    """Why no file can be written in a folder; one that ROS would make is made, as root can write where it may not."""
+    """Return why no file can be written in a folder. With `may_make`, one that is missing is made, as ROS would do."""
     try:
         if may_make:
             folder.mkdir(parents=True, exist_ok=True)

@@ -35,14 +35,6 @@ def wait_until(
         time.sleep(poll_s)
 
 
-def comes_true(condition: Callable[[], object], *, within_s: float) -> bool:
-    """Whether the condition holds by then: for what is tried again where a busy machine is in its way."""
-    end = time.monotonic() + within_s
-    while not (held := bool(condition())) and time.monotonic() < end:
-        time.sleep(_POLL_S)
-    return held
-
-
 def ros_environment(*, domain: int, folder: Path) -> dict[str, str]:
     """The caller's environment without any choice of ROS that it made, on a domain of its own."""
     kept = {

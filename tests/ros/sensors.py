@@ -24,10 +24,7 @@ ON_AND_ON_MS = 300_000
 BY_RECEIPT = inputs(PAIR, stamp="receive")
 
 
-# How long something took or lasts: how long it is, a busy machine says.
-LASTED = r"[\d.]+ (?:ms|s|min|h)"
-
-# What a machine that does not give a rig the time it needs makes of it, truly: no test has a say in that.
+# Findings that are true of a rig on a busy machine, which no test can prevent.
 OF_A_BUSY_MACHINE = {"too_slow", "bursts", "slowed", "silent"}
 
 
