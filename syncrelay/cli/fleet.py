@@ -52,7 +52,7 @@ def do_on_many(task: Task, words: Sequence[str], arguments: Namespace, *, finish
         )
         if run.unreadable:
             lines = counted(run.unreadable, "line")
-            remark(f"{named}: {lines} of its ledger cannot be read; those recordings are done again")
+            remark(f"{named}: {lines} of its ledger cannot be read: what no other line has is done again")
         progress = Progress(run.jobs, time.monotonic())
         try:
             code = _go(run, progress, arguments)

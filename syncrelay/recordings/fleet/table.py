@@ -81,6 +81,7 @@ def _rows_of(result: str, entry: Entry) -> list[FleetRow]:
         ]
     if not rows:
         raise SyncRelayError(
-            f"{redacted(result)}/{FACTS}: cannot be read: remove the folder, and run the command again"
+            f"{redacted(result)}/{FACTS}: cannot be read: remove this folder, and run the command again with"
+            f" {entry.recording} among the recordings"
         )
     return rows

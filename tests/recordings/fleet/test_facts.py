@@ -5,6 +5,7 @@ import random
 import re
 from collections import Counter
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +14,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from syncrelay.errors import UsageError
-from syncrelay.recordings.fleet.facts import FindingFacts, FleetRow, SuggestedValue
+from syncrelay.recordings.fleet.facts import FindingFacts, FleetRow, SlopTrial, SuggestedValue
 from syncrelay.recordings.fleet.ledger import Entry, Ledger, State
 from syncrelay.recordings.fleet.recordings import result_name
 from syncrelay.recordings.fleet.robots import RobotPattern
 from syncrelay.recordings.fleet.summary import Summary
-from syncrelay.recordings.fleet.table import fleet_rows
+from syncrelay.recordings.fleet.table import fleet_rows, write_table
 from tests.cli.command import ROOT, run
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.recordings.bag.making import write_mcap
-from tests.recordings.fleet.fleets import FILE, file_text
+from tests.recordings.fleet.fleets import FILE, file_text, result
 from tests.ros.streams import at, merged
 
 _SEED = 29
@@ -200,6 +201,44 @@ def test_the_summary_is_one_screen_about_the_same(fleet):
     assert len(lines) <= 22
     assert max(map(len, lines)) <= 80
     assert f"facts.parquet: {_DRAWN} rows" in fleet.ended.stderr
+
+
+@pytest.mark.parametrize("others", [(), ("bags/b.mcap",)])
+def test_a_lost_result_of_a_recording_that_is_not_named_is_an_error_that_can_be_mended(tmp_path, others):
+    (tmp_path / FILE).write_text(file_text())
+    (tmp_path / "bags").mkdir()
+    for name in ("a", "b"):
+        write_mcap(tmp_path / "bags" / f"{name}.mcap", at("/camera", 0))
+    words = ("--config", FILE, "--into", "out", "--jobs", "1")
+    run("analyze", "bags", *words, folder=tmp_path)
+    lost = result(tmp_path / "out", "b") / "facts.jsonl"
+    lost.unlink()
+    ended = run("analyze", "bags/a.mcap", *others, *words, folder=tmp_path)
+    told = (
+        f"syncrelay: out/{lost.parent.name}/facts.jsonl: cannot be read: remove this folder, and run the command again"
+        f" with {tmp_path}/bags/b.mcap among the recordings\n"
+    )
+    assert (told in ended.stderr) is not bool(others)
+    assert lost.exists() is bool(others)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        (),
+        (FleetRow(recording="/a", error="torn"),),
+        (FleetRow(recording="/a", group_name="g", slop_trials=(SlopTrial(slop_ms=1, sets=0, of_messages=0),)),),
+    ],
+    ids=["no rows", "failed", "no messages"],
+)
+def test_the_queries_give_no_nan_and_no_error_of_a_fleet_without_messages(tmp_path, rows):
+    with duckdb.connect() as connection:
+        connection.execute(f"SET file_search_path='{tmp_path}'")
+        for folder in ("out", "old", "new"):
+            (tmp_path / folder).mkdir()
+            assert [*write_table(str(tmp_path / folder / "facts.parquet"), rows)] == [*rows]
+        values = [value for query in _QUERIES for row in connection.sql(query).fetchall() for value in row]
+    assert not [value for value in values if isinstance(value, float) and isnan(value)]
 
 
 @pytest.mark.parametrize(
