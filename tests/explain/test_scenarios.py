@@ -121,23 +121,19 @@ CAUSES: dict[str, tuple[Callable[[], Told], str, tuple[str, ...]]] = {
         "duplicates",
         ("/b",),
     ),
-    "a publisher returns with another type": (
-        lambda: a_pair(
-            sends=lambda second: second < 20,
-            more=shown(lambda second: (IMAGES if second > 20 else Endpoint("/b_driver", IMU),)),
-        ),
-        "other_type",
-        ("/b",),
-    ),
-    "a publisher returns with another type than was taken": (
-        lambda: a_pair(
-            sends=lambda second: second < 20,
-            more=shown(lambda second: (IMAGES if second > 20 else Endpoint("/b_driver", IMU),)),
-            **UNTYPED,
-        ),
-        "other_type",
-        ("/b",),
-    ),
+    **{
+        f"a publisher returns with another type{than}": (
+            partial(
+                a_pair,
+                sends=lambda second: second < 20,
+                more=shown(lambda second: (IMAGES if second > 20 else Endpoint("/b_driver", IMU),)),
+                **options,
+            ),
+            "other_type",
+            ("/b",),
+        )
+        for than, options in (("", {}), (" than was taken", UNTYPED))
+    },
     "a topic without a type has two": (
         lambda: a_pair(
             sends=lambda second: second > 30,

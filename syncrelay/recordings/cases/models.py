@@ -1,6 +1,6 @@
 """What a test file may say. Its JSON Schema and its errors come from these models and nowhere else."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, InstanceOf, WithJsonSchema, model_validator
 from pydantic.config import JsonDict
@@ -106,6 +106,10 @@ _NOT_EMPTY: Final[JsonDict] = {"minProperties": 1}
 _DURATION: Final = "A number is seconds, a string has a unit (ns, us, ms, s, min)."
 
 
+def _time(meaning: str, example: str) -> Any:
+    return Field(default=0, description=f"{meaning} {_DURATION} Default: 0.", examples=[example])
+
+
 class InputSource(Keys):
     """What comes of an input: as it was drawn, or so many a second."""
 
@@ -115,25 +119,11 @@ class InputSource(Keys):
         " Default: none, it is drawn or sends nothing.",
         examples=["30 Hz"],
     )
-    phase: Length = Field(
-        default=0, description=f"When the first is measured, with `rate`. {_DURATION} Default: 0.", examples=["3ms"]
-    )
-    jitter: Length = Field(
-        default=0,
-        description=f"Standard deviation of stamps, with `rate`. {_DURATION} Default: 0.",
-        examples=["1ms"],
-    )
-    latency: Length = Field(
-        default=0, description=f"From the measurement to the receipt. {_DURATION} Default: 0.", examples=["20ms"]
-    )
-    latency_jitter: Length = Field(
-        default=0,
-        description=f"Standard deviation of the latency, with `rate`. {_DURATION} Default: 0.",
-        examples=["4ms"],
-    )
-    offset: SignedDuration = Field(
-        default=0, description=f"How far ahead the clock is that stamps. {_DURATION} Default: 0.", examples=["12ms"]
-    )
+    phase: Length = _time("When the first is measured, with `rate`.", "3ms")
+    jitter: Length = _time("Standard deviation of stamps, with `rate`.", "1ms")
+    latency: Length = _time("From the measurement to the receipt.", "20ms")
+    latency_jitter: Length = _time("Standard deviation of the latency, with `rate`.", "4ms")
+    offset: SignedDuration = _time("How far ahead the clock is that stamps.", "12ms")
     drop: Loss = Field(
         default=0, description="Share of messages that are never sent, with `rate`. Default: 0%.", examples=["3%"]
     )
