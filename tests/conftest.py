@@ -1,6 +1,7 @@
 """What a machine lacks is skipped with the reason; what a test with ROS needs, it has for itself alone."""
 
 import gc
+import importlib.metadata
 import importlib.util
 import itertools
 import os
@@ -35,6 +36,10 @@ def pytest_configure(config: pytest.Config) -> None:
     named = os.environ.get(_REAL_DATA)
     if named and not Path(named).is_dir():
         raise pytest.UsageError(f"{_REAL_DATA}={named}: no such folder")
+    others = sorted(entry.value for entry in importlib.metadata.entry_points(group="syncrelay.policies"))
+    if others:
+        # They would be in the schema and on the pages that the tests compare with those in the repository.
+        raise pytest.UsageError(f"policies of other packages are installed here, uninstall them: {', '.join(others)}")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
