@@ -3,6 +3,7 @@
 import bz2
 import gzip
 import os
+import re
 import resource
 import shutil
 import sqlite3
@@ -157,7 +158,7 @@ def test_a_ros1_bag_without_an_index_is_refused_with_the_command_that_makes_one(
     [
         (b"index_pos=", struct.pack("<Q", 1 << 40), "Header could not be read from file"),
         (b"index_pos=", struct.pack("<Q", 13), "Record of type 'BAGHEADER' is unexpected"),
-        (b"topic=", b"\xff", "the records do not fit together"),
+        (b"message_definition=", b"\xff", "Could not read string field 'message_definition'"),
     ],
 )
 def test_why_the_index_of_a_ros1_bag_cannot_be_read_is_said_in_words(field, value, why, tmp_path):
@@ -168,6 +169,16 @@ def test_why_the_index_of_a_ros1_bag_cannot_be_read_is_said_in_words(field, valu
     path.write_bytes(content[:at] + value + content[at + len(value) :])
     with pytest.raises(BagError, match=rf"its index cannot be read: {why}\. A bag that was not closed"):
         _read(path)
+
+
+def test_of_what_rosbags_has_no_words_for_no_exception_is_shown(tmp_path):
+    path = ros1()(tmp_path)
+    content = path.read_bytes()
+    # Of a message's header: the connection that it belongs to, which the index knows under another number.
+    at = next(re.finditer(rb"op=\x02.{4}conn=", content, re.DOTALL)).end()
+    path.write_bytes(content[:at] + b"\7" + content[at + 1 :])
+    _, (fault,) = _read(path)
+    assert fault == f"{path}: damaged; read as far as possible: the records do not fit together"
 
 
 def test_a_ros1_bag_is_read_up_to_a_chunk_that_is_damaged(tmp_path):
