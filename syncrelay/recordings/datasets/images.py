@@ -19,6 +19,8 @@ NEEDED: Final = ("height", "width", "encoding", "is_bigendian", "step", "data")
 # Higher levels take twice the time to save a few per cent.
 _PNG_LEVEL: Final = 1
 _JPEG_QUALITY: Final = 95
+# libjpeg's JPEG_MAX_DIMENSION. Pillow gives its error as one of the file that is written.
+_LONGEST_JPEG: Final = 65_500
 
 
 class _Pixels(NamedTuple):
@@ -113,6 +115,10 @@ def encoded(pixels: np.ndarray[Any, Any], image_format: ImageFormat, topic: str)
 
     if image_format == "jpeg" and pixels.dtype.itemsize > 1:
         raise BagError(f"{topic}: JPEG cannot hold 16 bit images: use --images {topic}=png")
+    height, width = pixels.shape[:2]
+    if image_format == "jpeg" and max(height, width) > _LONGEST_JPEG:
+        limit = f"at most {_LONGEST_JPEG:,} pixels a side, and one has {width:,} x {height:,}"
+        raise BagError(f"{topic}: JPEG holds images of {limit}: use --images {topic}=png")
     order = "<" if sys.byteorder == "little" else ">"
     plain = np.ascontiguousarray(pixels, dtype=pixels.dtype.newbyteorder(order))
     picture = Image.fromarray(plain)

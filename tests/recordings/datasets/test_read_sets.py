@@ -204,6 +204,13 @@ def test_depth_images_of_16_bits_are_whole_in_png(tmp_path, big_endian):
         rows_of(bag, config(), images="jpeg")
 
 
+def test_an_image_that_is_too_long_for_jpeg_is_whole_in_png(tmp_path):
+    bag = write_mcap(tmp_path / "bag.mcap", images("mono8", np.zeros((1, 65_501), "u1")))
+    with pytest.raises(BagError, match=r"/camera: JPEG holds .* one has 65,501 x 1: use --images /camera=png"):
+        rows_of(bag, config(), images="jpeg")
+    assert rows_of(bag, config(), images="png")[0]["/camera"]["width"] == 65_501
+
+
 @pytest.mark.parametrize(
     ("chosen", "camera", "lidar"),
     [
