@@ -169,11 +169,10 @@ def _code(error: SyncRelayError) -> int:
 
 
 def _lacking(error: ImportError, package: str) -> str:
-    from syncrelay.cli.commands import EXTRAS
+    from syncrelay.cli.commands import EXTRAS, line_to_install
 
-    extra = next((f"[{name}]" for name, packages in EXTRAS.items() if package in packages), "")
+    extra = next((name for name, packages in EXTRAS.items() if package in packages), "")
     return (
-        f"{sys.executable} lacks a Python package that syncrelay needs, or has too old a version: {error}; run"
-        f" `pip install 'syncrelay{extra}'`, in a clone `pip install '.{extra}'`, or see docs/howto/workspace.md for a"
-        " ROS workspace"
+        f"{sys.executable} lacks a Python package that syncrelay needs, or has too old a version: {error}\n"
+        f"  {line_to_install(extra)}\n  for a ROS workspace, see docs/howto/workspace.md"
     )

@@ -112,8 +112,9 @@ def require_extras(command: Command, arguments: Namespace) -> None:
 
 
 def line_to_install(extras: str) -> str:
-    """Return what to type for extras, which are separated by commas."""
-    return f"pip install 'syncrelay[{extras}]'     (in a clone: pip install '.[{extras}]')"
+    """Return what to type for extras, which are separated by commas; for none, what installs the rest."""
+    with_extras = f"[{extras}]" if extras else ""
+    return f"pip install 'syncrelay{with_extras}'     (in a clone: pip install '.{with_extras}')"
 
 
 def is_installed(extra: str) -> bool:

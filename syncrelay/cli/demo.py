@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
 from syncrelay.cli.commands import is_installed, line_to_install
-from syncrelay.cli.parser import Parser, positive
+from syncrelay.cli.parser import Parser, positive, seed
 from syncrelay.cli.stop import StopRequest
 from syncrelay.printable import printable
 
@@ -45,7 +45,7 @@ def parser() -> Parser:
         "Exit code 1 if a group produced no set.",
     )
     parser.add_argument("--seconds", metavar="N", type=positive, help="end N seconds after the sensors are up")
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of jitter, latency and drops (0)")
+    parser.add_argument("--seed", metavar="N", type=seed, default=0, help="seed of jitter, latency and drops (0)")
     parser.add_argument("--show-config", action="store_true", help="print the file that the demo relays, and exit")
     parser.add_argument(
         "--record",

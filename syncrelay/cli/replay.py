@@ -52,7 +52,7 @@ def parser() -> Parser:
         help="lay a fault over the recording, such as 'late: TOPIC 80ms' or 'drop: TOPIC 10%% from 12s'; also offset,"
         " drift, dead",
     )
-    parser.add_argument("--seed", metavar="N", type=seed, default=0, help="with --what-if: which messages are lost (0)")
+    parser.add_argument("--seed", metavar="N", type=seed, help="with --what-if: which messages are lost (0)")
     add_fleet_options(parser)
     return parser
 
@@ -66,22 +66,25 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         what_if = tuple(map(parse_fault, arguments.what_if))
     except ValueError as error:
         parser.error(f"argument --what-if: {error}")
+    if arguments.seed is not None and not what_if:
+        parser.error("--seed goes with --what-if")
+    seed_of_faults = arguments.seed or 0
     require_into(parser, arguments)
     if arguments.into is None and arguments.jobs is not None:
         parser.error("--jobs goes with --into")
     if arguments.into is None:
-        return _replay(arguments, what_if)
+        return _replay(arguments, what_if, seed_of_faults)
     if arguments.output or arguments.json or arguments.drops:
         parser.error("--output, --json and --drops are for one replay: --into writes the sets of each recording")
     from syncrelay.cli.fleet import do_on_many
     from syncrelay.config import load
     from syncrelay.recordings.fleet.tasks import ReplayTask
 
-    task = ReplayTask.of(load(*arguments.config), what_if, arguments.seed)
+    task = ReplayTask.of(load(*arguments.config), what_if, seed_of_faults)
     return do_on_many(task, arguments.bags, arguments)
 
 
-def _replay(arguments: Namespace, what_if: "tuple[Fault, ...]") -> int:
+def _replay(arguments: Namespace, what_if: "tuple[Fault, ...]", seed_of_faults: int) -> int:
     """Feed recordings to the groups of files and print what became of them.
 
     Returns 1 if a required topic is not there, or part of the recording is missing or cannot be read.
@@ -104,11 +107,11 @@ def _replay(arguments: Namespace, what_if: "tuple[Fault, ...]") -> int:
         recording = open_recording(arguments.bags, tell=remark)
         opened.callback(recording.close)
         plain = recording
-        disturbed = Disturbed(recording, what_if, seed=arguments.seed) if what_if else None
+        disturbed = Disturbed(recording, what_if, seed=seed_of_faults) if what_if else None
         if disturbed is not None:
             recording = disturbed
             faults = ", ".join(f"`{fault.written}`" for fault in what_if)
-            remark(printable(f"faults laid over the recording (seed {arguments.seed}): {faults}"))
+            remark(printable(f"faults laid over the recording (seed {seed_of_faults}): {faults}"))
         bindings = bind(config, recording)
         _remark_all(problem for binding in bindings for problem in binding.problems)
         written = _written(arguments.output, bindings, opened)

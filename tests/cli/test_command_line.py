@@ -68,6 +68,8 @@ def test_the_version_is_that_of_the_package(tmp_path):
             ["demo", "--record", "rig.mcap", "--seconds", "1e308"],
             "argument --seconds: expected a number of at most 1000000000, found 1e308",
         ),
+        (["demo", "--seed", "one"], "argument --seed: expected a whole number of 0 or more, found one"),
+        (["replay", "rig.mcap", "--config", "f.yaml", "--seed", "1"], "--seed goes with --what-if"),
         (["analyze"], "the following arguments are required: BAG\n"),
     ],
 )

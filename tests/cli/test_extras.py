@@ -15,6 +15,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from syncrelay.cli.boundary import guarded
 from syncrelay.cli.commands import COMMANDS, EXTRAS
 from tests.cli.command import GOOD, ROOT
 
@@ -104,6 +105,16 @@ def test_a_command_whose_extra_is_missing_says_what_to_type_before_anything_slow
     assert _TOLD.findall(done.stderr) == [",".join(_missing(*words))]
     if _BARE is None:
         assert done.stderr.splitlines()[-1] == "slow:"
+
+
+@pytest.mark.parametrize(("package", "extra"), [("mcap", "[recordings]"), ("pydantic", "")])
+def test_a_package_that_is_too_old_is_told_with_what_to_type(package, extra, capsys):
+    def command():
+        raise ImportError(f"cannot import name 'new' from '{package}'", name=package)
+
+    assert guarded(command) == 69
+    said = f"  pip install 'syncrelay{extra}'     (in a clone: pip install '.{extra}')\n"
+    assert said in capsys.readouterr().err
 
 
 _OTHERS = [each for each in _WORDS if not _missing(*each) and each[0] != "demo"]
