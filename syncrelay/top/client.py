@@ -90,7 +90,8 @@ def get(connection: HTTPConnection, target: str, *, whole_s: float = _WHOLE_S) -
                 status, reason, body = response.status, response.reason, _body(response)
     except (OSError, IncompleteRead, UnicodeError) as error:
         raise _no_answer(error, connection.timeout or 0) from error
-    except HTTPException as error:
+    except (HTTPException, ValueError) as error:
+        # http.client raises ValueError for a chunk of a negative size.
         raise OtherServerError("what listens there is not a relay: its answer is not HTTP") from error
     if status != HTTPStatus.OK:
         raise OtherServerError(_refused(f"{status} {reason}", body))

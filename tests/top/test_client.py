@@ -3,6 +3,7 @@
 import re
 import socket
 from contextlib import closing
+from threading import Thread
 
 import pytest
 
@@ -73,6 +74,22 @@ def test_who_accepts_and_never_answers_is_given_up():
         pytest.raises(NoAnswerError, match="no answer within 2 s"),
     ):
         ask(f"http://127.0.0.1:{silent.getsockname()[1]}")
+
+
+def test_a_chunk_of_a_negative_size_is_said():
+    with closing(socket.create_server(("127.0.0.1", 0))) as server:
+
+        def answer() -> None:
+            connection, _ = server.accept()
+            with closing(connection):
+                connection.recv(1000)
+                connection.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n-5\r\nabc")
+
+        thread = Thread(target=answer)
+        thread.start()
+        with pytest.raises(OtherServerError, match="its answer is not HTTP"):
+            ask(f"http://127.0.0.1:{server.getsockname()[1]}")
+        thread.join()
 
 
 def test_an_unknown_machine_is_said():
