@@ -18,6 +18,8 @@ _KEPT: Final = 5_000
 # Stands for "no message on this side". Twice this still fits into 64 bits.
 _FAR: Final = 2**61
 _LATEST: Final = 2**62 - 1
+LONGEST: Final = _LATEST
+"""No offset or wait longer than this, 146 years, is tried: as a duration of the file it might be out of range."""
 # Stamps are meant to be equal if this share of them is. One that is not has lost its partner.
 _EQUAL: Final = 0.8
 # A set that spans more periods of its slowest input, or more times the usual span, pairs messages of two moments.
@@ -33,6 +35,12 @@ class Received(NamedTuple):
     stamps: Nanoseconds
     received: Nanoseconds
     places: Nanoseconds
+
+    @property
+    def are_stamped(self) -> npt.NDArray[np.bool_]:
+        """Which messages have a stamp."""
+        stamped: npt.NDArray[np.bool_] = (self.stamps != 0) & (self.stamps != UNREADABLE)
+        return stamped
 
 
 class InOrder(NamedTuple):
@@ -86,7 +94,7 @@ def as_arrays(messages: Sequence[Message], n_inputs: int) -> tuple[Received, ...
 
 def in_order(messages: Received, offset: int) -> InOrder:
     """Sort an input's messages by stamp. Of messages with one stamp the last counts, as it does in the engine."""
-    is_set = (messages.stamps != 0) & (messages.stamps != UNREADABLE)
+    is_set = messages.are_stamped
     stamps, places = messages.stamps[is_set], messages.places[is_set]
     _, last = np.unique(stamps[::-1], return_index=True)
     at = len(stamps) - 1 - last
@@ -95,7 +103,8 @@ def in_order(messages: Received, offset: int) -> InOrder:
 
 def shifted(stamps: Nanoseconds, offset: int) -> Nanoseconds:
     """Add an offset to stamps, and keep them so far from the ends of 64 bits that they can be subtracted."""
-    moved: Nanoseconds = np.clip(stamps + max(-_LATEST, min(_LATEST, offset)), -_LATEST, _LATEST)
+    near = np.clip(stamps, -_LATEST, _LATEST)
+    moved: Nanoseconds = np.clip(near + max(-_LATEST, min(_LATEST, offset)), -_LATEST, _LATEST)
     return moved
 
 
@@ -162,7 +171,7 @@ def possible_sets(
     elif not is_alone and not is_age:
         for side, other in zip(found, others, strict=True):
             belong &= ~_is_lost(side, other.stamps)
-        periods = [_period(each.stamps) for each in others]
+        periods = [period_of(each.stamps) for each in others]
         usual = quantile(spans[belong], 0.75) if belong.any() else 0
         belong &= spans <= min(_PERIODS * max(periods), _FAR_OFF * usual)
         if not config.options.repeats:
@@ -208,14 +217,15 @@ def _queues(chosen: Sequence[tuple[InOrder, Nanoseconds]], *, successors: int) -
 
 def _is_lost(found: Sides, stamps: Nanoseconds) -> npt.NDArray[np.bool_]:
     """Tell around which messages the partner of a steady input is missing: they are amid a gap, far from its ends."""
-    period = _period(stamps)
+    period = period_of(stamps)
     if not period or quantile(np.diff(stamps), 0.75) > _PERIODS * period:
         return np.zeros(len(found.at), dtype=np.bool_)
     gap = found.before + found.after
     return (gap > _PERIODS * period) & (np.minimum(found.before, found.after) > _NOT_NEAREST * period)
 
 
-def _period(stamps: Nanoseconds) -> float:
+def period_of(stamps: Nanoseconds) -> float:
+    """Return the usual time between stamps in order, 0 where most are equal or there is only one."""
     return float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
 
 

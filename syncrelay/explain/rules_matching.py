@@ -13,7 +13,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Finding, Found, absence, counted, nodes
-from syncrelay.explain.nearest import quantile, signed_distances
+from syncrelay.explain.nearest import quantile, shifted, signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
 from syncrelay.explain.standing import Standing
@@ -148,8 +148,8 @@ def _whole_periods_off(facts: GroupFacts, first: int, other: int) -> int | None:
         return None
     if abs(one.figures.pace_hz * period / SECOND - 1) > _CONSTANT:
         return None
-    shifted = [[stamp + each.offset for stamp in each.figures.stamps] for each in (one, two)]
-    signed = signed_distances(*(np.sort(np.array(each, dtype=np.int64)) for each in shifted))
+    stamps = (shifted(np.array(each.figures.stamps, dtype=np.int64), each.offset) for each in (one, two))
+    signed = signed_distances(*map(np.sort, stamps))
     if len(signed) < _ENOUGH or quantile(signed, 0.95) - quantile(signed, 0.05) > _CONSTANT * period:
         return None
     distance = quantile(signed, 0.5)

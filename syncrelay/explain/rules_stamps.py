@@ -11,7 +11,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Finding, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
-from syncrelay.explain.trials import Change, Trials, Verdict
+from syncrelay.explain.trials import Trials, Verdict, offset_change
 from syncrelay.sync.messages import DropReason
 
 # Stamps further off than this come from another clock, or are older than a queue should hold.
@@ -144,8 +144,8 @@ def offered_offset(facts: GroupFacts, code: Code, index: int, by: int) -> str:
         near = by_clock if code is Code.OTHER_CLOCK and (by_clock := trials.clock_offset(index)) else None
         near = near or next((each for each in trials.offsets() if each.input == index), None)
         if near is None or abs(parse_duration(near.value) - by) > _SAME_OFFSET * abs(by):
-            near = Change("offset", words.exactly(by), index)
-        tried = trials.by_offset(near)
+            near = offset_change(index, by)
+        tried = None if near is None else trials.by_offset(near)
         return Verdict(() if tried is None else (tried,))
 
     found = facts.suggester.ask((code, index), question, now=facts.figures.now).tried

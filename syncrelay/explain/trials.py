@@ -21,12 +21,15 @@ from syncrelay.explain import words
 from syncrelay.explain.clocks import time_scale
 from syncrelay.explain.dry_run import EngineDriver
 from syncrelay.explain.nearest import (
+    LONGEST,
     Nanoseconds,
     PossibleSets,
     Received,
     in_order,
+    period_of,
     possible_sets,
     quantile,
+    shifted,
     signed_distances,
 )
 from syncrelay.sync import Match, Message, Outcome
@@ -244,12 +247,11 @@ class Trials:
             for wider in dict.fromkeys((with_headroom(possible.spans), words.at_least(possible.widest))):
                 yield from ((*policy, Change(tolerance.key, wider)) for policy in (*policies, *patient))
         if target is not REQUIRED and (late := self._lateness(target)) > 0:
-            yield from ((Change("max_wait", words.at_least(times * late)),) for times in (1, 2))
+            yield from _waits(late, 2 * late)
         yield ()
         if target is REQUIRED:
             yield from patient
-            waits = (2 * options.max_wait, 4 * options.max_wait) if options.max_wait else ()
-            yield from ((Change("max_wait", words.at_least(wait)),) for wait in waits)
+            yield from _waits(2 * options.max_wait, 4 * options.max_wait) if options.max_wait else ()
 
     def _exact(self) -> Iterator[Changes]:
         is_by_stamp = all(topic.stamp != "receive" for topic in self.config.topics)
@@ -293,13 +295,13 @@ class Trials:
         """Return how much later than the required inputs' an optional input's messages come, with headroom."""
         delays = [self._delays(other) for other in self.required]
         others, own = [int(np.median(each)) for each in delays if len(each)], self._delays(index)
-        return parse_duration(with_headroom(own - min(others))) if others and len(own) else 0
+        return parse_duration(with_headroom(shifted(own, -min(others)))) if others and len(own) else 0
 
     def _delays(self, index: int) -> Nanoseconds:
         """Return how long after its stamp, offset added, each message of an input came."""
-        stamps, received, _ = self.inputs[index]
-        is_set = (stamps != 0) & (stamps > -(2**62))
-        return np.asarray(received[is_set] - stamps[is_set] - self.config.topics[index].offset_ns)
+        messages, offset = self.inputs[index], self.config.topics[index].offset_ns
+        is_set = messages.are_stamped
+        return shifted(shifted(messages.received[is_set], 0) - shifted(messages.stamps[is_set], offset), 0)
 
     def verdict(self, target: int | None, keys: Collection[str], *, all_widths: bool = False) -> Verdict:
         """Return the fewest values of the plan, of these keys, that cure a target.
@@ -349,29 +351,29 @@ class Trials:
                 continue
             one, other = (in_order(self.inputs[at], self.config.topics[at].offset_ns).stamps for at in (pivot, index))
             distances = signed_distances(one, other)
-            if len(distances) < _FEWEST or len(other) < 2:  # noqa: PLR2004  two make a period
+            period = period_of(other)
+            if len(distances) < _FEWEST or not period:
                 continue
             middle = quantile(distances, 0.5)
             scatter = quantile(distances, 0.95) - quantile(distances, 0.05)
             if abs(middle) < _LEAST_DISTANCE or 2 * scatter > abs(middle):
                 continue
             delays = [float(np.median(self._delays(at))) for at in (index, pivot)]
-            period = float(np.median(np.diff(other)))
             whole = round((delays[0] - delays[1] + middle) / period) * period
             is_whole = bool(whole) and abs(delays[0] - delays[1] + middle - whole) <= _SAME * period
             shift = whole - middle if is_whole else -middle
             # Of two, the one that is farther from this machine's time is odd.
             at, shift = (index, shift) if abs(delays[0]) >= abs(delays[1]) else (pivot, -shift)
             is_same_rate = abs(float(np.median(np.diff(one))) / period - 1) <= _SAME_RATE if len(one) > 1 else False
-            offset = round(self.config.topics[at].offset_ns + shift)
-            yield Change("offset", words.exactly(offset), at), is_whole and is_same_rate
+            if (change := offset_change(at, round(self.config.topics[at].offset_ns + shift))) is not None:
+                yield change, is_whole and is_same_rate
 
     def by_offset(self, change: Change, target: int | None = REQUIRED) -> Tried | None:
         """Return what another offset gives if it brings messages together that are possible sets by then, else None."""
-        shifted = replace(self, config=changed(self.config, (change,)), _targets={}, _runs={})
-        if not shifted.is_enough((), target):
+        moved = replace(self, config=changed(self.config, (change,)), _targets={}, _runs={})
+        if not moved.is_enough((), target):
             return None
-        return Tried((change,), shifted.given((), target), self.given((), target), len(shifted.spans(target)))
+        return Tried((change,), moved.given((), target), self.given((), target), len(moved.spans(target)))
 
     def clock_offset(self, index: int) -> Change | None:
         """Return the offset that brings an input of another clock to the time of the required inputs."""
@@ -379,7 +381,7 @@ class Trials:
         offset = self.config.topics[index].offset_ns
         stamps = self.inputs[index].stamps
         scale = time_scale(int(stamps[-1]) if len(stamps) else 0, by)
-        return Change("offset", words.exactly((by if scale is None else scale[1]) + offset), index) if by else None
+        return offset_change(index, (by if scale is None else scale[1]) + offset) if by else None
 
     def apart(self, index: int) -> int:
         """Return how much later after its stamp an input's message comes than the required ones' do; 0 if unknown."""
@@ -390,6 +392,15 @@ class Trials:
         # Of two, the one that is farther from this machine's time is odd.
         usual = median_low(delays.values()) if len(delays) > 2 else min(delays.values(), key=abs)  # noqa: PLR2004
         return delays[index] - usual
+
+
+def _waits(*each: int) -> Iterator[Changes]:
+    yield from ((Change("max_wait", words.at_least(wait)),) for wait in each if wait <= LONGEST)
+
+
+def offset_change(index: int, by: int) -> Change | None:
+    """Return an offset of an input as it stands in the file; None of one that is too large to be written there."""
+    return Change("offset", words.exactly(by), index) if abs(by) <= LONGEST else None
 
 
 def with_headroom(spans: Nanoseconds) -> str:
