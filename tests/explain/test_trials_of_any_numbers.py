@@ -1,6 +1,7 @@
 """Trials answer, whatever numbers messages and the file have: those at the ends of 64 bits, none, or many of one."""
 
 import random
+from typing import Any
 
 import pytest
 
@@ -20,10 +21,13 @@ _KEYS = frozenset({"slop", "queue_size", "max_wait", "policy", "max_age"})
 def _drawn(seed: int):
     """A group, and the stamps and times of receipt of each input's messages."""
     chance = random.Random(f"any numbers {seed}")
-    topics = [{"topic": f"/t{index}", "type": IMU} for index in range(chance.choice([2, 2, 3]))]
+    topics: list[dict[str, Any]] = [{"topic": f"/t{index}", "type": IMU} for index in range(chance.choice([2, 2, 3]))]
     for topic in topics:
         topic.update(chance.choice([{}, {}, {"offset": chance.choice(["-37s", "4000000000s", "-9000000000s"])}]))
-    group = {"policy": chance.choice(["approximate_time", "approximate_time_eager", "exact_time"]), "topics": topics}
+    group: dict[str, Any] = {
+        "policy": chance.choice(["approximate_time", "approximate_time_eager", "exact_time"]),
+        "topics": topics,
+    }
     group |= {"queue_size": chance.choice([1, 10]), "max_wait": chance.choice(["100ms", "3000000000s"])}
     if group["policy"] != "exact_time":
         group["slop"] = chance.choice(["1ms", "9000000000s"])
