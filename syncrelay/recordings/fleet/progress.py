@@ -58,7 +58,7 @@ class Progress:
         ended = self.done + self.kept + self.failed
         parts = [f"{ended} of {counted(len(self.jobs), 'recording')}"]
         if self.kept:
-            parts.append(f"{self.kept} were done before")
+            parts.append(f"{self.kept} done before")
         if self.failed:
             parts.append(f"{self.failed} failed")
         elapsed = now - self.begun

@@ -31,7 +31,7 @@ def progress(all_jobs, outcomes):
 
 def test_it_counts():
     shown = progress(jobs(*[10**6] * 9, done=(0,)), [Kept(), _DONE, Failed("")])
-    assert shown.line(102.0) == "3 of 9 recordings, 1 were done before, 1 failed, 1 MB/s"
+    assert shown.line(102.0) == "3 of 9 recordings, 1 done before, 1 failed, 1 MB/s"
 
 
 def test_what_is_left_goes_by_bytes():
