@@ -11,7 +11,7 @@ from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
 from syncrelay.explain.findings import SECOND, Finding, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
-from syncrelay.explain.trials import Trials, Verdict, offset_change
+from syncrelay.explain.trials import REQUIRED, Trials, Verdict, offset_change
 from syncrelay.sync.messages import DropReason
 
 # Stamps further off than this come from another clock, or are older than a queue should hold.
@@ -129,7 +129,7 @@ def other_clock(facts: GroupFacts) -> Found:
         text = f"stamps of {an_input.name}{shifted} {apart_by}"
         suggestion = (
             f"synchronize the clocks of their machines{_or_offset(facts, odd, behind + offset)}"
-            f"{_wait_for_it(facts, behind, an_input.name)}"
+            f"{_wait_for_it(facts, odd, behind)}"
         )
     yield Finding(Code.OTHER_CLOCK, Severity.ERROR, text, suggestion, odd)
 
@@ -161,10 +161,23 @@ def _or_offset(facts: GroupFacts, index: int, by: int) -> str:
     return f", or {advice}" if advice else ""
 
 
-def _wait_for_it(facts: GroupFacts, behind: int, name: str) -> str:
-    needed = max((each.counts.needed_queue or 0 for each in facts.inputs), default=0)
-    may_be_late = needed > facts.queue_size and 0 < behind < _LATENCY
-    return f"; if {name} really takes that long to arrive, write `queue_size: {needed}`" if may_be_late else ""
+def _wait_for_it(facts: GroupFacts, index: int, behind: int) -> str:
+    """Offer a longer queue, if one was tried and helps: stamps that seem old may be of results that take long."""
+    if facts.suggester is None or not 0 < behind < _LATENCY:
+        return ""
+    about = (Code.OTHER_CLOCK, index, "queue_size")
+    found = facts.suggester.ask(about, _longer_queue, now=facts.figures.now).tried
+    if not found:
+        return ""
+    (change,) = found[0].changes
+    return (
+        f"; if {facts.inputs[index].name} really takes that long to arrive, write `{change.key}: {change.value}`, which"
+        f" would give {found[0].given} of {found[0].possible} possible sets"
+    )
+
+
+def _longer_queue(trials: Trials) -> Verdict:
+    return trials.verdict(REQUIRED, {"queue_size"})
 
 
 def no_common_key(facts: GroupFacts) -> Found:

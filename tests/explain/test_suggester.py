@@ -178,6 +178,20 @@ def test_the_offset_of_another_clock_is_tried_and_cures():
     assert_cured(cured, offered=1)
 
 
+def test_a_longer_queue_is_offered_for_stamps_that_seem_old_only_if_it_cures():
+    told, _ = rig(CAMERA, replace(LIDAR, delay_ms=2500), slop="20ms", queue_size=5)
+    assert told.codes == {"other_clock"}
+    suggestion = told.found[-1][1][0].suggestion or ""
+    offered = r"if /lidar really takes that long to arrive, write `queue_size: (\d+)`, which would give (\d+) of"
+    ((size, promised),) = re.findall(offered, suggestion)
+    waiting = run(CAMERA, replace(LIDAR, delay_ms=2500), seconds=30, options={"slop": "20ms", "queue_size": int(size)})
+    assert waiting.warnings == []
+    assert waiting.facts.figures.sets >= int(promised)
+    # Stamps that are never within slop are not cured by a queue.
+    apart, _ = rig(replace(CAMERA, phase_ms=50), replace(LIDAR, delay_ms=2500), slop="10ms", queue_size=5)
+    assert "queue_size" not in "".join(each.suggestion or "" for _, found in apart.found for each in found)
+
+
 def test_no_offset_is_offered_for_another_clock_whose_stamps_would_not_match_by_it():
     wandering = Source("/lidar", hz=10, jitter_ms=30, clock=lambda _: 5.25)
     told, cured = rig(CAMERA, wandering, slop="2ms")

@@ -13,7 +13,6 @@ from tests.explain.support.cases import (
     camera,
     drifting,
     dropped,
-    fed,
     stamped,
     wide,
 )
@@ -163,16 +162,6 @@ FOUND = {
         a_silent_group(camera(offset=-1500 * MS, figures={"delay": 5 * MS}), LIDAR),
         "stamps of /camera, with its offset of -1.5s, are 1.5 s behind those of /lidar",
         "synchronize the clocks of their machines, or write `offset: 0ms` at /camera",
-    ),
-    "a result that may only come late": (
-        Code.OTHER_CLOCK,
-        Severity.ERROR,
-        a_silent_group(camera(figures={"delay": 1505 * MS}), an_input("/lidar", counts=fed(needed_queue=16))),
-        "stamps of /camera are 1.5 s behind those of /lidar",
-        (
-            "synchronize the clocks of their machines, or write `offset: 1.5s` at /camera; if /camera really takes that"
-            " long to arrive, write `queue_size: 16`"
-        ),
     ),
     "no common key": (
         Code.NO_COMMON_KEY,
