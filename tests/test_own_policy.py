@@ -15,11 +15,13 @@ from syncrelay.config import ConfigError, load_text
 from syncrelay.config.installed import installed_policies
 from syncrelay.config.models import Group
 from syncrelay.config.policies import GROUP_MODELS
+from syncrelay.dataflow.group import GroupRelay
 from syncrelay.explain import Code
 from syncrelay.recordings.analysis import GroupAnalysis, analyze
 from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
 from tests.cli.command import run, run_here, run_python
+from tests.dataflow.payloads import FLOWS
 from tests.faults.extent import chosen
 from tests.own_policies import installed_example, offer, on_path
 from tests.recordings.bag.making import write_mcap
@@ -215,6 +217,14 @@ def test_a_damaged_package_offers_nothing_and_harms_no_file(file: str, content: 
     with on_path(tmp_path):
         assert load_text(_exact()).groups
         assert "mine" not in installed_policies().models
+
+
+def test_the_package_of_a_policy_that_fails_is_suspected_too(tmp_path: Path, caplog: pytest.LogCaptureFixture):
+    offer(tmp_path, "robot-policies", {"mine": "Mine"}, text=_MODEL)
+    with on_path(tmp_path):
+        (group,) = load_text(config({"fused": {"policy": "mine", "topics": inputs(_TYPES)}})).groups
+        GroupRelay(group, now=lambda: 0, flow=FLOWS[0]).fail(KeyError("x"))
+    assert "fused: a bug in syncrelay or in the package of the policy `mine` stopped this group;" in caplog.text
 
 
 def _exact() -> str:

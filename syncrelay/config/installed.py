@@ -76,6 +76,12 @@ def policy_name(model: type[Group]) -> str:
     return str(name)
 
 
+def suspects(policy: str) -> str:
+    """Return whose code has the bug where a group of this policy fails, for a sentence: "a bug in ..."."""
+    own = any(policy_name(model) == policy for model in policies.GROUP_MODELS)
+    return "syncrelay" if own else f"syncrelay or in the package of the policy {quoted(policy)}"
+
+
 def topic_model(group: type[Group]) -> type[Topic]:
     """Return the model of the topics of a policy's groups."""
     model: type[Topic] = get_args(group.model_fields["topics"].annotation)[0]

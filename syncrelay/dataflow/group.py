@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Final, NamedTuple, TypeVar
 
 from syncrelay.config import GroupConfig
+from syncrelay.config.installed import policy_name, suspects
 from syncrelay.dataflow.backend import Outlet
 from syncrelay.dataflow.engines import PausedEngine, StoppedEngine
 from syncrelay.dataflow.flow import Engine, Flow
@@ -189,9 +190,10 @@ class GroupRelay:
             return
         self.failure = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         _LOG.error(
-            "%s: a bug in syncrelay stopped this group; other groups keep running. "
+            "%s: a bug in %s stopped this group; other groups keep running. "
             "Please report it with these lines and your file",
             self.config.name,
+            suspects(policy_name(type(self.config.options))),
             exc_info=error,
             extra={"group": self.config.name, "finding": Code.INTERNAL_ERROR.value},
         )

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
+from syncrelay.config.installed import suspects
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
 from syncrelay.explain.codes import Code, Severity
@@ -30,7 +31,7 @@ def internal_error(facts: GroupFacts) -> Found:
         yield Finding(
             Code.INTERNAL_ERROR,
             Severity.ERROR,
-            f"a bug in syncrelay stopped this group: {facts.failure}",
+            f"a bug in {suspects(facts.policy)} stopped this group: {facts.failure}",
             "report it with the traceback in the log; `syncrelay reload` starts the group again",
         )
 

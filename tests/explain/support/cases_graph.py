@@ -25,6 +25,13 @@ FOUND = {
         "a bug in syncrelay stopped this group: KeyError: 'x'",
         "report it with the traceback in the log; `syncrelay reload` starts the group again",
     ),
+    "a group of another package's policy that an exception stopped": (
+        Code.INTERNAL_ERROR,
+        Severity.ERROR,
+        a_group(failure="KeyError: 'x'", policy="led_by"),
+        "a bug in syncrelay or in the package of the policy `led_by` stopped this group: KeyError: 'x'",
+        "report it with the traceback in the log; `syncrelay reload` starts the group again",
+    ),
     "a managed node that waits to be activated": (
         Code.INACTIVE,
         Severity.WARN,
