@@ -4,6 +4,7 @@ import re
 import time
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
+from urllib.parse import urlsplit
 
 from syncrelay.errors import NO_SPACE, StorageError, SyncRelayError, UnavailableError
 from syncrelay.recording_files import scheme_of
@@ -36,6 +37,7 @@ _DENIALS: Final = ("Forbidden", "Anonymous caller", "Invalid Credentials")
 _NO_CREDENTIALS: Final = (
     "no credentials were found (docs/howto/storage.md says where they are looked for): check the environment"
 )
+_NO_SERVER: Final = "is not the URL of a server: check it"
 _GONE: Final = "no such file, folder or bucket: check the URL"
 _STATUSES: Final = {401: _DENIED, 403: _DENIED, 404: _GONE, 410: _GONE, 412: REPLACED}
 _PASSING: Final = (408, 421, 425, 429)
@@ -50,7 +52,8 @@ _LASTING_ERRORS: Final = {
     "FileNotFoundError": _GONE,
     "NoSuchBucket": _GONE,
     "FileExpired": REPLACED,
-    "InvalidURL": "is not the URL of a server: check it",
+    "InvalidURL": _NO_SERVER,
+    "TooManyRedirects": "the server redirects too often",
     "ClientSSLError": "the server's certificate is not trusted here: check the URL, and SSL_CERT_FILE",
 }
 _PASSING_ERRORS: Final = {
@@ -96,6 +99,8 @@ def file_system(url: str) -> tuple[Any, str]:
             " file's own URL, or copy it here"
         )
     scheme = scheme_of(url)
+    if scheme in SERVERS and not _has_valid_port(url):
+        raise StorageError(f"{redacted(url)}: {_NO_SERVER}")
     # fsspec knows schemes in lower case alone.
     url = scheme + url[len(scheme) :]
     try:
@@ -141,6 +146,14 @@ def tried(url: str, work: Callable[[], _Done], *, attempts: int = ATTEMPTS) -> _
     raise StorageError(f"{redacted(url)}: {why}") from None
 
 
+def _has_valid_port(url: str) -> bool:
+    try:
+        urlsplit(url).port  # noqa: B018  raises
+    except ValueError:
+        return False
+    return True
+
+
 def _options(url: str) -> dict[str, Any]:
     # A listing that is kept would hide that a file was replaced.
     options: dict[str, Any] = {"use_listings_cache": False}
@@ -166,13 +179,14 @@ def _reason(error: Exception, scheme: str) -> tuple[str, bool]:
     # fsspec's HTTP says of whatever goes wrong that there is no such file.
     if isinstance(error, FileNotFoundError) and isinstance(error.__cause__, Exception):
         error = error.__cause__
-    status = getattr(error, "status", None) or getattr(error, "code", None)
+    kinds = [kind.__name__ for kind in type(error).__mro__]
+    # Its status is 0.
+    status = None if "TooManyRedirects" in kinds else getattr(error, "status", None) or getattr(error, "code", None)
     if str(error).startswith(_DENIALS):
         return _DENIED, False
     if isinstance(status, int):
         may_pass = status in _PASSING or status >= _SERVER_ERRORS
         return _STATUSES.get(status, f"the server answered {status}"), may_pass
-    kinds = [kind.__name__ for kind in type(error).__mro__]
     for sentences, may_pass in ((_LASTING_ERRORS, False), (_PASSING_ERRORS, True)):
         for kind in kinds:
             if kind in sentences:

@@ -2,12 +2,14 @@
 
 import bz2
 import random
+import socket
 import struct
 import sys
+import threading
 import zlib
 from argparse import Namespace
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -231,6 +233,28 @@ def test_a_server_that_never_answers_is_not_waited_for_without_end(server, monke
     monkeypatch.setattr(urls, "_BYTES_WITHIN", 0.2)
     with pytest.raises(StorageError, match=r"the server did not answer in time \(5 attempts\)"):
         RemoteFile(server.url("/rig.mcap"))
+
+
+@pytest.mark.parametrize("port", ["99999", "abc"])
+def test_a_port_that_is_none_is_not_tried(port):
+    with pytest.raises(StorageError, match=r"is not the URL of a server: check it$"):
+        RemoteFile(f"http://host:{port}/rig.mcap")
+
+
+def test_a_server_that_redirects_in_circles_is_named():
+    answer = b"HTTP/1.1 302 Found\r\nLocation: /rig.mcap\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            with suppress(OSError):
+                while True:
+                    with listening.accept()[0] as asking:
+                        asking.recv(65536)
+                        asking.sendall(answer)
+
+        threading.Thread(target=serve, daemon=True).start()
+        with pytest.raises(StorageError, match=r"rig\.mcap: the server redirects too often$"):
+            RemoteFile(f"http://127.0.0.1:{listening.getsockname()[1]}/rig.mcap")
 
 
 def test_where_nobody_listens_that_is_said():
