@@ -6,31 +6,38 @@ from syncrelay.explain import ClockState, Code, Finding, Severity, explanation, 
 from syncrelay.explain.judge import EXPLAINS
 from syncrelay.sync.messages import DropReason
 from tests.explain.support import cases_flow, cases_graph, cases_stamps
-from tests.explain.support.cases import (
-    STRANGER,
-    UNFIT,
-    camera,
-    fed,
-)
+from tests.explain.support.cases import STRANGER, UNFIT, camera, fed, said_of_cases
 from tests.explain.support.groups import BEGAN, MS, NOW, S, a_group, a_silent_group, an_input
 
 FOUND = cases_graph.FOUND | cases_stamps.FOUND | cases_flow.FOUND
-QUIETLY = cases_graph.QUIETLY | cases_stamps.QUIETLY | cases_flow.QUIETLY
+QUIETLY = [
+    pytest.param(code, facts, id=name)
+    for module in (cases_graph, cases_stamps, cases_flow)
+    for code, cases in module.QUIETLY.items()
+    for name, facts in cases.items()
+]
+SAID = said_of_cases()
 
 
 def found_in(facts):
     return with_ok(facts, judge(facts))
 
 
-@pytest.mark.parametrize(("code", "severity", "facts", "text", "suggestion"), FOUND.values(), ids=FOUND)
-def test_it_is_found_and_said(code, severity, facts, text, suggestion):
-    found = next((finding for finding in found_in(facts) if finding.code is code), None)
+@pytest.mark.parametrize("name", FOUND)
+def test_it_is_found_and_said(name):
+    code, severity, text, suggestion = SAID[name]
+    found = next((finding for finding in found_in(FOUND[name]) if finding.code is code), None)
     assert found is not None
     assert (found.severity, found.text, found.suggestion) == (severity, text, suggestion)
 
 
-@pytest.mark.parametrize(("code", "severity"), [case[:2] for case in FOUND.values()], ids=FOUND)
-def test_a_finding_is_as_bad_as_its_code_says_or_an_error_as_the_cause_of_a_silence(code, severity):
+def test_what_is_said_is_said_of_a_case():
+    assert SAID.keys() == FOUND.keys()
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_a_finding_is_as_bad_as_its_code_says_or_an_error_as_the_cause_of_a_silence(name):
+    code, severity, *_ = SAID[name]
     assert severity in code.severities or (severity is Severity.ERROR and code in EXPLAINS)
 
 
@@ -39,19 +46,19 @@ def test_every_finding_says_what_it_means_and_what_to_do_unless_all_is_well():
     assert {code for code in Code if code.remedy is None} == {Code.NOBODY_LISTENS, Code.STARTING, Code.HEALTHY}
 
 
-@pytest.mark.parametrize(("code", "facts"), QUIETLY.values(), ids=QUIETLY)
+@pytest.mark.parametrize(("code", "facts"), QUIETLY)
 def test_it_is_not_found(code, facts):
     assert code not in {finding.code for finding in found_in(facts)}
 
 
-@pytest.mark.parametrize("facts", [case[2] for case in FOUND.values()], ids=FOUND)
+@pytest.mark.parametrize("facts", FOUND.values(), ids=FOUND)
 def test_nothing_is_found_twice(facts):
     found = judge(facts)
     assert len(found) == len(set(found))
 
 
 def test_every_code_has_its_case():
-    assert {case[0] for case in FOUND.values()} == set(Code)
+    assert {code for code, *_ in SAID.values()} == set(Code)
 
 
 def test_findings_explain_a_silence_in_the_order_of_the_codes():
@@ -70,14 +77,14 @@ def test_findings_explain_a_silence_in_the_order_of_the_codes():
     assert len(set(codes)) >= 6
 
 
-@pytest.mark.parametrize("facts", [a_silent_group(), *(case[2] for case in FOUND.values() if case[2].is_silent)])
+@pytest.mark.parametrize("facts", [a_silent_group(), *(facts for facts in FOUND.values() if facts.is_silent)])
 def test_what_is_remarkable_of_a_silent_group_is_an_error_at_least(facts):
     assert Severity.ERROR in {finding.severity for finding in judge(facts)}
 
 
 def test_nothing_is_remarkable_of_a_healthy_group_but_what_is_well():
     assert {each.severity for each in judge(a_group())} <= {Severity.OK}
-    assert {each.severity for each in judge(FOUND["stamps that fell"][2])} == {Severity.OK}
+    assert {each.severity for each in judge(FOUND["stamps that fell"])} == {Severity.OK}
 
 
 def test_a_required_input_is_blamed_before_an_optional_one():
@@ -100,7 +107,7 @@ def test_an_explanation_is_the_first_of_the_worst():
 
 
 def test_an_explanation_of_nothing_bad_is_the_last_word():
-    assert explanation(found_in(FOUND["stamps that fell"][2])).code is Code.HEALTHY
+    assert explanation(found_in(FOUND["stamps that fell"])).code is Code.HEALTHY
 
 
 def test_a_group_is_silent_after_five_seconds_or_three_sets():

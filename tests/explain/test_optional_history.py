@@ -12,7 +12,7 @@ import pytest
 from syncrelay.config import load_text
 from syncrelay.explain import Code, Endpoint, GroupWatch, InputGraph, judge
 from syncrelay.sync import Match, Message
-from tests.explain.support.cases_flow import FOUND
+from tests.explain.support.cases import said_of_cases
 from tests.explain.support.groups import BEGAN, MS, S
 
 _SLOP = 20 * MS
@@ -116,7 +116,7 @@ _TRUE: dict[str, Callable[[_History, int], bool]] = {
     "an optional input that never came": lambda history, _: not history.came,
     "an optional input that comes in time and is missing all the same": lambda *_: True,
 }
-_CAUSES = {_template(FOUND[name][3]): name for name in _TRUE}
+_CAUSES = {_template(said_of_cases()[name][2]): name for name in _TRUE}
 
 
 @pytest.mark.long

@@ -1,7 +1,9 @@
 """Inputs and groups that findings are about."""
 
+from pathlib import Path
+
 from syncrelay.config import Distance
-from syncrelay.explain import Distribution, Endpoint, Mismatch, Tolerance
+from syncrelay.explain import Code, Distribution, Endpoint, Mismatch, Severity, Tolerance
 from syncrelay.explain.clocks import Drift
 from syncrelay.sync.counts import InputCounts
 from syncrelay.sync.messages import DropReason
@@ -20,6 +22,17 @@ ONCE = {**QUIET, "usual_hz": 0.0, "longest_pause": 0}
 AGES = {"policy": "latest_time", "trigger": 1, "tolerance": None, "distance": Distance.AGE, "repeats": True}
 
 HALF_A_SECOND = {**AGES, "tolerance": Tolerance("max_age", 500 * MS)}
+
+
+def said_of_cases() -> dict[str, tuple[Code, Severity, str, str | None]]:
+    """What is found in each case: the code, how bad it is, the sentence, and what is suggested."""
+    text = (Path(__file__).parents[1] / "findings.txt").read_text()
+    said = {}
+    for block in text.strip().split("\n\n"):
+        name, kind, sentence, *suggestion = block.split("\n")
+        code, severity = kind.split(", ")
+        said[name] = Code(code), Severity[severity.upper()], sentence, "\n".join(suggestion) or None
+    return said
 
 
 def camera(**facts):
