@@ -27,14 +27,6 @@ _FUSION = {
     "slop": "1ms",
     "topics": [{"topic": "/camera", "type": VECTOR}, {"topic": "/lidar", "type": VECTOR}],
 }
-_TESTS = """\
-version: 1
-config: ../fusion.yaml
-cases:
-  all:
-    recording: ../rig.mcap
-    expect: {sets: 7}
-"""
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +38,6 @@ def told(tmp_path_factory):
     drive(folder / "drive.mcap")
     (folder / "lerobot.yaml").write_text(FILE)
     (folder / "fusion.yaml").write_text(yaml.safe_dump({"version": 1, "groups": {"front": _FUSION}}))
-    (folder / "tests.yaml").write_text(_TESTS)
     argv = [*_UNSHARE, sys.executable, "-m", "tests.cli.full_disk", _SEED, str(_SIZES), str(folder)]
     done = subprocess.run(argv, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -38,7 +38,7 @@ def _commands(bag: str, file: str, folder: Path) -> dict[str, tuple[str, ...]]:
     return {
         "replay": ("replay", *given, "--json", "--drops"),
         "replay --what-if": ("replay", *given, "--json", "--drops", *faults),
-        "test": ("test", _test_file(bag, file, folder), "--format", "junit", "--update"),
+        "test": ("test", _test_file(bag, file, folder), "--format", "junit"),
         "replay -o": ("replay", *given, "-o", str(folder / "out.mcap")),
         "analyze": ("analyze", *given, "--html", str(folder / "report.html")),
         "analyze, JSON": ("analyze", *given, "--json"),

@@ -2,6 +2,5 @@
 
 from syncrelay.recordings.cases.checking import Mismatch, Result, check
 from syncrelay.recordings.cases.load import Suite, load_suite, load_suite_text
-from syncrelay.recordings.cases.update import updated
 
-__all__ = ["Mismatch", "Result", "Suite", "check", "load_suite", "load_suite_text", "updated"]
+__all__ = ["Mismatch", "Result", "Suite", "check", "load_suite", "load_suite_text"]

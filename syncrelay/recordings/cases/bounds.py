@@ -3,7 +3,7 @@
 import operator
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 from enum import Enum
 from types import MappingProxyType
@@ -34,7 +34,9 @@ _LEAST: Final = Decimal(0)
 _WHOLE: Final = Decimal(1)
 # Shares, and durations in their unit, are printed with four decimals.
 _DIGITS: Final = Decimal("0.0001")
-_ROUNDED: Final[Mapping[str, str]] = MappingProxyType({"<=": ROUND_CEILING, ">=": ROUND_FLOOR})
+_ROUNDED: Final[Mapping[str, str]] = MappingProxyType(
+    {"<": ROUND_CEILING, "<=": ROUND_CEILING, ">": ROUND_FLOOR, ">=": ROUND_FLOOR}
+)
 _SIZES: Final[Mapping[str, Decimal]] = MappingProxyType(
     {"": Decimal(1), "%": Decimal("0.01"), **{unit: Decimal(size) for unit, size in NS_PER_UNIT.items()}}
 )
@@ -74,29 +76,15 @@ class Bound:
 
     def told(self, found: Decimal) -> str:
         """Write a measured value as in a file, rounded so that its difference from the bound shows."""
-        return _written(*self._rounded(found))
-
-    def _rounded(self, found: Decimal) -> tuple[Decimal, str]:
+        rounding = _ROUNDED.get(self.comparison)
+        if self.quantity is Quantity.SHARE and rounding is None:
+            return _written(_share(found), self.unit)
         unit, step = self.unit, _DIGITS
-        if self.quantity is Quantity.SHARE and self._inclusive not in _ROUNDED:
-            return _share(found), unit
         if self.quantity is Quantity.DURATION:
             unit = _fitting(self.unit, found)
             # Equality is compared to the nanosecond.
-            step = _DIGITS * _SIZES[unit] if self._inclusive in _ROUNDED else Decimal(1)
-        rounding = _ROUNDED.get(self._inclusive, ROUND_HALF_EVEN)
-        return (found / step).to_integral_value(rounding) * step, unit
-
-    def renewed(self, found: Decimal) -> str | int:
-        """Return the bound for the file that a measured value meets, with the same comparison."""
-        if self.comparison:
-            value, unit = self._rounded(found)
-            renewed = Bound(self.quantity, self._inclusive, value, unit)
-            if renewed.always_holds:
-                # The new bound could never fail.
-                renewed = replace(renewed, comparison="==" if value == found else self._inclusive[0])
-            return str(renewed)
-        return int(found) if self.quantity is Quantity.COUNT else self.told(found)
+            step = Decimal(1) if rounding is None else _DIGITS * _SIZES[unit]
+        return _written((found / step).to_integral_value(rounding or ROUND_HALF_EVEN) * step, unit)
 
     @property
     def always_holds(self) -> bool:
@@ -111,10 +99,6 @@ class Bound:
         compare = _COMPARE[self.comparison]
         is_whole = self.quantity is Quantity.SHARE and self.value == _WHOLE
         return (compare is operator.lt and self.value == _LEAST) or (compare is operator.gt and is_whole)
-
-    @property
-    def _inclusive(self) -> str:
-        return {"<": "<=", ">": ">="}.get(self.comparison, self.comparison)
 
 
 def _written(number: Decimal, unit: str) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
-from syncrelay.config import GroupConfig
+from syncrelay.config import ConfigError, GroupConfig, Problem
 from syncrelay.config.problems import Path
+from syncrelay.config.source import Patience, listed, shown_name
 from syncrelay.errors import SyncRelayError
 from syncrelay.explain import UNREADABLE, Code, Distribution, EngineDriver
 from syncrelay.recordings.analysis.evaluation import Evaluation, evaluate
@@ -19,36 +20,33 @@ from syncrelay.recordings.bag import open_recording
 from syncrelay.recordings.bag.bindings import bind
 from syncrelay.recordings.bag.what_if import Disturbed
 from syncrelay.recordings.cases.bounds import Bound, Quantity
-from syncrelay.recordings.cases.load import LoadedCase, Suite
+from syncrelay.recordings.cases.load import LoadedCase, Suite, load_suite
 from syncrelay.recordings.cases.models import InputExpectation
 from syncrelay.recordings.cases.sources import START, Arrival, arrivals, streams
 from syncrelay.sync import Match, Message, Outcome
 
 _P95: Final = 0.95
 
-Renewal: TypeAlias = str | int | list[str] | tuple[str, ...]
-"""The value that an updated file would expect; for a drawing a tuple of lines."""
-
 
 @dataclass(frozen=True, slots=True)
 class Mismatch:
-    """A difference between what the file expects at `path` and what was found, both as lines.
-
-    `renewed` is None if no file could expect what was found.
-    """
+    """A difference between what the file expects at `path` and what was found, both as lines."""
 
     path: Path
     expected: tuple[str, ...]
     found: tuple[str, ...]
-    renewed: Renewal | None
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether a drawing differs."""
+        return self.path[-1] == "drawing"
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
     """The result of a case, and how many seconds it took. `error` says why it could not be run.
 
-    `remarks` name damage of a recording, and faults that changed nothing. `updated` says whether the file was updated
-    to expect what was found.
+    `remarks` name damage of a recording, and faults that changed nothing.
     """
 
     case: LoadedCase
@@ -56,17 +54,31 @@ class Result:
     seconds: float
     error: str | None = None
     remarks: tuple[str, ...] = ()
-    updated: bool = False
 
     @property
     def passed(self) -> bool:
         """Whether everything was as expected."""
         return self.error is None and not self.mismatches
 
-    @property
-    def failed(self) -> bool:
-        """Whether something differs that was not updated."""
-        return not self.passed and not self.updated
+
+class Ran(NamedTuple):
+    """What came of a test file: the result of one of its cases, or the problems for which it could not be run."""
+
+    file: str
+    outcome: Result | Sequence[Problem]
+
+
+def run_files(paths: Sequence[str]) -> Iterator[Ran]:
+    """Run the cases of test files, or of all files of a directory."""
+    patience = Patience()
+    for path in paths:
+        name = path
+        try:
+            for name in listed(path):
+                for result in check(load_suite(name, patience=patience)):
+                    yield Ran(shown_name(name), result)
+        except ConfigError as error:
+            yield Ran(shown_name(name), error.problems)
 
 
 def check(suite: Suite) -> Iterator[Result]:
@@ -93,7 +105,7 @@ def _mismatches(loaded: LoadedCase, suite: Suite, remarks: list[str]) -> Iterato
     if drawing is not None and (drawing.expected or case.expect is None):
         left = tuple(_left(loaded.group, received, end=START + (drawing.width - 1) * case.period, of=loaded))
         if list(left) != drawing.expected:
-            yield Mismatch(("cases", loaded.name, "drawing"), tuple(drawing.expected), left, left)
+            yield Mismatch(("cases", loaded.name, "drawing"), tuple(drawing.expected), left)
     drawn = 0 if drawing is None else drawing.width * case.period
     yield from _compared(loaded, loaded.group, streams(received, loaded.group), START + max(drawn, case.lasts or 0))
 
@@ -192,7 +204,7 @@ def _compared(loaded: LoadedCase, group: GroupConfig, found: Sequence[Stream], e
         codes = list(dict.fromkeys(codes)) or [(Code.HEALTHY if evaluation.sets else Code.STARTING).value]
         if set(codes) != set(expect.findings):
             at = (*path, "findings")
-            yield Mismatch(at, (", ".join(expect.findings) or "none",), (", ".join(codes),), codes)
+            yield Mismatch(at, (", ".join(expect.findings) or "none",), (", ".join(codes),))
 
 
 _Figures: TypeAlias = Mapping[str, Decimal | None]
@@ -211,9 +223,9 @@ def _of_bounds(expect: InputExpectation, figures: _Figures, path: Path) -> Itera
 def _of_bound(bound: Bound, found: Decimal | None, path: Path) -> Iterator[Mismatch]:
     if found is None:
         lack = "no message came" if bound.quantity is Quantity.SHARE else "no set left"
-        yield Mismatch(path, (str(bound),), (lack,), None)
+        yield Mismatch(path, (str(bound),), (lack,))
     elif not bound.holds(found):
-        yield Mismatch(path, (str(bound),), (bound.told(found),), bound.renewed(found))
+        yield Mismatch(path, (str(bound),), (bound.told(found),))
 
 
 def _figures(group: GroupConfig, evaluation: Evaluation) -> _Figures:

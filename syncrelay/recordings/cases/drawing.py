@@ -122,16 +122,6 @@ def _add_line(drawing: Drawing, number: int, line: str, did_you_mean: DidYouMean
         )
 
 
-def with_expected(text: str, lines: Sequence[str]) -> str:
-    """Replace the `->` lines of a drawing's text."""
-    kept = text.splitlines()
-    places = [number for number, line in enumerate(kept) if line.strip().startswith(_ARROW)]
-    at = places[0] if places else len(kept)
-    before = [line for line in kept[:at] if line.strip() or places]
-    after = [line for line in kept[at:] if not line.strip().startswith(_ARROW)]
-    return "\n".join([*before, *(f"{_ARROW} {line}" for line in lines), *after]) + "\n"
-
-
 def lanes(text: str) -> list[str]:
     """Return the lines of a drawing that draw messages."""
     return [line.strip() for line in text.splitlines() if line.strip() and not line.strip().startswith(_ARROW)]

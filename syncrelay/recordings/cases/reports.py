@@ -1,34 +1,21 @@
 """The results of tests, for people and for programs: text, JUnit's XML, JSON, GitHub's annotations."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from difflib import SequenceMatcher
-from typing import Any, Final, NamedTuple, Protocol
-from xml.sax.saxutils import escape, quoteattr
+from itertools import groupby
+from operator import attrgetter
+from typing import Any, Final, NamedTuple, TypeAlias
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from syncrelay.config import Problem, render
+from syncrelay.config import render
 from syncrelay.config.annotations import inert, problem_as_json, problem_command, workflow_command
 from syncrelay.config.problems import dotted
 from syncrelay.printable import one_entry, printable, printable_lines
-from syncrelay.recordings.cases.checking import Mismatch, Result
+from syncrelay.recordings.cases.checking import Mismatch, Ran, Result
 from syncrelay.recordings.cases.drawing import lanes
 
 _BOLD, _RED, _RESET = "\033[1m", "\033[31m", "\033[0m"
-
-
-@dataclass(frozen=True, slots=True)
-class FileResult:
-    """A test file: its problems, or the results of its cases."""
-
-    name: str
-    problems: Sequence[Problem]
-    cases: Sequence[Result]
-
-    @property
-    def failed(self) -> bool:
-        """Whether the file has a problem or a case failed."""
-        return bool(self.problems) or any(case.failed for case in self.cases)
 
 
 class Talk(NamedTuple):
@@ -41,135 +28,112 @@ class Talk(NamedTuple):
     talk_is_coloured: bool
 
 
-class Report(Protocol):
-    """Reports test files while they run, and a summary at the end."""
-
-    def begin(self, name: str) -> None:
-        """Report that the cases of a file run next."""
-        ...
-
-    def fault(self, result: FileResult) -> None:
-        """Report a file that cannot be run."""
-        ...
-
-    def case(self, name: str, result: Result) -> None:
-        """Report the result of a case."""
-        ...
-
-    def end(self, results: Sequence[FileResult]) -> None:
-        """Report the summary."""
-        ...
+Report: TypeAlias = Callable[[Iterable[Ran], Talk], Sequence[Ran]]
+"""Reports what comes of test files, and returns it."""
 
 
-class Text:
-    """For people: a line for each case, the differences of those that fail or were updated, and a summary."""
+class Counts(NamedTuple):
+    """How many cases passed, how many failed, and how many files could not be run."""
 
-    def __init__(self, talk: Talk) -> None:
-        self._talk = talk
-        self._bold, self._red, self._reset = (_BOLD, _RED, _RESET) if talk.data_is_coloured else ("", "", "")
-
-    def begin(self, name: str) -> None:
-        """See Report."""
-        self._talk.put(f"{self._bold}{printable(name)}{self._reset}")
-
-    def fault(self, result: FileResult) -> None:
-        """See Report."""
-        self._talk.say(render(result.problems, colour=self._talk.talk_is_coloured))
-
-    def case(self, name: str, result: Result) -> None:
-        """See Report."""
-        self._talk.put(f"  {self._status(result)}  {printable(result.case.name)}")
-        for line in what_differs(result):
-            self._talk.put(f"        {printable(line)}")
-        for sentence in _remarks(name, result):
-            self._talk.remark(sentence)
-
-    def _status(self, result: Result) -> str:
-        if result.failed:
-            return f"{self._red}FAIL{self._reset}"
-        return "updated" if result.updated else "ok  "
-
-    def end(self, results: Sequence[FileResult]) -> None:
-        """See Report."""
-        self._talk.put(summary(results))
+    passed: int
+    failed: int
+    errors: int
 
 
-class Github(Text):
-    """Workflow annotations at the lines of failed cases, beside the text."""
-
-    def begin(self, name: str) -> None:
-        """See Report."""
-        self._talk.put(inert(printable(name)))
-
-    def fault(self, result: FileResult) -> None:
-        """See Report."""
-        for problem in result.problems:
-            self._talk.put(problem_command(problem))
-
-    def case(self, name: str, result: Result) -> None:
-        """See Report."""
-        if result.failed:
-            text = "\n".join([result.case.name, *what_differs(result)])
-            self._talk.put(workflow_command("error", text, file=name, span=result.case.span))
-        else:
-            self._talk.put(inert(f"  {self._status(result)}  {printable(result.case.name)}"))
-        for sentence in _remarks(name, result):
-            self._talk.remark(inert(sentence))
+def counts(ran: Sequence[Ran]) -> Counts:
+    """Count the cases and faulty files of a run."""
+    passed = [each.outcome.passed for each in ran if isinstance(each.outcome, Result)]
+    return Counts(sum(passed), len(passed) - sum(passed), len(ran) - len(passed))
 
 
-def _remarks(name: str, result: Result) -> Iterator[str]:
-    """Yield the remarks on a case with its file and name, for stderr."""
-    for sentence in result.remarks:
-        yield printable(f"{name}: {result.case.name}: {sentence}")
+def report_text(ran: Iterable[Ran], talk: Talk) -> Sequence[Ran]:
+    """Print a line for each case, the differences of those that fail, and a summary."""
+    bold, red, reset = (_BOLD, _RED, _RESET) if talk.data_is_coloured else ("", "", "")
+    all_ran: list[Ran] = []
+    for file, of_file in groupby(ran, attrgetter("file")):
+        for number, each in enumerate(of_file):
+            all_ran.append(each)
+            if not isinstance(each.outcome, Result):
+                talk.say(render(each.outcome, colour=talk.talk_is_coloured))
+                continue
+            if not number:
+                talk.put(f"{bold}{printable(file)}{reset}")
+            status = "ok  " if each.outcome.passed else f"{red}FAIL{reset}"
+            talk.put(f"  {status}  {printable(each.outcome.case.name)}")
+            for line in what_differs(each.outcome):
+                talk.put(f"        {printable(line)}")
+            for sentence in _remarks(file, each.outcome):
+                talk.remark(sentence)
+    talk.put(summary(all_ran))
+    return all_ran
 
 
-class Json:
-    """One JSON document at the end."""
-
-    def __init__(self, talk: Talk) -> None:
-        self._put = talk.put
-
-    def begin(self, _name: str) -> None:
-        """See Report."""
-
-    def fault(self, _result: FileResult) -> None:
-        """See Report."""
-
-    def case(self, _name: str, _result: Result) -> None:
-        """See Report."""
-
-    def end(self, results: Sequence[FileResult]) -> None:
-        """See Report."""
-        passed, updated, failed = counts(results)
-        figures = {"passed": passed, "updated": updated, "failed": failed}
-        self._put(json.dumps({**figures, "files": [_file(each) for each in results]}, indent=2))
-
-
-class Junit(Json):
-    """JUnit's XML at the end, as GitLab, Jenkins and others read it."""
-
-    def end(self, results: Sequence[FileResult]) -> None:
-        """See Report."""
-        self._put("\n".join(_junit(results)))
+def report_to_github(ran: Iterable[Ran], talk: Talk) -> Sequence[Ran]:
+    """Print workflow annotations at the lines of failed cases, and lines of text for the others."""
+    all_ran: list[Ran] = []
+    for file, of_file in groupby(ran, attrgetter("file")):
+        for number, each in enumerate(of_file):
+            all_ran.append(each)
+            result = each.outcome
+            if not isinstance(result, Result):
+                for problem in result:
+                    talk.put(problem_command(problem))
+                continue
+            if not number:
+                talk.put(inert(printable(file)))
+            if result.passed:
+                talk.put(inert(f"  ok    {printable(result.case.name)}"))
+            else:
+                text = "\n".join([result.case.name, *what_differs(result)])
+                talk.put(workflow_command("error", text, file=file, span=result.case.span))
+            for sentence in _remarks(file, result):
+                talk.remark(inert(sentence))
+    talk.put(summary(all_ran))
+    return all_ran
 
 
-REPORTS: Final[dict[str, Callable[[Talk], Report]]] = {"text": Text, "junit": Junit, "json": Json, "github": Github}
+def report_json(ran: Iterable[Ran], talk: Talk) -> Sequence[Ran]:
+    """Print one JSON document at the end."""
+    all_ran = list(ran)
+    found = counts(all_ran)
+    files = [_file(name, list(of_file)) for name, of_file in groupby(all_ran, attrgetter("file"))]
+    talk.put(json.dumps({"passed": found.passed, "failed": found.failed, "files": files}, indent=2))
+    return all_ran
 
 
-def counts(results: Sequence[FileResult]) -> tuple[int, int, int]:
-    """Return how many cases passed, were updated and failed."""
-    cases = [case for result in results for case in result.cases]
-    updated, failed = sum(case.updated for case in cases), sum(case.failed for case in cases)
-    return len(cases) - updated - failed, updated, failed
+def report_junit(ran: Iterable[Ran], talk: Talk) -> Sequence[Ran]:
+    """Print JUnit's XML at the end, as GitLab, Jenkins and others read it."""
+    all_ran = list(ran)
+    root = Element("testsuites", {"name": "syncrelay test", **_totals(all_ran)})
+    for name, of_file in groupby(all_ran, attrgetter("file")):
+        group, file = list(of_file), printable(name)
+        seconds = sum(each.outcome.seconds for each in group if isinstance(each.outcome, Result))
+        suite = SubElement(root, "testsuite", {"name": file, **_totals(group), "time": f"{seconds:.3f}"})
+        for each in group:
+            if isinstance(each.outcome, Result):
+                _add_junit_case(suite, file, each.outcome)
+            else:
+                error = SubElement(SubElement(suite, "testcase", name=file), "error")
+                error.set("message", printable(each.outcome[0].text))
+                error.text = printable_lines(render(each.outcome))
+    indent(root)
+    talk.put(f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}')
+    return all_ran
 
 
-def summary(results: Sequence[FileResult]) -> str:
+REPORTS: Final[dict[str, Report]] = {
+    "text": report_text,
+    "junit": report_junit,
+    "json": report_json,
+    "github": report_to_github,
+}
+
+
+def summary(ran: Sequence[Ran]) -> str:
     """Return the closing line."""
-    passed, updated, failed = counts(results)
-    faulty = sum(bool(result.problems) for result in results)
+    passed, failed, faulty = counts(ran)
     errors = f", {faulty} {'file' if faulty == 1 else 'files'} with errors" if faulty else ""
-    renewed = f"{updated} updated, " if updated else ""
-    return f"{passed} passed, {renewed}{failed} failed{errors}"
+    return f"{passed} passed, {failed} failed{errors}"
 
 
 def what_differs(result: Result) -> Iterator[str]:
@@ -177,7 +141,7 @@ def what_differs(result: Result) -> Iterator[str]:
     if result.error is not None:
         yield from one_entry(result.error).split("\n")
     for mismatch in result.mismatches:
-        if isinstance(mismatch.renewed, tuple):
+        if mismatch.is_drawn:
             yield from lanes(result.case.case.drawing or "")
             yield from _diff(mismatch)
         else:
@@ -185,12 +149,17 @@ def what_differs(result: Result) -> Iterator[str]:
             yield f"{label}: expected {', '.join(mismatch.expected)}, found {', '.join(mismatch.found)}"
 
 
+def _remarks(file: str, result: Result) -> Iterator[str]:
+    """Yield the remarks on a case with its file and name, for stderr."""
+    for sentence in result.remarks:
+        yield printable(f"{file}: {result.case.name}: {sentence}")
+
+
 def _headline(result: Result) -> str:
     """Return the differences in a few words."""
     if result.error is not None:
         return result.error.splitlines()[0]
-    is_drawn = [isinstance(each.renewed, tuple) for each in result.mismatches]
-    if any(is_drawn):
+    if any(each.is_drawn for each in result.mismatches):
         return "not what was drawn"
     return f"not as expected: {', '.join(dotted(each.path[3:]) for each in result.mismatches)}"
 
@@ -205,74 +174,41 @@ def _diff(mismatch: Mismatch) -> Iterator[str]:
             yield from (f"+ -> {line}" for line in found[other_begin:other_end])
 
 
-def _file(result: FileResult) -> dict[str, Any]:
+def _file(name: str, ran: Sequence[Ran]) -> dict[str, Any]:
+    results = [each.outcome for each in ran if isinstance(each.outcome, Result)]
+    problems = [problem for each in ran if not isinstance(each.outcome, Result) for problem in each.outcome]
     return {
-        "file": result.name,
-        "problems": [problem_as_json(problem) for problem in result.problems],
-        "cases": [_case(case) for case in result.cases],
-    }
-
-
-def _case(result: Result) -> dict[str, Any]:
-    return {
-        "name": result.case.name,
-        "line": result.case.span.line,
-        "group": result.case.group.name,
-        "passed": result.passed,
-        "updated": result.updated,
-        "seconds": round(result.seconds, 6),
-        "error": result.error,
-        "mismatches": [
-            {"path": dotted(each.path), "expected": each.expected, "found": each.found} for each in result.mismatches
+        "file": name,
+        "problems": [problem_as_json(problem) for problem in problems],
+        "cases": [
+            {
+                "name": result.case.name,
+                "line": result.case.span.line,
+                "group": result.case.group.name,
+                "passed": result.passed,
+                "seconds": round(result.seconds, 6),
+                "error": result.error,
+                "mismatches": [
+                    {"path": dotted(each.path), "expected": each.expected, "found": each.found}
+                    for each in result.mismatches
+                ],
+                "remarks": result.remarks,
+            }
+            for result in results
         ],
-        "remarks": result.remarks,
     }
 
 
-def _junit(results: Sequence[FileResult]) -> Iterator[str]:
-    yield '<?xml version="1.0" encoding="UTF-8"?>'
-    *others, failed = counts(results)
-    errors = sum(bool(result.problems) for result in results)
-    tests = sum(others) + failed + errors
-    yield f'<testsuites name="syncrelay test" tests="{tests}" failures="{failed}" errors="{errors}">'
-    for result in results:
-        of_file = counts([result])
-        faulty = bool(result.problems)
-        seconds = sum(case.seconds for case in result.cases)
-        yield (
-            f'  <testsuite name={_attribute(result.name)} tests="{sum(of_file) + faulty}" failures="{of_file[-1]}"'
-            f' errors="{int(faulty)}" time="{seconds:.3f}">'
-        )
-        if faulty:
-            yield f"    <testcase name={_attribute(result.name)}>"
-            yield f"      <error message={_attribute(result.problems[0].text)}>{_text(render(result.problems))}</error>"
-            yield "    </testcase>"
-        for case in result.cases:
-            yield from _junit_case(result.name, case)
-        yield "  </testsuite>"
-    yield "</testsuites>"
+def _totals(ran: Sequence[Ran]) -> dict[str, str]:
+    found = counts(ran)
+    return {"tests": str(sum(found)), "failures": str(found.failed), "errors": str(found.errors)}
 
 
-def _junit_case(file: str, result: Result) -> Iterator[str]:
-    head = (
-        f"    <testcase classname={_attribute(file)} name={_attribute(result.case.name)}"
-        f' file={_attribute(file)} line="{result.case.span.line}" time="{result.seconds:.3f}"'
-    )
-    if not result.failed and not result.remarks:
-        yield f"{head}/>"
-        return
-    yield f"{head}>"
-    if result.failed:
-        lines = "\n".join(what_differs(result))
-        yield f"      <failure message={_attribute(_headline(result))}>{_text(lines)}</failure>"
+def _add_junit_case(suite: Element, file: str, result: Result) -> None:
+    case = SubElement(suite, "testcase", classname=file, name=printable(result.case.name), file=file)
+    case.attrib |= {"line": str(result.case.span.line), "time": f"{result.seconds:.3f}"}
+    if not result.passed:
+        failure = SubElement(case, "failure", message=printable(_headline(result)))
+        failure.text = printable_lines("\n".join(what_differs(result)))
     if result.remarks:
-        yield f"      <system-err>{_text(chr(10).join(map(printable, result.remarks)))}</system-err>"
-    yield "    </testcase>"
-
-
-def _attribute(text: str) -> str:
-    return quoteattr(printable(text))
-
-
-def _text(text: str) -> str:
-    return escape(printable_lines(text))
+        SubElement(case, "system-err").text = "\n".join(map(printable, result.remarks))
