@@ -1,17 +1,16 @@
 """`syncrelay analyze BAG...`: figures of recordings, what a file makes of each, and the values that would fit."""
 
 import json
-import os
 from argparse import Namespace
 from contextlib import closing
-from functools import partial
 from typing import TYPE_CHECKING
 
-from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark
+from syncrelay.cli.boundary import AT_FAULT, DONE, put, remark, tell
 from syncrelay.cli.fleet_options import add_fleet_options, require_into
 from syncrelay.cli.new_file import write_again, write_new, write_suggested
 from syncrelay.cli.parser import Parser
 from syncrelay.cli.stop import StopRequest
+from syncrelay.errors import SyncRelayError
 from syncrelay.printable import printable
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ def parser() -> Parser:
         example="syncrelay analyze drive.mcap --config fusion.yaml",
         description="Measures a recording without ROS: rates, gaps, faulty stamps, offsets; what the groups of a file "
         "make of it, and why; and the values that would fit. With BAG alone it lists what the recording holds. "
-        "Each of several recordings is measured by itself, on all cores. "
+        "Each of several recordings is measured by itself. "
         "Exit code 1 if a required topic, or part of a recording, is missing.",
     )
     parser.add_argument("bag", metavar="BAG", help="a recording, as for replay")
@@ -59,12 +58,10 @@ def parser() -> Parser:
 
 def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay analyze`."""
-    from syncrelay.cli.side_by_side import Work, side_by_side
     from syncrelay.config import load_text
     from syncrelay.config.source import read_source
     from syncrelay.recordings.bag import is_recording
     from syncrelay.recordings.fleet.recordings import names_recordings
-    from syncrelay.urls import redacted
 
     config, *others = arguments.config or [None]
     if others:
@@ -88,8 +85,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         return _analyze(bags[0], arguments, text, topics, indent=2)
     if text is not None:
         load_text(text, name=config)
-    works = [Work(redacted(bag), partial(_analyze, bag, arguments, text, topics, indent=None)) for bag in bags]
-    return side_by_side(works, jobs=arguments.jobs or len(os.sched_getaffinity(0)))
+    return _analyze_in_turn(bags, arguments, text, topics)
 
 
 def _analyze_many(
@@ -128,6 +124,18 @@ def _analyze_many(
         return DONE
 
     return do_on_many(task, bags, arguments, finish=finish)
+
+
+def _analyze_in_turn(bags: "Sequence[str]", arguments: Namespace, text: str | None, topics: tuple[str, ...]) -> int:
+    """Analyze recordings one after another; one that cannot be read does not end the others."""
+    code = DONE
+    for bag in bags:
+        try:
+            code = max(code, _analyze(bag, arguments, text, topics, indent=None))
+        except SyncRelayError as error:
+            tell(error)
+            code = AT_FAULT
+    return code
 
 
 def _analyze(bag: str, arguments: Namespace, text: str | None, topics: tuple[str, ...], *, indent: int | None) -> int:

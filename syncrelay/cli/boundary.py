@@ -56,7 +56,7 @@ def _guarded(command: Callable[[], int]) -> int:
         code = command()
         _to_stdout(sys.stdout.flush)
     except SyncRelayError as error:
-        _tell(error)
+        tell(error)
         return _code(error)
     except (KeyboardInterrupt, Terminated) as ended:
         return TERMINATED if isinstance(ended, Terminated) else INTERRUPTED
@@ -107,16 +107,6 @@ def flush() -> None:
     _to_stdout(sys.stdout.flush)
 
 
-def pass_on(output: bytes, talk: bytes) -> None:
-    """Print what another process of ours printed on its stdout and its stderr."""
-    sys.stderr.flush()
-    sys.stderr.buffer.write(talk)
-    sys.stderr.flush()
-    _to_stdout(sys.stdout.flush)
-    _to_stdout(lambda: sys.stdout.buffer.write(output))
-    _to_stdout(sys.stdout.flush)
-
-
 def wants_colour(is_terminal: bool) -> bool:  # noqa: FBT001  the answer of isatty
     """Tell whether output may be coloured (https://no-color.org)."""
     return is_terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
@@ -145,7 +135,8 @@ def _abandon(stream: TextIO) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
-def _tell(error: SyncRelayError) -> None:
+def tell(error: SyncRelayError) -> None:
+    """Print what the user can mend; of a faulty file, every problem with its line."""
     if isinstance(error, UsageError | UnavailableError):
         # The import below takes far longer than reading the words did.
         remark(str(error))

@@ -42,5 +42,7 @@ def require_into(parser: Parser, arguments: Namespace) -> None:
         for name in ("strict", "overwrite", "time_limit"):
             if getattr(arguments, name):
                 parser.error(f"--{name.replace('_', '-')} goes with --into")
+        if arguments.jobs is not None:
+            parser.error("--jobs goes with --into")
         if arguments.engine != "local":
             parser.error("--engine goes with --into")

@@ -70,8 +70,6 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         parser.error("--seed goes with --what-if")
     seed_of_faults = arguments.seed or 0
     require_into(parser, arguments)
-    if arguments.into is None and arguments.jobs is not None:
-        parser.error("--jobs goes with --into")
     if arguments.into is None:
         return _replay(arguments, what_if, seed_of_faults)
     if arguments.output or arguments.json or arguments.drops:

@@ -185,6 +185,19 @@ def test_keys_that_no_two_inputs_have_in_common_are_found(folder):
     assert group["findings"][0] == found
 
 
+def test_several_recordings_are_measured_one_after_another_and_a_faulty_one_ends_no_other(folder):
+    (folder / "empty.mcap").write_bytes(b"")
+    write_mcap(folder / "short.mcap", rig(20))
+    of = ("--config", "f.yaml", "--json")
+    alone = [json.loads(run_here("analyze", bag, *of, folder=folder).stdout) for bag in ("rig.mcap", "short.mcap")]
+    done = run_here("analyze", "rig.mcap", "empty.mcap", "short.mcap", *of, folder=folder)
+    assert (done.returncode, done.stderr) == (1, "syncrelay: empty.mcap: is empty\n")
+    assert list(map(json.loads, done.stdout.splitlines())) == alone
+    (folder / "bad.yaml").write_text((folder / "f.yaml").read_text().replace("slop", "slopp"))
+    faulty = run_here("analyze", "rig.mcap", "short.mcap", "--config", "bad.yaml", folder=folder)
+    assert (faulty.returncode, faulty.stdout, faulty.stderr.count("unknown key")) == (1, "", 1)
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
