@@ -46,15 +46,16 @@ class Disk:
         self._mount("-t", "tmpfs")
 
     def begin(self, size: int | None) -> None:
-        """Take away what is there, and leave it so many bytes."""
+        """Take away what is there, and leave room for so many bytes beside a page: a size of 0 would be no limit."""
         self.resize(None)
         for path in self.folder.iterdir():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
+        (self.folder / "page").write_text("held")
         self.resize(size)
 
     def resize(self, size: int | None) -> None:
-        # No tmpfs is smaller than what it holds, and one of size 0 is unlimited.
-        self._mount("-o", f"remount,size={(1 << 30) if size is None else max(1, self.used() + size)}")
+        # No tmpfs is smaller than what it holds.
+        self._mount("-o", f"remount,size={(1 << 30) if size is None else self.used() + size}")
 
     def used(self) -> int:
         there = os.statvfs(self.folder)

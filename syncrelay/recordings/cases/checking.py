@@ -72,13 +72,18 @@ def run_files(paths: Sequence[str]) -> Iterator[Ran]:
     """Run the cases of test files, or of all files of a directory."""
     patience = Patience()
     for path in paths:
-        name = path
         try:
-            for name in listed(path):
-                for result in check(load_suite(name, patience=patience)):
-                    yield Ran(shown_name(name), result)
+            files = listed(path)
         except ConfigError as error:
-            yield Ran(shown_name(name), error.problems)
+            yield Ran(shown_name(path), error.problems)
+            continue
+        for file in files:
+            try:
+                suite = load_suite(file, patience=patience)
+            except ConfigError as error:
+                yield Ran(shown_name(file), error.problems)
+            else:
+                yield from (Ran(shown_name(file), result) for result in check(suite))
 
 
 def check(suite: Suite) -> Iterator[Result]:
