@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from docs.generate.markdown import linked
 from syncrelay.explain import Code, Severity
-from syncrelay.explain.judge import EXPLAINS, MATCHING
+from syncrelay.explain.codes import MATCHING
+from syncrelay.explain.judge import EXPLAINS
 
 # As programs get them: in /status, in the metrics, in `analyze --json`.
 _OK, _WARN, _ERROR = (f"`{severity.name.lower()}`" for severity in Severity)

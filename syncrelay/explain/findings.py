@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
@@ -36,18 +36,43 @@ class Finding:
         return self.inputs if self.input is None else (self.input,)
 
 
-Found: TypeAlias = Iterator[Finding]
-Rule: TypeAlias = Callable[[GroupFacts], Iterable[Finding]]
+class Fault(NamedTuple):
+    """What a rule finds: a finding but for its code, which the judge's table has beside the rule."""
+
+    text: str
+    suggestion: str | None = None
+    severity: Severity = Severity.WARN
+    input: int | None = None
+    explains: bool = True
+    inputs: tuple[int, ...] = ()
 
 
-def of_each_input(rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:
+Found: TypeAlias = Iterator[Fault]
+
+
+class Rule(NamedTuple):
+    """How faults of one code are found."""
+
+    code: Code
+    find: Callable[[GroupFacts], Iterable[Fault]]
+
+    def findings(self, facts: GroupFacts) -> Iterator[Finding]:
+        """Yield what it finds."""
+        for fault in self.find(facts):
+            text, suggestion, severity, about, explains, inputs = fault
+            yield Finding(self.code, severity, text, suggestion, about, explains, inputs)
+
+
+def of_each_input(code: Code, rule: Callable[[GroupFacts, int, InputFacts], Found]) -> Rule:
     """Make a rule about an input one about a group, the required inputs first."""
 
-    def of_all(facts: GroupFacts) -> list[Finding]:
+    def find(facts: GroupFacts) -> list[Fault]:
         inputs = facts.inputs
-        return [finding for index in facts.required_first for finding in rule(facts, index, inputs[index])]
+        return [
+            fault._replace(input=index) for index in facts.required_first for fault in rule(facts, index, inputs[index])
+        ]
 
-    return of_all
+    return Rule(code, find)
 
 
 def blocks(facts: GroupFacts, an_input: InputFacts) -> Severity:

@@ -16,73 +16,62 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 from syncrelay.explain import rules_clock, rules_flow, rules_graph, rules_matching, rules_stamps, words
-from syncrelay.explain.codes import Code, Severity
+from syncrelay.explain.codes import MATCHING, Code, Of, Severity, codes_of
 from syncrelay.explain.facts import GroupFacts
 from syncrelay.explain.findings import Finding, Rule, of_each_input
 from syncrelay.explain.input_observation import WINDOW_NS
 from syncrelay.explain.standing import BACK, Standing
 
 _CAUSE_RULES: Final[tuple[Rule, ...]] = (
-    rules_graph.internal_error,
-    rules_graph.inactive,
-    rules_flow.paused,
-    of_each_input(rules_graph.refused_by_dds),
-    of_each_input(rules_graph.type_not_importable),
-    of_each_input(rules_graph.other_type),
-    of_each_input(rules_graph.several_types),
-    rules_graph.alone,
-    rules_graph.no_publisher,
-    of_each_input(rules_graph.incompatible_qos),
-    rules_graph.nobody_listens,
-    rules_graph.no_clock,
-    rules_graph.clock_stopped,
-    rules_flow.too_slow,
-    rules_graph.silent,
-    of_each_input(rules_stamps.malformed),
-    of_each_input(rules_stamps.unstamped),
-    of_each_input(rules_stamps.several_publishers),
-    rules_stamps.clock_step,
-    rules_stamps.clock_drift,
-    rules_stamps.other_clock,
-    rules_clock.off_the_clock,
-    rules_stamps.no_common_key,
-    of_each_input(rules_flow.slowed),
-    rules_flow.bursts,
-    of_each_input(rules_stamps.time_jump),
-    of_each_input(rules_flow.messages_lost),
-    of_each_input(rules_stamps.duplicates),
+    Rule(Code.INTERNAL_ERROR, rules_graph.internal_error),
+    Rule(Code.INACTIVE, rules_graph.inactive),
+    Rule(Code.PAUSED, rules_flow.paused),
+    of_each_input(Code.REFUSED_BY_DDS, rules_graph.refused_by_dds),
+    of_each_input(Code.TYPE_NOT_IMPORTABLE, rules_graph.type_not_importable),
+    of_each_input(Code.OTHER_TYPE, rules_graph.other_type),
+    of_each_input(Code.SEVERAL_TYPES, rules_graph.several_types),
+    Rule(Code.ALONE, rules_graph.alone),
+    Rule(Code.NO_PUBLISHER, rules_graph.no_publisher),
+    of_each_input(Code.INCOMPATIBLE_QOS, rules_graph.incompatible_qos),
+    Rule(Code.NOBODY_LISTENS, rules_graph.nobody_listens),
+    Rule(Code.NO_CLOCK, rules_graph.no_clock),
+    Rule(Code.CLOCK_STOPPED, rules_graph.clock_stopped),
+    Rule(Code.TOO_SLOW, rules_flow.too_slow),
+    Rule(Code.SILENT, rules_graph.silent),
+    of_each_input(Code.MALFORMED, rules_stamps.malformed),
+    of_each_input(Code.UNSTAMPED, rules_stamps.unstamped),
+    of_each_input(Code.SEVERAL_PUBLISHERS, rules_stamps.several_publishers),
+    Rule(Code.CLOCK_STEP, rules_stamps.clock_step),
+    Rule(Code.CLOCK_DRIFT, rules_stamps.clock_drift),
+    Rule(Code.OTHER_CLOCK, rules_stamps.other_clock),
+    Rule(Code.OTHER_CLOCK, rules_clock.off_the_clock),
+    Rule(Code.NO_COMMON_KEY, rules_stamps.no_common_key),
+    of_each_input(Code.SLOWED, rules_flow.slowed),
+    Rule(Code.BURSTS, rules_flow.bursts),
+    of_each_input(Code.TIME_JUMP, rules_stamps.time_jump),
+    of_each_input(Code.MESSAGES_LOST, rules_flow.messages_lost),
+    of_each_input(Code.DUPLICATES, rules_stamps.duplicates),
 )
 
-_MATCHING_RULES: Final[tuple[tuple[Code, Rule], ...]] = (
-    (Code.OVER_SLOP, rules_matching.over_slop),
-    (Code.OVER_SLOP, rules_clock.too_old),
-    (Code.SHORT_QUEUE, of_each_input(rules_matching.short_queue)),
-    (Code.WAITING_FOR_OPTIONAL, of_each_input(rules_matching.waiting_for_optional)),
-    (Code.CONSTANT_OFFSET, rules_matching.constant_offset),
+_MATCHING_RULES: Final[tuple[Rule, ...]] = (
+    Rule(Code.OVER_SLOP, rules_matching.over_slop),
+    Rule(Code.OVER_SLOP, rules_clock.too_old),
+    of_each_input(Code.SHORT_QUEUE, rules_matching.short_queue),
+    of_each_input(Code.WAITING_FOR_OPTIONAL, rules_matching.waiting_for_optional),
+    Rule(Code.CONSTANT_OFFSET, rules_matching.constant_offset),
 )
 """What they suggest they try, which costs: they are not asked for what a cause explains."""
 
 _OF_DRIFT: Final = frozenset({Code.OVER_SLOP, Code.CONSTANT_OFFSET})
 """What a drift brings about, and sooner than it can be proven."""
-_OF_GRAPH: Final = frozenset(
-    {
-        Code.ALONE,
-        Code.NO_PUBLISHER,
-        Code.TYPE_NOT_IMPORTABLE,
-        Code.OTHER_TYPE,
-        Code.SEVERAL_TYPES,
-        Code.INCOMPATIBLE_QOS,
-        Code.NOBODY_LISTENS,
-        Code.NO_CLOCK,
-    }
-)
 _WAIT: Final = "wait some seconds: it is not known yet whether a clock drifts"
 
 _OTHER_RULES: Final[tuple[Rule, ...]] = (
-    of_each_input(rules_stamps.out_of_order),
-    of_each_input(rules_graph.subscriber_qos),
-    of_each_input(rules_graph.output_taken),
+    of_each_input(Code.OUT_OF_ORDER, rules_stamps.out_of_order),
+    of_each_input(Code.SUBSCRIBER_QOS, rules_graph.subscriber_qos),
+    of_each_input(Code.OUTPUT_TAKEN, rules_graph.output_taken),
 )
+_FEW_SETS: Final = Rule(Code.FEW_SETS, rules_matching.few_sets)
 
 
 class _Explained(NamedTuple):
@@ -92,39 +81,8 @@ class _Explained(NamedTuple):
     of_input: frozenset[Code] = frozenset()
 
 
-MATCHING: Final = frozenset(
-    {
-        Code.OVER_SLOP,
-        Code.SHORT_QUEUE,
-        Code.WAITING_FOR_OPTIONAL,
-        Code.CONSTANT_OFFSET,
-        Code.FEW_SETS,
-        Code.UNEXPLAINED,
-    }
-)
-"""What most causes explain: that messages do not match, or not enough of them."""
-
-_ORDER: Final = frozenset({Code.TIME_JUMP, Code.OUT_OF_ORDER, Code.DUPLICATES})
-_FLOW: Final = (
-    MATCHING
-    | _ORDER
-    | {
-        Code.NO_CLOCK,
-        Code.CLOCK_STOPPED,
-        Code.TOO_SLOW,
-        Code.SILENT,
-        Code.MALFORMED,
-        Code.UNSTAMPED,
-        Code.SEVERAL_PUBLISHERS,
-        Code.CLOCK_STEP,
-        Code.CLOCK_DRIFT,
-        Code.OTHER_CLOCK,
-        Code.NO_COMMON_KEY,
-        Code.SLOWED,
-        Code.BURSTS,
-        Code.MESSAGES_LOST,
-    }
-)
+_ORDER: Final = codes_of(Of.ORDER)
+_FLOW: Final = codes_of(Of.MESSAGES, Of.ORDER, Of.MATCHING) | {Code.NO_CLOCK}
 """What messages tell, and not the graph."""
 
 # What can be mended before the node is activated.
@@ -211,18 +169,18 @@ class Judge:
 
     def judge(self, facts: GroupFacts) -> tuple[Finding, ...]:
         """Return what is not as usual, an error at least of a silent group; see `with_ok` for what is well."""
-        found = [finding for rule in _CAUSE_RULES for finding in rule(facts)]
+        found = [finding for rule in _CAUSE_RULES for finding in rule.findings(facts)]
         self._remember(found, facts)
         may_drift = rules_stamps.may_drift(facts)
-        for code, rule in () if facts.is_new else _MATCHING_RULES:
-            if self._is_explained(code, facts):
+        for rule in () if facts.is_new else _MATCHING_RULES:
+            if self._is_explained(rule.code, facts):
                 continue
-            if not (may_drift and code in _OF_DRIFT):
-                found += rule(facts)
+            if not (may_drift and rule.code in _OF_DRIFT):
+                found += rule.findings(facts)
             elif facts.is_silent:
-                found += [replace(finding, suggestion=_WAIT) for finding in rule(facts)]
+                found += [replace(finding, suggestion=_WAIT) for finding in rule.findings(facts)]
         found += self._still_too_wide(found, facts)
-        found += [finding for rule in _OTHER_RULES for finding in rule(facts)]
+        found += [finding for rule in _OTHER_RULES for finding in rule.findings(facts)]
         if facts.is_silent and not any(finding.severity is Severity.ERROR for finding in found):
             found += [_unexplained(facts)] if facts.had_time else []
         said = self._unexplained_by_others(found, facts) if found and self._causes else tuple(found)
@@ -292,7 +250,7 @@ class Judge:
         cause = next((each for each in said if each.severity is not Severity.OK and _gives_few_sets(each.code)), None)
         if cause is not None:
             return tuple(replace(each, severity=least) if each is cause else each for each in said)
-        few = next(rules_matching.few_sets(facts))
+        (few,) = _FEW_SETS.findings(facts)
         over = [each for each in self._causes.values() if each.was_said and _explains(each, few, facts)]
         if over:
             cause, at, _ = max(over, key=lambda each: each.at)
@@ -324,7 +282,7 @@ def _gives_few_sets(code: Code) -> bool:
 def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
     looks_back = finding.code is Code.FEW_SETS
     is_over = cause.at < facts.figures.now and not looks_back
-    if cause.finding.code in _OF_GRAPH and is_over and finding.severity is Severity.ERROR:
+    if cause.finding.code.of is Of.GRAPH and is_over and finding.severity is Severity.ERROR:
         # What the graph shows no more is not why no set leaves now.
         return False
     explained, about = EXPLAINS[cause.finding.code], cause.finding.input

@@ -6,9 +6,9 @@ from typing import Final
 
 from syncrelay.config import Distance
 from syncrelay.explain import words
-from syncrelay.explain.codes import Code, Severity
+from syncrelay.explain.codes import Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Finding, Found
+from syncrelay.explain.findings import SECOND, Fault, Found
 from syncrelay.explain.rules_flow import waited_for_relay
 
 _OFF: Final = SECOND
@@ -31,13 +31,12 @@ def off_the_clock(facts: GroupFacts) -> Found:
     by = off[index]
     are_all = len(off) == len(required) > 1 and max(off.values()) - min(off.values()) < _OFF
     whose = "all inputs" if are_all else facts.inputs[index].name
-    yield Finding(
-        Code.OTHER_CLOCK,
-        Severity.ERROR,
+    yield Fault(
         f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} {_clock(facts)},"
         " which triggers the sets",
         _to_one_clock(facts),
-        None if are_all else index,
+        Severity.ERROR,
+        input=None if are_all else index,
     )
 
 
@@ -86,13 +85,12 @@ def too_old(facts: GroupFacts) -> Found:
     an_input = facts.inputs[index]
     where = "a tick" if facts.trigger is None else f"a message of {facts.inputs[facts.trigger].name}"
     at = "" if an_input.own_tolerance is None else f" at {an_input.name}"
-    yield Finding(
-        Code.OVER_SLOP,
-        Severity.ERROR if facts.is_silent else Severity.WARN,
+    yield Fault(
         f"at {where}, the latest message of {an_input.name} is {words.duration(least)} to {words.duration(most)} old,"
         f" {max_age.key} is {words.duration(max_age.ns)}",
         f"write `{max_age.key}: {words.at_least(round(_HEADROOM * most))}`{at}"
         f"{_or_wait(facts, index, most - least, max_age.ns)}",
+        Severity.ERROR if facts.is_silent else Severity.WARN,
     )
 
 

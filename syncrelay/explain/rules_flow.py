@@ -5,9 +5,8 @@ from itertools import pairwise
 from typing import Final
 
 from syncrelay.explain import words
-from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Finding, Found, nodes
+from syncrelay.explain.findings import SECOND, Fault, Found, nodes
 
 _TOO_SLOW: Final = 500_000_000
 # An input too slow to send this many messages in the time of a burst cannot show one.
@@ -24,17 +23,17 @@ def bursts(facts: GroupFacts) -> Found:
         yield _burst_together(facts, dict(held_up))
         return
     for index, each in held_up:
-        yield Finding(Code.BURSTS, Severity.WARN, _burst_text([each]), _burst_check(facts, each), index, explains=False)
+        yield Fault(_burst_text([each]), _burst_check(facts, each), input=index, explains=False)
 
 
-def _burst_together(facts: GroupFacts, inputs: dict[int, InputFacts]) -> Finding:
+def _burst_together(facts: GroupFacts, inputs: dict[int, InputFacts]) -> Fault:
     held_up = list(inputs.values())
     others = [each for each in facts.inputs if each not in held_up]
     held = max(each.figures.held for each in held_up)
     are_all = all(each.figures.usual_hz * held < _SHOWN_BY * SECOND for each in others)
     what = "a player" if not facts.is_recorded else "the recorder"
     check = f"check whether this machine, {what} or what connects them stood still"
-    return Finding(Code.BURSTS, Severity.WARN, _burst_text(held_up, are_all=are_all), check, inputs=tuple(inputs))
+    return Fault(_burst_text(held_up, are_all=are_all), check, inputs=tuple(inputs))
 
 
 def _burst_text(held_up: Sequence[InputFacts], *, are_all: bool = False) -> str:
@@ -64,16 +63,13 @@ def _overlap(held_up: Sequence[Sequence[tuple[int, int]]]) -> bool:
     )
 
 
-def messages_lost(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def messages_lost(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find messages that DDS itself lost before they came here."""
     if an_input.graph.lost:
         messages = "1 message" if an_input.graph.lost == 1 else f"{an_input.graph.lost} messages"
-        yield Finding(
-            Code.MESSAGES_LOST,
-            Severity.WARN,
+        yield Fault(
             f"DDS lost {messages} of {an_input.name} on the way here in the last 10 s",
             f"check the network and the CPU load; if {nodes(an_input)} is reliable, `qos: auto` makes it resend them",
-            index,
         )
 
 
@@ -86,9 +82,7 @@ def too_slow(facts: GroupFacts) -> Found:
         text = f"the relay stood still for {words.duration(max(each.ns for each in facts.standstills))}"
     else:
         return
-    yield Finding(
-        Code.TOO_SLOW,
-        Severity.WARN,
+    yield Fault(
         text,
         "check whether other processes leave it enough CPU; if they do, spread the groups over several relays with"
         " --group",
@@ -125,24 +119,19 @@ def paused(facts: GroupFacts) -> Found:
     """Find that somebody has paused the relay. A warning: it is as it was asked for, and may be forgotten."""
     if facts.pause is not None:
         since = words.seconds(facts.figures.now - min(facts.pause.since, facts.figures.now))
-        yield Finding(
-            Code.PAUSED,
-            Severity.WARN,
+        yield Fault(
             f"paused for {since}: no set leaves",
             f"`ros2 service call {facts.pause.ended_by} std_srvs/srv/Trigger` ends the pause",
         )
 
 
-def slowed(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def slowed(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find an input that comes at a much lower rate than it used to."""
     figures = an_input.figures
     if figures.slowed_from_hz is not None:
-        yield Finding(
-            Code.SLOWED,
-            Severity.WARN,
+        yield Fault(
             f"{an_input.name} has slowed from {words.rate(figures.slowed_from_hz)} to {words.rate(figures.pace_hz)}",
             f"check {nodes(an_input)}: its settings, its load, and the network to it",
-            index,
         )
 
 

@@ -6,9 +6,9 @@ from typing import Final
 from syncrelay.config.installed import suspects
 from syncrelay.config.wording import all_of, one_of
 from syncrelay.explain import words
-from syncrelay.explain.codes import Code, Severity
+from syncrelay.explain.codes import Severity
 from syncrelay.explain.facts import Endpoint, GraphSnapshot, GroupFacts, InputFacts, serving
-from syncrelay.explain.findings import SECOND, Finding, Found, absence, blocks
+from syncrelay.explain.findings import SECOND, Fault, Found, absence, blocks
 
 _NO_MESSAGE: Final = 5 * SECOND
 # Fast DDS's lease: a killed node stays in the graph this long.
@@ -28,40 +28,35 @@ _PAUSES: Final = 3
 def internal_error(facts: GroupFacts) -> Found:
     """Find that an exception has stopped the group."""
     if facts.failure is not None:
-        yield Finding(
-            Code.INTERNAL_ERROR,
-            Severity.ERROR,
+        yield Fault(
             f"a bug in {suspects(facts.policy)} stopped this group: {facts.failure}",
             "report it with the traceback in the log; `syncrelay reload` starts the group again",
+            Severity.ERROR,
         )
 
 
 def inactive(facts: GroupFacts) -> Found:
     """Find that the group belongs to a managed node that waits to be activated."""
     if facts.inactive is not None:
-        yield Finding(
-            Code.INACTIVE,
-            Severity.WARN,
+        yield Fault(
             "the node is inactive: it receives and publishes nothing",
             f"activate it with `ros2 lifecycle set {facts.inactive} activate`",
         )
 
 
-def refused_by_dds(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def refused_by_dds(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find a topic that DDS lets the group not subscribe to or publish."""
     if (refusal := an_input.graph.refusal) is not None:
-        yield Finding(
-            Code.REFUSED_BY_DDS,
-            Severity.ERROR if an_input.required else Severity.WARN,
+        yield Fault(
             refusal.text,
             "give one of the two another name: a process has one type for each topic"
             if refusal.held_as
             else "the relay tries again every 5 s; if this goes on, check the limits on memory and open files",
-            index,
+            Severity.ERROR if an_input.required else Severity.WARN,
         )
 
 
-def type_not_importable(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def type_not_importable(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find a type that cannot be used here, or not as the file asks."""
     severity = Severity.ERROR if an_input.required else Severity.WARN
     if an_input.graph.not_importable:
@@ -70,20 +65,18 @@ def type_not_importable(facts: GroupFacts, index: int, an_input: InputFacts) -> 
         if others := _of_another_type(an_input):
             text += f"; {others[0].node} publishes it as {others[0].type}"
             suggestion = f"write `type: {others[0].type}`, or leave `type` out"
-        yield Finding(Code.TYPE_NOT_IMPORTABLE, severity, text, suggestion, index)
+        yield Fault(text, suggestion, severity)
     elif an_input.graph.not_readable:
         needs_stamps = facts.tolerance is not None and not facts.tolerance.takes_times_of_arrival
         by_arrival = "" if needs_stamps else ", or write `stamp: receive`"
-        yield Finding(
-            Code.TYPE_NOT_IMPORTABLE,
-            severity,
+        yield Fault(
             f"{an_input.name}: {an_input.graph.not_readable.splitlines()[0]}",
             f"name a field that it has at `stamp` or `key`{by_arrival}, then `syncrelay reload`",
-            index,
+            severity,
         )
 
 
-def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def other_type(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find publishers of another type than the file's, or than the one that was taken from the graph."""
     others = _of_another_type(an_input)
     # Of a type that cannot be used at all, it says who publishes another.
@@ -93,14 +86,12 @@ def other_type(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     origin = an_input.graph.type_from
     expected = f"the relay took {an_input.type} from {origin.node}" if origin else f"the file says {an_input.type}"
     for publisher in others:
-        yield Finding(
-            Code.OTHER_TYPE,
-            blocks(facts, an_input) if alone else Severity.WARN,
+        yield Fault(
             f"{publisher.node} publishes {an_input.name} as {publisher.type}, {expected}",
             (f"write `type: {publisher.type}`" if origin is None else f"restart the relay, or {_write(publisher)}")
             if alone
             else f"have {publisher.node} use another topic",
-            index,
+            blocks(facts, an_input) if alone else Severity.WARN,
             explains=alone,
         )
 
@@ -114,17 +105,15 @@ def _write(publisher: Endpoint) -> str:
     return f"write `type: {publisher.type}` and `syncrelay reload`"
 
 
-def several_types(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def several_types(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find a topic whose type the file leaves to its publishers, and these do not agree."""
     by_type = {each.type: each for each in reversed(an_input.graph.publishers)}
     if an_input.type is None and len(by_type) > 1:
         types = all_of(f"{each.type} by {each.node}" for each in reversed(by_type.values()))
-        yield Finding(
-            Code.SEVERAL_TYPES,
-            blocks(facts, an_input),
+        yield Fault(
             f"{an_input.name} is published with {len(by_type)} types: {types}",
             "write the `type` that is meant, or have only one of them publish it",
-            index,
+            blocks(facts, an_input),
         )
 
 
@@ -133,12 +122,11 @@ def alone(facts: GroupFacts) -> Found:
     graph = facts.empty_graph
     if graph is None or facts.is_discovering or any(each.figures.last_received for each in facts.inputs):
         return
-    yield Finding(
-        Code.ALONE,
-        Severity.ERROR if facts.is_silent else Severity.WARN,
+    yield Fault(
         no_other_node(graph),
         "start the robot's nodes; if they are running, compare ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and"
         " RMW_IMPLEMENTATION on both sides, and run `syncrelay doctor --live`",
+        Severity.ERROR if facts.is_silent else Severity.WARN,
     )
 
 
@@ -158,10 +146,10 @@ def no_publisher(facts: GroupFacts) -> Found:
         yield _without_publisher(facts, gone, _no_longer_published(facts, [facts.inputs[index] for index in gone]))
 
 
-def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: tuple[str, str]) -> Finding:
+def _without_publisher(facts: GroupFacts, indices: Sequence[int], words_of_it: tuple[str, str]) -> Fault:
     severity = max(absence(facts, facts.inputs[index]) for index in indices)
     one = indices[0] if len(indices) == 1 else None
-    return Finding(Code.NO_PUBLISHER, severity, *words_of_it, one, inputs=tuple(indices))
+    return Fault(*words_of_it, severity, one, inputs=tuple(indices))
 
 
 def _never_published(facts: GroupFacts, missing: Sequence[InputFacts]) -> tuple[str, str]:
@@ -228,19 +216,17 @@ def _no_longer_published(facts: GroupFacts, gone: Sequence[InputFacts]) -> tuple
     return text, "restart the nodes that published them"
 
 
-def incompatible_qos(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def incompatible_qos(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find publishers that cannot serve the QoS that the group requests."""
     of_type = [each for each in an_input.graph.publishers if each.type == an_input.type]
     alone = all(each.mismatch for each in of_type)
     for publisher in of_type:
         if (why := publisher.mismatch) is not None:
-            yield Finding(
-                Code.INCOMPATIBLE_QOS,
-                blocks(facts, an_input) if alone else Severity.WARN,
+            yield Fault(
                 f"{publisher.node} offers {an_input.name} with {why.policy} {why.offered}, the group requests"
                 f" {why.requested}",
                 f"write `qos: auto` at {an_input.name}, or have {publisher.node} offer {why.requested}",
-                index,
+                blocks(facts, an_input) if alone else Severity.WARN,
                 explains=alone,
             )
 
@@ -252,29 +238,27 @@ def nobody_listens(facts: GroupFacts) -> Found:
         names = one_of(each.output for each in outputs)
         some = any(each.graph.subscribers for each in outputs)
         who = f"no subscriber of {names} fits what the relay offers" if some else f"nobody subscribes to {names}"
-        yield Finding(Code.NOBODY_LISTENS, Severity.OK, f"{who}, so this lazy group receives nothing")
+        yield Fault(f"{who}, so this lazy group receives nothing", severity=Severity.OK)
 
 
 def no_clock(facts: GroupFacts) -> Found:
     """Find that time is simulated and that nobody has told it."""
     if facts.clock is not None and not facts.clock.received and facts.clock.stopped is not None:
-        yield Finding(
-            Code.NO_CLOCK,
-            Severity.ERROR if facts.is_silent else Severity.WARN,
+        yield Fault(
             f"no /clock has been received for {words.seconds(facts.clock.stopped)}, and the relay runs with"
             " use_sim_time: nothing that waits expires",
             "start what publishes /clock, such as `ros2 bag play --clock`, or run without use_sim_time",
+            Severity.ERROR if facts.is_silent else Severity.WARN,
         )
 
 
 def clock_stopped(facts: GroupFacts) -> Found:
     """Find that simulated time does not pass any more."""
     if facts.clock is not None and facts.clock.received and facts.clock.stopped is not None:
-        yield Finding(
-            Code.CLOCK_STOPPED,
-            Severity.ERROR if facts.is_silent else Severity.WARN,
+        yield Fault(
             f"/clock has stood still for {words.seconds(facts.clock.stopped)}: nothing that waits expires",
             "start or resume what publishes /clock, or run without use_sim_time",
+            Severity.ERROR if facts.is_silent else Severity.WARN,
         )
 
 
@@ -285,20 +269,19 @@ def silent(facts: GroupFacts) -> Found:
     ]
     quiet = [facts.figures.now - each.figures.last_received for each in facts.inputs if each.figures.last_received]
     if 1 < len(found) == len(quiet) == len(facts.inputs) and max(quiet) - min(quiet) < _TOGETHER:
-        yield Finding(
-            Code.SILENT,
-            max(each.severity for each in found),
+        yield Fault(
             f"all inputs have been silent for {words.seconds(min(quiet))}",
             "check whether recording was paused"
             if facts.is_recorded
             else "check whether their publishers are still running, and the network to them",
+            max(each.severity for each in found),
             inputs=tuple(range(len(facts.inputs))),
         )
     else:
         yield from found
 
 
-def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | None:
+def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Fault | None:
     fitting = serving(an_input.graph, an_input.type)
     now, figures = facts.figures.now, an_input.figures
     if not fitting or now - max(facts.figures.began, an_input.served_since or 0) < _NO_MESSAGE:
@@ -307,25 +290,23 @@ def _silent(facts: GroupFacts, index: int, an_input: InputFacts) -> Finding | No
     node, quiet = fitting[0].node, now - (figures.last_received or now)
     if figures.last_received is None and not figures.fed:
         lately = " lately" if an_input.counts.fed else ""
-        return Finding(
-            Code.SILENT,
-            absence(facts, an_input),
+        return Fault(
             f"{node} publishes {an_input.name}, but no message has arrived{lately}",
             f"check with `ros2 topic hz {an_input.name}` whether {node} is sending; if so, run `syncrelay doctor"
             " --config FILE --live`",
-            index,
+            absence(facts, an_input),
+            input=index,
         )
     if not _is_silent(facts, an_input, quiet) or (facts.is_held(index) and _is_enough(facts, an_input)):
         return None
     until_then = f"; before that its rate was {words.rate(figures.usual_hz)}" if figures.usual_hz else ""
-    return Finding(
-        Code.SILENT,
-        absence(facts, an_input),
+    return Fault(
         f"{an_input.name} has been silent for {words.seconds(quiet)}{until_then}",
         f"check whether recording of {an_input.name} stopped"
         if facts.is_recorded
         else f"check {node}, which {_is_there(facts, an_input, quiet)}{_or_hold_longer(facts, index)}",
-        index,
+        absence(facts, an_input),
+        input=index,
     )
 
 
@@ -367,30 +348,24 @@ def _or_hold_longer(facts: GroupFacts, index: int) -> str:
     return f"; if it is meant to be sent this rarely, write a `{tolerance.key}` larger than {age} for it"
 
 
-def subscriber_qos(_facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def subscriber_qos(_facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find subscribers of an output that the relay's QoS cannot serve."""
     for subscriber in an_input.graph.subscribers:
         if (why := subscriber.mismatch) is not None:
-            yield Finding(
-                Code.SUBSCRIBER_QOS,
-                Severity.WARN,
+            yield Fault(
                 f"{subscriber.node} requests {an_input.output} with {why.policy} {why.requested}, the relay offers"
                 f" {why.offered}, so it gets nothing",
                 f"have {subscriber.node} request {why.offered}, or {an_input.name}'s publisher offer {why.requested}",
-                index,
             )
 
 
-def output_taken(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def output_taken(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find others that publish an output, as a second relay of the same file does."""
     if an_input.graph.rivals and facts.figures.now - an_input.graph.rivals_since >= _ENDING:
         they = " and ".join(dict.fromkeys(each.node for each in an_input.graph.rivals))
         verb, whose = ("publishes", "both") if len(an_input.graph.rivals) == 1 else ("publish", "all")
-        yield Finding(
-            Code.OUTPUT_TAKEN,
-            Severity.WARN,
+        yield Fault(
             f"{they} {verb} {an_input.output} too: its subscribers get the messages of {whose}",
             "stop all publishers but one, or give this output another name with `output: ...`; a node that was killed"
             " stays in the graph for 20 s",
-            index,
         )

@@ -12,7 +12,7 @@ from syncrelay.explain import words
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.distribution import Distribution
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Finding, Found, absence, counted, nodes
+from syncrelay.explain.findings import SECOND, Fault, Found, absence, counted, nodes
 from syncrelay.explain.nearest import quantile, shifted, signed_distances
 from syncrelay.explain.rules_flow import fates
 from syncrelay.explain.rules_stamps import offered_offset, other_clock
@@ -62,11 +62,8 @@ def over_slop(facts: GroupFacts) -> Found:
     else:
         return
     found = _verdict(facts, (Code.OVER_SLOP, None), lambda trials: _wide_enough(facts, tolerance, nearest, trials))
-    yield Finding(
-        Code.OVER_SLOP,
-        severity,
-        text,
-        _advice(facts, found) or "check how these topics are stamped, and whether messages are missing",
+    yield Fault(
+        text, _advice(facts, found) or "check how these topics are stamped, and whether messages are missing", severity
     )
 
 
@@ -125,14 +122,12 @@ def constant_offset(facts: GroupFacts) -> Found:
         off = off if odd == other else -off
         name = facts.inputs[odd].name
         advice = offered_offset(facts, Code.CONSTANT_OFFSET, odd, facts.inputs[odd].offset - off)
-        yield Finding(
-            Code.CONSTANT_OFFSET,
-            Severity.WARN,
+        yield Fault(
             f"stamps of {name} are always {words.duration(abs(off))} {'ahead of' if off > 0 else 'behind'} those of"
             f" {facts.inputs[right].name} received at the same time: sets may hold messages of different moments",
             f"check how {nodes(facts.inputs[odd])} stamps"
             + (f"; if both are measured at the same time, {advice}" if advice else ""),
-            odd,
+            input=odd,
         )
 
 
@@ -178,13 +173,11 @@ def short_queue(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     found = _verdict(facts, (Code.SHORT_QUEUE, index), lambda trials: trials.verdict(REQUIRED, _QUEUE))
     if not found.may_miss:
         return
-    yield Finding(
-        Code.SHORT_QUEUE,
-        Severity.ERROR if facts.is_silent else Severity.WARN,
+    yield Fault(
         f"{counted(overflowed, an_input.figures.fed)} messages of {an_input.name} overflowed its queue of"
         f" {facts.queue_size} before their partners came",
         _advice(facts, found),
-        index,
+        Severity.ERROR if facts.is_silent else Severity.WARN,
     )
 
 
@@ -207,12 +200,10 @@ def waiting_for_optional(facts: GroupFacts, index: int, an_input: InputFacts) ->
     must = 1 - could_hz / rate_hz
     slow = f", {words.share(must)} because it comes at {words.rate(pace_hz)} only" if must > _MISSING else ""
     why, what_helps = away or _why_without(facts, index, an_input)
-    yield Finding(
-        Code.WAITING_FOR_OPTIONAL,
-        absence(facts, an_input) if away else Severity.WARN,
+    yield Fault(
         f"{words.share(missing)} of the sets leave without {an_input.name}{waits}{'' if away else slow}{why}",
         what_helps,
-        index,
+        absence(facts, an_input) if away else Severity.WARN,
     )
 
 
@@ -289,15 +280,14 @@ def few_sets(facts: GroupFacts) -> Found:
     severity = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
     left = left_of_possible(facts)
     if 2 * share.absent > share.possible - share.left:
-        yield Finding(
-            Code.FEW_SETS,
-            severity,
+        yield Fault(
             f"{left}; {share.absent} messages of {pacemaker.name} did not come: it pauses, or they are lost",
             f"check {nodes(pacemaker)}, and the network to it",
-            share.pacemaker,
+            severity,
+            input=share.pacemaker,
         )
         return
-    yield Finding(Code.FEW_SETS, severity, f"{left}; {fates(pacemaker)}", more_sets(facts, Code.FEW_SETS))
+    yield Fault(f"{left}; {fates(pacemaker)}", more_sets(facts, Code.FEW_SETS), severity)
 
 
 def left_of_possible(facts: GroupFacts) -> str:

@@ -9,7 +9,7 @@ from syncrelay.explain import words
 from syncrelay.explain.clocks import BOOT_NS, Drift, apart, time_scale
 from syncrelay.explain.codes import Code, Severity
 from syncrelay.explain.facts import GroupFacts, InputFacts
-from syncrelay.explain.findings import SECOND, Finding, Found, blocks, counted, nodes
+from syncrelay.explain.findings import SECOND, Fault, Found, blocks, counted, nodes
 from syncrelay.explain.rules_flow import waited_for_relay
 from syncrelay.explain.trials import REQUIRED, Trials, Verdict, offset_change
 from syncrelay.sync.messages import DropReason
@@ -51,30 +51,26 @@ _SAME_OFFSET: Final = 0.1
 _SLEW: Final = "check what set the clock {where}; NTP and chrony can be told to slew it instead"
 
 
-def malformed(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def malformed(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find messages whose stamp or key could not be read."""
     if count := an_input.figures.dropped.get(DropReason.MALFORMED, 0):
         # A key may stand anywhere in a message.
         what = "or not of its type" if facts.by_stamp else "not of its type, or have too many values before the key"
-        yield Finding(
-            Code.MALFORMED,
-            _blocks_if_most(facts, an_input, count),
+        yield Fault(
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} are cut short, {what}",
             f"check that {nodes(an_input)} uses the same version of {an_input.type} as is installed here",
-            index,
+            _blocks_if_most(facts, an_input, count),
             explains=_matters(facts, an_input, count),
         )
 
 
-def unstamped(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def unstamped(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find messages whose stamp was never set."""
     if count := an_input.figures.dropped.get(DropReason.UNSTAMPED, 0):
-        yield Finding(
-            Code.UNSTAMPED,
-            _blocks_if_most(facts, an_input, count),
+        yield Fault(
             f"{counted(count, an_input.figures.fed)} messages of {an_input.name} have stamp 0",
             f"have {nodes(an_input)} set header.stamp{_or_by_arrival(facts, an_input)}",
-            index,
+            _blocks_if_most(facts, an_input, count),
             explains=_matters(facts, an_input, count),
         )
 
@@ -131,7 +127,7 @@ def other_clock(facts: GroupFacts) -> Found:
             f"synchronize the clocks of their machines{_or_offset(facts, odd, behind + offset)}"
             f"{_wait_for_it(facts, odd, behind)}"
         )
-    yield Finding(Code.OTHER_CLOCK, Severity.ERROR, text, suggestion, odd)
+    yield Fault(text, suggestion, Severity.ERROR, input=odd)
 
 
 def offered_offset(facts: GroupFacts, code: Code, index: int, by: int) -> str:
@@ -185,11 +181,10 @@ def no_common_key(facts: GroupFacts) -> Found:
     if facts.by_stamp or not facts.is_silent or any(each.key is None for each in facts.inputs):
         return
     newest = ", ".join(f"{each.key!r} of {each.name}" for each in facts.inputs)
-    yield Finding(
-        Code.NO_COMMON_KEY,
-        Severity.ERROR,
+    yield Fault(
         f"no key arrived on all inputs while it was buffered; the newest are {newest}",
         "correct `key`, or write a larger `queue_size` if one input's keys arrive much later",
+        Severity.ERROR,
     )
 
 
@@ -208,12 +203,10 @@ def several_publishers(facts: GroupFacts, index: int, an_input: InputFacts) -> F
         return
     *first, last = [each.node for each in publishers]
     who = f"{', '.join(first)} and {last} {'all' if len(first) > 1 else 'both'}"
-    yield Finding(
-        Code.SEVERAL_PUBLISHERS,
-        blocks(facts, an_input),
+    yield Fault(
         f"{who} publish {an_input.name}: {conflict}",
         "give each publisher its own topic, or stop all but one",
-        index,
+        blocks(facts, an_input),
         explains=figures.swings >= _FEWEST_SWINGS or _matters(facts, an_input, disorder),
     )
 
@@ -223,7 +216,7 @@ def clock_step(facts: GroupFacts) -> Found:
     now = facts.figures.now
     if facts.clock_set is not None:
         text = f"this machine's clock was set {_forward(facts.clock_set.by)}, {_ago(now, facts.clock_set.at)}"
-        yield Finding(Code.CLOCK_STEP, Severity.WARN, text, _SLEW.format(where="here"))
+        yield Fault(text, _SLEW.format(where="here"))
         return
     if not facts.by_stamp:
         return
@@ -232,18 +225,17 @@ def clock_step(facts: GroupFacts) -> Found:
     if 1 < len(steps) == len(facts.inputs) and max(steps) - min(steps) < _STEPPED_ALIKE:
         at = max(step.at for _, step in stepped if step)
         text = f"stamps of all inputs jumped {_forward(steps[0])} against this machine's clock, {_ago(now, at)}"
-        yield Finding(Code.CLOCK_STEP, Severity.WARN, text, _SLEW.format(where="on the machine that stamps them"))
+        yield Fault(text, _SLEW.format(where="on the machine that stamps them"))
         return
     for index, step in stepped:
         if step is not None:
             an_input = facts.inputs[index]
-            yield Finding(
-                Code.CLOCK_STEP,
-                blocks(facts, an_input),
+            yield Fault(
                 f"stamps of {an_input.name} jumped {_forward(step.by)}, {_ago(now, step.at)}"
                 f"{_of_others(facts, index, step.at)}",
                 _SLEW.format(where=f"of {nodes(an_input)}"),
-                index,
+                blocks(facts, an_input),
+                input=index,
             )
 
 
@@ -262,35 +254,31 @@ def _ago(now: int, at: int) -> str:
     return f"{words.seconds(max(0, now - at))} ago"
 
 
-def time_jump(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def time_jump(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find that stamps fell back; without blame, unless they do so again and again."""
     now, figures = facts.figures.now, an_input.figures
     if facts.by_stamp and figures.swings >= _FEWEST_SWINGS:
-        yield Finding(
-            Code.TIME_JUMP,
-            blocks(facts, an_input),
+        yield Fault(
             f"timestamps of {an_input.name} jump back and forth by {words.duration(figures.swung_by)}",
             f"check whether {nodes(an_input)} stamps by two clocks, or two nodes publish {an_input.name}",
-            index,
+            blocks(facts, an_input),
         )
     elif figures.fell_at is not None and figures.fell_by is not None and now - figures.fell_at < _TOLD_JUMP:
-        yield Finding(
-            Code.TIME_JUMP,
-            Severity.OK,
+        yield Fault(
             f"timestamps of {an_input.name} jumped back {words.duration(figures.fell_by)},"
             f" {_ago(now, figures.fell_at)}; matching restarted",
             "a looped recording does this, or a clock that was reset",
-            index,
+            Severity.OK,
             explains=False,
         )
 
 
-def out_of_order(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
+def out_of_order(facts: GroupFacts, _index: int, an_input: InputFacts) -> Found:
     """Find messages that came after one of a later stamp."""
     count = an_input.figures.out_of_order
     if facts.by_stamp and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} arrived out of stamp order"
-        yield Finding(Code.OUT_OF_ORDER, Severity.WARN, text, f"check how {nodes(an_input)} stamps and sends", index)
+        yield Fault(text, f"check how {nodes(an_input)} stamps and sends")
 
 
 def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
@@ -298,14 +286,7 @@ def duplicates(facts: GroupFacts, index: int, an_input: InputFacts) -> Found:
     count = an_input.figures.duplicates
     if facts.by_stamp and not facts.is_held(index) and count > _FAULTY * an_input.figures.fed:
         text = f"{counted(count, an_input.figures.fed)} messages of {an_input.name} repeat the stamp before them"
-        yield Finding(
-            Code.DUPLICATES,
-            Severity.WARN,
-            text,
-            f"check how {nodes(an_input)} stamps its messages",
-            index,
-            explains=_matters(facts, an_input, count),
-        )
+        yield Fault(text, f"check how {nodes(an_input)} stamps its messages", explains=_matters(facts, an_input, count))
 
 
 def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:
@@ -378,12 +359,10 @@ def clock_drift(facts: GroupFacts) -> Found:
         else f"stamps of {name} and {against} drift apart by {a_second} ({ppm} ppm)"
     )
     gone = abs(found.slope) * (facts.figures.now - facts.figures.began)
-    yield Finding(
-        Code.CLOCK_DRIFT,
-        Severity.WARN,
+    yield Fault(
         text,
         "synchronize their clocks with PTP or chrony, or have their drivers stamp with the host's time",
-        odd if is_evident else None,
+        input=odd if is_evident else None,
         # A clock that is off by a few ppm is not why stamps lie far apart today.
         explains=facts.tolerance is not None and gone >= _MATTERS * facts.tolerance.ns,
     )
