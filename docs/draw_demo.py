@@ -8,10 +8,9 @@ from picture import COLUMNS, LINES, draw
 from syncrelay.cli.demo import prepare_ros, relay_rig
 from syncrelay.cli.stop import StopRequest
 from syncrelay.explain import RecentDrop
-from syncrelay.top.demo_screen import WIDEST_STRIP, frame, head_of
-from syncrelay.top.demo_text import Moment
+from syncrelay.top.demo_screen import frame, window_of
 from syncrelay.top.group_blocks import as_matched
-from syncrelay.top.strip import Sweep
+from syncrelay.top.plain import Moment
 
 _SECONDS = 16.0
 _SETTLED_S = 8.0
@@ -26,15 +25,14 @@ def main() -> None:
     relay_rig(nullcontext(moments.append), total_s=_SECONDS, seed=0, stop=StopRequest())
     settled = [moment for moment in moments if moment.elapsed_s > _SETTLED_S]
     healthy = [moment for moment in settled if not any(group.problems for group in moment.state.groups)]
-    draw(frame(max(healthy or settled, key=_fullness), width=COLUMNS, height=LINES), _PICTURE)
+    draw(frame(max(healthy or settled, key=_shows_a_lost_set), width=COLUMNS, height=LINES), _PICTURE)
 
 
-def _fullness(moment: Moment) -> tuple[bool, int]:
-    """Prefer a moment that shows a lost set, and then one at which the strip is about to begin again."""
-    sweep = Sweep(head=head_of(moment), width=WIDEST_STRIP)
+def _shows_a_lost_set(moment: Moment) -> bool:
+    window = window_of(moment, COLUMNS)
     outcomes = as_matched(moment.state.groups[0])
     lost = [each for each in outcomes if isinstance(each, RecentDrop) and each.input == _LIDAR]
-    return any(sweep.column(each.stamp) for each in lost), sweep.column(sweep.head) or 0
+    return any(window.column(each.stamp) is not None for each in lost)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from syncrelay.rig.processes import Rig
     from syncrelay.ros.relay import Relay
     from syncrelay.status.document import Status
-    from syncrelay.top.demo_text import Moment
+    from syncrelay.top.plain import Moment
 
 _STARTING: Final = "Starting a simulated camera, lidar and IMU ..."
 _FRAME_S: Final = 0.125
@@ -64,7 +64,7 @@ def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
         sys.stdout.write(shipped_config())
         return DONE
     from syncrelay.logs import configure
-    from syncrelay.top.demo_text import summary
+    from syncrelay.top.plain import summary_of
 
     configure("warning", "text")
     prepare_ros()
@@ -72,7 +72,7 @@ def command(_parser: Parser, arguments: Namespace, stop: StopRequest) -> int:
     if final is None:
         remark("stopped before it started")
         return DONE
-    put(summary(final))
+    put(summary_of(final))
     return DONE if all(group.sets for group in final.state.groups) else AT_FAULT
 
 
@@ -119,7 +119,7 @@ def relay_rig(
 
 def _relay(relay: "Relay", rig: "Rig", show: Show, *, total_s: float | None, stop: StopRequest) -> "Moment":
     from syncrelay.status import status_of
-    from syncrelay.top.demo_text import Moment
+    from syncrelay.top.plain import Moment
 
     began = time.monotonic()
     end = math.inf if total_s is None else began + total_s
@@ -166,14 +166,14 @@ def _view() -> Iterator[Show]:
         return
     if can_draw:
         remark(f"this is text, as the packages that draw it are not installed\n  {line_to_install('top')}")
-    from syncrelay.top.demo_text import plain_line
+    from syncrelay.top.plain import line_of
 
     next_s = _LINE_S
 
     def show_line(moment: "Moment") -> None:
         nonlocal next_s
         if moment.elapsed_s >= next_s:
-            print(plain_line(moment), flush=True)  # noqa: T201  as it happens, through a pipe too
+            print(line_of(moment), flush=True)  # noqa: T201  as it happens, through a pipe too
             next_s = math.floor(moment.elapsed_s) + _LINE_S
 
     print(_STARTING, flush=True)  # noqa: T201

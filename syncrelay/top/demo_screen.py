@@ -10,28 +10,31 @@ from rich.text import Text
 from syncrelay.explain import RecentDrop
 from syncrelay.status.document import Group
 from syncrelay.top import group_blocks, phrases
-from syncrelay.top.demo_text import TITLE, Moment
 from syncrelay.top.pieces import line
-from syncrelay.top.strip import COLUMN_NS, UNNEEDED, Sweep, letter_style, mark_of, newest_stamp
+from syncrelay.top.plain import DEMO, Moment
+from syncrelay.top.strip import UNNEEDED, Window, letter_style, mark_of, newest_stamp
 
 # Reports come once a second with what has left by then. The strip is drawn this much later, so that it moves steadily.
 _DELAY_NS: Final = 1_250_000_000
+# An input at 100 Hz has two messages in a column; a set of a group at 10 Hz has five columns for its letter and span.
+_COLUMN_NS: Final = 20_000_000
 # A report holds too few messages of a 100 Hz input to fill a wider strip.
-WIDEST_STRIP: Final = 65
+_WIDEST_STRIP: Final = 65
 
 
-def head_of(moment: Moment) -> int:
-    """Return the stamp up to which the strip is drawn, in nanoseconds."""
+def window_of(moment: Moment, width: int) -> Window:
+    """Return what the strips of all groups show on a terminal of so many columns."""
     recent = chain.from_iterable(map(group_blocks.as_matched, moment.state.groups))
-    return min(moment.now - _DELAY_NS, newest_stamp(recent))
+    head = min(moment.now - _DELAY_NS, newest_stamp(recent))
+    return Window(head, min(width - group_blocks.LANE_LABEL - 2, _WIDEST_STRIP), _COLUMN_NS)
 
 
 def frame(moment: Moment, *, width: int, height: int) -> Lines:
     """Draw a moment for a terminal of so many columns and lines; 80x24 shows all of two groups of two inputs."""
     groups = moment.state.groups
-    sweep = Sweep(head=head_of(moment), width=min(width - group_blocks.LANE_LABEL - 2, WIDEST_STRIP))
-    strips = [list(group_blocks.lanes(group, group_blocks.as_matched(group), sweep)) for group in groups]
-    legend = list(_legend(groups, sweep, width))
+    window = window_of(moment, width)
+    strips = [list(group_blocks.lanes(group, group_blocks.as_matched(group), window)) for group in groups]
+    legend = list(_legend(groups, window, width))
     for draw in (_large_block, _block, _small_block):
         drawn = [list(draw(group, strip, width)) for group, strip in zip(groups, strips, strict=True)]
         blocks = [[_title(moment, width)], *drawn, legend]
@@ -69,17 +72,17 @@ def _small_block(group: Group, strip: Sequence[Text], width: int) -> Iterator[Te
 
 def _title(moment: Moment, width: int) -> Text:
     clock = f"{moment.elapsed_s:.1f}" + (" s" if moment.total_s is None else f" / {moment.total_s:g} s")
-    title = Text(TITLE, style="bold", no_wrap=True)
+    title = Text(DEMO, style="bold", no_wrap=True)
     title.truncate(width - len(clock) - 1, overflow="ellipsis", pad=True)
     return Text.assemble(title, " ", clock)
 
 
-def _legend(groups: Sequence[Group], sweep: Sweep, width: int) -> Iterator[Text]:
+def _legend(groups: Sequence[Group], window: Window, width: int) -> Iterator[Text]:
     letters = Text(" ").join(Text(letter, letter_style(number)) for number, letter in enumerate("ABC"))
     yield line(letters, "  each letter is a set: messages matched by time and sent on together")
     drops = [each for group in groups for each in group_blocks.as_matched(group) if isinstance(each, RecentDrop)]
-    occurred = {mark_of(each) for each in drops if sweep.column(each.stamp) is not None}
+    occurred = {mark_of(each) for each in drops if window.column(each.stamp) is not None}
     # Always explained, as every newcomer meets it.
     yield from group_blocks.side_by_side(group_blocks.marks({UNNEEDED, *occurred}), width)
-    column, strip_s = phrases.duration(COLUMN_NS / 1e6), sweep.width * COLUMN_NS / 1e9
-    yield line((f"a column is {column}; after {strip_s:.1f} s it starts again on the left; Ctrl-C ends it", "dim"))
+    column = phrases.duration(_COLUMN_NS / 1e6)
+    yield line((f"a column is {column}, the newest is on the right; Ctrl-C ends it", "dim"))

@@ -13,9 +13,8 @@ from syncrelay.top.pieces import STYLES, bar, line, sparkline, wrapped
 from syncrelay.top.strip import (
     MARKS,
     UNNEEDED,
-    Axis,
-    Lanes,
     Mark,
+    Window,
     letter_style,
     mark_of,
     newest_stamp,
@@ -127,9 +126,9 @@ def as_matched(group: Group) -> tuple[RecentSet | RecentDrop, ...]:
     return tuple(outcome.shifted(shifts) for outcome in group.recent)
 
 
-def lanes(group: Group, recent: Sequence[RecentSet | RecentDrop], axis: Axis) -> Iterator[Text]:
+def lanes(group: Group, recent: Sequence[RecentSet | RecentDrop], window: Window) -> Iterator[Text]:
     """Draw a lane for each input with its recent messages, and below them the spans of the sets."""
-    drawn = strip(Lanes(len(group.inputs), group.sets, tuple(recent)), axis)
+    drawn = strip(recent, window, n_inputs=len(group.inputs), sets=group.sets)
     for index, name in enumerate(short_names([each.topic for each in group.inputs])):
         shift = f" {group.inputs[index].offset_ms:+g} ms" if group.inputs[index].offset_ms else ""
         label = f"{fitted(name, LANE_LABEL - len(shift))}{shift}".rjust(LANE_LABEL)

@@ -1,14 +1,50 @@
-"""The status of a relay as plain text: `top --once`, the service ~/status, what `observe` prints."""
+"""The status of a relay as plain text: `top --once`, the service ~/status, what `observe` and `demo` print."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
 from textwrap import wrap
+from typing import Final
 
 from syncrelay.status import Level, advice
 from syncrelay.status.document import Finding, Group, Input, Relay, Status
 from syncrelay.top import phrases
 from syncrelay.top.client import Answer
 
-WIDTH = 80
+WIDTH: Final = 80
+DEMO: Final = "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS"
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The state of the demo's relay as of its last report, `elapsed_s` after the start, of `total_s` if an end is set.
+
+    `now` is the time, in nanoseconds of the clock that the rig stamps by.
+    """
+
+    state: Status
+    elapsed_s: float
+    total_s: float | None
+    now: int
+
+
+def line_of(moment: Moment) -> str:
+    """Return one line on all groups of the demo."""
+    return f"{moment.elapsed_s:5.1f} s  {'; '.join(map(_in_short, moment.state.groups))}"
+
+
+def _in_short(group: Group) -> str:
+    if not group.rate_hz or group.span_ms is None:
+        return f"{group.name}: {group.explanation.text if group.explanation else 'no set yet'}"
+    rates = f"{phrases.sets_of_possible(group)} possible sets a second, span {phrases.duration(group.span_ms.p50)}"
+    problems = ", ".join(problem.label for problem in group.problems)
+    return f"{group.name}: {rates}{f' ({problems})' if problems else ''}"
+
+
+def summary_of(moment: Moment) -> str:
+    """Return what became of every message of the demo and what its relay found, as `syncrelay top --once` shows it."""
+    groups = chain.from_iterable(["", *group_lines(group)] for group in moment.state.groups)
+    return "\n".join([f"{DEMO}: {moment.elapsed_s:.1f} s", *groups])
 
 
 def plain_text(answer: Answer) -> str:

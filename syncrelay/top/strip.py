@@ -5,24 +5,22 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 from types import MappingProxyType
-from typing import Final, NamedTuple, Protocol, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from rich.text import Text
 
 from syncrelay.explain import NO_SET_MISSED, RecentDrop, RecentSet
+from syncrelay.status import fates
+from syncrelay.status.fates import FATES
 from syncrelay.sync.messages import DropReason
 
 Outcome: TypeAlias = RecentSet | RecentDrop
 
-# An input at 100 Hz has two messages in a column; a set of a group at 10 Hz has five columns for its letter and span.
-COLUMN_NS = 20_000_000
 # Columns for a set's letter and its span, where the scale may be chosen.
 _COLUMNS_PER_SET = 6
 _FINEST_NS = 1_000_000
 # A strip of such columns is longer than stamps of one clock are apart.
 _COARSEST_NS = 10_000_000_000
-# Columns ahead of the newest message that are kept blank, to show where old messages are written over.
-_GAP = 3
 
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 # Middle tones of the 256-colour palette: black letters on them, and lines of them on light and dark grounds, are
@@ -37,28 +35,10 @@ class Mark(NamedTuple):
     style: str
 
 
-UNNEEDED: Final = Mark("·", "dim")
-
-_CHARACTERS: Final = {
-    DropReason.TOO_FAR: "×",  # noqa: RUF001  the sign, a cross
-    DropReason.SUPERSEDED: "»",
-    DropReason.LATE: "<",
-    DropReason.DUPLICATE: "=",
-    DropReason.OVERFLOW: "!",
-    DropReason.EXPIRED: "~",
-    DropReason.TIME_JUMP: "^",
-    DropReason.UNSTAMPED: "0",
-    DropReason.MALFORMED: "?",
-    DropReason.THINNED: "-",
-    DropReason.PAUSED: ":",
-    DropReason.SHUTDOWN: "|",
-}
-
+_CHARACTERS: Final = {fate.name: fate.character for fate in FATES}
+UNNEEDED: Final = Mark(_CHARACTERS[fates.UNNEEDED], "dim")
 MARKS: Final[Mapping[DropReason, Mark]] = MappingProxyType(
-    {
-        reason: Mark(character, "dim" if reason in NO_SET_MISSED else "bold red")
-        for reason, character in _CHARACTERS.items()
-    }
+    {reason: Mark(_CHARACTERS[reason.value], "dim" if reason in NO_SET_MISSED else "bold red") for reason in DropReason}
 )
 """The marks of needed messages. Reasons that cost sets stand out."""
 
@@ -74,52 +54,6 @@ def letter_style(number: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Lanes:
-    """A group as the strip draws it: its number of inputs, of `sets` so far, and its last sets and drops."""
-
-    n_inputs: int
-    sets: int
-    recent: tuple[Outcome, ...]
-
-
-class Axis(Protocol):
-    """Maps stamps to columns of the strip."""
-
-    @property
-    def width(self) -> int:
-        """How many columns there are."""
-
-    def column(self, stamp: int) -> int | None:
-        """Return the column of a stamp in nanoseconds, None outside the strip."""
-
-    def joins(self, one: int, other: int) -> bool:
-        """Whether a line between two columns stays on the strip."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sweep:
-    """Draws as an oscilloscope does: time runs to the right and starts again at the left.
-
-    A message stays in its column until the sweep comes round. All groups share `head`, the newest stamp in
-    nanoseconds, so that a message is in the same column in each of them.
-    """
-
-    head: int
-    width: int
-
-    def column(self, stamp: int) -> int | None:
-        """Return the column of a stamp, None if it is too old or newer than the head."""
-        behind = self.head // COLUMN_NS - stamp // COLUMN_NS
-        if not 0 <= behind < self.width - _GAP:
-            return None
-        return stamp // COLUMN_NS % self.width
-
-    def joins(self, one: int, other: int) -> bool:
-        """Whether a line between two columns does not cross the end of the strip."""
-        return abs(one - other) <= self.width // 2
-
-
-@dataclass(frozen=True, slots=True)
 class Window:
     """Draws the newest stamp, `head`, in the last column and older ones to its left."""
 
@@ -131,10 +65,6 @@ class Window:
         """Return the column of a stamp, None if it is too old or newer than the head."""
         behind = self.head // self.column_ns - stamp // self.column_ns
         return self.width - 1 - behind if 0 <= behind < self.width else None
-
-    def joins(self, _one: int, _other: int) -> bool:
-        """Whether a line between two columns stays on the strip: always."""
-        return True
 
 
 def window_of(recent: Sequence[Outcome], width: int) -> Window:
@@ -171,42 +101,38 @@ def _stamps(outcome: Outcome) -> Iterator[int]:
         yield from (stamp for stamp in outcome.stamps if stamp is not None)
 
 
-def strip(lanes: Lanes, axis: Axis) -> list[Text]:
+def strip(recent: Sequence[Outcome], window: Window, *, n_inputs: int, sets: int) -> list[Text]:
     """Draw two lines for each input: its lane, and below it the lines that join sets.
 
-    The last line has the spans of the sets in milliseconds.
+    The last line has the spans of the sets in milliseconds. `sets` is how many the group gave since its start: a set
+    keeps its letter from frame to frame.
     """
-    drawing = _Drawing(lanes=lanes.n_inputs, width=axis.width)
-    for outcome in lanes.recent:
+    drawing = _Drawing(lanes=n_inputs, width=window.width)
+    for outcome in recent:
         if isinstance(outcome, RecentDrop):
-            _draw_drop(drawing, outcome, axis)
-    for number, a_set in _numbered_sets(lanes):
-        _draw_set(drawing, number, a_set, axis)
+            _draw_drop(drawing, outcome, window)
+    shown = [outcome for outcome in recent if isinstance(outcome, RecentSet)]
+    for number, a_set in enumerate(shown, start=sets - len(shown)):
+        _draw_set(drawing, number, a_set, window)
     return drawing.lines()
 
 
-def _numbered_sets(lanes: Lanes) -> Iterator[tuple[int, RecentSet]]:
-    """Number the sets from the group's start, so that a set keeps its letter from frame to frame."""
-    recent = [outcome for outcome in lanes.recent if isinstance(outcome, RecentSet)]
-    return enumerate(recent, start=lanes.sets - len(recent))
-
-
-def _draw_drop(drawing: "_Drawing", drop: RecentDrop, axis: Axis) -> None:
-    column, mark = axis.column(drop.stamp), mark_of(drop)
+def _draw_drop(drawing: "_Drawing", drop: RecentDrop, window: Window) -> None:
+    column, mark = window.column(drop.stamp), mark_of(drop)
     # In a column that several share, a needed message must be seen.
     if column is None or (mark is UNNEEDED and drawing.taken(2 * drop.input, column)):
         return
     drawing.put(2 * drop.input, column, *mark)
 
 
-def _draw_set(drawing: "_Drawing", number: int, a_set: RecentSet, axis: Axis) -> None:
+def _draw_set(drawing: "_Drawing", number: int, a_set: RecentSet, window: Window) -> None:
     colour = _COLOURS[number % len(_COLOURS)]
-    columns = [None if stamp is None else axis.column(stamp) for stamp in a_set.stamps]
+    columns = [None if stamp is None else window.column(stamp) for stamp in a_set.stamps]
     for lane, column in enumerate(columns):
         if column is not None:
             drawing.put(2 * lane, column, _LETTERS[number % len(_LETTERS)], letter_style(number))
     for lane, (above, below) in enumerate(pairwise(columns)):
-        if above is not None and below is not None and axis.joins(above, below):
+        if above is not None and below is not None:
             _draw_joint(drawing, 2 * lane + 1, above, below, colour)
     last = next((column for column in reversed(columns) if column is not None), None)
     if last is not None:

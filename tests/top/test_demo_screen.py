@@ -9,8 +9,8 @@ from rich.console import Console
 
 from syncrelay.cli.demo import shipped_config
 from syncrelay.status import status_of
-from syncrelay.top.demo_screen import frame, head_of
-from syncrelay.top.demo_text import Moment, plain_line, summary
+from syncrelay.top.demo_screen import frame, window_of
+from syncrelay.top.plain import Moment, line_of, summary_of
 from tests.top.rigs import Sensor, simulated
 
 CAMERA, LIDAR, IMU = "/demo/camera/image_raw", "/demo/lidar/points", "/demo/imu/data"
@@ -56,7 +56,7 @@ def test_two_groups_fill_an_80x24_terminal():
         "",
         "A B C  each letter is a set: messages matched by time and sent on together",
         "· not needed",
-        "a column is 20 ms; after 1.3 s it starts again on the left; Ctrl-C ends it",
+        "a column is 20 ms, the newest is on the right; Ctrl-C ends it",
     ]
 
 
@@ -84,7 +84,7 @@ def test_what_is_wrong_stands_in_place_of_the_rate():
 def test_the_strip_moves_on_between_two_reports():
     one = moment()
     later = Moment(one.state, one.elapsed_s, one.total_s, one.now + 500_000_000)
-    assert head_of(later) == head_of(one) + 500_000_000
+    assert window_of(later, 80).head == window_of(one, 80).head + 500_000_000
     assert shown(one) != shown(later)
 
 
@@ -109,17 +109,17 @@ def test_without_an_end_only_the_time_passed_is_shown():
 def test_a_plain_line_holds_all_groups():
     assert re.fullmatch(
         r" 12\.0 s  camera_lidar: 10\.1 of 10\.1 possible sets a second, span \S+ [um]s; lidar_imu: .*/demo/imu/data.*",
-        plain_line(moment(IMU)),
+        line_of(moment(IMU)),
     )
 
 
 def test_before_the_first_set_a_plain_line_says_so():
     drawn = moment(CAMERA, LIDAR, IMU, seconds=0)
-    assert plain_line(drawn).endswith(f"lidar_imu: {drawn.state.groups[1].findings[0].text}")
+    assert line_of(drawn).endswith(f"lidar_imu: {drawn.state.groups[1].findings[0].text}")
 
 
 def test_the_summary_says_what_became_of_every_message_and_what_was_found():
-    lines = summary(moment(IMU)).splitlines()
+    lines = summary_of(moment(IMU)).splitlines()
     assert lines[0] == "syncrelay demo: camera, lidar and IMU simulated, relayed over DDS: 12.0 s"
     assert "camera_lidar: OK, 10.1 of 10.1 possible sets a second, 120 sets, last just now" in lines
     assert "lidar_imu: ERROR, 0 of 0 possible sets a second, no set yet" in lines

@@ -6,11 +6,11 @@ import pytest
 
 from syncrelay.explain import RecentDrop, RecentSet
 from syncrelay.sync.messages import DropReason
-from syncrelay.top.strip import MARKS, UNNEEDED, Lanes, Sweep, Window, mark_of, newest_stamp, strip, window_of
+from syncrelay.top.strip import MARKS, UNNEEDED, Window, mark_of, newest_stamp, strip, window_of
 
 MS = 1_000_000
-# A column is 20 ms.
-_HEAD = 340 * MS
+# A column is 20 ms, so the first one begins at the stamp 0.
+_WINDOW = Window(head=380 * MS, width=20, column_ns=20 * MS)
 
 
 def a_set(*stamps_ms):
@@ -21,17 +21,10 @@ def a_drop(lane, stamp_ms, reason=DropReason.SUPERSEDED, *, unneeded=None):
     return RecentDrop(lane, round(stamp_ms * MS), reason, unneeded)
 
 
-def lanes_of(recent, *, inputs=2, sets=None):
-    """Lanes that have given just their recent sets, unless said otherwise."""
-    return Lanes(inputs, sum(hasattr(each, "stamps") for each in recent) if sets is None else sets, tuple(recent))
-
-
-def drawn(lanes, *, head=_HEAD, width=20):
-    return plain(lanes, Sweep(head=head, width=width))
-
-
-def plain(lanes, axis):
-    return [line.plain.rstrip() for line in strip(lanes, axis)]
+def drawn(recent, window=_WINDOW, *, inputs=2, sets=None):
+    """The lines of a group that has given just its recent sets, unless said otherwise."""
+    given = sum(hasattr(each, "stamps") for each in recent) if sets is None else sets
+    return [line.plain.rstrip() for line in strip(recent, window, n_inputs=inputs, sets=given)]
 
 
 @pytest.mark.parametrize(
@@ -93,42 +86,22 @@ def plain(lanes, axis):
             id="a span that would touch its neighbour is left out",
         ),
         pytest.param(
-            [a_set(1, 0)],
+            [a_set(-1, -20)],
             ["", "", "", ""],
             id="what is older than the strip is not on it",
         ),
     ],
 )
 def test_messages_stand_on_their_lanes_by_their_stamps(recent, lanes):
-    assert drawn(lanes_of(recent)) == lanes
-
-
-def test_time_begins_again_at_the_left_and_messages_stay_where_they_were():
-    lanes = lanes_of([a_set(245, 245), a_set(345, 345), a_set(445, 445)])
-    assert drawn(lanes, head=445 * MS) == [
-        "  C         A    B",
-        "  │         │    │",
-        "  C         A    B",
-        " 0.0       0.0  0.0",
-    ]
-
-
-def test_a_set_across_the_end_of_the_strip_has_no_joint():
-    assert drawn(lanes_of([a_set(399, 401)]), head=401 * MS) == [
-        "                   A",
-        "",
-        "A",
-        "2.0",
-    ]
+    assert drawn(recent) == lanes
 
 
 def test_a_set_keeps_its_letter_when_older_ones_are_forgotten():
-    lanes = lanes_of([a_set(45, 45), a_set(145, 145)], sets=28)
-    assert drawn(lanes)[0] == "  A    B"
+    assert drawn([a_set(45, 45), a_set(145, 145)], sets=28)[0] == "  A    B"
 
 
 def test_three_inputs_have_three_lanes():
-    assert drawn(lanes_of([a_set(40, 60, 60)], inputs=3)) == ["  A", "  ╰╮", "   A", "   │", "   A", "  20.0"]
+    assert drawn([a_set(40, 60, 60)], inputs=3) == ["  A", "  ╰╮", "   A", "   │", "   A", "  20.0"]
 
 
 def test_each_reason_has_a_mark_of_its_own():
@@ -158,14 +131,14 @@ def test_a_drop_stands_out_where_it_costs_a_set(reason, unneeded, mark):
 
 
 def test_sets_are_told_apart_by_colour_and_by_letter():
-    lane = strip(lanes_of([a_set(45, 45), a_set(145, 145)]), Sweep(head=_HEAD, width=20))[0]
+    lane = strip([a_set(45, 45), a_set(145, 145)], _WINDOW, n_inputs=2, sets=2)[0]
     letters = {lane.plain[span.start : span.end].strip(): str(span.style) for span in lane.spans}
     assert letters["A"] != letters["B"]
 
 
 def test_a_window_has_the_newest_at_its_right_end_and_joints_of_any_width():
-    lanes = lanes_of([a_set(100, 130), a_set(400, 200)])
-    assert plain(lanes, Window(head=400 * MS, width=32, column_ns=10 * MS)) == [
+    window = Window(head=400 * MS, width=32, column_ns=10 * MS)
+    assert drawn([a_set(100, 130), a_set(400, 200)], window) == [
         " A                             B",
         " ╰──╮      ╭───────────────────╯",
         "    A      B",
