@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Policy, check_sizes
+from syncrelay.sync.policy import Queued, check_sizes
 from syncrelay.sync.queues import Losses, StampQueue
 
 
-class ApproximateEpsilonTime(Policy):
+class ApproximateEpsilonTime(Queued):
     """The oldest messages of all inputs are a set, at once, if none is more than epsilon after the oldest.
 
     If one is, the oldest message of every input that has one within epsilon of the oldest of all is too far. This is
@@ -52,16 +52,6 @@ class ApproximateEpsilonTime(Policy):
             self._losses.lose(place, queue.stamps[0])
             outcomes += queue.drop(1, DropReason.OVERFLOW)
         return outcomes
-
-    def flush(self, reason: DropReason) -> list[Drop]:
-        self._losses.forget()
-        return [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
-
-    def buffered(self, place: int) -> int:
-        return len(self._queues[place].stamps)
-
-    def needed_queue(self, place: int) -> int | None:
-        return self._losses.needed[place]
 
     def _take_oldest(self, outcomes: list[Outcome]) -> None:
         oldest = min(queue.stamps[0] for queue in self._queues)

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Policy, check_sizes, of_required
-from syncrelay.sync.queues import Losses
+from syncrelay.sync.policy import Queued, check_sizes, of_required
+from syncrelay.sync.queues import Losses, StampQueue
 
 _NO_PIVOT = -1
 
@@ -14,7 +14,7 @@ _STEPS = 8
 """A search strides only after this many single steps. Most searches take fewer, and a stride costs several steps."""
 
 
-class ApproximateTime(Policy):
+class ApproximateTime(Queued):
     """The set of least span around each pivot leaves as soon as no later message can make a better one.
 
     On messages that arrive in stamp order, the sets are those of C++ message_filters' ApproximateTime, at the same
@@ -50,6 +50,7 @@ class ApproximateTime(Policy):
         "_pivot_stamp",
         "_proof_end",
         "_queue_size",
+        "_queues",
         "_scale",
         "_slop",
         "_stamps",
@@ -79,8 +80,10 @@ class ApproximateTime(Policy):
         self._age_penalty = age_penalty
         self._scale = (1.0 + age_penalty).as_integer_ratio()
         self._min_periods = periods
-        self._stamps: list[list[int]] = [[] for _ in periods]
-        self._messages: list[list[Message]] = [[] for _ in periods]
+        self._queues = [StampQueue() for _ in periods]
+        # The search works on the lists themselves.
+        self._stamps = [queue.stamps for queue in self._queues]
+        self._messages = [queue.messages for queue in self._queues]
         self._losses = Losses(n_inputs)
         # (stamp, place) of the head of each input that has one, the earliest first.
         self._heads: list[tuple[int, int]] = []
@@ -126,22 +129,12 @@ class ApproximateTime(Policy):
         return self._search(outcomes)
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        drops = [Drop(message, reason) for messages in self._messages for message in messages]
-        for stamps, messages in zip(self._stamps, self._messages, strict=True):
-            stamps.clear()
-            messages.clear()
+        drops = super().flush(reason)
         self._reset()
         return drops
 
-    def buffered(self, place: int) -> int:
-        return len(self._messages[place])
-
-    def needed_queue(self, place: int) -> int | None:
-        return self._losses.needed[place]
-
     def _reset(self) -> None:
         self.waits_ended = self.waits_started
-        self._losses.forget()
         self._overflowed: set[int] = set()
         self._forget_candidate()
 
@@ -158,17 +151,11 @@ class ApproximateTime(Policy):
 
     def _feed_behind(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
         stamps = self._stamps[place]
-        messages = self._messages[place]
-        position = bisect_left(stamps, stamp)
-        if stamps[position] == stamp:
-            replaced = messages[position]
-            messages[position] = message
+        replaced = self._queues[place].insert(stamp, message)
+        if replaced is not None:
             return (Drop(replaced, DropReason.DUPLICATE),)
-        passed = position <= self._cursors[place]
-        stamps.insert(position, stamp)
-        messages.insert(position, message)
         outcomes: list[Outcome] = []
-        if passed:
+        if bisect_left(stamps, stamp) <= self._cursors[place]:
             self._forget_candidate()
             self._search_again(outcomes)
         if len(stamps) > self._queue_size:
@@ -178,12 +165,11 @@ class ApproximateTime(Policy):
     def _overflow(self, place: int, outcomes: list[Outcome]) -> list[Outcome]:
         self._losses.lose(place, self._stamps[place][0])
         self._overflowed.add(place)
-        if self._pivot == _NO_PIVOT:
-            self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
-            return outcomes
-        self._forget_candidate()
+        had_candidate = self._pivot != _NO_PIVOT
+        if had_candidate:
+            self._forget_candidate()
         self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
-        return self._search_again(outcomes)
+        return self._search_again(outcomes) if had_candidate else outcomes
 
     def _search_again(self, outcomes: list[Outcome]) -> list[Outcome]:
         """Search after a candidate was forgotten. If there is one again, the wait for a better one goes on."""
@@ -296,11 +282,8 @@ class ApproximateTime(Policy):
     def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
         """Drop heads while there is no candidate."""
         stamps = self._stamps[place]
-        messages = self._messages[place]
         self._heads.remove((stamps[0], place))
-        outcomes += [Drop(message, reason) for message in messages[:count]]
-        del messages[:count]
-        del stamps[:count]
+        outcomes += self._queues[place].drop(count, reason)
         if stamps:
             insort(self._heads, (stamps[0], place))
 
@@ -314,10 +297,7 @@ class ApproximateTime(Policy):
     def _drop_skipped(self, outcomes: list[Outcome]) -> None:
         for place, cursor in enumerate(self._cursors):
             if cursor:
-                messages = self._messages[place]
-                outcomes += [Drop(message, DropReason.SUPERSEDED) for message in messages[:cursor]]
-                del messages[:cursor]
-                del self._stamps[place][:cursor]
+                outcomes += self._queues[place].drop(cursor, DropReason.SUPERSEDED)
                 self._cursors[place] = 0
 
     def _emit(self, outcomes: list[Outcome]) -> None:

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Policy, check_sizes
-from syncrelay.sync.queues import Losses
+from syncrelay.sync.policy import Queued, check_sizes
+from syncrelay.sync.queues import Losses, StampQueue
 
 
-class ApproximateTimeEager(Policy):
+class ApproximateTimeEager(Queued):
     """The tightest set within slop that has the message that has just arrived leaves at once.
 
     Of sets of the same span, the one that starts first leaves, in which each input has its latest message that is not
@@ -26,7 +26,7 @@ class ApproximateTimeEager(Policy):
     Slop is 2. aA does not wait for b, which is nearer to A and comes a little later.
     """
 
-    __slots__ = ("_losses", "_messages", "_queue_size", "_slop", "_stamps", "n_inputs")
+    __slots__ = ("_losses", "_queue_size", "_queues", "_slop", "_stamps", "n_inputs")
 
     def __init__(self, *, n_inputs: int, queue_size: int, slop_ns: int) -> None:
         check_sizes(n_inputs, queue_size)
@@ -35,8 +35,8 @@ class ApproximateTimeEager(Policy):
         self.n_inputs = n_inputs
         self._queue_size = queue_size
         self._slop = slop_ns
-        self._stamps: list[list[int]] = [[] for _ in range(n_inputs)]
-        self._messages: list[list[Message]] = [[] for _ in range(n_inputs)]
+        self._queues = [StampQueue() for _ in range(n_inputs)]
+        self._stamps = [queue.stamps for queue in self._queues]
         self._losses = Losses(n_inputs)
 
     def for_required(self, required: Sequence[bool]) -> tuple["ApproximateTimeEager", OptionalInputs]:
@@ -45,52 +45,26 @@ class ApproximateTimeEager(Policy):
         return ApproximateTimeEager(n_inputs=sum(required), queue_size=size, slop_ns=slop), stage
 
     def feed(self, place: int, stamp: int, message: Message) -> Sequence[Outcome]:
-        stamps = self._stamps[place]
+        queue, stamps = self._queues[place], self._stamps[place]
         outcomes: list[Outcome] = []
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
-            self._messages[place].append(message)
+            queue.messages.append(message)
             if len(stamps) == 1:
                 self._begin(stamp, outcomes)
-        else:
-            self._insert(place, stamp, message, outcomes)
+        elif (replaced := queue.insert(stamp, message)) is not None:
+            outcomes.append(Drop(replaced, DropReason.DUPLICATE))
+        elif stamps[0] == stamp:
+            self._drop_too_far(outcomes)
         if all(self._stamps):
             # There was no set before, so this is the only message of its input. The first messages of all inputs are
             # within slop of the latest of them, so there is a set now.
             self._match(stamp, outcomes)
         if len(stamps) > self._queue_size:
             self._losses.lose(place, stamps[0])
-            self._drop_oldest(place, 1, DropReason.OVERFLOW, outcomes)
+            outcomes += queue.drop(1, DropReason.OVERFLOW)
             self._drop_too_far(outcomes)
         return outcomes
-
-    def flush(self, reason: DropReason) -> list[Drop]:
-        drops = [Drop(message, reason) for messages in self._messages for message in messages]
-        for stamps, messages in zip(self._stamps, self._messages, strict=True):
-            stamps.clear()
-            messages.clear()
-        self._losses.forget()
-        return drops
-
-    def buffered(self, place: int) -> int:
-        return len(self._stamps[place])
-
-    def needed_queue(self, place: int) -> int | None:
-        return self._losses.needed[place]
-
-    def _insert(self, place: int, stamp: int, message: Message, outcomes: list[Outcome]) -> None:
-        """Insert a message that is not newer than all of its queue, which is not empty."""
-        stamps = self._stamps[place]
-        messages = self._messages[place]
-        position = bisect_left(stamps, stamp)
-        if stamps[position] == stamp:
-            outcomes.append(Drop(messages[position], DropReason.DUPLICATE))
-            messages[position] = message
-            return
-        stamps.insert(position, stamp)
-        messages.insert(position, message)
-        if position == 0:
-            self._drop_too_far(outcomes)
 
     def _begin(self, stamp: int, outcomes: list[Outcome]) -> None:
         """Note which overflowed messages the only message of its input has missed, and drop what is too far."""
@@ -107,30 +81,22 @@ class ApproximateTimeEager(Policy):
         """Drop messages that are not within slop of any message that another input has or will send."""
         while (firsts := [stamps[0] for stamps in self._stamps if stamps]) and min(firsts) < max(firsts) - self._slop:
             near = max(firsts) - self._slop
-            for place, stamps in enumerate(self._stamps):
-                if stamps and stamps[0] < near:
-                    self._drop_oldest(place, bisect_left(stamps, near), DropReason.TOO_FAR, outcomes)
-
-    def _drop_oldest(self, place: int, count: int, reason: DropReason, outcomes: list[Outcome]) -> None:
-        messages = self._messages[place]
-        outcomes += [Drop(message, reason) for message in messages[:count]]
-        del messages[:count]
-        del self._stamps[place][:count]
+            for queue in self._queues:
+                if queue.stamps and queue.stamps[0] < near:
+                    outcomes += queue.drop(bisect_left(queue.stamps, near), DropReason.TOO_FAR)
 
     def _match(self, stamp: int, outcomes: list[Outcome]) -> None:
         if max(map(len, self._stamps)) == 1:
             # The usual case: there is no choice, and nothing is left over.
-            outcomes.append(Match(tuple([messages.pop() for messages in self._messages])))
+            outcomes.append(Match(tuple([queue.messages.pop() for queue in self._queues])))
             for stamps in self._stamps:
                 stamps.clear()
             return
         members = []
-        for place, wanted in enumerate(_tightest(stamp, self._stamps)):
-            stamps = self._stamps[place]
-            if stamps[0] != wanted:
-                self._drop_oldest(place, bisect_left(stamps, wanted), DropReason.SUPERSEDED, outcomes)
-            del stamps[0]
-            members.append(self._messages[place].pop(0))
+        for queue, wanted in zip(self._queues, _tightest(stamp, self._stamps), strict=True):
+            if queue.stamps[0] != wanted:
+                outcomes += queue.drop(bisect_left(queue.stamps, wanted), DropReason.SUPERSEDED)
+            members.append(queue.remove(0))
         outcomes.append(Match(tuple(members)))
         self._drop_too_far(outcomes)
 

@@ -4,7 +4,7 @@ from bisect import bisect_right
 from collections.abc import Hashable, Sequence
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
-from syncrelay.sync.optional_keys import OptionalKeys
+from syncrelay.sync.optional import OptionalKeys
 from syncrelay.sync.policy import Policy, check_sizes
 from syncrelay.sync.queues import Losses
 

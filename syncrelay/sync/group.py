@@ -5,7 +5,7 @@ from typing import Generic
 
 from syncrelay.sync.arrivals import Arrivals
 from syncrelay.sync.counts import InputCounts, Ledger
-from syncrelay.sync.matching import ByClock, Limited, Matching, Unlimited
+from syncrelay.sync.matching import Limited, Prompt
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome, Restamp, T, common_stamp
 from syncrelay.sync.policy import Policy
 from syncrelay.sync.thinning import Thinning
@@ -83,11 +83,9 @@ class SyncGroup(Generic[T]):
                 n_inputs=n_inputs, repeats=policy.repeats, every=every, min_set_period_ns=min_set_period_ns
             )
         self._is_limited = max_wait_ns is not None or policy.by_clock
-        self._matching: Matching
-        if policy.by_clock:
-            self._matching = ByClock(policy, required=required, max_wait_ns=max_wait_ns or 0)
-        elif max_wait_ns is None:
-            self._matching = Unlimited(policy, required=required)
+        self._matching: Prompt | Limited
+        if policy.by_clock or max_wait_ns is None:
+            self._matching = Prompt(policy, required=required, max_wait_ns=max_wait_ns or 0)
         else:
             self._matching = Limited(
                 policy, self._arrivals, required=required, max_wait_ns=max_wait_ns, offsets_ns=offsets

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from syncrelay.sync.latest_time import check_max_ages
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Policy, check_sizes
-from syncrelay.sync.queues import LONGEST_QUEUE, StampQueue
+from syncrelay.sync.policy import Queued, check_sizes
+from syncrelay.sync.queues import Losses, StampQueue
 from syncrelay.sync.ticks import Ticks
 
 REST_NS = 10_000_000_000
@@ -17,7 +17,7 @@ REST_NS = 10_000_000_000
 _FALL_NS = 1_000_000_000
 
 
-class LatestAtTicks(Policy):
+class LatestAtTicks(Queued):
     """At each tick, a set of every input's latest message that is not newer than the tick.
 
     None is older at the tick than its input's of `max_ages_ns` (None: any age will do). A message may serve many
@@ -48,8 +48,8 @@ class LatestAtTicks(Policy):
 
     __slots__ = (
         "_fed_until",
+        "_losses",
         "_max_ages",
-        "_needed",
         "_passed",
         "_queue_size",
         "_queues",
@@ -81,7 +81,7 @@ class LatestAtTicks(Policy):
         self._max_ages = check_max_ages(max_ages_ns, n_inputs)
         self._required = needed
         self._queues = [StampQueue() for _ in needed]
-        self._needed: list[int | None] = [None] * n_inputs
+        self._losses = Losses(n_inputs)
         # The last tick that has passed, the time that was reached, and the time when the last message was fed.
         self._passed = -1
         self._until = 0
@@ -106,7 +106,8 @@ class LatestAtTicks(Policy):
         outcomes: list[Outcome] = [] if replaced is None else [Drop(replaced, DropReason.DUPLICATE)]
         outcomes += self._drop_useless(place, stamp)
         if len(queue.stamps) > self._queue_size:
-            self._note_needed(place)
+            # A queue with a place for every tick that is waited for would not be full.
+            self._losses.need(place, self.ticks.first_from(queue.stamps[-1]) - self._passed + 1)
             outcomes += queue.drop(1, DropReason.OVERFLOW)
         return outcomes
 
@@ -128,19 +129,9 @@ class LatestAtTicks(Policy):
         self._begin_again_if_fallen(until)
         self._passed = max(self._passed, self.ticks.last_until(until))
 
-    def flush(self, reason: DropReason) -> list[Drop]:
-        # No tick comes again.
-        return [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
-
     def let_go(self, reason: DropReason) -> list[Drop]:
         """Drop all but the latest message of every input."""
         return [drop for queue in self._queues for drop in queue.drop(max(0, len(queue.stamps) - 1), reason)]
-
-    def buffered(self, place: int) -> int:
-        return self._queues[place].unmatched
-
-    def needed_queue(self, place: int) -> int | None:
-        return self._needed[place]
 
     def _begin_again_if_fallen(self, until: int) -> None:
         if until < self.ticks.at(self._passed) - _FALL_NS:
@@ -210,10 +201,3 @@ class LatestAtTicks(Policy):
         if position > 0 and queue.stamps[position - 1] > self.ticks.at(tick - 1):
             return [*drops, Drop(queue.remove(position - 1), DropReason.SUPERSEDED)]
         return drops
-
-    def _note_needed(self, place: int) -> None:
-        """Note that a queue is full. One with a place for every tick that is waited for would not be."""
-        newest = self._queues[place].stamps[-1]
-        length = self.ticks.first_from(newest) - self._passed + 1
-        if (self._needed[place] or 0) < length <= LONGEST_QUEUE:
-            self._needed[place] = length

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
 from syncrelay.sync.optional import OptionalInputs
-from syncrelay.sync.policy import Policy, check_sizes
+from syncrelay.sync.policy import Queued, check_sizes
 from syncrelay.sync.queues import Losses, StampQueue
 
 
@@ -25,7 +25,7 @@ class _Lookup(NamedTuple):
     may_come: bool
 
 
-class LatestTime(Policy):
+class LatestTime(Queued):
     """At each message of input `trigger`, a set of it and the latest not newer message of every other input.
 
     None is older at the trigger's stamp than its input's of `max_ages_ns` (None: any age will do). A message may
@@ -117,10 +117,8 @@ class LatestTime(Policy):
         return outcomes
 
     def flush(self, reason: DropReason) -> list[Drop]:
-        drops = [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
-        self._losses.forget()
         self.waits_ended = self.waits_started
-        return drops
+        return super().flush(reason)
 
     def let_go(self, reason: DropReason) -> list[Drop]:
         """Drop the triggers that wait, and all but the latest message of every other input."""
@@ -130,12 +128,6 @@ class LatestTime(Policy):
             drops += queue.drop(max(0, len(queue.stamps) - kept), reason)
         self.waits_ended = self.waits_started
         return drops
-
-    def buffered(self, place: int) -> int:
-        return self._queues[place].unmatched
-
-    def needed_queue(self, place: int) -> int | None:
-        return self._losses.needed[place]
 
     def _serve(self, outcomes: list[Outcome]) -> None:
         triggers = self._queues[self._trigger]

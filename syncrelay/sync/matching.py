@@ -1,77 +1,30 @@
-"""A policy at work in a group: at once, with a limit to what may wait, or by the clock."""
+"""A policy at work in a group, whose sets leave when it makes them, or with a limit to what may wait.
+
+Both kinds have the methods of a policy, with inputs in place of its places. `feed` takes an input, the stamp to match
+by and a message, at the time of the last `due`, which returns what has waited long enough; `next_deadline` is when
+something will have, if no message comes before.
+"""
 
 from collections import deque
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Sequence
 
 from syncrelay.sync.arrivals import Arrivals
 from syncrelay.sync.messages import Drop, DropReason, Match, Message, Outcome
+from syncrelay.sync.optional import Waiting
 from syncrelay.sync.policy import Policy
 
 
-class Matching(Protocol):
-    """Feeds a policy the messages of a group, and lets sets leave in time. By default sets leave when they are made."""
-
-    __slots__ = ()
-
-    _policy: Policy
-
-    feed: Callable[[int, int, Message], Sequence[Outcome]]
-    """Takes an input, the stamp to match by and a message, at the time of the last `due`; returns what leaves."""
-
-    def due(self, now: int) -> Sequence[Outcome]:
-        """Return what has waited long enough."""
-        del now
-        return ()
-
-    def next_deadline(self) -> int | None:
-        """Return when something will have waited long enough, if no message comes before."""
-        return None
-
-    def pass_over(self, now: int) -> None:
-        """Let time pass without the sets that only the clock would have given."""
-        del now
-
-    def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop all that is buffered, and be as new."""
-        return self._policy.flush(reason)
-
-    def let_go(self, reason: DropReason) -> list[Drop]:
-        """Drop what waits for others; see Policy."""
-        return self._policy.let_go(reason)
-
-    def buffered(self, index: int) -> int:
-        """Return how many messages of this input are buffered and have been in no set."""
-        return self._policy.buffered(index)
-
-    def needed_queue(self, index: int) -> int | None:
-        """See Policy."""
-        return self._policy.needed_queue(index)
-
-
-class Unlimited(Matching):
-    """A set waits as long as the policy has it wait, so it must not wait for an optional input."""
-
-    __slots__ = ("_policy", "feed")
-
-    def __init__(self, policy: Policy, *, required: Sequence[bool]) -> None:
-        self._policy, stage = policy.for_required(required)
-        if stage.inputs:
-            raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
-        # The policy's own method: a method between would be called for every message.
-        self.feed = self._policy.feed
-
-
-class ByClock(Matching):
-    """A policy that makes its sets as time passes: the set of a time leaves `max_wait_ns` after it."""
+class Prompt:
+    """Sets leave when the policy makes them: those of a clock's tick `max_wait_ns` after it."""
 
     __slots__ = ("_max_wait", "_policy", "feed")
 
-    def __init__(self, policy: Policy, *, required: Sequence[bool], max_wait_ns: int) -> None:
+    def __init__(self, policy: Policy, *, required: Sequence[bool], max_wait_ns: int = 0) -> None:
         self._policy, stage = policy.for_required(required)
         if stage.inputs:
-            raise ValueError("a policy that is by the clock deals with optional inputs itself")
+            raise ValueError("an optional input needs max_wait_ns: a set would wait for it without end")
         self._max_wait = max_wait_ns
+        # The policy's own method: a method between would be called for every message.
         self.feed = self._policy.feed
 
     def due(self, now: int) -> Sequence[Outcome]:
@@ -84,8 +37,20 @@ class ByClock(Matching):
     def pass_over(self, now: int) -> None:
         self._policy.pass_over(now - self._max_wait)
 
+    def flush(self, reason: DropReason) -> list[Drop]:
+        return self._policy.flush(reason)
 
-class Limited(Matching):
+    def let_go(self, reason: DropReason) -> list[Drop]:
+        return self._policy.let_go(reason)
+
+    def buffered(self, index: int) -> int:
+        return self._policy.buffered(index)
+
+    def needed_queue(self, index: int) -> int | None:
+        return self._policy.needed_queue(index)
+
+
+class Limited:
     """A set waits no longer than `max_wait_ns` from when its required messages are all there.
 
     A wait counts from the `now` at which the message that began it was fed. Where `now` falls, all waits count from
@@ -103,7 +68,6 @@ class Limited(Matching):
         "_stage",
         "_waits_ended",
         "_waits_started",
-        "feed",
     )
 
     def __init__(
@@ -124,9 +88,8 @@ class Limited(Matching):
         self._now = 0
         self._since: deque[int] = deque()
         self._waits_started = self._waits_ended = 0
-        self.feed = self._fed
 
-    def _fed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
+    def feed(self, index: int, stamp: int, message: Message) -> Sequence[Outcome]:
         place = self._places.get(index)
         if place is None:
             outcomes = self._stage.put(index, stamp, message)
@@ -153,6 +116,9 @@ class Limited(Matching):
         if since is None and self._since:
             since = self._since[0]
         return None if since is None else since + self._max_wait
+
+    def pass_over(self, now: int) -> None:
+        """Let time pass: only a clock would give sets meanwhile."""
 
     def flush(self, reason: DropReason) -> list[Drop]:
         drops = self._policy.flush(reason) + self._stage.flush(reason)
@@ -182,11 +148,11 @@ class Limited(Matching):
                 continue
             # Sets may wait in the stage. A message that is older than theirs is late already.
             self._arrivals.give(outcome.messages)
-            joined += self._stage.hold(*self._widened(outcome), since)
+            joined += self._stage.hold(self._widened(outcome, since))
             since = now
         return joined
 
-    def _widened(self, match: Match) -> tuple[tuple[Message | None, ...], int, int]:
+    def _widened(self, match: Match, since: int) -> Waiting:
         """Return a set with a place for every input, and the least and the greatest stamp that it was matched by."""
         messages: list[Message | None] = [None] * len(self._offsets)
         stamps = []
@@ -194,7 +160,7 @@ class Limited(Matching):
             if message is not None:
                 messages[message.input] = message
                 stamps.append(message.stamp + self._offsets[message.input])
-        return tuple(messages), min(stamps), max(stamps)
+        return Waiting(tuple(messages), min(stamps), max(stamps), since)
 
     def _note_waits(self, now: int) -> int:
         """Note which waits began and ended. Return when the first one that ended had begun, `now` if none ended."""

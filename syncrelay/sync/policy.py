@@ -4,44 +4,8 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from syncrelay.sync.messages import Drop, DropReason, Message, Outcome
-
-
-class OptionalStage(Protocol):
-    """Where the sets of required inputs wait for messages of the optional ones. They leave in the order they come."""
-
-    __slots__ = ()
-
-    inputs: Sequence[int]
-    """The optional inputs."""
-
-    @property
-    def oldest_since(self) -> int | None:
-        """When the oldest set began to wait."""
-        ...
-
-    def wait_from(self, now: int) -> None:
-        """Let no wait have begun later than `now`, because the clock fell."""
-        ...
-
-    def put(self, index: int, stamp: int, message: Message) -> list[Outcome]:
-        """Take a message of an optional input; return what leaves because of it."""
-        ...
-
-    def hold(self, messages: tuple[Message | None, ...], low: int, high: int, since: int) -> list[Outcome]:
-        """Take a set of the required inputs whose stamps go from `low` to `high`; return what leaves."""
-        ...
-
-    def leave(self) -> list[Outcome]:
-        """Let the oldest set leave with what there is."""
-        ...
-
-    def flush(self, reason: DropReason) -> list[Drop]:
-        """Drop everything, and be as new."""
-        ...
-
-    def buffered(self, index: int) -> int:
-        """How many messages of this input, required or not, are in here."""
-        ...
+from syncrelay.sync.optional import OptionalStage
+from syncrelay.sync.queues import Losses, StampQueue
 
 
 class Policy(Protocol):
@@ -119,6 +83,25 @@ class Policy(Protocol):
     def needed_queue(self, place: int) -> int | None:
         """Return how long a queue would have held all that other messages missed; None if nothing was missed."""
         ...
+
+
+class Queued(Policy, Protocol):
+    """A policy that keeps the messages of each input in a queue."""
+
+    __slots__ = ()
+
+    _queues: Sequence[StampQueue]
+    _losses: Losses
+
+    def flush(self, reason: DropReason) -> list[Drop]:
+        self._losses.forget()
+        return [drop for queue in self._queues for drop in queue.drop(len(queue.stamps), reason)]
+
+    def buffered(self, place: int) -> int:
+        return self._queues[place].unmatched
+
+    def needed_queue(self, place: int) -> int | None:
+        return self._losses.needed[place]
 
 
 def check_sizes(n_inputs: int, queue_size: int) -> None:

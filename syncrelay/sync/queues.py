@@ -22,6 +22,9 @@ class StampQueue:
         self.messages: list[Message] = []
         self.is_served = False
 
+    def __len__(self) -> int:
+        return len(self.stamps)
+
     @property
     def unmatched(self) -> int:
         """How many messages have been in no set."""
@@ -51,13 +54,13 @@ class StampQueue:
     def take(self, count: int) -> list[Message]:
         """Remove the oldest `count` messages and return them."""
         taken = self.messages[:count]
-        del self.messages[:count]
-        del self.stamps[:count]
+        del self.messages[:count], self.stamps[:count]
         return taken
 
     def drop(self, count: int, reason: DropReason) -> list[Drop]:
         """Remove the oldest `count` messages; return the drops of those that have been in no set."""
-        taken = self.take(count)
+        taken = self.messages[:count]
+        del self.messages[:count], self.stamps[:count]
         if taken and self.is_served:
             self.is_served = False
             del taken[0]
