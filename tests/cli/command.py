@@ -1,6 +1,8 @@
 """The command line as a user starts it: a process of its own, or here where that is not what is tested."""
 
 import os
+import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -11,6 +13,8 @@ from typing import IO
 from unittest.mock import patch
 
 from syncrelay.cli import main
+from syncrelay.cli import run as relay
+from syncrelay.cli.commands import COMMANDS
 from tests import preloaded
 
 ROOT = Path(__file__).parents[2]
@@ -25,6 +29,15 @@ groups:
       - {topic: /b, type: sensor_msgs/msg/Image}
 """
 BAD = GOOD.replace("exact_time", "exact_tim")
+
+
+def example(command: str) -> list[str]:
+    """The words behind `syncrelay COMMAND` in the example that a command's help ends with; "" is the relay."""
+    parser = COMMANDS[command].parser() if command else relay.parser()
+    (line,) = re.findall(r"^example: (?:\w+=\S+ )?syncrelay (.*)$", parser.epilog or "", re.MULTILINE)
+    words = shlex.split(line.partition(" > ")[0])
+    assert words[:1] == [command] or not command
+    return words[bool(command) :]
 
 
 def run(

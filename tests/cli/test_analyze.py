@@ -196,25 +196,3 @@ def test_several_recordings_are_measured_one_after_another_and_a_faulty_one_ends
     (folder / "bad.yaml").write_text((folder / "f.yaml").read_text().replace("slop", "slopp"))
     faulty = run_here("analyze", "rig.mcap", "short.mcap", "--config", "bad.yaml", folder=folder)
     assert (faulty.returncode, faulty.stdout, faulty.stderr.count("unknown key")) == (1, "", 1)
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "said"),
-    [
-        (["rig.mcap", "--html", "r.html"], 2, "name a file with --config FILE, or the topics to match: there is"),
-        (["rig.mcap", "--write", "n.yaml"], 2, "name a file with --config FILE, or the topics to match: there is"),
-        (
-            ["rig.mcap", "/camera", "--config", "f.yaml"],
-            2,
-            "name a file with --config FILE, or the topics to match, not both",
-        ),
-        (["rig.mcap", "/camera"], 2, "name 2 topics or more"),
-        (["rig.mcap", "/camera", "/lidr"], 1, "/lidr is not in the recording, did you mean `/lidar`?"),
-        (["none.mcap", "/camera", "/lidar"], 1, "none.mcap: no such file or folder"),
-        (["x" * 300, "/camera", "/lidar"], 1, f"{'x' * 300}: cannot be read: File name too long"),
-    ],
-)
-def test_what_is_wrong_is_said(words, code, said, folder):
-    done = run_here("analyze", *words, folder=folder)
-    assert (done.returncode, done.stdout) == (code, "")
-    assert done.stderr.startswith(f"syncrelay: {said}")

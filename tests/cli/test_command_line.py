@@ -5,9 +5,7 @@ import sys
 
 import pytest
 
-from syncrelay.cli import run as relay
 from syncrelay.cli.commands import COMMANDS
-from syncrelay.cli.parser import HelpRequested
 from tests.cli.command import BAD, GOOD, ROOT, run, run_here, run_python
 
 
@@ -41,73 +39,11 @@ def test_the_version_is_that_of_the_package(tmp_path):
     assert done.stdout.startswith("syncrelay ")
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["validat", "f.yaml"], "unknown command validat, did you mean `validate`?\n  syncrelay --help"),
-        (["xyzzy"], "unknown command xyzzy\n  syncrelay --help lists the commands"),
-        (["f.yaml"], "f.yaml is not a command\n  syncrelay --config f.yaml "),
-        (["--confg", "f.yaml"], "unknown argument --confg, did you mean `--config`?\n  see syncrelay --help"),
-        (["--config"], "argument --config: expected one argument"),
-        (["--config", "f.yaml", "g.yaml"], "unknown argument g.yaml"),
-        (["--config", "f.yaml", "--log-level", "loud"], "argument --log-level: invalid choice: 'loud'"),
-        (["--config", "f.yaml", "-r", "__ns:=/a"], "unknown argument -r"),
-        (["--ros-args", "--config", "f.yaml"], "--config FILE is missing"),
-        (["validate"], "the following arguments are required: FILE\n  see syncrelay validate --help"),
-        (["validate", "--formt=json", "f.yaml"], "unknown argument --formt=json, did you mean `--format`?"),
-        (
-            ["analyze", "rig.mcap", "--config", "f.yaml", "--config", "g.yaml"],
-            "--config was given more than once: analyze",
-        ),
-        (["schema", "f.yaml"], "unknown argument f.yaml"),
-        (["doctor", "--seconds", "3"], "--seconds N needs --live: it is how long to observe the graph"),
-        (["doctor", "--live", "--seconds", "0"], "argument --seconds: expected a number above 0, found 0"),
-        (["demo", "--seconds", "soon"], "argument --seconds: expected a number above 0, found soon"),
-        (["demo", "--seconds", "nan"], "argument --seconds: expected a number above 0, found nan"),
-        (
-            ["demo", "--record", "rig.mcap", "--seconds", "1e308"],
-            "argument --seconds: expected a number of at most 1000000000, found 1e308",
-        ),
-        (["demo", "--seed", "one"], "argument --seed: expected a whole number of 0 or more, found one"),
-        (["replay", "rig.mcap", "--config", "f.yaml", "--seed", "1"], "--seed goes with --what-if"),
-        (["analyze"], "the following arguments are required: BAG\n"),
-    ],
-)
-def test_a_wrong_word_is_a_usage_error_that_helps(words, said, tmp_path):
-    done = run(*words, folder=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith(f"syncrelay: {said}")
-
-
-def test_a_group_that_the_file_lacks_is_a_usage_error(tmp_path):
-    (tmp_path / "f.yaml").write_text(GOOD)
-    done = run("--config", "f.yaml", "--group", "frnt", folder=tmp_path)
-    assert done.returncode == 2
-    assert "did you mean `front`?" in done.stderr
-
-
 def test_the_relay_shows_the_faults_of_its_file_as_validate_does(tmp_path):
     (tmp_path / "f.yaml").write_text(BAD)
     relayed = run("--config", "f.yaml", folder=tmp_path)
     assert (relayed.returncode, relayed.stdout) == (1, "")
     assert relayed.stderr == run("validate", "f.yaml", folder=tmp_path).stderr
-
-
-@pytest.mark.parametrize("command", ["", *COMMANDS])
-def test_the_help_of_every_command_ends_with_an_example_of_it(command):
-    with pytest.raises(HelpRequested) as asked:
-        (COMMANDS[command].parser if command else relay.parser)().read(["--help"])
-    *_, example = str(asked.value).splitlines()
-    assert example.startswith("example: ")
-    assert len(example) <= 80
-    words = shlex.split(example.removeprefix("example: ").partition(" > ")[0])
-    at = words.index("syncrelay")
-    assert all("=" in word for word in words[:at])
-    if not command:
-        assert relay.parser().read(words[at + 1 :]).config
-        return
-    assert words[at + 1] == command
-    COMMANDS[command].parser().read(words[at + 2 :])
 
 
 @pytest.mark.parametrize("name", ["drive.mcap", "a drive.db3.zstd", "old.bag", "rosbag2_day"])

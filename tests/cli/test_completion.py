@@ -167,12 +167,6 @@ def test_every_word_that_a_command_takes_is_known_to_completion():
     assert taken - _UNKNOWN == set(COMPLETERS) - {"COMMAND"}
 
 
-def test_an_unknown_shell_is_a_usage_error(tmp_path):
-    done = run("completion", "tcsh", folder=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "invalid choice: 'tcsh'" in done.stderr
-
-
 @pytest.fixture
 def environ(folder):
     """An environment in which `syncrelay` is the one that is tested, and a script for each shell is in the folder."""

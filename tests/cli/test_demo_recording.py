@@ -52,8 +52,3 @@ def test_a_seed_repeats_it(folder, tmp_path):
     content = (folder / "rig.mcap").read_bytes()
     assert (tmp_path / "same.mcap").read_bytes() == content
     assert (tmp_path / "other.mcap").read_bytes() != content
-
-
-def test_nothing_is_overwritten(folder):
-    done = run_here("demo", "--record", "rig.mcap", folder=folder)
-    assert (done.returncode, done.stderr) == (1, "syncrelay: rig.mcap: already exists and is not overwritten\n")

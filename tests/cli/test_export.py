@@ -183,25 +183,17 @@ def test_messages_that_cannot_be_decoded_are_told(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "told"),
+    ("words", "told"),
     [
-        (["--fields", "/camera"], 2, "--fields /camera: expected TOPIC:FIELD,FIELD"),
-        (["--fields", "/camra:x"], 2, "/camra is no input of the file, did you mean `/camera`?"),
-        (["--fields", "/camera:vectr"], 1, "has no field `vectr`, did you mean `vector`?"),
-        (["--group", "frnt"], 2, "--group frnt: pair.yaml has no such group, did you mean `front`?"),
-        (["--images", "jpg"], 2, "--images jpg: expected png or jpeg, or TOPIC=png or TOPIC=jpeg"),
-        (["--images", "/camra=png"], 2, "/camra is no input of the file, did you mean `/camera`?"),
-        (["--images", "/camera=png", "--images", "/camera=jpeg"], 2, "a format is named twice for /camera: name one"),
-        (["--images", "/lidar=png"], 1, "/lidar is geometry_msgs/msg/Vector3Stamped, expected sensor_msgs/msg/Image"),
-        (["--raw", "--images", "png"], 2, "--raw keeps each message as it is"),
-        (["--format", "mcap", "--raw"], 2, "--format mcap writes whole messages"),
+        (["--fields", "/camera:vectr"], "has no field `vectr`, did you mean `vector`?"),
+        (["--images", "/lidar=png"], "/lidar is geometry_msgs/msg/Vector3Stamped, expected sensor_msgs/msg/Image"),
     ],
 )
-def test_words_that_make_no_sense_are_refused(tmp_path, words, code, told):
+def test_what_a_type_does_not_have_is_a_fault_of_the_recording(tmp_path, words, told):
     write_mcap(tmp_path / "bag.mcap", rig())
     (tmp_path / "pair.yaml").write_text(PAIR)
     done = run("export", "bag.mcap", "--config", "pair.yaml", "-o", "out", *words, folder=tmp_path)
-    assert (done.returncode, told in done.stderr) == (code, True), done.stderr
+    assert (done.returncode, told in done.stderr) == (1, True), done.stderr
 
 
 def test_memory_does_not_grow_with_the_recording(tmp_path):

@@ -6,7 +6,6 @@ In `make test` a process hides what no base dependency brings; `make test-bare` 
 import importlib.metadata
 import os
 import re
-import shlex
 import subprocess
 import sys
 import tomllib
@@ -17,7 +16,7 @@ from packaging.utils import canonicalize_name
 
 from syncrelay.cli.boundary import guarded
 from syncrelay.cli.commands import COMMANDS, EXTRAS
-from tests.cli.command import GOOD, ROOT
+from tests.cli.command import GOOD, ROOT, example
 
 _PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 _BARE = os.environ.get("SYNCRELAY_BARE")
@@ -67,16 +66,9 @@ def _run(words, folder):
     return subprocess.run(argv, cwd=folder, env=environ, capture_output=True, text=True, check=False, timeout=120)
 
 
-def _example(name: str) -> list[str]:
-    """The words with which a command's help ends."""
-    (line,) = re.findall(r"^example: (.*)$", COMMANDS[name].parser().epilog or "", re.MULTILINE)
-    words = shlex.split(line.partition(" > ")[0])
-    return words[words.index("syncrelay") + 1 :]
-
-
 _TOLD = re.compile(r"pip install 'syncrelay\[([a-z,]+)\]'")
 _WORDS = [
-    *map(_example, COMMANDS),
+    *([name, *example(name)] for name in COMMANDS),
     *map(
         str.split,
         (

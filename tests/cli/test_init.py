@@ -49,21 +49,3 @@ def test_what_it_writes_for_packages_that_are_not_installed_is_in_order_too(fold
     assert (done.returncode, done.stderr) == (0, "")
     assert "note: groups.epoch_1.topics[0].type: the package `rig_msgs` is not installed here" in done.stdout
     assert run_here("replay", "custom.mcap", "--config", "custom.yaml", folder=folder).returncode == 0
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "said"),
-    [
-        ([], 2, "one of the arguments --from-bag --from-graph is required"),
-        (["--from-bag", "rig.mcap", "--from-graph"], 2, "argument --from-graph: not allowed with argument --from-bag"),
-        (["--from-bag", "rig.mcap", "--seconds", "3"], 2, "--seconds N needs --from-graph"),
-        (["--from-graph", "--seconds", "0"], 2, "argument --seconds: expected a number above 0, found 0"),
-        (["--from-bag", "none.mcap"], 1, "none.mcap: no such file or folder"),
-        (["--from-bag", "x" * 300], 1, f"{'x' * 300}: cannot be read: File name too long"),
-        (["--from-bag", "rig.mcap", "-o", "mine.yaml"], 1, "mine.yaml: already exists and is not overwritten"),
-    ],
-)
-def test_what_is_wrong_is_said(words, code, said, folder):
-    done = run_here("init", *words, folder=folder)
-    assert (done.returncode, done.stdout) == (code, "")
-    assert done.stderr.startswith(f"syncrelay: {said}")

@@ -114,23 +114,6 @@ def test_only_drops_are_printed_where_they_are_asked_for(tmp_path, words):
     assert [line.split()[2] for line in done.stdout.splitlines()] == ["drop,", "drop,"]
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (["frnt"], "the relay has no group `frnt`, did you mean `front`?"),
-        (["--input", "/nothing"], "the relay has no input `/nothing`"),
-        (["--reason", "lat"], "invalid choice: 'lat'"),
-        (["-n", "0"], "expected a whole number above 0, found 0"),
-        (["--drop"], "unknown argument --drop, did you mean `--drops`?"),
-    ],
-)
-def test_what_the_relay_does_not_have_is_wrong_usage(tmp_path, words, text):
-    with leaving() as url:
-        done = run("tap", *words, "--url", url, folder=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert text in done.stderr
-
-
 def test_without_a_relay_it_says_what_to_do(tmp_path):
     with leaving() as url:
         pass

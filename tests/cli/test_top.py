@@ -54,20 +54,6 @@ def test_where_no_relay_answers_it_says_what_to_do(tmp_path):
     ]
 
 
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (["--json"], "--json goes with --once"),
-        (["--url", "ftp://robot"], "expected a host, host:port or http://host:port"),
-        (["--urls", "robot"], "unknown argument --urls, did you mean `--url`?"),
-    ],
-)
-def test_wrong_usage_is_said(tmp_path, words, text):
-    shown = run("top", *words, folder=tmp_path)
-    assert shown.returncode == 2
-    assert text in shown.stderr
-
-
 def test_without_a_terminal_it_points_to_text(tmp_path):
     with serving(states.healthy()) as server:
         shown = run("top", "--url", server.url, folder=tmp_path)

@@ -117,32 +117,6 @@ def test_files_together_are_checked_as_the_relay_takes_them(folder, environ):
     assert (relayed.returncode, relayed.stderr) == (1, together.stderr)
 
 
-@pytest.mark.parametrize("second", ["good.yaml", "./good.yaml", "link.yaml"])
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["validate", "--together", "{}", "{}"],
-        ["--config", "{}", "--config", "{}"],
-        ["replay", "x.mcap", "--config", "{}", "--config", "{}"],
-        ["doctor", "--config", "{}", "--config", "{}"],
-    ],
-    ids=lambda words: words[0],
-)
-def test_a_file_that_is_to_run_together_with_itself_is_wrong_usage(folder, environ, words, second):
-    (folder / "link.yaml").symlink_to("good.yaml")
-    files = iter(["good.yaml", second])
-    done = run(*(next(files) if word == "{}" else word for word in words), folder=folder, environ=environ)
-    same = "good.yaml is named twice" if second == "good.yaml" else f"good.yaml and {second} are the same file"
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.splitlines()[0] == f"syncrelay: {same}: name each file once"
-
-
-@pytest.mark.parametrize("words", [["--together"], []], ids=["together", "each by itself"])
-def test_standard_input_is_read_once(folder, environ, words):
-    done = run("validate", *words, "-", "-", folder=folder, environ=environ, stdin=GOOD)
-    assert (done.returncode, done.stderr.splitlines()[0]) == (2, "syncrelay: - is named twice: name each file once")
-
-
 def test_json_tells_of_files_together_in_which_the_problem_is(folder, environ):
     words = ["validate", "--together", "--format=json", "good.yaml", "f.yaml"]
     good, front = json.loads(run_here(*words, folder=folder, environ=environ).stdout)

@@ -3,7 +3,6 @@
 import pytest
 
 from syncrelay.cli.replay import command, parser
-from syncrelay.errors import UsageError
 from tests.recordings.bag.making import rig, write_mcap
 from tests.recordings.cases.suites import write
 from tests.ros.cdr_messages import VECTOR
@@ -48,20 +47,3 @@ def test_a_fault_that_changes_nothing_is_told(replayed):
 def test_a_seed_decides_what_is_lost(replayed):
     lost = ("--what-if", "drop: /lidar 50%", "--json", "--seed")
     assert replayed(*lost, "1") == replayed(*lost, "1") != replayed(*lost, "2")
-
-
-@pytest.mark.parametrize(
-    ("words", "error"),
-    [
-        (
-            ("--what-if", "lat: /lidar 3ms"),
-            "argument --what-if: `lat: /lidar 3ms` is not a fault, did you mean `late`?",
-        ),
-        (("--what-if", "dead: /lida"), "`dead: /lida`: there is no topic `/lida`, did you mean `/lidar`?"),
-        (("--seed", "-1"), "expected a whole number of 0 or more, found -1"),
-    ],
-)
-def test_what_cannot_be_is_wrong_usage(replayed, words, error):
-    with pytest.raises(UsageError) as raised:
-        replayed(*words)
-    assert error in str(raised.value)
