@@ -2,26 +2,20 @@
 
 import os
 import pty
+import re
 import select
 import struct
 import subprocess
+import sys
 import termios
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from fcntl import ioctl
 
 from tests.cli.command import ROOT
 
 _DEADLINE_S = 60
-
-
-def read_to_the_end(descriptor):
-    """All that was written to a terminal that nobody has open any more; a single read may cut it anywhere."""
-    parts = []
-    with suppress(OSError):  # once nobody writes, Linux says EIO
-        while part := os.read(descriptor, 65536):
-            parts.append(part)
-    return b"".join(parts)
+_ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\x1b[=>]|[\r\x07]")
 
 
 class Terminal:
@@ -44,8 +38,14 @@ class Terminal:
 
     def wait_for(self, text):
         end = time.monotonic() + _DEADLINE_S
-        while text not in self.written:
+        while text not in _ESCAPES.sub("", self.written):
             assert self._read(end), f"waited in vain for {text!r}: {self.written!r}"
+
+    def type(self, text, *, until):
+        """Type a text, and wait until something is shown from then on."""
+        self._written = b""
+        self.press(text)
+        self.wait_for(until)
 
     def wait_for_end(self):
         end = time.monotonic() + _DEADLINE_S
@@ -86,3 +86,10 @@ def on_terminal(argv, *, folder, environ):
         process.kill()
         process.wait()
         os.close(ours)
+
+
+def shown_on_terminal(*words, folder, **environ):
+    """Run syncrelay on a terminal to its end: its exit code, and all that it wrote."""
+    argv = [sys.executable, "-m", "syncrelay", *words]
+    with on_terminal(argv, folder=folder, environ=environ) as terminal:
+        return terminal.wait_for_end(), terminal.written

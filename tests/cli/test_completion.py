@@ -16,7 +16,7 @@ from syncrelay.cli.commands import COMMANDS
 from syncrelay.cli.completion import COMPLETERS
 from syncrelay.yaml_files import group_names
 from tests.cli.command import ROOT, run, run_python
-from tests.cli.shells import Shell
+from tests.cli.terminals import on_terminal
 from tests.recordings.bag.making import rig, write_mcap, write_rosbag2
 
 _FILE = """\
@@ -202,7 +202,7 @@ def test_tab_completes_in_a_terminal(shell, folder, environ):
     require(shell)
     argv, start = _STARTS[shell]
     write_mcap(folder / "rig.mcap", rig(3))
-    with Shell(argv, folder=folder, environ=environ) as terminal:
+    with on_terminal(argv, folder=folder, environ=environ) as terminal:
         terminal.type(f"{start}; echo re''ady\n", until="ready")
         for begun, whole in (
             ("syncrelay val", "syncrelay validate "),

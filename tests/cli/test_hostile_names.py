@@ -4,11 +4,8 @@ import asyncio
 import html.parser
 import json
 import os
-import pty
 import random
 import re
-import subprocess
-import sys
 import threading
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -24,8 +21,8 @@ from syncrelay.cli.stop import StopRequest
 from syncrelay.status import status_of
 from syncrelay.top.app import TopApp
 from syncrelay.top.client import ask
-from tests.cli.command import BAD, GOOD, ROOT
-from tests.cli.terminals import read_to_the_end
+from tests.cli.command import BAD, GOOD
+from tests.cli.terminals import shown_on_terminal
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.recordings.bag.making import rig
 from tests.ros.cdr_messages import STORE, VECTOR
@@ -288,16 +285,7 @@ def test_words_of_the_command_line(folder, chance, shown):
 def test_on_a_terminal_only_our_own_colours_are_let_through(folder, chance):
     path = folder / f"{_file_name(chance)}.yaml"
     path.write_text(GOOD.replace("/a", json.dumps(hostile_name(chance))))
-    ours, theirs = pty.openpty()
-    done = subprocess.run(
-        [sys.executable, "-m", "syncrelay", "validate", str(path)],
-        env={**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "NO_COLOR": ""},
-        stderr=theirs,
-        check=False,
-    )
-    os.close(theirs)
-    shown = read_to_the_end(ours).decode()
-    os.close(ours)
-    assert (done.returncode, "\x1b[31m" in shown) == (1, True)
+    code, shown = shown_on_terminal("validate", str(path), folder=folder)
+    assert (code, "\x1b[31m" in shown) == (1, True)
     assert_shown_safely(re.sub("\x1b\\[[0-9]{1,2}m", "", shown.replace("\r\n", "\n")))
     assert set(re.findall("\x1b\\[([0-9]+)m", shown)) <= {"0", "1", "31", "34"}

@@ -134,7 +134,7 @@ def test_every_option_is_suggested_where_it_is_misspelt_and_refuses_what_it_does
     for action in make().actions:
         for option in (each for each in action.option_strings if each.startswith("--")):
             misspelt = f"{option[:3]}{option[2:]}"
-            said = {(misspelt,): f"unknown argument {misspelt}, did you mean `{option}`?"}
+            said: dict[tuple[str, ...], str] = {(misspelt,): f"unknown argument {misspelt}, did you mean `{option}`?"}
             if action.nargs != 0:
                 said[option,] = f"argument {'/'.join(action.option_strings)}: expected one argument"
             if action.choices is not None:

@@ -1,13 +1,11 @@
 import json
-import os
-import pty
-import subprocess
+import shlex
 import sys
 
 import pytest
 
-from tests.cli.command import ROOT, run, run_here, run_python
-from tests.cli.terminals import read_to_the_end
+from tests.cli.command import run, run_here, run_python
+from tests.cli.terminals import on_terminal
 from tests.recordings.bag.making import rig, write_mcap, write_ros1
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
@@ -118,18 +116,8 @@ def test_it_needs_no_ros(folder):
 
 
 def test_a_terminal_gets_a_bar_on_stderr_that_leaves_no_trace_on_stdout(folder):
-    ours, theirs = pty.openpty()
-    done = subprocess.run(
-        [sys.executable, "-m", "syncrelay", "replay", "rig.mcap", "--config", "f.yaml"],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm"},
-        stdout=subprocess.PIPE,
-        stderr=theirs,
-        text=True,
-        check=False,
-    )
-    os.close(theirs)
-    shown = read_to_the_end(ours)
-    os.close(ours)
-    assert b"reading" in shown
-    assert done.stdout == _SUMMARY
+    line = f"exec {shlex.quote(sys.executable)} -m syncrelay replay rig.mcap --config f.yaml > out"
+    with on_terminal(["sh", "-c", line], folder=folder, environ={}) as terminal:
+        assert terminal.wait_for_end() == 0
+    assert "reading" in terminal.written
+    assert (folder / "out").read_text() == _SUMMARY

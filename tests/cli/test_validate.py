@@ -1,6 +1,5 @@
 import json
 import os
-import pty
 import shlex
 import subprocess
 import sys
@@ -8,7 +7,7 @@ import sys
 import pytest
 
 from tests.cli.command import BAD, GOOD, ROOT, run, run_here
-from tests.cli.terminals import read_to_the_end
+from tests.cli.terminals import shown_on_terminal
 from tests.config.ament import make_index
 
 ERROR = """\
@@ -185,14 +184,8 @@ def test_github_takes_what_would_end_a_property_or_a_command(folder, environ):
     [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
 )
 def test_colour_is_for_terminals_that_want_it(variables, coloured, folder, environ):
-    reader, terminal = pty.openpty()
-    started = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm", "NO_COLOR": "", **environ, **variables}
-    command = [sys.executable, "-m", "syncrelay", "validate", "f.yaml"]
-    subprocess.run(command, cwd=folder, env=started, stderr=terminal, check=False, timeout=120)
-    os.close(terminal)
-    shown = read_to_the_end(reader).decode()
-    os.close(reader)
-    assert "unknown value" in shown
+    code, shown = shown_on_terminal("validate", "f.yaml", folder=folder, **environ, **variables)
+    assert (code, "unknown value" in shown) == (1, True)
     assert ("\033[" in shown) == coloured
 
 
