@@ -7,10 +7,18 @@ from typing import Final
 import numpy as np
 import pyarrow as pa
 
-from syncrelay.recordings.datasets.message_types import Array, Node, Number, Run, Struct, Text, arrow_type, is_empty
-from syncrelay.recordings.datasets.payload_rows import ENCAPSULATION, ORDERS, Rows, UnfitError, joined, offsets_of
+from syncrelay.recordings.datasets.message_types import has_uneven_elements, is_number
+from syncrelay.recordings.datasets.payload_rows import (
+    ENCAPSULATION,
+    ORDERS,
+    Order,
+    Rows,
+    UnfitError,
+    joined,
+    offsets_of,
+)
 
-# From here on copying a payload costs more than decoding it by itself.
+# From here on copying a payload costs more than decoding it by itself, if its elements have known sizes.
 _LARGE: Final = 65_536
 # Some writers pad a payload to a multiple of four bytes.
 _MOST_PADDING: Final = 3
@@ -19,13 +27,14 @@ _MOST_PADDING: Final = 3
 class Decoder:
     """Decodes the messages of one type."""
 
-    def __init__(self, tree: Struct) -> None:
-        """Take the tree of the type, in which some fields may not be asked for."""
-        self.arrow: Final = arrow_type(tree)
+    def __init__(self, whole: pa.StructType, wanted: pa.StructType) -> None:
+        """Take the type of the messages with all fields, and with those that are wanted; see arrow_type."""
+        self.arrow: Final = wanted
         """The type of the column."""
         self.undecodable = 0
         """How many payloads were not a message of this type. They are null."""
-        self._tree = tree
+        self._whole = whole
+        self._are_alone = not has_uneven_elements(whole)
 
     def decode(self, payloads: Sequence[bytes | None]) -> pa.ChunkedArray:
         """Return a column with a row for each payload: null for None and for what cannot be decoded."""
@@ -36,7 +45,7 @@ class Decoder:
             if len(payload) < ENCAPSULATION or payload[0] or payload[1] >= len(ORDERS):
                 self.undecodable += 1
             else:
-                together[payload[1], place if len(payload) >= _LARGE else -1].append(place)
+                together[payload[1], place if self._are_alone and len(payload) >= _LARGE else -1].append(place)
         parts: list[pa.Array] = []
         places: list[int] = []
         for (order, _), among in together.items():
@@ -50,12 +59,12 @@ class Decoder:
         whole = pa.concat_arrays(parts) if parts else pa.nulls(0, self.arrow)
         return pa.chunked_array([whole.take(pa.array(index, mask=index < 0))], type=self.arrow)
 
-    def _decoded(self, payloads: Sequence[bytes | None], places: list[int], order: str) -> tuple[pa.Array, list[int]]:
+    def _decoded(self, payloads: Sequence[bytes | None], places: list[int], order: Order) -> tuple[pa.Array, list[int]]:
         """Decode the payloads at these places; return the rows, and the places of those that could be decoded."""
         while places:
             rows = joined([payloads[place] or b"" for place in places], order)
             try:
-                column = _column(self._tree, rows)
+                column = _column(self._whole, self.arrow, rows)
                 rows.require((rows.at <= rows.end) & (rows.at + _MOST_PADDING >= rows.end))
             except UnfitError as unfit:
                 self.undecodable += len(unfit.messages)
@@ -65,43 +74,42 @@ class Decoder:
         return pa.nulls(0, self.arrow), places
 
 
-def _column(node: Node, rows: Rows) -> pa.Array:
-    """Return a field of all rows."""
-    match node:
-        case Number():
-            return rows.numbers(node)
-        case Text():
-            return rows.texts()
-        case Struct():
-            return _struct(node, rows)
-        case Array():
-            return pa.FixedSizeListArray.from_arrays(_elements(node, rows), type=arrow_type(node))
-        case Run():
-            return _run(node, rows)
+def _column(kind: pa.DataType, wanted: pa.DataType, rows: Rows) -> pa.Array:
+    """Return a field of all rows, with those of its own fields that are wanted."""
+    if pa.types.is_struct(kind):
+        return _struct(kind, wanted, rows)
+    if pa.types.is_fixed_size_list(kind):
+        return pa.FixedSizeListArray.from_arrays(_elements(kind, wanted, rows), type=wanted)
+    if pa.types.is_list(kind):
+        return _run(kind, wanted, rows)
+    if pa.types.is_binary(kind):
+        return rows.run_of_bytes()
+    return rows.texts() if pa.types.is_string(kind) else rows.numbers(kind)
 
 
-def _struct(node: Struct, rows: Rows) -> pa.Array:
+def _struct(kind: pa.StructType, wanted: pa.StructType, rows: Rows) -> pa.Array:
     columns = []
-    for field in node.fields:
-        if field.is_wanted and not is_empty(field.node):
-            columns.append(_column(field.node, rows))
+    for field in kind:
+        place = wanted.get_field_index(field.name)
+        if place < 0:
+            rows.skip(field.type)
         else:
-            rows.skip(field.node)
-    return pa.Array.from_buffers(arrow_type(node), len(rows), [None], children=columns)
+            columns.append(_column(field.type, wanted.field(place).type, rows))
+    return pa.Array.from_buffers(wanted, len(rows), [None], children=columns)
 
 
-def _elements(node: Array, rows: Rows) -> pa.Array:
-    if isinstance(node.element, Number):
-        return rows.numbers(node.element, node.count)
-    return _column(node.element, rows.elements(node.element, np.full(len(rows), node.count)))
+def _elements(kind: pa.FixedSizeListType, wanted: pa.FixedSizeListType, rows: Rows) -> pa.Array:
+    element, count = kind.value_type, kind.list_size
+    if is_number(element):
+        return rows.numbers(element, count)
+    return _column(element, wanted.value_type, rows.elements(element, np.full(len(rows), count)))
 
 
-def _run(node: Run, rows: Rows) -> pa.Array:
-    if not isinstance(node.element, Number):
-        counts = rows.lengths()
-        values = _column(node.element, rows.elements(node.element, counts))
-    elif node.is_bytes:
-        return rows.run_of_bytes(node.element)
+def _run(kind: pa.ListType, wanted: pa.ListType, rows: Rows) -> pa.Array:
+    element = kind.value_type
+    if is_number(element):
+        values, counts = rows.run_of_numbers(element)
     else:
-        values, counts = rows.run_of_numbers(node.element)
-    return pa.ListArray.from_arrays(offsets_of(counts), values, type=arrow_type(node))
+        counts = rows.lengths()
+        values = _column(element, wanted.value_type, rows.elements(element, counts))
+    return pa.ListArray.from_arrays(offsets_of(counts), values, type=wanted)

@@ -6,23 +6,19 @@ a sequence begin with a uint32 length; a string's length counts the zero that it
 """
 
 from collections.abc import Collection, Sequence
-from struct import Struct as Packed
-from struct import error
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 import pyarrow as pa
 
-from syncrelay.recordings.datasets.message_types import Array, Node, Number, Run, Struct, Text, size_of_many
+from syncrelay.recordings.datasets.message_types import LARGEST_ALIGNMENT, size_of, sizes_of
 
 ENCAPSULATION: Final = 4
 """How many bytes a payload has before the message."""
 
-ORDERS: Final = (">", "<")
+Order: TypeAlias = Literal[">", "<"]
+ORDERS: Final[tuple[Order, ...]] = (">", "<")
 """numpy's names of the byte orders that the second byte of a plain CDR payload stands for."""
-
-_COUNTS: Final = {order: Packed(f"{order}I") for order in ORDERS}
-_LARGEST_ALIGNMENT: Final = 8
 
 Integers: TypeAlias = "np.ndarray[Any, np.dtype[np.int64]]"
 
@@ -43,7 +39,7 @@ class Rows:
     number.
     """
 
-    def __init__(self, buffer: bytes, order: str, at: Integers, end: Integers, message: Integers) -> None:
+    def __init__(self, buffer: bytes, order: Order, at: Integers, end: Integers, message: Integers) -> None:
         self.at = at
         self.end = end
         self._buffer = buffer
@@ -58,28 +54,27 @@ class Rows:
         if not fits.all():
             raise UnfitError(self._message[~fits].tolist())
 
-    def numbers(self, number: Number, count: int = 1) -> pa.Array:
+    def numbers(self, kind: pa.DataType, count: int = 1) -> pa.Array:
         """Return the next `count` numbers of each row, row by row."""
-        begin = _aligned(self.at, number.size)
-        self._go_to(begin + number.size * count)
-        dtype = np.dtype(self._order + number.code)
-        size = number.size
+        size = size_of(kind)
+        begin = _aligned(self.at, size)
+        self._go_to(begin + size * count)
         # Whole numbers from behind the first encapsulation to the end.
-        values = np.frombuffer(self._buffer, dtype, (len(self._buffer) - ENCAPSULATION) // size, offset=ENCAPSULATION)
+        most = (len(self._buffer) - ENCAPSULATION) // size
+        values = np.frombuffer(self._buffer, self._dtype(kind), most, offset=ENCAPSULATION)
         first = (begin - ENCAPSULATION) // size
         if len(self) == 1:
-            return _arrow_numbers(number, values[first[0] : first[0] + count])
-        return _arrow_numbers(number, values[(first[:, None] + np.arange(count)).reshape(-1)])
+            return _arrow_numbers(kind, values[first[0] : first[0] + count])
+        return _arrow_numbers(kind, values[(first[:, None] + np.arange(count)).reshape(-1)])
 
-    def run_of_numbers(self, number: Number) -> tuple[pa.Array, Integers]:
+    def run_of_numbers(self, kind: pa.DataType) -> tuple[pa.Array, Integers]:
         """Return the numbers of a sequence of each row, row by row, and how many each row has."""
-        content, counts = self._run(number)
-        return _arrow_numbers(number, np.frombuffer(content, np.dtype(self._order + number.code))), counts
+        content, counts = self._run(size_of(kind))
+        return _arrow_numbers(kind, np.frombuffer(content, self._dtype(kind))), counts
 
-    def run_of_bytes(self, number: Number) -> pa.Array:
+    def run_of_bytes(self) -> pa.Array:
         """Return a sequence of bytes of each row."""
-        content, counts = self._run(number)
-        return _binary(content, counts)
+        return _binary(*self._run(1))
 
     def texts(self) -> pa.Array:
         """Return the next string of each row."""
@@ -103,13 +98,14 @@ class Rows:
         self.require(found <= self.end - self.at)
         return found
 
-    def elements(self, element: Node, counts: Integers) -> "Rows":
+    def elements(self, element: pa.DataType, counts: Integers) -> "Rows":
         """Go past the elements of an array or a sequence, and return them as rows, row by row."""
         begin = self.at
-        if element.sizes is None:
+        known = sizes_of(element)
+        if known is None:
             starts = self._go_through(element, counts)
         else:
-            sizes = np.array(element.sizes)
+            sizes = np.array(known)
             first = sizes[_residue(begin)]
             # From the second on all are equally far apart: each ends at the same distance from its last alignment.
             stride = sizes[_residue(begin + first)]
@@ -119,32 +115,36 @@ class Rows:
             starts = begin + np.where(number > 0, first + (number - 1) * stride, 0)
         return Rows(self._buffer, self._order, starts, np.repeat(self.end, counts), np.repeat(self._message, counts))
 
-    def skip(self, node: Node) -> None:
+    def skip(self, kind: pa.DataType) -> None:
         """Go past what nobody asks for."""
-        if node.sizes is not None:
-            self._go_to(self.at + np.array(node.sizes)[_residue(self.at)])
-            return
-        match node:
-            case Text():
-                lengths = self.lengths()
-                self._go_to(self.at + lengths)
-            case Struct():
-                for field in node.fields:
-                    self.skip(field.node)
-            case Array():
-                self.elements(node.element, np.full(len(self), node.count))
-            case Run():
-                self.elements(node.element, self.lengths())
+        sizes = sizes_of(kind)
+        if sizes is not None:
+            self._go_to(self.at + np.array(sizes)[_residue(self.at)])
+        elif pa.types.is_struct(kind):
+            for field in kind:
+                self.skip(field.type)
+        elif pa.types.is_fixed_size_list(kind):
+            self.elements(kind.value_type, np.full(len(self), kind.list_size))
+        elif pa.types.is_list(kind):
+            self.elements(kind.value_type, self.lengths())
+        else:
+            lengths = self.lengths()
+            self._go_to(self.at + lengths)
 
     def _go_to(self, at: Integers) -> None:
         self.at = at
         self.require(at <= self.end)
 
-    def _run(self, number: Number) -> tuple[Any, Integers]:
+    def _dtype(self, kind: pa.DataType) -> "np.dtype[Any]":
+        # Any byte but 0 is true.
+        plain: np.dtype[Any] = np.dtype("u1" if pa.types.is_boolean(kind) else kind.to_pandas_dtype())
+        return plain.newbyteorder(self._order)
+
+    def _run(self, size: int) -> tuple[Any, Integers]:
         counts = self.lengths()
         # An empty sequence ends with its length, whatever its numbers would be aligned to.
-        begin = np.where(counts > 0, _aligned(self.at, number.size), self.at)
-        self._go_to(begin + counts * number.size)
+        begin = np.where(counts > 0, _aligned(self.at, size), self.at)
+        self._go_to(begin + counts * size)
         return self._content(begin, self.at), counts
 
     def _content(self, begin: Integers, end: Integers) -> Any:
@@ -153,56 +153,26 @@ class Rows:
         parts = [whole[first:last] for first, last in zip(begin.tolist(), end.tolist(), strict=True)]
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
-    def _go_through(self, element: Node, counts: Integers) -> Integers:
-        """Go past elements of differing sizes one by one; return where each begins."""
-        starts: list[int] = []
-        unfit: list[int] = []
-        behind: list[int] = []
-        rows = zip(self.at.tolist(), self.end.tolist(), counts.tolist(), self._message.tolist(), strict=True)
-        for at, end, count, message in rows:
-            place = at
-            try:
-                for _ in range(count):
-                    starts.append(place)
-                    place = self._behind(element, place, end)
-            except error:
-                unfit.append(message)
-            behind.append(place)
-        if unfit:
-            raise UnfitError(unfit)
-        self.at = np.array(behind, np.int64)
-        return np.array(starts, np.int64)
-
-    def _behind(self, node: Node, place: int, end: int) -> int:
-        """Return the place behind a field of one message; raises struct.error where that has ended before."""
-        if node.sizes is not None:
-            place += node.sizes[_residue(place)]
-        elif isinstance(node, Struct):
-            for field in node.fields:
-                place = self._behind(field.node, place, end)
-        elif isinstance(node, Array):
-            for _ in range(node.count):
-                place = self._behind(node.element, place, end)
-        else:
-            place += -place % 4
-            (count,) = _COUNTS[self._order].unpack_from(self._buffer, place)
-            place += 4
-            if not isinstance(node, Run):
-                place += count
-            elif node.element.sizes is not None:
-                place += size_of_many(node.element.sizes, count, _residue(place))
-            else:
-                for _ in range(count):
-                    place = self._behind(node.element, place, end)
-        if place > end:
-            raise error
-        return place
+    def _go_through(self, element: pa.DataType, counts: Integers) -> Integers:
+        """Go past elements of differing sizes, the first of all rows, then the second; return where each begins."""
+        starts: list[Integers] = [np.zeros(0, np.int64)]
+        owners: list[Integers] = [np.zeros(0, np.int64)]
+        at = self.at.copy()
+        for number in range(counts.max(initial=0)):
+            among = np.flatnonzero(counts > number)
+            rows = Rows(self._buffer, self._order, at[among], self.end[among], self._message[among])
+            starts.append(rows.at)
+            owners.append(among)
+            rows.skip(element)
+            at[among] = rows.at
+        self.at = at
+        return np.concatenate(starts)[np.argsort(np.concatenate(owners), kind="stable")]
 
 
-def joined(payloads: Sequence[bytes], order: str) -> Rows:
+def joined(payloads: Sequence[bytes], order: Order) -> Rows:
     """Return payloads as rows, each begun behind its encapsulation."""
     sizes = np.array([len(each) for each in payloads], np.int64)
-    paddings = -sizes % _LARGEST_ALIGNMENT
+    paddings = -sizes % LARGEST_ALIGNMENT
     begin = np.cumsum(sizes + paddings) - sizes - paddings
     buffer = payloads[0]
     if len(payloads) > 1:
@@ -213,19 +183,19 @@ def joined(payloads: Sequence[bytes], order: str) -> Rows:
 
 def _residue(place: Any) -> Any:
     """Return by how much places are off the largest alignment."""
-    return (place - ENCAPSULATION) % _LARGEST_ALIGNMENT
+    return (place - ENCAPSULATION) % LARGEST_ALIGNMENT
 
 
 def _aligned(at: Integers, size: int) -> Integers:
     return at + -(at - ENCAPSULATION) % size
 
 
-def _arrow_numbers(number: Number, values: "np.ndarray[Any, Any]") -> pa.Array:
-    if pa.types.is_boolean(number.arrow):
+def _arrow_numbers(kind: pa.DataType, values: "np.ndarray[Any, Any]") -> pa.Array:
+    if pa.types.is_boolean(kind):
         return pa.array(values != 0)
     native = values.astype(values.dtype.newbyteorder("="), copy=False)
     # Within one large payload numbers may stand at any address.
-    return pa.array(np.require(native, requirements=["C", "A"]), type=number.arrow)
+    return pa.array(np.require(native, requirements=["C", "A"]), type=kind)
 
 
 def _binary(content: Any, lengths: Integers) -> pa.Array:

@@ -13,18 +13,19 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 import pyarrow as pa
+from rosbags.typesys.store import Typestore
 
 from syncrelay import own_version
 from syncrelay.config.wording import counted
 from syncrelay.errors import BagError
 from syncrelay.recordings.bag.bindings import GroupBinding, Input
 from syncrelay.recordings.bag.definitions import typestore
-from syncrelay.recordings.bag.recording import Channel
+from syncrelay.recordings.bag.recording import Channel, Definition
 from syncrelay.recordings.bag.replay import received
 from syncrelay.recordings.bag.writing import Outgoing, outgoing
 from syncrelay.recordings.datasets.decoding import Decoder
 from syncrelay.recordings.datasets.images import IMAGE, NEEDED, ImageColumn, ImageFormat
-from syncrelay.recordings.datasets.message_types import only, type_tree
+from syncrelay.recordings.datasets.message_types import arrow_type
 from syncrelay.sync import Match, Message, Outcome
 
 _TIME: Final = pa.timestamp("ns", tz="UTC")
@@ -145,7 +146,7 @@ class _InputColumn:
         self.type: Final = each.config.type or ""
         self._offset = each.config.offset_ns
         self._outgoing: dict[Channel, Outgoing] = {channel: outgoing(each, channel) for channel in each.channels}
-        self._decoders: dict[Channel, Decoder] = {}
+        self._decoder: Decoder | None = None
         self._undecodable = 0
         self._images: ImageColumn | None = None
         self.arrow: pa.DataType = pa.binary() if content.raw else pa.null()
@@ -160,34 +161,36 @@ class _InputColumn:
         image_format = content.images.get(each.topic, content.other_images)
         if image_format is not None and self.type == IMAGE and (paths is None or "data" in paths):
             self._images = ImageColumn(each.topic, image_format)
-        by_definition: dict[Any, Decoder] = {}
-        for channel in each.channels:
-            if channel.definition not in by_definition:
-                by_definition[channel.definition] = self._decoder(channel, paths)
-            self._decoders[channel] = by_definition[channel.definition]
-        decoders = [*by_definition.values()] or [*self._decoder_of_missing(paths)]
-        if any(each.arrow != decoders[0].arrow for each in decoders):
+        stores = [self._store(channel.type, channel.definition) for channel in each.channels]
+        if not stores and self.type and typestore(self.type, None) is not None:
+            # The column of nulls has the type that the file names.
+            stores = [self._store(self.type, None)]
+        if not stores:
+            return
+        wholes = [arrow_type(store, self.type, topic=self.topic) for store in stores]
+        if any(whole != wholes[0] for whole in wholes):
             raise BagError(f"{self.topic} was recorded with two definitions of {self.type}: use --raw")
-        if decoders:
-            self.arrow = self._decoded = decoders[0].arrow
-            if self._images is not None:
-                asked = frozenset(paths or [field.name for field in self._decoded])
-                self.arrow = self._images.arrow(self._decoded, asked)
+        needed = paths if paths is None or self._images is None else [*paths, *NEEDED]
+        self.arrow = arrow_type(stores[0], self.type, needed, topic=self.topic)
+        self._decoder = Decoder(wholes[0], self.arrow)
+        if self._images is not None:
+            asked = frozenset(paths or [field.name for field in self.arrow])
+            self.arrow = self._images.arrow(self.arrow, asked)
 
     @property
     def undecodable(self) -> int:
         """How many messages of sets could not be decoded, and are null."""
         images = 0 if self._images is None else self._images.undecodable
-        return self._undecodable + images + sum(each.undecodable for each in set(self._decoders.values()))
+        return self._undecodable + images + (0 if self._decoder is None else self._decoder.undecodable)
 
     def column(self, messages: Sequence[tuple[Message | None, int | None]]) -> pa.ChunkedArray:
         """Return a column of messages, each given with the common stamp of its set."""
         if pa.types.is_null(self.arrow):
             return pa.chunked_array([pa.nulls(len(messages))])
         payloads = [None if message is None else self._payload(message, stamp) for message, stamp in messages]
-        if not self._decoders:
+        if self._decoder is None:
             return pa.chunked_array([pa.array(payloads, type=self.arrow)])
-        found = self._decode([None if message is None else message.payload[0] for message, _ in messages], payloads)
+        found = self._decoder.decode(payloads)
         return found if self._images is None else self._images.encode(found, self.arrow)
 
     def described(self, column: pa.ChunkedArray) -> dict[str, Any]:
@@ -202,21 +205,6 @@ class _InputColumn:
                 about["fields"] = json.dumps(first["fields"])
         return about
 
-    def _decode(self, channels: Sequence[Channel | None], payloads: Sequence[bytes | None]) -> pa.ChunkedArray:
-        decoders = set(self._decoders.values())
-        if len(decoders) == 1:
-            return decoders.pop().decode(payloads)
-        # Each decoder decodes its own rows and gives null for the others.
-        whole: pa.Array | None = None
-        for decoder in decoders:
-            own = [
-                payload if channel is not None and self._decoders[channel] is decoder else None
-                for channel, payload in zip(channels, payloads, strict=True)
-            ]
-            found = decoder.decode(own).combine_chunks()
-            whole = found if whole is None else pa.compute.coalesce(whole, found)
-        return pa.chunked_array([whole])
-
     def _payload(self, message: Message, stamp: int | None) -> bytes | None:
         channel, _, recorded = message.payload
         try:
@@ -225,26 +213,14 @@ class _InputColumn:
             self._undecodable += 1
             return None
 
-    def _decoder(self, channel: Channel, paths: Sequence[str] | None) -> Decoder:
-        store = typestore(channel.type, channel.definition)
+    def _store(self, type_name: str, definition: Definition | None) -> Typestore:
+        store = typestore(type_name, definition)
         if store is None:
             raise BagError(
-                f"{self.topic}: the recording does not define {channel.type}, so it cannot be decoded: use --raw, which"
+                f"{self.topic}: the recording does not define {type_name}, so it cannot be decoded: use --raw, which"
                 " keeps the bytes"
             )
-        return self._decoder_of(store, channel.type, paths)
-
-    def _decoder_of_missing(self, paths: Sequence[str] | None) -> Iterator[Decoder]:
-        """Yield a decoder for the type in the file, if ROS 2 knows it: the column of nulls has its type."""
-        store = typestore(self.type, None) if self.type else None
-        if store is not None:
-            yield self._decoder_of(store, self.type, paths)
-
-    def _decoder_of(self, store: Any, type_name: str, paths: Sequence[str] | None) -> Decoder:
-        tree = type_tree(store, type_name)
-        if paths is not None:
-            tree = only(tree, [*paths, *(NEEDED if self._images is not None else ())], self.topic)
-        return Decoder(tree)
+        return store
 
 
 def _stamp_of(match: Match) -> int:

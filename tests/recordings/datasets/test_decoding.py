@@ -10,7 +10,7 @@ from syncrelay.errors import BagError
 from syncrelay.recordings.bag.definitions import typestore
 from syncrelay.recordings.bag.recording import Definition
 from syncrelay.recordings.datasets.decoding import Decoder
-from syncrelay.recordings.datasets.message_types import only, type_tree
+from syncrelay.recordings.datasets.message_types import arrow_type
 from tests.calls import Calls
 from tests.faults.extent import chosen
 from tests.recordings.datasets.drawn_messages import LARGE, drawn_messages, drawn_type
@@ -22,8 +22,7 @@ _PACKAGES = sorted({name.split("/")[0] for name in _JAZZY.fielddefs})
 
 
 def decoder(store, name, *paths):
-    tree = type_tree(store, name)
-    return Decoder(only(tree, paths, "/topic") if paths else tree)
+    return Decoder(arrow_type(store, name), arrow_type(store, name, paths or None, topic="/topic"))
 
 
 def test_every_field_of_any_type_has_the_value_that_was_serialized():

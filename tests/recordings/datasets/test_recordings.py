@@ -14,7 +14,7 @@ from syncrelay.recordings.bag.definitions import converter, typestore
 from syncrelay.recordings.bag.recording import Encoding
 from syncrelay.recordings.bag.replay import Replay, received
 from syncrelay.recordings.datasets.decoding import Decoder
-from syncrelay.recordings.datasets.message_types import type_tree
+from syncrelay.recordings.datasets.message_types import arrow_type
 from syncrelay.recordings.datasets.reading import SetsOf
 from syncrelay.recordings.datasets.tables import Content
 from syncrelay.sync import Match
@@ -53,7 +53,8 @@ def test_every_topic_is_decoded_as_a_slow_decoder_does(name, real_data):
         if store is None:
             assert channel.definition is None, channel.type
             continue
-        decoder = Decoder(type_tree(store, channel.type))
+        arrow = arrow_type(store, channel.type)
+        decoder = Decoder(arrow, arrow)
         column = decoder.decode(found)
         assert (len(column), decoder.undecodable) == (len(found), 0), channel.topic
         step = len(found) // _MOST + 1
