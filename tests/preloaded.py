@@ -51,9 +51,7 @@ _MAINS: Final = {
         for name in (
             "tests.faults.source",
             "tests.faults.witness",
-            "tests.ros.caller",
             "tests.ros.collector",
-            "tests.ros.manager",
             "tests.ros.player",
             "tests.scenarios.source",
         )

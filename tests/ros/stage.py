@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -15,6 +16,9 @@ from tests.ros import frames
 from tests.ros.frames import Frame
 from tests.ros.processes import DEADLINE_S, Process, ros_environment
 from tests.ros.shared_memory import left_of
+
+if TYPE_CHECKING:
+    from tests.ros.caller import Caller
 
 IS_COMPILED = find_spec("syncrelay.ros.compiled.path") is not None
 """Whether the compiled path was built here; tests/ros/test_compiled_build.py says where it must be."""
@@ -110,38 +114,6 @@ class Collector:
         self._read += size
 
 
-class Caller:
-    """Calls services of a node; see tests/ros/caller.py."""
-
-    def __init__(self, process: Process, node: str) -> None:
-        self.process = process
-        self.node = node
-
-    def call(self, service: str) -> tuple[bool, str]:
-        """Call ~/service; whether it succeeded, and its words."""
-        success, message = json.loads(self.process.ask(f"call {self.node}/{service}"))
-        return success, message
-
-    def begin(self, service: str) -> None:
-        """Call ~/service without waiting for the answer, for which `end` waits."""
-        self.process.ask(f"begin {self.node}/{service}")
-
-    def end(self) -> list[tuple[bool, str]]:
-        return [(success, message) for success, message in json.loads(self.process.ask("end"))]
-
-    def get(self, *names: str) -> list[object]:
-        return list(json.loads(self.process.ask(f"get {self.node} {' '.join(names)}")))
-
-    def set(self, name: str, value: object) -> tuple[bool, str]:
-        words = json.dumps(value, separators=(",", ":"))
-        successful, reason = json.loads(self.process.ask(f"set {self.node} {name} {words}"))
-        return successful, reason
-
-    def services(self) -> list[str]:
-        """The names of all services in the graph."""
-        return list(json.loads(self.process.ask("services")))
-
-
 class Stage:
     """Starts the processes of one test on one domain."""
 
@@ -151,6 +123,7 @@ class Stage:
         self.environment["SYNCRELAY_RECEIVE"] = backend
         self._processes: list[Process] = []
         self._segments: set[Path] = set()
+        self._callers: list[Caller] = []
 
     def start(self, name: str, argv: Sequence[str], *, stdin: int = subprocess.DEVNULL) -> Process:
         process = Process(
@@ -202,10 +175,12 @@ class Stage:
         argv = _module("tests.ros.collector", topics or {}, node=node, reliability=reliability, durability=durability)
         return Collector(self.start("collector", [*argv, "--output", str(output)], stdin=subprocess.PIPE), output)
 
-    def caller(self, node: str = "/syncrelay") -> Caller:
-        """A process that calls services of a node."""
-        argv = [sys.executable, "-m", "tests.ros.caller"]
-        return Caller(self.start("caller", argv, stdin=subprocess.PIPE), node)
+    def caller(self, node: str = "/syncrelay") -> "Caller":
+        """What calls services of a node."""
+        from tests.ros.caller import Caller  # noqa: PLC0415  where ROS is not installed, nothing is called
+
+        self._callers.append(Caller(node, domain=self.domain, environment=self.environment))
+        return self._callers[-1]
 
     def before_each_sensor(self, statements: str) -> None:
         """Have each sensor of a rig that is started from now on run these statements before all else."""
@@ -235,6 +210,8 @@ class Stage:
     def end(self) -> None:
         """End all processes and remove what they left, as Fast DDS does after SIGKILL."""
         self.note_shared_memory()
+        for caller in self._callers:
+            caller.close()
         for process in self._processes:
             process.ask_to_end()
         for process in self._processes:

@@ -35,9 +35,8 @@ _SOON_S = 0.0005
 
 
 @pytest.fixture(params=BACKENDS)
-def here(request, ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
+def here(request, ros_domain: int) -> Iterator[SimpleNamespace]:
     """A node of this process, a backend on it, and topics."""
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     with own_node(ros_domain) as own:
         own.backend = choose_backend(request.param, node=own.node, context=own.context)
         own.topics = [_topic(own.node, f"/t{n}") for n in range(3)]

@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-import rclpy
 from builtin_interfaces.msg import Time
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 
 from syncrelay.ros.clock import WaitingClock
 from tests.faults.extent import chosen
+from tests.ros.in_process import own_node
 
 _SECOND = 10**9
 
@@ -21,20 +21,14 @@ _SECOND = 10**9
 @contextmanager
 def _simulated(domain: int) -> Iterator[tuple[Any, Callable[[int], None]]]:
     """A node by simulated time, and what gives it a message of /clock as its executor would."""
-    context = rclpy.context.Context()
-    rclpy.init(context=context, domain_id=domain, args=["--ros-args", "--disable-external-lib-logs"])
-    node: Any = rclpy.create_node("here", context=context, parameter_overrides=[Parameter("use_sim_time", value=True)])
-    (subscription,) = node.subscriptions
+    with own_node(domain, parameter_overrides=[Parameter("use_sim_time", value=True)]) as own:
+        (subscription,) = own.node.subscriptions
 
-    def tick(now: int) -> None:
-        sec, nanosec = divmod(now, _SECOND)
-        subscription.callback(Clock(clock=Time(sec=sec, nanosec=nanosec)))
+        def tick(now: int) -> None:
+            sec, nanosec = divmod(now, _SECOND)
+            subscription.callback(Clock(clock=Time(sec=sec, nanosec=nanosec)))
 
-    try:
-        yield node, tick
-    finally:
-        node.destroy_node()
-        context.try_shutdown()
+        yield own.node, tick
 
 
 def test_the_clock_jumps_where_it_falls_by_a_second_or_more(ros_domain: int, caplog: pytest.LogCaptureFixture):

@@ -31,7 +31,6 @@ pytest.importorskip("rclpy", reason="rclpy is not installed")
 if not IS_COMPILED:
     pytest.skip("the compiled path was not built: it needs a C compiler", allow_module_level=True)
 
-import rclpy
 from geometry_msgs.msg import Vector3Stamped
 from rclpy.qos import HistoryPolicy, QoSProfile
 
@@ -51,9 +50,8 @@ _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
 
 
 @pytest.fixture
-def here(ros_domain: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
+def here(ros_domain: int) -> Iterator[SimpleNamespace]:
     """A node of this process, the compiled backend as it proved itself on it, and topics."""
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     with own_node(ros_domain) as own:
         own.backend = choose_backend("compiled", node=own.node, context=own.context)
         own.topics = [
@@ -280,14 +278,8 @@ def test_changes_of_the_graph_are_seen_once_each(here, ros_domain, monkeypatch):
     here.node.destroy_publisher(publisher)
     assert changes.seen()
     wait_until(lambda: not changes.seen(), "the end of changes")
-    there = rclpy.context.Context()
-    rclpy.init(context=there, domain_id=ros_domain, args=["--ros-args", "--disable-external-lib-logs"])
-    other = rclpy.create_node("there", context=there)
-    try:
+    with own_node(ros_domain, "there"):
         wait_until(changes.seen, "another participant")
-    finally:
-        other.destroy_node()
-        there.try_shutdown()
 
 
 def test_a_change_of_the_graph_that_was_never_reported_is_looked_for_every_minute(here, monkeypatch):

@@ -1,10 +1,9 @@
-"""The relay as a managed node, driven by a process of its own, as nav2's lifecycle manager drives it."""
+"""The relay as a managed node, driven as nav2's lifecycle manager drives it."""
 
 import itertools
 import json
 import random
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -21,6 +20,11 @@ from tests.ros.status import ANY_PORT, first_group, page, problems, status
 from tests.ros.streams import BEGIN, MS, at, merged
 from tests.ros.summary import read_summary
 
+pytest.importorskip("rclpy", reason="rclpy is not installed")
+
+from lifecycle_msgs.msg import Transition, TransitionEvent
+from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
+
 pytestmark = pytest.mark.ros
 
 _PAIR = {"/camera": VECTOR, "/lidar": VECTOR}
@@ -33,26 +37,43 @@ def _managed(node: dict[str, Any] | None = None, **groups: Any) -> str:
 
 
 class _Manager:
-    """Asks for transitions of one node; see tests/ros/manager.py."""
+    """Asks for transitions of one node, as nav2's lifecycle manager does."""
 
     def __init__(self, stage: Stage, node: str = "/syncrelay") -> None:
-        argv = [sys.executable, "-m", "tests.ros.manager"]
-        self._process = stage.start("manager", argv, stdin=subprocess.PIPE)
-        self._node = node
-
-    def ask(self, command: str, *words: str) -> Any:
-        return json.loads(self._process.ask(" ".join([command, self._node, *words])))
+        self._caller = stage.caller(node)
+        self._goals: list[str] = []
 
     def change(self, transition: str) -> bool:
-        return bool(self.ask("change", transition))
+        """Ask for a transition by its label, or its number; whether it succeeded."""
+        asked = {"id": int(transition)} if transition.isdigit() else {"label": transition}
+        return bool(self._caller.ask(ChangeState, "change_state", transition=Transition(**asked)).success)
 
     @property
     def state(self) -> str:
-        return str(self.ask("state"))
+        return str(self._caller.ask(GetState, "get_state").current_state.label)
 
     @property
-    def events(self) -> list[list[str]]:
-        return list(json.loads(self._process.ask("events")))
+    def states(self) -> set[str]:
+        """The labels of all states."""
+        states = self._caller.ask(GetAvailableStates, "get_available_states").available_states
+        return {each.label for each in states}
+
+    def transitions(self, service: str) -> list[str]:
+        """The labels of those that a service names."""
+        return [
+            each.transition.label for each in self._caller.ask(GetAvailableTransitions, service).available_transitions
+        ]
+
+    def watch(self) -> None:
+        """Listen to the node's transition events from here on."""
+        node, topic = self._caller.node, f"{self._caller.called}/transition_event"
+        node.create_subscription(TransitionEvent, topic, lambda event: self._goals.append(event.goal_state.label), 100)
+        wait_until(lambda: node.count_publishers(topic) > 0, f"a publisher of {topic}")
+
+    def goals(self) -> list[str]:
+        """Where the events led that were heard."""
+        self._caller.spin()
+        return self._goals
 
 
 def _end(relay: Process, number: signal.Signals = signal.SIGTERM) -> None:
@@ -97,7 +118,7 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
     player.match(0)
     assert manager.state == "unconfigured"
     relay.wait_for_log("the node is unconfigured: configure it with `ros2 lifecycle set /syncrelay configure`")
-    manager.ask("watch")
+    manager.watch()
     assert manager.change("configure")
     wait_until(lambda: status(relay)["relay"]["phase"] == "inactive", "the inactive relay")
     wait_until(lambda: problems(relay) == {"inactive"}, "the finding and no other")
@@ -124,7 +145,7 @@ def test_sets_leave_only_while_the_node_is_active(stage: Stage):
 
     def are_told() -> bool:
         """Whether these are the events; what was told while the manager was not heard of yet is lost to it."""
-        told = [goal for _, goal in manager.events]
+        told = manager.goals()
         return len(told) >= 6 and told == expected[-len(told) :]
 
     wait_until(are_told, "all events")
@@ -190,13 +211,13 @@ def test_whatever_is_asked_for_the_state_is_the_one_that_the_transitions_lead_to
         assert manager.change(word) is (goal is not None), (state, word)
         state = goal or state
         assert manager.state == state
-        assert sorted(manager.ask("available")) == sorted(
+        assert sorted(manager.transitions("get_available_transitions")) == sorted(
             [*(transition for before, transition in _LEADS_TO if before == state), "shutdown"]
         )
         phases = {"active": {"starting", "running"}}.get(state, {state})
         assert status(relay)["relay"]["phase"] in phases
-    assert {"unconfigured", "inactive", "active", "finalized"} <= set(manager.ask("states"))
-    assert set(_NUMBERS) <= set(manager.ask("graph"))
+    assert {"unconfigured", "inactive", "active", "finalized"} <= manager.states
+    assert set(_NUMBERS) <= set(manager.transitions("get_transition_graph"))
     while state != "active":
         ((asked, state),) = [(asked, goal) for (before, asked), goal in _LEADS_TO.items() if before == state][:1]
         assert manager.change(asked)
