@@ -11,8 +11,8 @@ from syncrelay.status import status_of
 from syncrelay.status.document import read_status
 from syncrelay.top.graph import Drawing, Mark, as_mermaid, as_text, drawing_of
 from tests.cli.command import ROOT, run, run_here
+from tests.status.support.serving import running
 from tests.top import states
-from tests.top.relay_server import serving
 
 _HOSTILE = "\"]; click g0 href 'x' </text><script>alert(1)</script> #quot; %%{init: {}}%% \\N\\l & <b> \u202e"
 _FILE = """\
@@ -122,13 +122,13 @@ def test_the_command_draws_files_together_and_says_what_the_relay_does_not_run(t
     alone = run("graph", "fusion.yaml", folder=tmp_path)
     assert (alone.returncode, alone.stderr) == (0, "")
     assert alone.stdout.startswith('---\ntitle: "fusion.yaml"\n---\nflowchart LR\n')
-    with serving(states.rig()) as server:
+    with running(states.rig()) as server:
         live = run_here("graph", "fusion.yaml", "--format", "text", "--url", server.url, folder=tmp_path)
     assert live.returncode == 0
     assert live.stderr == "syncrelay: /syncrelay does not run new: drawn without figures\n"
     assert "OK, 10 of 10 sets/s" in live.stdout
     (tmp_path / "old.yaml").write_text(states.file(front=states.group({"/old": states.IMAGE, "/lidar/points": None})))
-    with serving(states.rig()) as server:
+    with running(states.rig()) as server:
         other = run_here("graph", "old.yaml", "--url", server.url, folder=tmp_path)
     assert "<br/>as /camera/image_raw<br/>" in other.stdout
     assert other.stderr.splitlines()[-1] == (

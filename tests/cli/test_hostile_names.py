@@ -28,7 +28,7 @@ from tests.recordings.bag.making import rig
 from tests.ros.cdr_messages import STORE, VECTOR
 from tests.ros.configs import config, inputs
 from tests.top import states
-from tests.top.relay_server import serving
+from tests.top.speaker import answering
 from tests.top.terminal import Terminal
 
 pytestmark = pytest.mark.parametrize("seed", range(3))
@@ -188,19 +188,19 @@ def _hostile_status(chance, **relay) -> bytes:
 
 
 def test_names_that_a_relay_tells(chance, shown):
-    with serving(states.rig()) as server:
-        server.body = _hostile_status(chance)
-        assert shown("top", "--once", "--url", server.url)[0] == 0
-        code, told, _ = shown("top", "--once", "--json", "--url", server.url)
-        assert (code, json.loads(told)) == (0, json.loads(server.body))
-        server.body = _hostile_status(chance, pid=os.getppid(), reloads=0, refused_reloads=0)
-        assert shown("reload", "--url", server.url)[0] == 1
-        server.body = json.dumps({"relay": {hostile_name(chance): 1}, hostile_name(chance): []}).encode()
-        assert shown("top", "--once", "--url", server.url)[0] == 1
+    document = _hostile_status(chance)
+    with answering(document) as url:
+        assert shown("top", "--once", "--url", url)[0] == 0
+        code, told, _ = shown("top", "--once", "--json", "--url", url)
+    assert (code, json.loads(told)) == (0, json.loads(document))
+    with answering(_hostile_status(chance, pid=os.getppid(), reloads=0, refused_reloads=0)) as url:
+        assert shown("reload", "--url", url)[0] == 1
+    with answering(json.dumps({"relay": {hostile_name(chance): 1}, hostile_name(chance): []}).encode()) as url:
+        assert shown("top", "--once", "--url", url)[0] == 1
 
 
-async def _screens(server) -> list[str]:
-    app = TopApp([ask(server.url)], period_s=0.1)
+async def _screens(url: str) -> list[str]:
+    app = TopApp([ask(url)], period_s=0.1)
     async with app.run_test(size=(200, 60)) as pilot:
         await pilot.pause()
         seen = []
@@ -212,9 +212,8 @@ async def _screens(server) -> list[str]:
 
 
 def test_names_on_the_screens_of_top(chance):
-    with serving(states.rig()) as server:
-        server.body = _hostile_status(chance)
-        lines = asyncio.run(_screens(server))
+    with answering(_hostile_status(chance)) as url:
+        lines = asyncio.run(_screens(url))
     assert [line for line in lines if not line.isprintable()] == []
     # Names are text and no markup.
     assert all(word in "".join(lines) for word in ("FORGED", "name", "\\n"))

@@ -5,18 +5,15 @@ from contextlib import ExitStack
 
 import pytest
 
-from syncrelay.config import Listen
-from syncrelay.explain import Tape
-from syncrelay.status import Taps, status_of
-from syncrelay.status.server import Server
+from syncrelay.status import status_of
 from tests.cli.command import run
+from tests.status.support.serving import running
 from tests.top import states
-from tests.top.relay_server import serving
-from tests.top.speaker import speaking
+from tests.top.speaker import answering, speaking
 
 
 def test_where_nobody_answers_it_names_whom_it_asked(tmp_path):
-    with serving(states.healthy()) as server:
+    with running(states.healthy()) as server:
         url = server.url
     asked = run("reload", "--url", url, folder=tmp_path)
     assert (asked.returncode, asked.stdout) == (1, "")
@@ -31,16 +28,14 @@ def test_where_nobody_answers_it_names_whom_it_asked(tmp_path):
 def test_of_several_relays_none_is_taken_for_the_one_that_is_meant(tmp_path, words):
     state = states.rig()
     with ExitStack() as stack:
-        servers = [stack.enter_context(Server(Listen("127.0.0.1", range(1)))) for _ in range(2)]
-        for server in servers:
-            server.serve(lambda: state, Taps(Tape(), str))
+        servers = [stack.enter_context(running(state)) for _ in range(2)]
         asked = run(*words, folder=tmp_path)
     assert (asked.returncode, asked.stdout) == (1, "")
     first, *lines = asked.stderr.splitlines()
     assert first.endswith(" relays answer; choose one")
     # Others may run on this machine.
     groups = ", ".join(group.facts.name for group in state.groups)
-    assert {f"  --url {server.place.url}   /syncrelay: {groups}" for server in servers} <= set(lines)
+    assert {f"  --url {server.url}   /syncrelay: {groups}" for server in servers} <= set(lines)
 
 
 def test_a_relay_that_ends_once_it_is_found_is_gone(tmp_path):
@@ -59,8 +54,7 @@ def test_what_is_no_relay_here_gets_no_signal(tmp_path, told):
     state = status_of(states.healthy()).as_dict()
     del state["relay"]["pid"]
     state["relay"] |= told
-    with serving(states.healthy()) as server:
-        server.body = json.dumps(state).encode()
-        asked = run("reload", "--url", server.url, folder=tmp_path)
+    with answering(json.dumps(state).encode()) as url:
+        asked = run("reload", "--url", url, folder=tmp_path)
     assert (asked.returncode, asked.stdout) == (1, "")
     assert asked.stderr.startswith(f"syncrelay: process {told.get('pid', 0)} is not the relay: it runs in a container")

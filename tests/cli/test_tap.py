@@ -12,14 +12,14 @@ import pytest
 
 from syncrelay.config import Listen, load_text
 from syncrelay.explain import GroupLines, RecentDrop, Tape
-from syncrelay.status import RelayState, Taps
+from syncrelay.status import RelayState, Taps, status_of
 from syncrelay.status.server import Server
 from syncrelay.sync import DropReason
 from syncrelay.top.tap_text import plain_line
 from tests.cli.command import run
 from tests.hostile_names import assert_shown_safely, hostile_name
 from tests.top import states
-from tests.top.relay_server import serving
+from tests.top.speaker import answering
 
 _MS = 1_000_000
 _AT = 1_700_000_000 * 1000 * _MS
@@ -138,12 +138,11 @@ def test_a_line_of_another_server_ends_it_with_a_sentence(tmp_path, key):
     sane = {"group": "front", "time": _AT, "stamps": {"/a": _AT}, "offsets": {}, "span": 0, "latency": 0}
     line = sane | {key: {"/a": 10**400} if key == "stamps" else 10**400}
     body = json.dumps({"after": 1, "more": False, "lost": 0, "lines": [line]}).encode()
-    with serving(states.healthy()) as server:
-        server.paths["/tap"] = body
-        done = run("tap", "--url", server.url, folder=tmp_path)
+    with answering(status_of(states.healthy()).as_json(), body) as url:
+        done = run("tap", "--url", url, folder=tmp_path)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == (
-        f"syncrelay: the relay at {server.url} cannot be followed any more: what listens there is not a relay, or runs"
+        f"syncrelay: the relay at {url} cannot be followed any more: what listens there is not a relay, or runs"
         " another version\n"
     )
 

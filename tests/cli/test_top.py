@@ -10,14 +10,14 @@ import pytest
 from syncrelay.status import status_of
 from tests.cli.command import run
 from tests.cli.terminals import on_terminal
+from tests.status.support.serving import running
 from tests.top import states
-from tests.top.relay_server import serving
 
 _DEADLINE_S = 60
 
 
 def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
-    with serving(states.rig()) as server:
+    with running(states.rig()) as server:
         shown = run("top", "--once", "--url", server.url, folder=tmp_path)
     assert (shown.returncode, shown.stderr) == (0, "")
     lines = shown.stdout.splitlines()
@@ -34,13 +34,13 @@ def test_the_state_is_printed_once_as_text_of_80_columns(tmp_path):
 
 
 def test_the_document_is_printed_as_it_came(tmp_path):
-    with serving(states.rig()) as server:
+    with running(states.rig()) as server:
         shown = run("top", "--once", "--json", "--url", server.url, folder=tmp_path)
     assert json.loads(shown.stdout) == json.loads(json.dumps(status_of(states.rig()).as_dict()))
 
 
 def test_where_no_relay_answers_it_says_what_to_do(tmp_path):
-    with serving(states.healthy()) as server:
+    with running(states.healthy()) as server:
         url = server.url
     shown = run("top", "--url", url, folder=tmp_path)
     assert shown.returncode == 1
@@ -55,7 +55,7 @@ def test_where_no_relay_answers_it_says_what_to_do(tmp_path):
 
 
 def test_without_a_terminal_it_points_to_text(tmp_path):
-    with serving(states.healthy()) as server:
+    with running(states.healthy()) as server:
         shown = run("top", "--url", server.url, folder=tmp_path)
     assert (shown.returncode, shown.stdout) == (1, "")
     assert shown.stderr == (
@@ -65,14 +65,14 @@ def test_without_a_terminal_it_points_to_text(tmp_path):
 
 @pytest.mark.parametrize("setting", [{"TERM": "dumb"}, {"PYTHONIOENCODING": "latin-1"}])
 def test_a_terminal_that_cannot_draw_gets_a_sentence(tmp_path, setting):
-    with serving(states.healthy()) as server, _top(server.url, tmp_path, **setting) as top:
+    with running(states.healthy()) as server, _top(server.url, tmp_path, **setting) as top:
         assert top.wait_for_end() == 1
     assert "top cannot draw on this terminal: check TERM and LANG" in top.written
     assert "\x1b[?1049h" not in top.written
 
 
 def test_on_a_terminal_it_draws_until_q_and_leaves_it_as_it_was(tmp_path):
-    with serving(states.rig()) as server, _top(server.url, tmp_path) as top:
+    with running(states.rig()) as server, _top(server.url, tmp_path) as top:
         top.wait_for("other clock")
         top.press("q")
         assert top.wait_for_end() == 0
@@ -81,7 +81,7 @@ def test_on_a_terminal_it_draws_until_q_and_leaves_it_as_it_was(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_leaves_the_terminal_as_it_was(tmp_path, number):
-    with serving(states.rig()) as server, _top(server.url, tmp_path) as top:
+    with running(states.rig()) as server, _top(server.url, tmp_path) as top:
         top.wait_for("other clock")
         os.kill(top.pid, number)
         top.wait_for_end()
@@ -89,7 +89,7 @@ def test_a_signal_leaves_the_terminal_as_it_was(tmp_path, number):
 
 
 def test_without_colour_no_colour_is_written(tmp_path):
-    with serving(states.rig()) as server, _top(server.url, tmp_path, NO_COLOR="1") as top:
+    with running(states.rig()) as server, _top(server.url, tmp_path, NO_COLOR="1") as top:
         top.wait_for("other clock")
         top.press("q")
         top.wait_for_end()

@@ -7,36 +7,16 @@ from dataclasses import replace
 
 import pytest
 
-from syncrelay.config import Listen
-from syncrelay.explain import Tape
-from syncrelay.status import RelayState, Taps
-from syncrelay.status.server import Server
+from syncrelay.status import RelayState
 from tests.browser import Opened, launched, needs_chromium, opened
 from tests.hostile_names import FORGED, hostile_name
-from tests.status.support.serving import ANY
+from tests.status.support.serving import Relay, running
 from tests.top import states
 
 pytestmark = [pytest.mark.browser, needs_chromium]
 
 _STATES = {"light": "rgb(255, 255, 255)", "dark": "rgb(18, 22, 27)"}
 _SHOWN = "html[data-shown]"
-
-
-class Relay:
-    """A relay's server whose state can change, and that can go and come back."""
-
-    def __init__(self, state: RelayState) -> None:
-        self.state, self._listen = state, ANY
-        self.start()
-
-    def start(self) -> None:
-        self._server = Server(self._listen)
-        self._server.serve(lambda: self.state, Taps(Tape(), str))
-        self._listen = Listen("127.0.0.1", range(self._server.place.port, self._server.place.port + 1))
-        self.url = self._server.place.url
-
-    def stop(self) -> None:
-        self._server.__exit__(None, None, None)
 
 
 @pytest.fixture(scope="module")
@@ -47,14 +27,10 @@ def browser():
 
 @contextmanager
 def watching(browser, state: RelayState, *, at: str = "", **options) -> Iterator[tuple[Opened, Relay]]:
-    relay = Relay(state)
-    try:
-        with opened(browser, **options) as page:
-            page.page.goto(f"{relay.url}/{at}")
-            page.page.wait_for_selector(_SHOWN, state="attached")
-            yield page, relay
-    finally:
-        relay.stop()
+    with running(state) as relay, opened(browser, **options) as page:
+        page.page.goto(f"{relay.url}/{at}")
+        page.page.wait_for_selector(_SHOWN, state="attached")
+        yield page, relay
 
 
 def chosen(page) -> str:

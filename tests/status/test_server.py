@@ -13,6 +13,7 @@ from syncrelay.config.listen import Listen
 from syncrelay.errors import ListenError
 from syncrelay.explain import Endpoint, Mismatch, Refusal, Tape
 from syncrelay.status import Phase, Taps, server
+from syncrelay.status.announcement import announced
 from syncrelay.status.server import PATHS_TOLD, Server
 from tests.status.support.serving import ANY, asked, connected, sent, serving
 from tests.status.support.states import CAMERA, relay, started, working
@@ -271,5 +272,6 @@ def test_it_ends_with_its_threads_and_its_port_whoever_is_connected():
 def test_it_ends_where_it_never_served():
     with Server(ANY) as server:
         address = server.place.host, server.place.port
+        assert server.place not in announced()
     with pytest.raises(ConnectionRefusedError):
         connected(address)

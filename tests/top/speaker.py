@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from threading import Event, Thread
 
+HEAD = b"HTTP/1.1 200 OK\r\n\r\n"
 Speech = Callable[[], Iterator[bytes]]
 
 
@@ -18,6 +19,14 @@ def speaking(speech: Speech) -> Iterator[str]:
         finally:
             # Closing it alone would not wake who waits in accept.
             listener.shutdown(socket.SHUT_RDWR)
+
+
+@contextmanager
+def answering(*bodies: bytes) -> Iterator[str]:
+    """The base URL of a server that answers with these in turn, whatever it is asked for, and then with the last."""
+    left = list(bodies)
+    with speaking(lambda: iter([HEAD, left.pop(0) if len(left) > 1 else left[0]])) as url:
+        yield url
 
 
 def slowly(chunk: bytes) -> Iterator[bytes]:

@@ -1,107 +1,111 @@
-"""Asking for the state over real sockets: a relay, nobody, somebody else, somebody who never answers."""
+"""Asking for the state over real sockets: a relay, nobody, somebody else, somebody who never comes to an end."""
 
+import random
 import re
 import socket
-from contextlib import closing
-from threading import Thread
+from contextlib import ExitStack, closing
 
 import pytest
 
 from syncrelay.errors import UsageError
-from syncrelay.status import Level
-from syncrelay.sync import DropReason
+from syncrelay.status import status_of
 from syncrelay.top.client import NoAnswerError, OtherServerError, ask, base_urls, search
+from tests.status.support.serving import running
 from tests.top import states
-from tests.top.relay_server import serving
+from tests.top.speaker import HEAD, answering, slowly, speaking, without_end
 
 _USUAL = [f":{port}" for port in range(9464, 9474)]
+# For a machine that others use too.
+_PATIENT = {"timeout_s": 60, "whole_s": 60}
 
 
 @pytest.fixture
-def closed_port():
+def closed():
+    """The URL of a port at which nobody listens any more."""
     with closing(socket.create_server(("127.0.0.1", 0))) as opened:
         number = opened.getsockname()[1]
-    # Closed again: nobody listens at it now.
-    return int(number)
+    return f"http://127.0.0.1:{number}"
 
 
-def test_a_state_comes_back_as_it_was_told():
-    told = states.healthy()
-    with serving(told) as server:
-        answer = ask(server.url)
-    assert answer.document == server.body
-    (report,), (group,) = told.groups, answer.status.groups
-    assert (answer.status.relay.node, answer.status.relay.ready, answer.status.relay.uptime_s) == (
-        "/syncrelay",
-        True,
-        30,
-    )
-    assert (group.name, group.level, group.sets) == ("front", Level.OK, report.facts.figures.sets)
-    assert group.recent == report.recent
-    assert [each.topic for each in group.inputs] == ["/camera/image_raw", "/lidar/points"]
-    camera = group.inputs[0]
-    assert camera.dropped == {DropReason.TOO_FAR.value: report.facts.inputs[0].counts.dropped[DropReason.TOO_FAR]}
-    assert [publisher.node for publisher in camera.publishers] == ["/camera_driver"]
-    assert group.span_ms
-    assert group.span_ms.p50 <= group.span_ms.p95 <= group.span_ms.max <= 20
-    assert len(group.last_sets) == 100
+def test_a_state_comes_back_as_it_was_told_and_no_proxy_of_the_environment_is_asked(monkeypatch, closed):
+    monkeypatch.setenv("http_proxy", closed)
+    told = status_of(states.healthy())
+    with running(states.healthy()) as relay:
+        answer = ask(relay.url)
+    assert (answer.document, answer.status) == (told.as_json(), told)
 
 
-def test_the_first_of_the_worst_findings_explains_a_group():
-    with serving(states.rig()) as server:
-        groups = ask(server.url).status.groups
-    explanations = [group.explanation.code for group in groups if group.explanation]
-    assert explanations == ["healthy", "other_clock", "short_queue", "no_publisher"]
+@pytest.mark.parametrize(
+    ("speech", "patience", "why"),
+    [
+        (lambda: slowly(b""), {"timeout_s": 0.2}, "no answer within 0.2 s"),
+        (lambda: slowly(b"H"), {"whole_s": 0.3}, "no complete answer within 0.3 s"),
+        (lambda: slowly(b"HTTP/1.1 100 Continue\r\n\r\n"), {"whole_s": 0.3}, "no complete answer within 0.3 s"),
+        (lambda: slowly(HEAD), {"whole_s": 0.3}, "no complete answer within 0.3 s"),
+        (lambda: without_end(b"HTTP/1.1 100 Continue\r\n\r\n"), {"whole_s": 0.3}, "no complete answer within 0.3 s"),
+        (lambda: iter([b""]), _PATIENT, "the connection closed before the answer was complete"),
+        (
+            lambda: iter([b"HTTP/1.1 200 OK\r\nContent-Length: 99999999999\r\n\r\n{"]),
+            _PATIENT,
+            "the connection closed before the answer was complete",
+        ),
+    ],
+    ids=["never begins", "slow letters", "goes on slowly", "slow body", "goes on", "says nothing", "says half of it"],
+)
+def test_who_does_not_answer_to_the_end_is_given_up(speech, patience, why):
+    with speaking(speech) as url, pytest.raises(NoAnswerError, match=f"^{re.escape(why)}$"):
+        ask(url, **patience)
 
 
-def test_an_input_tells_its_offset_and_a_strange_key_is_left_aside():
-    group = states.group({"/a": states.IMAGE, "/b": states.IMAGE})
-    group["topics"][0]["offset"] = "-12ms"
-    with serving(states.simulated(states.file(front=group), {})) as server:
-        server.body = server.body.replace(b'"relay": {', b'"key_of_tomorrow": 1, "relay": {', 1)
-        (shown,) = ask(server.url).status.groups
-    assert [each.offset_ms for each in shown.inputs] == [-12, 0]
+_NOT_HTTP, _VERSION = "its answer is not HTTP", "or runs another version"
 
 
-def test_nobody_there_is_said(closed_port):
-    with pytest.raises(NoAnswerError, match="nothing listens there"):
-        ask(f"http://127.0.0.1:{closed_port}")
+@pytest.mark.parametrize(
+    ("speech", "why"),
+    [
+        ([b"SSH-2.0-OpenSSH_9.2\r\n"], _NOT_HTTP),
+        ([b"HTTP/1.1 200 OK\r\n" + b"X: y\r\n" * 500 + b"\r\n"], _NOT_HTTP),
+        ([b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n-5\r\nabc"], _NOT_HTTP),
+        ([HEAD, b"[" * 1_000_000], _VERSION),
+        ([HEAD, b'{"relay": ' * 100_000], _VERSION),
+        ([HEAD, b'{"x": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"], _VERSION),
+        ([HEAD, b"\xff\xfe\x00"], _VERSION),
+        ([HEAD, b'{"relay": {}, "groups": []}'], "runs another version (relay.node: Field required)"),
+        ([HEAD, b'{"relay": {}, "groups": [], "\x1b[2J": 1}'], _VERSION),
+        ([b"HTTP/1.1 302 Found\r\nLocation: file:///etc/passwd\r\n\r\n"], "it answers 302 Found"),
+        ([b"HTTP/1.1 500 \x1b]0;owned\x07\r\n\r\n"], "it answers 500 \\x1b]0;owned\\x07"),
+    ],
+    ids=[
+        *("SSH", "headers", "a negative chunk", "brackets", "unclosed", "nested", "no text", "a field", "escapes"),
+        *("elsewhere", "a title"),
+    ],
+)
+def test_who_answers_something_else_is_no_relay_and_writes_nothing_to_the_terminal(speech, why):
+    with speaking(lambda: iter(speech)) as url, pytest.raises(OtherServerError, match=re.escape(why)) as caught:
+        ask(url, **_PATIENT)
+    assert str(caught.value).isprintable()
 
 
-def test_who_accepts_and_never_answers_is_given_up():
-    with (
-        closing(socket.create_server(("127.0.0.1", 0))) as silent,
-        pytest.raises(NoAnswerError, match="no answer within 2 s"),
-    ):
-        ask(f"http://127.0.0.1:{silent.getsockname()[1]}")
-
-
-def test_a_chunk_of_a_negative_size_is_said():
-    with closing(socket.create_server(("127.0.0.1", 0))) as server:
-
-        def answer() -> None:
-            connection, _ = server.accept()
-            with closing(connection):
-                connection.recv(1000)
-                connection.sendall(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n-5\r\nabc")
-
-        thread = Thread(target=answer)
-        thread.start()
-        with pytest.raises(OtherServerError, match="its answer is not HTTP"):
-            ask(f"http://127.0.0.1:{server.getsockname()[1]}")
-        thread.join()
+def test_any_noise_is_an_error_of_ours():
+    """A document that is damaged at a few places, and lines that are no HTTP."""
+    chance = random.Random(15)
+    whole = HEAD + status_of(states.rig()).as_json()
+    damaged = b""
+    with speaking(lambda: iter([damaged])) as url:
+        for _ in range(150):
+            changed = bytearray(whole[: chance.choice([20, 200, len(whole)])])
+            for _ in range(chance.randrange(1, 6)):
+                changed[chance.randrange(len(changed))] = chance.randrange(256)
+            damaged = bytes(changed)
+            try:
+                ask(url)
+            except (NoAnswerError, OtherServerError) as error:
+                assert str(error).isprintable(), damaged[:200]  # noqa: PT017  any of them may be raised, or none
 
 
 def test_an_unknown_machine_is_said():
     with pytest.raises(NoAnswerError, match="no machine with that name was found"):
         ask("http://robot.invalid:9464")
-
-
-def test_a_relay_of_another_shape_is_said_by_the_field_that_it_lacks():
-    with serving(states.nothing()) as server:
-        server.body = b'{"relay": {}, "groups": []}'
-        with pytest.raises(OtherServerError, match=r"runs another version \(relay.node: Field required\)"):
-            ask(server.url)
 
 
 @pytest.mark.parametrize(
@@ -120,27 +124,47 @@ def test_a_relay_of_another_shape_is_said_by_the_field_that_it_lacks():
     ],
 )
 def test_a_state_that_cannot_be_drawn_is_said_by_its_field(written, by, why):
-    with serving(states.healthy()) as server:
-        changed = re.sub(written, by, server.body, count=1)
-        assert changed != server.body
-        server.body = changed
-        with pytest.raises(OtherServerError, match=rf"runs another version \({re.escape(why)}"):
-            ask(server.url)
+    told = status_of(states.healthy()).as_json()
+    changed = re.sub(written, by, told, count=1)
+    assert changed != told
+    with answering(changed) as url, pytest.raises(OtherServerError, match=rf"another version \({re.escape(why)}"):
+        ask(url)
 
 
-def test_another_http_server_is_said_with_its_answer():
-    with serving(states.nothing()) as server, pytest.raises(OtherServerError, match="it answers 404"):
-        ask(f"{server.url}/other")
+def test_a_relay_that_is_asked_by_a_name_that_it_does_not_go_by_says_what_to_write():
+    # To the kernel 0.0.0.0 is this machine; to the relay it is not one of its own.
+    with running(states.healthy()) as relay, pytest.raises(OtherServerError) as caught:
+        ask(relay.url.replace("127.0.0.1", "0.0.0.0"))  # noqa: S104
+    assert str(caught.value) == (
+        "this relay does not answer to 0.0.0.0: if that is its name, write `metrics: {hosts: [0.0.0.0]}` in its file"
+        " and restart it"
+    )
 
 
-def test_a_search_finds_relays_and_tells_what_else_answers(closed_port):
-    closed = f"http://127.0.0.1:{closed_port}"
-    with serving(states.healthy()) as one, serving(states.rig()) as two, serving(states.nothing()) as other:
-        other.body = b"{}"
-        found = search([one.url, closed, two.url, other.url])
+def test_a_search_finds_relays_and_tells_what_else_answers(closed):
+    with running(states.healthy()) as one, running(states.rig()) as two, answering(b"{}") as other:
+        found = search([one.url, closed, two.url, other])
     assert [answer.url for answer in found.relays] == [one.url, two.url]
-    assert [text.startswith(other.url) for text in found.others] == [True]
+    assert [text.startswith(other) for text in found.others] == [True]
     assert search([closed]).others == (f"{closed}: nothing listens there",)
+
+
+def test_relays_are_found_among_fifty_that_hang_or_never_end():
+    # Those that never end take all of a core: two leave the relays, which share this process, their turn.
+    speeches = [*[lambda: without_end(b"x")] * 2]
+    speeches += [
+        speech for _ in range(16) for speech in (lambda: slowly(b"H"), lambda: iter([b"?"]), lambda: slowly(b""))
+    ]
+    with ExitStack() as stack:
+        urls = [stack.enter_context(speaking(speech)) for speech in speeches]
+        relays = [stack.enter_context(running(states.healthy())).url for _ in range(2)]
+        for patience_s in (3, 10, 40):
+            # At last long enough for a relay on a machine that others use too.
+            found = search([*urls[:25], *relays, *urls[25:]], timeout_s=patience_s, whole_s=patience_s)
+            if len(found.relays) == len(relays):
+                break
+    assert [answer.url for answer in found.relays] == relays
+    assert len(found.others) == 50
 
 
 @pytest.mark.parametrize(
@@ -163,9 +187,3 @@ def test_a_relay_is_named_by_host_port_or_url(named, urls):
 def test_what_names_no_relay_is_wrong_usage(named):
     with pytest.raises(UsageError, match="--url "):
         base_urls(named)
-
-
-def test_a_proxy_of_the_environment_is_not_asked(monkeypatch, closed_port):
-    monkeypatch.setenv("http_proxy", f"http://127.0.0.1:{closed_port}")
-    with serving(states.healthy()) as server:
-        assert ask(server.url)

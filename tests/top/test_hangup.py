@@ -10,8 +10,8 @@ import time
 
 import pytest
 
+from tests.status.support.serving import running
 from tests.top import states
-from tests.top.relay_server import serving
 
 _DEADLINE_S = 60
 
@@ -19,7 +19,7 @@ _DEADLINE_S = 60
 @pytest.mark.parametrize("inherited", [signal.SIG_DFL, signal.SIG_IGN])
 @pytest.mark.parametrize("delay_s", [0.0, 0.03, 0.08, 0.2, 0.6])
 def test_it_ends_with_its_terminal_however_soon_that_goes(delay_s: float, inherited: signal.Handlers):
-    with serving(states.healthy()) as server:
+    with running(states.healthy()) as server:
         ours, its = pty.openpty()
         process = subprocess.Popen(
             # The terminal has to be the process's own, to have it told that it is gone.

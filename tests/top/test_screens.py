@@ -11,8 +11,8 @@ from syncrelay.explain import explanation
 from syncrelay.status import Phase
 from syncrelay.top.app import EndedError, TopApp
 from syncrelay.top.client import ask
+from tests.status.support.serving import running
 from tests.top import states
-from tests.top.relay_server import serving
 from tests.top.terminal import Terminal
 
 _SMALL, _WIDE = (80, 24), (160, 45)
@@ -30,7 +30,7 @@ def at_terminal(state, *keys, size=_SMALL):
     """The lines of a terminal after some keys."""
 
     async def look():
-        with serving(state) as server:
+        with running(state) as server:
             async with terminal(server, size=size) as user:
                 await user.press(*keys)
                 return user.lines
@@ -76,7 +76,7 @@ def test_one_that_only_observes_is_told_by_its_file():
 
 def test_it_ends_with_what_it_watches():
     async def watch():
-        with serving(states.healthy()) as server:
+        with running(states.healthy()) as server:
             relays, asked = [ask(server.url)], []
 
             def source(url):
@@ -117,7 +117,7 @@ def test_a_wide_terminal_shows_spans_latencies_the_sentence_and_recent_sets():
 
 def test_groups_are_sorted_and_the_selected_one_stays_selected():
     async def look():
-        with serving(states.rig()) as server:
+        with running(states.rig()) as server:
             async with terminal(server) as user:
                 orders = []
                 for _ in range(4):
@@ -163,7 +163,7 @@ def test_a_type_that_is_not_known_yet_is_said_to_be_none():
 
 def test_keys_lead_through_the_groups_and_back():
     async def look():
-        with serving(states.rig()) as server:
+        with running(states.rig()) as server:
             async with terminal(server) as user:
                 for key, sees in (
                     ("enter", "── front"),
@@ -196,9 +196,9 @@ def test_keys_lead_through_the_groups_and_back():
 
 def test_the_screen_follows_the_relay():
     async def look():
-        with serving(states.healthy()) as server:
+        with running(states.healthy()) as server:
             async with terminal(server) as user:
-                server.show(states.silent())
+                server.state = states.silent()
                 await user.sees(states.silent().groups[0].findings[0].text)
                 assert "→ " in user.text
 
@@ -207,12 +207,12 @@ def test_the_screen_follows_the_relay():
 
 def test_a_held_picture_stays_and_then_shows_what_came_meanwhile():
     async def look():
-        with serving(states.healthy()) as server:
+        with running(states.healthy()) as server:
             async with terminal(server) as user:
                 await user.press("space")
                 assert " PAUSED: press space to resume" in user.lines
                 asked = server.asked
-                server.show(states.silent())
+                server.state = states.silent()
                 while server.asked < asked + 2:
                     await user.pilot.pause(0.05)
                 assert "silent" not in user.text
@@ -225,7 +225,7 @@ def test_a_held_picture_stays_and_then_shows_what_came_meanwhile():
 
 def test_a_relay_that_goes_away_is_said_over_its_last_state_and_found_when_it_comes_back():
     async def look():
-        with serving(states.healthy()) as server:
+        with running(states.healthy()) as server:
             async with terminal(server) as user:
                 server.stop()
                 await user.sees("nothing listens there; still trying")
@@ -243,10 +243,10 @@ def test_a_relay_that_goes_away_is_said_over_its_last_state_and_found_when_it_co
 
 def test_a_group_that_a_new_file_lacks_is_said():
     async def look():
-        with serving(states.rig()) as server:
+        with running(states.rig()) as server:
             async with terminal(server) as user:
                 await user.press("down", "enter")
-                server.show(states.healthy())
+                server.state = states.healthy()
                 await user.sees("The relay has no group rear any more.")
                 await user.press("right")
                 assert user.lines[1].startswith("── front")
@@ -256,7 +256,7 @@ def test_a_group_that_a_new_file_lacks_is_said():
 
 def test_of_several_relays_one_is_chosen_and_another_after_it():
     async def look():
-        with serving(states.healthy()) as one, serving(states.rig()) as two:
+        with running(states.healthy()) as one, running(states.rig()) as two:
             async with terminal(one, two) as user:
                 assert user.lines[0] == "2 relays answer. Which one?"
                 assert f"/syncrelay  {two.url}  groups: front, rear, inertial, radar" in user.lines[3]
@@ -280,7 +280,7 @@ def test_a_terminal_that_is_too_small_gets_a_sentence(size):
 @pytest.mark.parametrize("state", states.ALL.values(), ids=states.ALL)
 def test_every_state_fits_every_terminal(state):
     async def look():
-        with serving(state()) as server:
+        with running(state()) as server:
             async with terminal(server) as user:
                 for size in ((60, 15), _SMALL, (200, 60)):
                     await user.pilot.resize_terminal(*size)
@@ -313,7 +313,7 @@ def test_a_bug_ends_it_and_is_handed_on():
             await pilot.press("s")
             await pilot.pause()
 
-    with serving(states.rig()) as server:
+    with running(states.rig()) as server:
         app = Broken([ask(server.url)])
         with pytest.raises(ZeroDivisionError):
             asyncio.run(look(app))

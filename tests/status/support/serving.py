@@ -3,6 +3,7 @@
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from syncrelay.config.listen import Listen
 from syncrelay.explain import Tape
@@ -13,12 +14,43 @@ ANY = Listen("127.0.0.1", range(1))
 _PATIENCE_S = 60
 
 
+class Relay:
+    """A relay's server without a relay. Its state may change, and it can go and come back at the same port."""
+
+    def __init__(self, state: RelayState, listen: Listen = ANY, taps: Taps | None = None) -> None:
+        self.state, self._listen, self._taps = state, listen, taps or Taps(Tape(), str)
+        self.asked = 0
+        self.start()
+
+    def start(self) -> None:
+        self._server = Server(self._listen)
+        self.address = self._server.place.host, self._server.place.port
+        self.url = self._server.place.url
+        self._listen = replace(self._listen, ports=range(self.address[1], self.address[1] + 1))
+        self._server.serve(self._tell, self._taps)
+
+    def _tell(self) -> RelayState:
+        self.asked += 1
+        return self.state
+
+    def stop(self) -> None:
+        self._server.__exit__(None, None, None)
+
+
+@contextmanager
+def running(state: RelayState, listen: Listen = ANY, taps: Taps | None = None) -> Iterator[Relay]:
+    relay = Relay(state, listen, taps)
+    try:
+        yield relay
+    finally:
+        relay.stop()
+
+
 @contextmanager
 def serving(state: RelayState, listen: Listen = ANY, taps: Taps | None = None) -> Iterator[tuple[str, int]]:
     """The address of a server that answers with one state."""
-    with Server(listen) as server:
-        server.serve(lambda: state, taps or Taps(Tape(), str))
-        yield server.place.host, server.place.port
+    with running(state, listen, taps) as relay:
+        yield relay.address
 
 
 def connected(address: tuple[str, int]) -> socket.socket:
