@@ -5,16 +5,13 @@ import json
 import re
 from base64 import b64decode
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from syncrelay.config import load_text
 from syncrelay.recordings.analysis import Analysis, analyze
-from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
 from tests.recordings.bag.making import write_mcap
+from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
@@ -39,8 +36,8 @@ def analyzed(folder: Path, frames: Sequence[Frame], **keys: Any) -> Analysis:
     defaults = {"policy": "approximate_time", "slop": "4ms", "topics": inputs(dict.fromkeys(TOPICS, VECTOR))}
     group = {key: value for key, value in {**defaults, **keys}.items() if value is not None}
     text = config({"fused": group})
-    with closing(open_recording([str(write_mcap(folder / "drive.mcap", frames))])) as recording:
-        return analyze(recording, text, bind(load_text(text), recording))
+    with bound(write_mcap(folder / "drive.mcap", frames), text=text) as (recording, bindings):
+        return analyze(recording, text, bindings)
 
 
 def renamed(analysis: Analysis) -> Analysis:

@@ -83,6 +83,8 @@ def _answer(request: BaseHTTPRequestHandler, served: FileServer) -> None:
         _close(request)
     elif fault.isdigit():
         _say(request, int(fault))
+    elif fault == "circle":
+        _say(request, 302, Location=path)
     elif path not in served.files:
         _say(request, 404)
     elif request.headers.get("If-Match", etag) != etag:

@@ -25,6 +25,7 @@ from syncrelay.errors import BagError
 from syncrelay.recordings.bag import Encoding, open_recording
 from tests.recordings.bag.damage import FRAMES, KINDS, mcap, ros1
 from tests.recordings.bag.making import BEST_EFFORT, as_ros1, rig, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.bag.reading import read
 from tests.ros.cdr_messages import IMAGE, header, serialize
 from tests.ros.frames import Frame
 from tests.ros.streams import BEGIN, MS
@@ -81,19 +82,9 @@ _ALL_KINDS = {
 }
 
 
-def _read(*paths: Path) -> tuple[list[Frame], list[str]]:
-    recording = open_recording([str(path) for path in paths])
-    try:
-        messages = list(chain.from_iterable(recording.batches(recording.channels)))
-        assert recording.position == recording.size
-        return [Frame(each.topic, each.type, time, payload) for each, time, payload in messages], recording.faults
-    finally:
-        recording.close()
-
-
 @pytest.mark.parametrize("kind", _ALL_KINDS)
 def test_every_kind_of_recording_gives_the_messages_as_they_were_received(kind, tmp_path):
-    frames, faults = _read(_ALL_KINDS[kind](tmp_path))
+    frames, faults, _ = read(_ALL_KINDS[kind](tmp_path))
     expected = FRAMES
     if kind.startswith("ROS 1"):
         # ROS 1's headers begin with `seq`; each file of a split bag counts anew.
@@ -115,30 +106,28 @@ def test_only_the_channels_that_are_wanted_are_read(make, tmp_path):
 def test_messages_that_were_written_out_of_order_come_by_their_receive_time(write, tmp_path):
     swapped = [frame for pair in zip(FRAMES[1::2], FRAMES[::2], strict=True) for frame in pair]
     options = {"chunk_size": 500} if write is write_mcap else {}
-    frames, _ = _read(write(tmp_path / "rig", swapped, **options))
+    frames, *_ = read(write(tmp_path / "rig", swapped, **options))
     assert [frame.time for frame in frames] == sorted(frame.time for frame in FRAMES)
 
 
 def test_several_recordings_are_read_as_one(tmp_path):
     camera = write_mcap(tmp_path / "camera.mcap", [frame for frame in FRAMES if frame.topic == "/camera"])
     lidar = write_rosbag2(tmp_path / "lidar", [frame for frame in FRAMES if frame.topic == "/lidar"])
-    assert _read(camera, lidar) == (FRAMES, [])
+    assert read(camera, lidar) == (FRAMES, [], [])
 
 
 def test_a_folder_may_be_named_by_its_metadata(tmp_path):
-    assert _read(_rosbag2()(tmp_path) / "metadata.yaml") == (FRAMES, [])
+    assert read(_rosbag2()(tmp_path) / "metadata.yaml") == (FRAMES, [], [])
 
 
 @pytest.mark.parametrize("make", [mcap(), mcap(use_chunking=False)], ids=["mcap", "mcap loose"])
 def test_of_a_file_that_is_cut_off_what_is_whole_is_read(make, tmp_path):
     path = make(tmp_path)
-    size = path.stat().st_size
-    whole, _ = _read(path)
-    with path.open("r+b") as file:
-        file.truncate(size // 2)
-    frames, (fault,) = _read(path)
-    assert 0 < len(frames) < len(whole)
-    assert frames == whole[: len(frames)]
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+    frames, (fault,), _ = read(path)
+    assert 0 < len(frames) < len(FRAMES)
+    assert frames == FRAMES[: len(frames)]
     assert "cut off or damaged at byte" in fault
 
 
@@ -150,7 +139,7 @@ def test_a_ros1_bag_without_an_index_is_refused_with_the_command_that_makes_one(
     at = content.index(b"index_pos=") + len(b"index_pos=")
     path.write_bytes(content[:-200] if change == "cut off" else content[:at] + bytes(8) + content[at + 8 :])
     with pytest.raises(BagError, match=r"rig\.bag: its index cannot be read: .* run `rosbag reindex .*rig\.bag`"):
-        _read(path)
+        read(path)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +157,7 @@ def test_why_the_index_of_a_ros1_bag_cannot_be_read_is_said_in_words(field, valu
     at = content.rindex(field) + len(field)
     path.write_bytes(content[:at] + value + content[at + len(value) :])
     with pytest.raises(BagError, match=rf"its index cannot be read: {why}\. A bag that was not closed"):
-        _read(path)
+        read(path)
 
 
 def test_of_what_rosbags_has_no_words_for_no_exception_is_shown(tmp_path):
@@ -177,8 +166,8 @@ def test_of_what_rosbags_has_no_words_for_no_exception_is_shown(tmp_path):
     # Of a message's header: the connection that it belongs to, which the index knows under another number.
     at = next(re.finditer(rb"op=\x02.{4}conn=", content, re.DOTALL)).end()
     path.write_bytes(content[:at] + b"\7" + content[at + 1 :])
-    _, (fault,) = _read(path)
-    assert fault == f"{path}: damaged; read as far as possible: the records do not fit together"
+    _, (fault,), _ = read(path)
+    assert fault == "damaged; read as far as possible: the records do not fit together"
 
 
 def test_a_ros1_bag_is_read_up_to_a_chunk_that_is_damaged(tmp_path):
@@ -187,7 +176,7 @@ def test_a_ros1_bag_is_read_up_to_a_chunk_that_is_damaged(tmp_path):
     at = content.index(b"BZh", len(content) // 2)
     content[at : at + 20] = bytes(20)
     path.write_bytes(content)
-    frames, (fault,) = _read(path)
+    frames, (fault,), _ = read(path)
     assert [frame[:3] for frame in frames] == [frame[:3] for frame in FRAMES[: len(frames)]]
     assert 0 < len(frames) < len(FRAMES)
     assert "damaged; read as far as possible" in fault
@@ -197,11 +186,11 @@ def test_a_ros1_bag_is_read_up_to_a_chunk_that_is_damaged(tmp_path):
 def test_a_compressed_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
     path = _packed(ros1(), ".bz2", lambda content: bz2.compress(content)[:-200])(tmp_path)
     with pytest.raises(BagError, match=r"rig\.bag\.bz2: cut off or damaged"):
-        _read(path)
+        read(path)
     many = write_mcap(tmp_path / "many.mcap", rig(40_000), chunk_size=100_000)
     packed = bz2.compress(many.read_bytes())
     (tmp_path / "many.mcap.bz2").write_bytes(packed[: len(packed) * 2 // 3])
-    frames, faults = _read(tmp_path / "many.mcap.bz2")
+    frames, faults, _ = read(tmp_path / "many.mcap.bz2")
     assert 0 < len(frames) < 80_000
     assert any("cut off" in fault for fault in faults)
 
@@ -218,14 +207,14 @@ def test_what_a_killed_recorder_left_in_the_write_ahead_log_is_read(tmp_path):
     shutil.copy(made, killed)
     shutil.copy(f"{made}-wal", f"{killed}-wal")
     database.close()
-    frames, faults = _read(killed)
+    frames, faults, _ = read(killed)
     assert (frames[:-1], len(frames), faults) == (FRAMES, len(FRAMES) + 1, [])
 
 
 def test_of_several_files_those_that_cannot_be_read_are_said(tmp_path):
     folder = _split(lambda into, number, frames: write_mcap(into / f"rig_{number}.mcap", frames))(tmp_path)
     (folder / "rig_2.mcap").write_bytes(b"")
-    frames, faults = _read(folder)
+    frames, faults, _ = read(folder)
     assert frames == FRAMES[: len(frames)]
     assert faults == [f"{folder}/rig_2.mcap: is empty"]
 

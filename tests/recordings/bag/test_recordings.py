@@ -1,18 +1,16 @@
 """Real recordings replayed: byte for byte the sets that come out over DDS (tests/ros/test_real_recordings.py)."""
 
-from itertools import chain
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from rosbags.rosbag2 import Reader
 
-from syncrelay.config import load_text
-from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
 from syncrelay.recordings.bag.mcap_output import McapOutput
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.recordings.bag.writing import SetWriter
 from tests.recordings.bag.making import write_mcap
+from tests.recordings.bag.reading import bound, read
 from tests.ros import recordings, relaying, test_real_recordings
 from tests.ros.cdr_messages import stamp_of
 from tests.ros.configs import config, inputs, outputs
@@ -42,14 +40,14 @@ def test_the_sets_of_a_replay_are_those_that_the_relay_gives(case, real_data: Pa
     bag = real_data / named if named else write_mcap(tmp_path / "bag.mcap", frames)
     types = relaying.topics_of(frames)
     group = {**case.group, "manifest": False, "topics": inputs({topic: types[topic] for topic in case.topics})}
-    recording = open_recording([str(bag)])
-    bindings = bind(load_text(config({case.name: group}), environ={}), recording)
-    with McapOutput(tmp_path / "out") as output:
+    with (
+        bound(bag, text=config({case.name: group})) as (recording, bindings),
+        McapOutput(tmp_path / "out") as output,
+    ):
         writer = SetWriter(output)
         for binding in bindings:
             writer.begin(binding)
         (result,) = replay(recording, bindings, listeners=[writer.take])
-    recording.close()
     assert result.sets == case.sets
     expected = relaying.matched_by_engine(case.policy(), frames, case.topics)
     aligned = outputs(case.name, case.topics)
@@ -87,11 +85,7 @@ _TYPES = {
 
 @pytest.mark.parametrize("bag", _TYPES)
 def test_real_recordings_hold_what_their_sources_say(bag, real_data: Path):
-    recording = open_recording([str(real_data / bag)])
-    channels = [channel for channel in recording.channels if channel.topic in _TYPES[bag]]
-    counts = {channel.topic: 0 for channel in channels}
-    for channel, _, _ in chain.from_iterable(recording.batches(channels)):
-        counts[channel.topic] += 1
-    recording.close()
-    assert {channel.topic: (channel.type, counts[channel.topic]) for channel in channels} == _TYPES[bag]
-    assert recording.faults == []
+    frames, faults, _ = read(real_data / bag, topics=set(_TYPES[bag]))
+    counts = Counter((frame.topic, frame.type_name) for frame in frames)
+    assert {topic: (type_name, count) for (topic, type_name), count in counts.items()} == _TYPES[bag]
+    assert faults == []

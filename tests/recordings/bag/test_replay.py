@@ -1,13 +1,8 @@
 """A replay feeds the engine as the relay would: by receive time, deadlines at their moment, misfits named."""
 
-from contextlib import closing
-
 import pytest
 
-from syncrelay.config import load_text
 from syncrelay.errors import BagError
-from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
 from syncrelay.recordings.bag.replay import replay
 from syncrelay.sync import Drop, DropReason, Match
 from tests.recordings.bag.making import (
@@ -18,8 +13,8 @@ from tests.recordings.bag.making import (
     rig,
     write_mcap,
     write_ros1,
-    write_rosbag2,
 )
+from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import STRING, TIME_REFERENCE, VECTOR, header, serialize, time
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
@@ -35,9 +30,7 @@ def _group(topics, **keys):
 def _replayed(path, group, **file_keys):
     """The sets and drops with the moments at which they left, and the result of the one group."""
     left = []
-    with closing(open_recording([str(path)])) as recording:
-        file = load_text(config({"front": group}, **file_keys))
-        bindings = bind(file, recording)
+    with bound(path, text=config({"front": group}, **file_keys)) as (recording, bindings):
         (result,) = replay(recording, bindings, listeners=[lambda _, outcome, now: left.append((outcome, now))])
     return left, result
 
@@ -48,15 +41,6 @@ def _sets(left):
 
 def _drops(left):
     return [(each.message.stamp, each.reason) for each, _ in left if isinstance(each, Drop)]
-
-
-@pytest.mark.parametrize("write", [write_mcap, write_rosbag2, write_ros1])
-def test_sets_and_counts_are_those_of_the_engine(write, tmp_path):
-    left, result = _replayed(write(tmp_path / "rig", rig()), _group(inputs(_PAIR)))
-    assert _sets(left) == [(BEGIN + (100 * n + 3) * MS, BEGIN + 100 * n * MS) for n in range(39)]
-    assert result.sets == 39
-    assert [each.counts.fed for each in result.inputs] == [40, 40]
-    assert _drops(left)[-1][1] is DropReason.SHUTDOWN
 
 
 _WHICH = "and the file has no type for it: write the one that is meant"
@@ -91,21 +75,12 @@ _OTHER = Frame("/camera", TIME_REFERENCE, BEGIN, serialize(TIME_REFERENCE, heade
 )
 def test_what_does_not_fit_is_named_and_not_fed(frames, topics, problems, tmp_path):
     kinds = [[each for each in frames if each is _OTHER], [each for each in frames if each is not _OTHER]]
-    paths = [str(write_mcap(tmp_path / f"{number}.mcap", each)) for number, each in enumerate(kinds) if each]
-    with closing(open_recording(paths)) as recording:
-        (binding,) = bind(load_text(config({"front": _group(topics)})), recording)
+    paths = [write_mcap(tmp_path / f"{number}.mcap", each) for number, each in enumerate(kinds) if each]
+    with bound(*paths, text=config({"front": _group(topics)})) as (recording, (binding,)):
         (result,) = replay(recording, [binding])
     assert binding.problems == tuple(f"front: {problem}" for problem in problems)
     assert not binding.is_complete
     assert result.inputs[0].counts.fed == 0
-
-
-def test_types_that_the_file_leaves_out_are_the_recordings(tmp_path):
-    path = write_mcap(tmp_path / "rig.mcap", rig())
-    left, result = _replayed(path, _group([{"topic": "/camera"}, {"topic": "/lidar"}]))
-    with_types, _ = _replayed(path, _group(inputs(_PAIR)))
-    assert _sets(left) == _sets(with_types)
-    assert result.sets == 39
 
 
 def test_names_are_resolved_as_the_node_would(tmp_path):
@@ -167,10 +142,8 @@ def test_a_channel_that_is_not_of_ros_is_named(tmp_path):
     write_mcap(path, rig(1), enable_crcs=False)
     content = path.read_bytes().replace(b"\x03\0\0\0cdr", b"\x03\0\0\0xml")
     path.write_bytes(content)
-    recording = open_recording([str(path)])
-    (binding,) = bind(load_text(config({"front": _group(inputs(_PAIR))})), recording)
-    recording.close()
-    assert any("/camera is recorded as xml, expected cdr" in problem for problem in binding.problems)
+    with bound(path, text=config({"front": _group(inputs(_PAIR))})) as (_, (binding,)):
+        assert any("/camera is recorded as xml, expected cdr" in problem for problem in binding.problems)
 
 
 @pytest.mark.parametrize("stamp", ["receive", {"field": "seen"}])

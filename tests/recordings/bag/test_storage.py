@@ -2,14 +2,12 @@
 
 import bz2
 import random
-import socket
 import struct
 import sys
-import threading
 import zlib
 from argparse import Namespace
 from collections.abc import Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -32,6 +30,7 @@ from syncrelay.urls import redacted
 from tests.recordings.bag.damage import FRAMES, KINDS, damaged
 from tests.recordings.bag.file_server import FileServer, file_server
 from tests.recordings.bag.making import rig, write_mcap, write_ros1, write_rosbag2
+from tests.recordings.bag.reading import read
 from tests.ros.frames import Frame
 
 fsspec = pytest.importorskip("fsspec", reason="the extra `fleet` is not installed")
@@ -63,17 +62,6 @@ def rig_with_images(count: int = 30, size: int = 60_000) -> list[Frame]:
     return sorted(frames + images, key=lambda frame: frame.time)
 
 
-def read(word: str, topics: set[str] | None = None) -> tuple[list[Frame], list[str], list[str]]:
-    """Messages of some topics or of all, what is wrong with the recording, and what is remarked."""
-    told: list[str] = []
-    with closing(open_recording([word], tell=told.append)) as recording:
-        wanted = [each for each in recording.channels if topics is None or each.topic in topics]
-        found = list(chain.from_iterable(recording.batches(wanted)))
-        assert recording.position == recording.size
-        frames = [Frame(each.topic, each.type, time, payload) for each, time, payload in found]
-        return frames, [fault.removeprefix(f"{redacted(word)}: ") for fault in recording.faults], told
-
-
 def served_as(server: FileServer, path: Path, at: str = "/rig.mcap") -> str:
     server.files[at] = path.read_bytes()
     return server.url(at)
@@ -95,7 +83,7 @@ _FETCHED: dict[str, tuple[Any, ...]] = {
 def test_no_more_is_fetched_than_what_is_wanted_and_in_few_requests(case, server, tmp_path):
     options, topics, least, most, requests = _FETCHED[case]
     path = write_mcap(tmp_path / "rig.mcap", rig_with_images(), **options)
-    assert read(served_as(server, path), topics) == read(str(path), topics)
+    assert read(served_as(server, path), topics=topics) == read(path, topics=topics)
     assert least <= server.sent / path.stat().st_size <= most
     assert len(server.requests) <= requests
 
@@ -107,7 +95,7 @@ def test_of_compressed_chunks_only_those_that_hold_a_wanted_topic_are_fetched(se
     frames.sort(key=lambda frame: frame.time)
     path = write_mcap(tmp_path / "rig.mcap", frames, chunk_size=50_000, compression=CompressionType.ZSTD)
     url = served_as(server, path)
-    assert read(url, {"/camera"}) == read(str(path), {"/camera"})
+    assert read(url, topics={"/camera"}) == read(path, topics={"/camera"})
     assert server.sent < 0.15 * path.stat().st_size
 
 
@@ -135,7 +123,7 @@ def test_an_index_that_hides_a_channel_is_told_by_the_statistics(server, tmp_pat
     _with_summary(path, entries, hidden + entries[10:])
     for topic in ("/camera", "/lidar"):
         (near, near_faults, _), (far, far_faults, _) = (
-            read(each, {topic}) for each in (str(path), served_as(server, path))
+            read(each, topics={topic}) for each in (path, served_as(server, path))
         )
         assert (near, near_faults) == (far, far_faults)
         assert near_faults == [] or "of the 30 messages in its statistics" in near_faults[0]
@@ -156,7 +144,7 @@ def test_whatever_became_of_it_is_read_as_a_file_of_this_machine_is(kind, server
 
 def _outcome(word: str, topics: set[str] | None) -> object:
     try:
-        frames, faults, _ = read(word, topics)
+        frames, faults, _ = read(word, topics=topics)
     except BagError as error:
         return str(error).replace(word, "")
     return frames, faults
@@ -165,7 +153,7 @@ def _outcome(word: str, topics: set[str] | None) -> object:
 def test_a_file_that_was_not_closed_is_fetched_once(server, tmp_path):
     path = KINDS["MCAP without chunks or an index"](tmp_path)
     path.write_bytes(path.read_bytes()[:-200])
-    near, near_faults, _ = read(str(path))
+    near, near_faults, _ = read(path)
     far, far_faults, (told,) = read(served_as(server, path))
     assert (near, near_faults) == (far, far_faults)
     assert "copied here as a whole" in told
@@ -183,7 +171,7 @@ def test_what_cannot_be_read_by_ranges_is_copied_here_and_that_is_said(kind, ser
         plain = write_mcap(tmp_path / "plain.mcap", FRAMES).read_bytes()
         path = tmp_path / f"rig.mcap.{kind}"
         path.write_bytes(bz2.compress(plain) if kind == "bz2" else zstandard.compress(plain))
-    near, near_faults, _ = read(str(path))
+    near, near_faults, _ = read(path)
     far, far_faults, (told,) = read(served_as(server, path))
     assert (near, near_faults) == (far, far_faults)
     assert len(far) == len(FRAMES)
@@ -198,7 +186,7 @@ def test_what_goes_wrong_once_is_tried_again(fault, number, server, tmp_path):
     server.fault = lambda request: fault if request == number else ""
     url = served_as(server, path)
     frames, faults, told = read(url)
-    assert (frames, faults) == read(str(path))[:2]
+    assert (frames, faults) == read(path)[:2]
     # A server that once sends the whole for a part may be one that has no parts.
     assert told == [] or fault == "whole"
     assert len(server.requests) > number + 1
@@ -241,20 +229,10 @@ def test_a_port_that_is_none_is_not_tried(port):
         RemoteFile(f"http://host:{port}/rig.mcap")
 
 
-def test_a_server_that_redirects_in_circles_is_named():
-    answer = b"HTTP/1.1 302 Found\r\nLocation: /rig.mcap\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-
-        def serve() -> None:
-            with suppress(OSError):
-                while True:
-                    with listening.accept()[0] as asking:
-                        asking.recv(65536)
-                        asking.sendall(answer)
-
-        threading.Thread(target=serve, daemon=True).start()
-        with pytest.raises(StorageError, match=r"rig\.mcap: the server redirects too often$"):
-            RemoteFile(f"http://127.0.0.1:{listening.getsockname()[1]}/rig.mcap")
+def test_a_server_that_redirects_in_circles_is_named(server):
+    server.fault = lambda _: "circle"
+    with pytest.raises(StorageError, match=r"rig\.mcap: the server redirects too often$"):
+        RemoteFile(server.url("/rig.mcap"))
 
 
 def test_where_nobody_listens_that_is_said():
@@ -294,7 +272,7 @@ def test_a_server_without_ranges_sends_the_whole_and_that_is_said(fault, server,
     server.has_ranges = False
     server.fault = lambda request: fault if request == 1 else ""
     far, faults, (told,) = read(served_as(server, path))
-    assert (far, faults) == read(str(path))[:2]
+    assert (far, faults) == read(path)[:2]
     assert "its server cannot send parts of it" in told
 
 
@@ -373,7 +351,7 @@ def test_a_recording_is_read_from_whatever_fsspec_knows(kind, tmp_path):
     else:
         path = (write_ros1 if kind == "rig.bag" else write_mcap)(tmp_path / kind, FRAMES)
     memory.put(str(path), f"/{tmp_path.name}/{path.name}", recursive=True)
-    near, faults, _ = read(str(path))
+    near, faults, _ = read(path)
     for word in (f"memory://{tmp_path.name}/{path.name}", path.as_uri()):
         assert read(word)[:2] == (near, faults)
         assert [each.rpartition("/")[2] for each in find(word)] == [path.name]
@@ -447,5 +425,5 @@ def _is_near(place: int, spans: Sequence[tuple[int, int]]) -> bool:
 def test_real_recordings_are_the_same_behind_a_url(bag, server, real_data: Path):
     path = real_data / bag
     far, faults, _ = read(served_as(server, path))
-    assert (far, faults) == read(str(path))[:2]
+    assert (far, faults) == read(path)[:2]
     assert server.sent < 1.02 * path.stat().st_size

@@ -1,6 +1,5 @@
 """What a replay writes is what the relay would publish, and others can read it."""
 
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -9,10 +8,8 @@ from mcap.reader import make_reader
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 
-from syncrelay.config import AUTO, QosOverrides, QosPreset, load_text
+from syncrelay.config import AUTO, QosOverrides, QosPreset
 from syncrelay.errors import OutputError
-from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
 from syncrelay.recordings.bag.mcap_output import McapOutput
 from syncrelay.recordings.bag.qos import PRESETS, Profile, output_profile, read_profiles, write_profile
 from syncrelay.recordings.bag.replay import replay
@@ -28,6 +25,7 @@ from tests.recordings.bag.making import (
     write_ros1,
 )
 from tests.recordings.bag.making import write_rosbag2 as write_folder
+from tests.recordings.bag.reading import bound
 from tests.ros.cdr_messages import STORE, VECTOR, stamp_of, with_stamp
 from tests.ros.configs import config, inputs
 from tests.ros.frames import Frame
@@ -41,9 +39,8 @@ _RIG = rig(10)
 def _written(bag: Path, output: Path, **keys) -> list[Frame]:
     """What a replay with a group of a camera and a lidar writes, as rosbags reads it."""
     group = {"policy": "approximate_time", "slop": "5ms", "manifest": False, "topics": inputs(_PAIR), **keys}
-    with closing(open_recording([str(bag)])) as recording, McapOutput(output) as written:
+    with bound(bag, text=config({"front": group})) as (recording, bindings), McapOutput(output) as written:
         writer = SetWriter(written)
-        bindings = bind(load_text(config({"front": group})), recording)
         for binding in bindings:
             writer.begin(binding)
         replay(recording, bindings, listeners=[writer.take])

@@ -10,10 +10,10 @@ from syncrelay.errors import NothingToMatchError
 from syncrelay.recordings.analysis import propose
 from syncrelay.recordings.analysis.inventory import no_header
 from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
 from syncrelay.recordings.bag.recording import Definition
 from syncrelay.recordings.bag.replay import replay
 from tests.recordings.bag.making import BEST_EFFORT, write_mcap, write_rosbag2
+from tests.recordings.bag.reading import bound
 from tests.ros import recordings
 from tests.ros.cdr_messages import STORE, STRING, VECTOR, header, serialize, vector
 from tests.ros.frames import Frame
@@ -33,8 +33,8 @@ def _proposed(bag: Path) -> tuple[str, dict[str, int]]:
     """The text for a recording, and the sets of each group when it is replayed."""
     with closing(open_recording([str(bag)])) as recording:
         text = propose(recording).text
-    with closing(open_recording([str(bag)])) as recording:
-        results = replay(recording, bind(load_text(text), recording))
+    with bound(bag, text=text) as (recording, bindings):
+        results = replay(recording, bindings)
     return text, {result.name: result.sets for result in results}
 
 

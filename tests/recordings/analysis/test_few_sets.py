@@ -2,18 +2,15 @@
 
 import random
 from collections import Counter
-from contextlib import closing
 from pathlib import Path
 
 import pytest
 
-from syncrelay.config import load_text
 from syncrelay.recordings.analysis.few_sets import why_few_sets
-from syncrelay.recordings.bag import open_recording
-from syncrelay.recordings.bag.bindings import bind
 from syncrelay.recordings.bag.replay import replay
 from tests.faults.extent import chosen
 from tests.recordings.bag.making import write_mcap
+from tests.recordings.bag.reading import bound
 from tests.ros.streams import MS, at
 
 LENGTH_MS = 6_000
@@ -111,16 +108,19 @@ def _said(ms: int) -> str:
     return f"{ms} ms" if ms < 1_000 else f"{ms // 1_000} s"
 
 
+def _said_of(path: Path, text: str) -> str | None:
+    with bound(path, text=text) as (recording, (binding,)):
+        (result,) = replay(recording, [binding])
+        return why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
+
+
 @pytest.mark.faults
 def test_what_is_said_to_cost_the_sets_is_the_key_that_was_drawn_too_short(tmp_path):
     kinds: Counter[tuple[str, bool]] = Counter()
     for seed in range(DRAWN):
         drawn = Drawn(seed)
         path = drawn.write(tmp_path / f"{seed}.mcap")
-        with closing(open_recording([str(path)])) as recording:
-            (binding,) = bind(load_text(drawn.text), recording)
-            (result,) = replay(recording, [binding])
-            said = why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
+        said = _said_of(path, drawn.text)
         where = f"seed {seed} of {DRAWN}, {drawn.text}: {said}"
         if drawn.expected is None:
             assert said is None, where
@@ -139,8 +139,4 @@ def test_where_no_single_key_costs_the_sets_none_is_named(tmp_path):
     path = write_mcap(tmp_path / "bag.mcap", sorted(late, key=lambda frame: frame.time))
     keys = "policy: approximate_time, slop: 20ms, queue_size: 2, topics: [{topic: /a}, {topic: /b}]"
     text = f"{{version: 1, groups: {{front: {{{keys}}}}}}}"
-    with closing(open_recording([str(path)])) as recording:
-        (binding,) = bind(load_text(text), recording)
-        (result,) = replay(recording, [binding])
-        said = why_few_sets(recording, binding, [each.counts for each in result.inputs], result.sets)
-    assert said == "front: only 0 of 60 possible sets are complete: `syncrelay analyze` says more"
+    assert _said_of(path, text) == "front: only 0 of 60 possible sets are complete: `syncrelay analyze` says more"

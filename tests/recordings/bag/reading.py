@@ -1,0 +1,40 @@
+"""Recordings as tests read them: all of their messages as frames, or bound to the groups of a file."""
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+from syncrelay.config import load_text
+from syncrelay.recordings.bag import Recording, open_recording
+from syncrelay.recordings.bag.bindings import GroupBinding, bind
+from syncrelay.urls import redacted
+from tests.ros.frames import Frame
+
+
+class Read(NamedTuple):
+    """The messages of a recording, what is wrong with it, and what is remarked."""
+
+    frames: list[Frame]
+    faults: list[str]
+    told: list[str]
+
+
+def read(*words: Path | str, topics: set[str] | None = None) -> Read:
+    """Read some topics or all of them; faults are told without the name of the first file."""
+    told: list[str] = []
+    name = f"{redacted(str(words[0]))}: "
+    with closing(open_recording([str(word) for word in words], tell=told.append)) as recording:
+        wanted = [each for each in recording.channels if topics is None or each.topic in topics]
+        found = list(chain.from_iterable(recording.batches(wanted)))
+        assert recording.position == recording.size
+        frames = [Frame(each.topic, each.type, time, payload) for each, time, payload in found]
+        return Read(frames, [fault.removeprefix(name) for fault in recording.faults], told)
+
+
+@contextmanager
+def bound(*words: Path | str, text: str) -> Iterator[tuple[Recording, tuple[GroupBinding, ...]]]:
+    """Open a recording, with the groups of a file's text as it fills them."""
+    with closing(open_recording([str(word) for word in words])) as recording:
+        yield recording, bind(load_text(text), recording)
