@@ -134,16 +134,11 @@ def _fates(row: InputFates) -> Iterator[str]:
     yield f"{row.received} received"
     yield f"{row.matched} in sets"
     if row.unneeded:
-        yield f"{row.unneeded} not needed ({unneeded_line(row)})"
+        yield f"{row.unneeded} not needed ({why_unneeded(row.lacking)})"
     if row.dropped:
         reasons = sorted(row.dropped.items(), key=lambda item: -item[1])
         told = ", ".join(f"{reason.value} {count}" for reason, count in reasons)
         yield f"{sum(row.dropped.values())} dropped ({told})"
-
-
-def unneeded_line(row: InputFates) -> str:
-    """Return why messages of an input were not needed; some must have been."""
-    return why_unneeded(row.lacking)
 
 
 def promise(suggestion: Suggestion) -> str:

@@ -9,13 +9,15 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from syncrelay.config.wording import counted
 from syncrelay.errors import BagError
 from syncrelay.explain import words
 from syncrelay.printable import printable, printable_lines
 from syncrelay.recordings.analysis import Analysis, file_with_changes
 from syncrelay.recordings.analysis.html.drawings import drawings_of
 from syncrelay.recordings.analysis.html.words import TOPIC_COLUMNS, group_words, topic_row
-from syncrelay.status.fates import FATES, Fate
+from syncrelay.recordings.analysis.report_text import sampled_line, size_text, slop_text
+from syncrelay.status.fates import FATES
 
 MARK: Final = '<meta name="generator" content="syncrelay">'
 """Stands near the begin of every page, and in no other file."""
@@ -38,13 +40,24 @@ def as_html(name: str, analysis: Analysis) -> str:
         name=printable(name),
         began=_when(analysis.begin),
         lasts=words.seconds(analysis.end - analysis.begin),
-        messages=sum(topic.messages for topic in analysis.topics),
+        messages=counted(sum(topic.messages for topic in analysis.topics), "message"),
         faults=list(map(printable, analysis.faults)),
         topics=[topic_row(topic) for topic in analysis.topics],
         columns=TOPIC_COLUMNS,
         groups=told,
+        counted=counted,
+        duration=words.duration,
+        seconds=words.seconds,
+        sampled_line=sampled_line,
+        size_text=size_text,
+        slop_text=slop_text,
         fates={fate.name: fate for fate in FATES},
-        drawings={"fates": [_fate(fate) for fate in FATES], "groups": [each.for_script for each in drawings]},
+        drawings={
+            "fates": [
+                {"name": fate.name, "word": fate.word, "path": fate.path, "filled": fate.is_filled} for fate in FATES
+            ],
+            "groups": [each.for_script for each in drawings],
+        },
         file=_file(analysis),
         script=script,
         style=style,
@@ -59,10 +72,6 @@ def _file(analysis: Analysis) -> str:
         return printable_lines(file_with_changes(analysis.text, analysis.changes)).rstrip()
     except BagError as error:
         return f"# {error}"
-
-
-def _fate(fate: Fate) -> dict[str, Any]:
-    return {"name": fate.name, "word": fate.word, "path": fate.path, "filled": fate.is_filled}
 
 
 def _template(name: str) -> Any:

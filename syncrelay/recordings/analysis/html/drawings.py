@@ -1,7 +1,8 @@
-"""What the script of the page draws for a group, with long rows of whole numbers packed into few characters."""
+"""What the script of the page draws for a group: lanes, histograms, curves; long rows of numbers are packed."""
 
 import gzip
 from base64 import b64encode
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -9,13 +10,27 @@ import numpy as np
 
 from syncrelay.config import GroupConfig
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis
-from syncrelay.recordings.analysis.html.charts import Histogram, histogram, queue_marks, slop_marks
 from syncrelay.recordings.analysis.html.lanes import Lanes, lanes_of
+from syncrelay.recordings.analysis.pairs import Pair
 from syncrelay.recordings.bag.columns import Nanoseconds
 
 _LARGEST: Final = 2**31 - 1
 # With other stamps, the drawn distances are not those that suggested values are for.
 _OTHER_STAMPS = ("stamp", "offset")
+_BINS: Final = 60
+# What lies so many times farther out than most do is counted, not drawn: it would press all others into one bar.
+_FARTHEST: Final = 1.5
+# A slop line so many times farther out than the offsets is left out for the same reason.
+_FARTHEST_LINE: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """How many offsets of a pair lie from one edge to the next, in nanoseconds, and how many outside of all."""
+
+    edges: tuple[float, ...]
+    counts: tuple[int, ...]
+    outside: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +44,11 @@ class Drawings:
 
 def drawings_of(group: GroupAnalysis, analysis: Analysis, *, most: int) -> Drawings:
     """Return what is drawn of a group, with about `most` messages."""
-    suggested = _suggested(group)
-    slops, sizes = slop_marks(group.group, suggested), queue_marks(group.group, suggested)
+    has_other_stamps = any(change.key in _OTHER_STAMPS for change in group.suggestion.changes)
+    configs = (group.group, group.group if has_other_stamps else group.suggested)
+    slops, sizes = [_slop(each) for each in configs], [each.options.queue_size for each in configs]
     lanes = lanes_of(group, analysis.begin, most=most)
-    histograms = tuple(histogram(pair, slops) for pair in group.pairs)
+    histograms = tuple(_histogram(pair, slops) for pair in group.pairs)
     return Drawings(
         lanes,
         histograms,
@@ -40,17 +56,35 @@ def drawings_of(group: GroupAnalysis, analysis: Analysis, *, most: int) -> Drawi
             "name": group.group.name,
             "duration": analysis.end - analysis.begin,
             "timeline": _timeline(lanes),
-            "slops": {"now": slops.now, "then": slops.then},
-            "sizes": {"now": sizes.now, "then": sizes.then},
+            "slops": _marks(*slops),
+            "sizes": _marks(*sizes),
             "histograms": [{"edges": each.edges, "counts": each.counts} for each in histograms],
             **_curves(group),
         },
     )
 
 
-def _suggested(group: GroupAnalysis) -> GroupConfig:
-    has_other_stamps = any(change.key in _OTHER_STAMPS for change in group.suggestion.changes)
-    return group.group if has_other_stamps else group.suggested
+def _slop(group: GroupConfig) -> int | None:
+    return None if group.options.matched_by or group.options.tolerance is None else group.options.tolerance.ns
+
+
+def _marks(now: int | None, then: int | None) -> dict[str, int | None]:
+    """Return the values that are marked in a chart: as they are in the file, and as they are suggested if different."""
+    return {"now": now, "then": None if then == now else then}
+
+
+def _histogram(pair: Pair, slops: Sequence[int | None]) -> Histogram:
+    """Return how the offsets of a pair are spread, slops within what is drawn if they are not far out."""
+    margin = round(_FARTHEST * (pair.signed.high - pair.signed.low))
+    low = max(pair.signed.least, pair.signed.low - margin)
+    high = min(pair.signed.greatest, pair.signed.high + margin)
+    reach = max(abs(low), abs(high), 1)
+    lines = [slop for slop in slops if slop is not None and slop <= _FARTHEST_LINE * reach]
+    low, high = (min([low, *(-slop for slop in lines)]), max([high, *lines]))
+    margin = max((high - low) // 20, 10)
+    edges = np.linspace(low - margin, high + margin, _BINS + 1)
+    counts, _ = np.histogram(pair.offsets, edges)
+    return Histogram(tuple(edges.tolist()), tuple(counts.tolist()), len(pair.offsets) - int(counts.sum()))
 
 
 def _curves(group: GroupAnalysis) -> dict[str, Any]:

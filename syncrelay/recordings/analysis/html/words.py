@@ -1,10 +1,11 @@
-"""What the page says in words and tables, as the template takes it."""
+"""What the page says in words and tables, beside the figures that the template takes as they are."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from syncrelay.config.wording import all_of, counted
 from syncrelay.explain import Severity, in_words, words
+from syncrelay.explain.summary import why_unneeded
 from syncrelay.recordings.analysis import GroupAnalysis, patch
 from syncrelay.recordings.analysis.html.drawings import Drawings
 from syncrelay.recordings.analysis.pairs import worth_seeing
@@ -15,10 +16,6 @@ from syncrelay.recordings.analysis.report_text import (
     pair_line,
     period_text,
     promise,
-    sampled_line,
-    size_text,
-    slop_text,
-    unneeded_line,
 )
 from syncrelay.recordings.analysis.topics import TopicFigures
 from syncrelay.recordings.analysis.unneeded import InputFates
@@ -50,9 +47,8 @@ def topic_row(topic: TopicFigures) -> dict[str, Any]:
 
 
 def group_words(group: GroupAnalysis, drawings: Drawings) -> dict[str, Any]:
-    """Return all that is said of a group."""
-    suggestion, config, curves, lanes = group.suggestion, group.group, group.curves, drawings.lanes
-    topics = [topic.topic for topic in config.topics]
+    """Return a group, its lanes, and what is said of them in words."""
+    suggestion, topics = group.suggestion, [topic.topic for topic in group.group.topics]
     fates = tuple(fate.name for fate in FATES if any(_count(row, fate.name) for row in group.fates))
     verdict, tone = _verdict(group)
     pairs = [
@@ -65,15 +61,13 @@ def group_words(group: GroupAnalysis, drawings: Drawings) -> dict[str, Any]:
     seen = worth_seeing(group.pairs)
     unseen = [at for at in range(len(pairs)) if at not in seen]
     return {
-        "name": config.name,
-        "policy": config.options.policy,
-        "sets": len(group.evaluation.sets),
+        "of": group,
+        "lanes": drawings.lanes,
         "verdict": verdict,
         "tone": tone,
         "notes": [_note(each, topics) for each in alike(group.findings)],
-        "hints": suggestion.hints,
         "promise": promise(suggestion).removesuffix(","),
-        "patch": patch(suggestion.changes, {config.name: topics}).rstrip() if suggestion.changes else "",
+        "patch": patch(suggestion.changes, {group.group.name: topics}).rstrip() if suggestion.changes else "",
         "reasons": list(dict.fromkeys(f"{change.key}: {change.reason}" for change in suggestion.changes)),
         "fates": fates,
         "rows": [_fate_row(row, fates) for row in group.fates],
@@ -81,25 +75,6 @@ def group_words(group: GroupAnalysis, drawings: Drawings) -> dict[str, Any]:
         "pairs": [pairs[at] for at in seen],
         "other_pairs": [pairs[at] for at in unseen],
         "others": other_pairs([group.pairs[at] for at in unseen]) if unseen else "",
-        "by_slop": [
-            (slop_text(group, point), point.sets, words.duration(point.median_span) if point.sets else "")
-            for point in (curves.by_slop if curves else ())
-        ],
-        "by_queue_size": [(size_text(group, point), point.sets) for point in (curves.by_queue_size if curves else ())],
-        "sampled": sampled_line(curves) if curves else "",
-        "thinned": ""
-        if lanes.each == 1
-        else (
-            f"This recording has more messages than the page can hold: one of every {lanes.each} stretches of"
-            f" {words.seconds(lanes.stretch)} is drawn, with all its messages. The figures and tables count every"
-            " message."
-        ),
-        "astray": ""
-        if not lanes.astray
-        else (
-            f"{counted(lanes.astray, 'message')} drawn at the time of receipt: unset stamps, or stamps seconds"
-            " off the usual delay."
-        ),
     }
 
 
@@ -134,7 +109,7 @@ def _unneeded(rows: Sequence[InputFates]) -> Iterator[str]:
     of_each: dict[str, list[str]] = {}
     for row in rows:
         if row.unneeded:
-            of_each.setdefault(unneeded_line(row), []).append(row.topic)
+            of_each.setdefault(why_unneeded(row.lacking), []).append(row.topic)
     for reason, topics in of_each.items():
         yield f"{all_of(topics)}: {reason}"
 
