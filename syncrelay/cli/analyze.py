@@ -146,7 +146,7 @@ def _analyze(bag: str, arguments: Namespace, text: str | None, topics: tuple[str
     """
     from syncrelay.cli.reading import reading, tell_faults
     from syncrelay.recordings.analysis import analyze, inventory, with_suggestions
-    from syncrelay.recordings.analysis.binding import bind_file_or_topics
+    from syncrelay.recordings.analysis.proposal import bind_file_or_topics
     from syncrelay.recordings.analysis.report_json import inventory_as_json
     from syncrelay.recordings.analysis.report_text import inventory_lines
     from syncrelay.recordings.bag import open_recording

@@ -7,6 +7,7 @@ import sys
 import time
 from argparse import Namespace
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from threading import Event
 from typing import TYPE_CHECKING, Final
 
@@ -145,10 +146,9 @@ def _answer(relay: "Relay") -> "Answer":
 
 def _as_json(state: "RelayState", seconds: float, analyses: "Sequence[GroupAnalysis]") -> object:
     """Return the state as /status has it, for how long was observed, and what is suggested for each group."""
-    from syncrelay.recordings.analysis.report_json import suggestion_as_json
     from syncrelay.status import status_of
 
-    suggestions = [{"group": each.group.name, **suggestion_as_json(each.suggestion)} for each in analyses]
+    suggestions = [{"group": each.group.name, **asdict(each.suggestion)} for each in analyses]
     return {**status_of(state).as_dict(), "seconds": round(seconds, 1), "suggestions": suggestions}
 
 

@@ -8,6 +8,7 @@ import itertools
 import json
 import os
 import re
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,6 @@ import yaml
 
 from syncrelay.config import Config, load_text
 from syncrelay.recordings.analysis.live import LiveStreams, analyze_live
-from syncrelay.recordings.analysis.report_json import suggestion_as_json
 from syncrelay.recordings.analysis.report_text import suggestion_lines
 from tests.cli.command import ROOT, run_here
 from tests.drawn_files import drawn_files, frames_for
@@ -108,7 +108,7 @@ def _observe(config: Config, frames: list[Frame]) -> None:
         came = [[(each.time, each.time) for each in frames if each.topic == topic.topic] for topic in group.topics]
         live.take(group.name, came)
     for analysis in analyze_live(config, config.groups, live):
-        assert suggestion_as_json(analysis.suggestion)
+        assert json.dumps(asdict(analysis.suggestion))
         assert all(suggestion_lines(analysis))
 
 

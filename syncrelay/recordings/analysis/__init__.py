@@ -1,9 +1,9 @@
 """What a recording tells of its topics, and what a file would make of it: figures, curves, findings, better values."""
 
-from syncrelay.recordings.analysis.analysis import Analysis, GroupAnalysis, analyze, proposed_text, with_suggestions
+from syncrelay.recordings.analysis.analysis import Analysis, GroupAnalysis, analyze, with_suggestions
 from syncrelay.recordings.analysis.changes import Change, file_with_changes, patch
 from syncrelay.recordings.analysis.inventory import Topic, inventory, inventory_of
-from syncrelay.recordings.analysis.proposal import Proposal, propose, propose_for
+from syncrelay.recordings.analysis.proposal import Proposal, propose, propose_for, proposed_text
 
 __all__ = [
     "Analysis",

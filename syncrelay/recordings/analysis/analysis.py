@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
-import yaml
-
 from syncrelay.config import GroupConfig, load_text
 from syncrelay.config.load import spelt_out
 from syncrelay.explain.nearest import PossibleSets
@@ -21,8 +19,7 @@ from syncrelay.recordings.analysis.topics import TopicFigures, figures_of
 from syncrelay.recordings.analysis.unneeded import InputFates, Unneeded, find_unneeded, input_fates
 from syncrelay.recordings.analysis.watching import LastingFinding, watch_group
 from syncrelay.recordings.bag.bindings import GroupBinding
-from syncrelay.recordings.bag.definitions import begins_with_header
-from syncrelay.recordings.bag.recording import Channel, Recording
+from syncrelay.recordings.bag.recording import Recording
 
 
 # No slots: what takes long is found when it is first asked for, and kept.
@@ -102,16 +99,6 @@ def analyze(recording: Recording, text: str, bindings: Sequence[GroupBinding]) -
     distinct = {(stream.topic, id(stream)): stream for of_group in streams for stream in of_group}
     topics = tuple(figures_of(stream) for stream in distinct.values() if stream.stamps)
     return Analysis(recording.begin, recording.end, topics, groups, text, tuple(recording.faults))
-
-
-def proposed_text(name: str, channels: Sequence[Channel]) -> str:
-    """Return a file's text with one group of channels, and values that stand until better ones are measured."""
-    topics = [{"topic": channel.topic, "type": channel.type} for channel in channels]
-    for topic, channel in zip(topics, channels, strict=True):
-        if begins_with_header(channel) is False:
-            topic["stamp"] = "receive"
-    group = {"policy": "approximate_time", "slop": "10ms", "topics": topics}
-    return yaml.safe_dump({"version": 1, "groups": {name: group}}, sort_keys=False)
 
 
 def with_suggestions(analysis: Analysis) -> Analysis:

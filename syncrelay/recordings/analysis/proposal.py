@@ -1,22 +1,26 @@
-"""A file for topics of which nothing is known: groups, types and values as measured, the evidence as comments."""
+"""Files for topics of which nothing is known: groups, types and values as measured, the evidence as comments."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import Final
 
-from syncrelay.config import GroupConfig
-from syncrelay.config.wording import counted
-from syncrelay.errors import NothingToMatchError
+import yaml
+
+from syncrelay.config import GroupConfig, load_text
+from syncrelay.config.wording import counted, did_you_mean
+from syncrelay.errors import BagError, NothingToMatchError, UsageError
 from syncrelay.explain import words
 from syncrelay.printable import printable
-from syncrelay.recordings.analysis.analysis import analyze_group, group_of, proposed_text
+from syncrelay.recordings.analysis.analysis import analyze_group, group_of
 from syncrelay.recordings.analysis.changes import Change, with_changes, with_evidence
 from syncrelay.recordings.analysis.evaluation import completed, evaluate
 from syncrelay.recordings.analysis.inventory import FEWEST, Topic, inventory
 from syncrelay.recordings.analysis.pairs import pair
 from syncrelay.recordings.analysis.topics import TopicFigures
-from syncrelay.recordings.bag.recording import Recording
+from syncrelay.recordings.bag.bindings import GroupBinding, bind
+from syncrelay.recordings.bag.definitions import begins_with_header
+from syncrelay.recordings.bag.recording import Channel, Recording
 from syncrelay.sync.queues import LONGEST_QUEUE
 
 # Topics of one rate whose stamps lie within a tenth of a period of each other come from one epoch.
@@ -24,6 +28,7 @@ _TOGETHER: Final = 0.1
 _SAME_RATE: Final = 1.1
 _EPOCH: Final = "epoch"
 _FUSED: Final = "fused"
+_MATCHED: Final = "matched"
 _SECOND: Final = 1_000_000_000
 _QUEUE_SIZE: Final = "queue_size"
 _HEAD: Final = "version: 1\ngroups:\n"
@@ -35,6 +40,36 @@ class Proposal:
 
     text: str
     left_out: tuple[str, ...]
+
+
+def proposed_text(name: str, channels: Sequence[Channel]) -> str:
+    """Return a file's text with one group of channels, and values that stand until better ones are measured."""
+    topics = [{"topic": channel.topic, "type": channel.type} for channel in channels]
+    for topic, channel in zip(topics, channels, strict=True):
+        if begins_with_header(channel) is False:
+            topic["stamp"] = "receive"
+    group = {"policy": "approximate_time", "slop": "10ms", "topics": topics}
+    return yaml.safe_dump({"version": 1, "groups": {name: group}}, sort_keys=False)
+
+
+def bind_file_or_topics(
+    recording: Recording, *, file: str | None, text: str | None, topics: Sequence[str]
+) -> tuple[str, tuple[GroupBinding, ...]]:
+    """Return the text of a file and its groups as the recording fills them; without a text, one proposed for topics.
+
+    Raises ConfigError for a faulty file, BagError for a topic that is not recorded, UsageError for fewer than two.
+    """
+    if text is None:
+        by_name = {channel.topic: channel for channel in recording.channels}
+        for topic in topics:
+            if topic not in by_name:
+                raise BagError(
+                    f"{topic} is not in the recording{did_you_mean(topic, by_name)}; it has {', '.join(by_name)}"
+                )
+        if len(set(topics)) < 2:  # noqa: PLR2004  one alone has nothing to be matched with
+            raise UsageError("name 2 topics or more")
+        text = proposed_text(_MATCHED, [by_name[topic] for topic in dict.fromkeys(topics)])
+    return text, bind(load_text(text, name=file or "<topics>"), recording)
 
 
 def propose(recording: Recording) -> Proposal:

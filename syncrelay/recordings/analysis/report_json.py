@@ -7,8 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from syncrelay.recordings.analysis import Analysis, GroupAnalysis, Topic
-from syncrelay.recordings.analysis.pairs import Pair
-from syncrelay.recordings.analysis.suggest import Suggestion
+from syncrelay.recordings.analysis.curves import Point
 from syncrelay.recordings.analysis.topics import spread
 from syncrelay.recordings.analysis.watching import LastingFinding
 from syncrelay.recordings.bag import Recording
@@ -57,10 +56,18 @@ def _group(each: GroupAnalysis) -> dict[str, Any]:
             }
             for topic, counts, fates in zip(each.group.topics, each.evaluation.counts, each.fates, strict=True)
         ],
-        "pairs": [_pair(pair) for pair in each.pairs],
+        "pairs": [
+            {
+                "first": pair.first,
+                "second": pair.second,
+                "signed": asdict(pair.signed),
+                "distance": asdict(pair.distance),
+            }
+            for pair in each.pairs
+        ],
         **_curves(each),
         "findings": [_finding(lasting) for lasting in each.findings],
-        "suggestion": suggestion_as_json(each.suggestion),
+        "suggestion": asdict(each.suggestion),
     }
 
 
@@ -70,46 +77,20 @@ def _quantity(values: Iterable[int]) -> dict[str, Any] | None:
     return asdict(spread(every)) if len(every) else None
 
 
-def suggestion_as_json(suggestion: Suggestion) -> dict[str, Any]:
-    """Return better values for a group, and what they would give, as what json.dumps takes."""
-    return {
-        "possible": suggestion.possible,
-        "now": suggestion.now,
-        "then": suggestion.then,
-        "hints": suggestion.hints,
-        "changes": [asdict(change) for change in suggestion.changes],
-    }
-
-
-def _pair(pair: Pair) -> dict[str, Any]:
-    return {
-        "first": pair.first,
-        "second": pair.second,
-        "signed": asdict(pair.signed),
-        "distance": asdict(pair.distance),
-    }
-
-
 def _curves(each: GroupAnalysis) -> dict[str, Any]:
     """Return the curves; `matched` is the share of the slowest input's messages, of the `tried` ones."""
     curves = each.curves
     if curves is None:
         return {"by_slop": [], "by_queue_size": [], "tried": None}
-    by_slop = [
-        {
-            "slop": point.value,
-            "sets": point.sets,
-            "matched": point.sets / max(1, curves.of),
-            "median_span": point.median_span,
-        }
-        for point in curves.by_slop
-    ]
-    by_queue_size = [
-        {"queue_size": point.value, "sets": point.sets, "matched": point.sets / max(1, curves.of)}
-        for point in curves.by_queue_size
-    ]
-    tried = {"messages": curves.messages, "recorded": curves.recorded, "lasts": curves.lasts}
-    return {"by_slop": by_slop, "by_queue_size": by_queue_size, "tried": tried}
+
+    def point_of(key: str, point: Point) -> dict[str, Any]:
+        return {key: point.value, "sets": point.sets, "matched": point.sets / max(1, curves.of)}
+
+    return {
+        "by_slop": [{**point_of("slop", each), "median_span": each.median_span} for each in curves.by_slop],
+        "by_queue_size": [point_of("queue_size", each) for each in curves.by_queue_size],
+        "tried": {"messages": curves.messages, "recorded": curves.recorded, "lasts": curves.lasts},
+    }
 
 
 def _finding(lasting: LastingFinding) -> dict[str, Any]:

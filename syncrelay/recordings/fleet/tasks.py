@@ -10,8 +10,8 @@ from typing import Final, Self
 from syncrelay.collector import eased_collector
 from syncrelay.config import Config, load_text
 from syncrelay.recordings.analysis import analyze, inventory, with_suggestions
-from syncrelay.recordings.analysis.binding import bind_file_or_topics
 from syncrelay.recordings.analysis.few_sets import why_few_sets
+from syncrelay.recordings.analysis.proposal import bind_file_or_topics
 from syncrelay.recordings.analysis.report_json import as_json, inventory_as_json
 from syncrelay.recordings.bag import Recording, open_recording
 from syncrelay.recordings.bag.bindings import GroupBinding, bind
