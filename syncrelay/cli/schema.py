@@ -22,7 +22,7 @@ def parser() -> Parser:
 def command(_parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     """Run `syncrelay schema`."""
     if arguments.test:
-        from syncrelay.recordings.cases.schema import cases_schema
+        from syncrelay.recordings.cases.models import cases_schema
 
         schema = cases_schema()
     else:

@@ -12,16 +12,14 @@ from syncrelay.config import Config, ConfigError, GroupConfig, Problem, Severity
 from syncrelay.config.document import Document, plain
 from syncrelay.config.problems import Path as Place
 from syncrelay.config.source import STDIN, Patience, Source, check_text, read_source
-from syncrelay.config.translate import translate
-from syncrelay.config.wording import describe, one_of, quoted
+from syncrelay.config.translate import Form, translate
+from syncrelay.config.wording import all_of, describe, one_of, quoted
 from syncrelay.config.yaml_tree import MOST_PROBLEMS, compose, too_many
 from syncrelay.recordings.bag import is_url
 from syncrelay.recordings.bag.bindings import full_name
 from syncrelay.recordings.cases import drawing as drawings
-from syncrelay.recordings.cases.drawing import Drawing
-from syncrelay.recordings.cases.form import CASES_FORM
-from syncrelay.recordings.cases.models import LONGEST, MOST_SECONDS, Case, CasesFile, InputSource
-from syncrelay.recordings.cases.names import input_named
+from syncrelay.recordings.cases.drawing import DidYouMean, Drawing
+from syncrelay.recordings.cases.models import LONGEST, MOST_SECONDS, Case, CasesFile, Expectation, InputSource
 from syncrelay.rig.what_if import Fault
 
 _LEAST: Final = "at least `version: 1`, `config:` and `cases:`"
@@ -30,6 +28,15 @@ _GROUPS: Final = (
     " `cases:`"
 )
 _MOST_MESSAGES: Final = 1_000_000
+_FORM: Final = Form(
+    CasesFile,
+    levels={"the file": CasesFile, "a case": Case, "a case's `expect`": Expectation, "a case's `inputs`": InputSource},
+    missing={
+        "version": "expected `version: 1`",
+        "config": "expected the file that is tested, for example `config: fusion.yaml`",
+        "cases": "expected one case or more",
+    },
+)
 _ONLY_WITH_RATE: Final = ("phase", "jitter", "latency_jitter", "drop")
 
 
@@ -76,7 +83,7 @@ def _suite(source: Source, folder: Path, environ: Mapping[str, str]) -> Suite:
     try:
         file = CasesFile.model_validate(plain(document.root))
     except ValidationError as error:
-        raise _refusal([*problems, *translate(error.errors(include_url=False), document, CASES_FORM)]) from error
+        raise _refusal([*problems, *translate(error.errors(include_url=False), document, _FORM)]) from error
     config = _tested(file.config, folder, document, environ)
     reader = _Reader(document, config, folder)
     if not file.cases:
@@ -265,3 +272,29 @@ class _Reader:
             else:
                 recorded = full_name(group.topics[place].topic, self._config)
                 yield fault.of_topic(group.inputs.names[place] if case.recording is None else recorded)
+
+
+def input_named(name: str, group: GroupConfig, *, did_you_mean: DidYouMean) -> int:
+    """Return the index of an input by a name: `left` names /left/image_raw if no other topic has that part.
+
+    Raises ValueError if no input or several have it.
+    """
+    topics = [topic.topic for topic in group.topics]
+    for known in (group.inputs.names, topics):
+        if name in known:
+            return known.index(name)
+    wanted = _parts(name)
+    spelt = f"/{'/'.join(wanted)}/"
+    found = [index for index, topic in enumerate(topics) if wanted and spelt in f"/{'/'.join(_parts(topic))}/"]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise ValueError(f"{quoted(name)} is a part of {all_of(topics[index] for index in found)}: write more of it")
+    hint = did_you_mean(
+        name, [*topics, *(_parts(topic)[-1] for topic in topics), *(_parts(topic)[0] for topic in topics)]
+    )
+    raise ValueError(f"{quoted(name)} is not an input of {group.name}{hint or f', expected {one_of(topics)}'}")
+
+
+def _parts(name: str) -> Sequence[str]:
+    return [part for part in name.split("/") if part]

@@ -7,6 +7,7 @@ from pydantic.config import JsonDict
 
 from syncrelay.config.file import Version
 from syncrelay.config.keys import NOT_NULL, FieldPath, Keys, Rate, SignedDuration, duration_schema
+from syncrelay.config.schema import DRAFT, REF, VARIABLE, Schema, of_mapping
 from syncrelay.config.units import parse_duration
 from syncrelay.config.wording import describe
 from syncrelay.explain import Code
@@ -110,14 +111,23 @@ def _time(meaning: str, example: str) -> Any:
     return Field(default=0, description=f"{meaning} {_DURATION} Default: 0.", examples=[example])
 
 
+def _unset(description: str, *examples: object) -> Any:
+    """Return a field that is None where the file does not have it."""
+    return Field(default=None, description=description, examples=[*examples] or None)
+
+
+OptionalCount = Annotated[Count | None, NOT_NULL]
+OptionalShare = Annotated[Share | None, NOT_NULL]
+OptionalTime = Annotated[Time | None, NOT_NULL]
+
+
 class InputSource(Keys):
     """What comes of an input: as it was drawn, or so many a second."""
 
-    rate: Annotated[Rate | None, NOT_NULL] = Field(
-        default=None,
-        description="Messages a second, for an input that is not drawn. A number is Hz, a string has a unit (Hz, kHz)."
-        " Default: none, it is drawn or sends nothing.",
-        examples=["30 Hz"],
+    rate: Annotated[Rate | None, NOT_NULL] = _unset(
+        "Messages a second, for an input that is not drawn. A number is Hz, a string has a unit (Hz, kHz). Default:"
+        " none, it is drawn or sends nothing.",
+        "30 Hz",
     )
     phase: Length = _time("When the first is measured, with `rate`.", "3ms")
     jitter: Length = _time("Standard deviation of stamps, with `rate`.", "1ms")
@@ -127,11 +137,10 @@ class InputSource(Keys):
     drop: Loss = Field(
         default=0, description="Share of messages that are never sent, with `rate`. Default: 0%.", examples=["3%"]
     )
-    field: Annotated[FieldPath | None, NOT_NULL] = Field(
-        default=None,
-        description="Which field the keys of the drawing stand in, for `equal_key`; a message has no other. Default:"
-        " the one that the file matches by.",
-        examples=["header.frame_id"],
+    field: Annotated[FieldPath | None, NOT_NULL] = _unset(
+        "Which field the keys of the drawing stand in, for `equal_key`; a message has no other. Default: the one that"
+        " the file matches by.",
+        "header.frame_id",
     )
 
 
@@ -140,18 +149,10 @@ class InputExpectation(Keys):
 
     model_config = ConfigDict(json_schema_extra=_NOT_EMPTY)
 
-    received: Annotated[Count | None, NOT_NULL] = Field(
-        default=None, description="Messages that come. Default: any number.", examples=[300]
-    )
-    in_sets: Annotated[Count | None, NOT_NULL] = Field(
-        default=None, description="Messages that leave in sets. Default: any number.", examples=[">= 290"]
-    )
-    match_rate: Annotated[Share | None, NOT_NULL] = Field(
-        default=None, description="Share of its messages that leave in sets. Default: any.", examples=[">= 0.98"]
-    )
-    dropped: Annotated[Count | None, NOT_NULL] = Field(
-        default=None, description="Messages that leave without a set. Default: any number.", examples=[0]
-    )
+    received: OptionalCount = _unset("Messages that come. Default: any number.", 300)
+    in_sets: OptionalCount = _unset("Messages that leave in sets. Default: any number.", ">= 290")
+    match_rate: OptionalShare = _unset("Share of its messages that leave in sets. Default: any.", ">= 0.98")
+    dropped: OptionalCount = _unset("Messages that leave without a set. Default: any number.", 0)
     drops: Annotated[dict[Reason, Count], AfterValidator(_not_empty)] = Field(
         default_factory=dict,
         description="Messages that leave without a set, by reason. Default: any number of any.",
@@ -169,43 +170,24 @@ class InputExpectation(Keys):
 class Expectation(InputExpectation):
     """What a group makes of the messages."""
 
-    received: Annotated[Count | None, NOT_NULL] = Field(
-        default=None, description="Messages that come, of all inputs. Default: any number.", examples=[1200]
+    received: OptionalCount = _unset("Messages that come, of all inputs. Default: any number.", 1200)
+    in_sets: OptionalCount = _unset("Messages that leave in sets, of all inputs. Default: any.", ">= 580")
+    match_rate: OptionalShare = _unset(
+        "Share of the messages of the rarest required input, or of the trigger, that leave in sets. Default: any.",
+        ">= 0.98",
     )
-    in_sets: Annotated[Count | None, NOT_NULL] = Field(
-        default=None, description="Messages that leave in sets, of all inputs. Default: any.", examples=[">= 580"]
+    sets: OptionalCount = _unset("Sets that leave. Default: any number.", ">= 980")
+    span_p95: OptionalTime = _unset(f"Span that 95 % of the sets do not exceed. {_DURATION} Default: any.", "< 20ms")
+    span_max: OptionalTime = _unset(f"Span of the widest set. {_DURATION} Default: any.", "<= 20ms")
+    latency_p95: OptionalTime = _unset(
+        "How long 95 % of the sets at most waited, from the receipt of their newest message until they left."
+        f" {_DURATION} Default: any.",
+        "< 60ms",
     )
-    match_rate: Annotated[Share | None, NOT_NULL] = Field(
-        default=None,
-        description="Share of the messages of the rarest required input, or of the trigger, that leave in sets."
-        " Default: any.",
-        examples=[">= 0.98"],
-    )
-    sets: Annotated[Count | None, NOT_NULL] = Field(
-        default=None, description="Sets that leave. Default: any number.", examples=[">= 980"]
-    )
-    span_p95: Annotated[Time | None, NOT_NULL] = Field(
-        default=None,
-        description=f"Span that 95 % of the sets do not exceed. {_DURATION} Default: any.",
-        examples=["< 20ms"],
-    )
-    span_max: Annotated[Time | None, NOT_NULL] = Field(
-        default=None, description=f"Span of the widest set. {_DURATION} Default: any.", examples=["<= 20ms"]
-    )
-    latency_p95: Annotated[Time | None, NOT_NULL] = Field(
-        default=None,
-        description="How long 95 % of the sets at most waited, from the receipt of their newest message until they"
-        f" left. {_DURATION} Default: any.",
-        examples=["< 60ms"],
-    )
-    latency_max: Annotated[Time | None, NOT_NULL] = Field(
-        default=None, description=f"The longest such wait. {_DURATION} Default: any.", examples=["<= 100ms"]
-    )
-    findings: Annotated[Codes | None, NOT_NULL] = Field(
-        default=None,
-        description="What the relay would find for 3 s or longer, by code: exactly these. `healthy` alone is none."
-        " Default: any.",
-        examples=[["healthy"]],
+    latency_max: OptionalTime = _unset(f"The longest such wait. {_DURATION} Default: any.", "<= 100ms")
+    findings: Annotated[Codes | None, NOT_NULL] = _unset(
+        "What the relay would find for 3 s or longer, by code: exactly these. `healthy` alone is none. Default: any.",
+        ["healthy"],
     )
     inputs: Annotated[dict[str, InputExpectation], AfterValidator(_not_empty)] = Field(
         default_factory=dict,
@@ -217,32 +199,26 @@ class Expectation(InputExpectation):
 class Case(Keys):
     """Messages that come, drawn, simulated or recorded, and what a group shall make of them."""
 
-    group: Annotated[str | None, NOT_NULL] = Field(
-        default=None, description="The group that is tested. Default: the only one of the file.", examples=["front"]
+    group: Annotated[str | None, NOT_NULL] = _unset(
+        "The group that is tested. Default: the only one of the file.", "front"
     )
-    drawing: Annotated[str | None, NOT_NULL] = Field(
-        default=None,
-        description="Lanes of messages, one a line, a column a `period`: `lidar |a.bc`; and what leaves because of"
-        " which message: `-> b: aA`. Default: nothing is drawn.",
-        examples=["lidar  |a...b\ncamera |.A...\n-> b: aA\n"],
+    drawing: Annotated[str | None, NOT_NULL] = _unset(
+        "Lanes of messages, one a line, a column a `period`: `lidar |a.bc`; and what leaves because of which message:"
+        " `-> b: aA`. Default: nothing is drawn.",
+        "lidar  |a...b\ncamera |.A...\n-> b: aA\n",
     )
     period: Period = Field(
         default=10_000_000, description=f"Time from column to column. {_DURATION} Default: 10ms.", examples=["10ms"]
     )
-    recording: Annotated[str | None, NOT_NULL] = Field(
-        default=None,
-        description="A recording, its path relative to this file. Default: none, messages are drawn or simulated.",
-        examples=["rig.mcap"],
+    recording: Annotated[str | None, NOT_NULL] = _unset(
+        "A recording, its path relative to this file. Default: none, messages are drawn or simulated.", "rig.mcap"
     )
     inputs: dict[str, InputSource] = Field(
         default_factory=dict,
         description="What comes of each input, by its topic, in numbers. Default: what is drawn, as it is drawn.",
     )
-    lasts: Annotated[Length | None, NOT_NULL] = Field(
-        default=None,
-        description=f"How long inputs with a `rate` send, at most 3600s. {_DURATION} Default: none, it is needed"
-        " for them.",
-        examples=["30s"],
+    lasts: Annotated[Length | None, NOT_NULL] = _unset(
+        f"How long inputs with a `rate` send, at most 3600s. {_DURATION} Default: none, it is needed for them.", "30s"
     )
     what_if: tuple[WhatIf, ...] = Field(
         default=(),
@@ -252,9 +228,7 @@ class Case(Keys):
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = Field(
         default=0, description="Seed of jitter, losses and faults. Default: 0."
     )
-    expect: Annotated[Expectation | None, NOT_NULL] = Field(
-        default=None, description="What the group makes of it. Default: what is drawn."
-    )
+    expect: Annotated[Expectation | None, NOT_NULL] = _unset("What the group makes of it. Default: what is drawn.")
 
 
 class CasesFile(Keys):
@@ -268,3 +242,20 @@ class CasesFile(Keys):
         description="Cases by name, 1 or more: a name is a sentence that says what shall be so.",
         json_schema_extra={"minProperties": 1},
     )
+
+
+SCHEMA_ID: Final = "urn:syncrelay:schema:test:1"
+"""The name of the JSON Schema; it ends in the `version` of the files that it describes."""
+
+
+def cases_schema() -> Schema:
+    """Return the JSON Schema of a test file (draft 7, which editors read)."""
+    generated: dict[str, Any] = CasesFile.model_json_schema(ref_template=REF + "{model}")
+    models: dict[str, Schema] = generated.pop("$defs")
+    return {
+        "$schema": DRAFT,
+        "$id": SCHEMA_ID,
+        "title": "syncrelay test file",
+        **of_mapping(generated),
+        "definitions": {**{name: of_mapping(model) for name, model in models.items()}, "Variable": VARIABLE},
+    }

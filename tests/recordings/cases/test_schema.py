@@ -6,8 +6,15 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft7Validator
 
-from syncrelay.recordings.cases.models import Case, CasesFile, Expectation, InputExpectation, InputSource
-from syncrelay.recordings.cases.schema import ID, cases_schema
+from syncrelay.recordings.cases.models import (
+    SCHEMA_ID,
+    Case,
+    CasesFile,
+    Expectation,
+    InputExpectation,
+    InputSource,
+    cases_schema,
+)
 from tests.cli.command import ROOT
 from tests.config.test_schema import parsed
 from tests.recordings.cases.mutants import CONFIGS
@@ -29,7 +36,7 @@ BEYOND_A_SCHEMA = {
 
 def test_the_schema_is_draft_7():
     Draft7Validator.check_schema(SCHEMA)
-    assert SCHEMA["$id"] == ID
+    assert SCHEMA["$id"] == SCHEMA_ID
     assert "$defs" not in str(SCHEMA)
 
 
