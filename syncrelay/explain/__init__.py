@@ -86,6 +86,5 @@ __all__ = [
     "judge",
     "may_set_pace",
     "no_other_node",
-    "recent",
     "with_ok",
 ]

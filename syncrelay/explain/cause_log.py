@@ -115,7 +115,9 @@ class CauseLog:
 
     def lines(self, *, now: int, is_last: bool = False) -> Iterator[Line]:
         """Yield the lines that are due: once every group was judged after the first remark came in."""
-        if self._waiting and (is_last or self._is_complete(now)):
+        others = (at for name, at in self._heard.items() if self._waiting and name != self._waiting[0][0])
+        is_complete = all(at > self._since for at in others) or now - self._since >= _ROUND
+        if self._waiting and (is_last or is_complete):
             waiting, self._waiting = self._waiting, []
             yield from self._merged(waiting, now)
         for key, end in [*self._ends.items()]:
@@ -123,10 +125,6 @@ class CauseLog:
                 del self._ends[key]
                 if groups := [name for name in self._found if name in end.groups]:
                     yield _line(Severity.OK, end.remark.text, groups, end.remark.code)
-
-    def _is_complete(self, now: int) -> bool:
-        others = (at for name, at in self._heard.items() if name != self._waiting[0][0])
-        return all(at > self._since for at in others) or now - self._since >= _ROUND
 
     def _merged(self, waiting: Sequence[tuple[str, Remark]], now: int) -> Iterator[Line]:
         warned: dict[_Cause, list[tuple[str, Remark]]] = {}
@@ -182,7 +180,8 @@ class CauseLog:
                 yield _line(Severity.WARN, _text(cause, found, hit), (group,), cause.code)
             return
         said = self._said.setdefault(cause, _Said())
-        if now - said.heard >= _FORGOTTEN and self._hit_by(cause) <= {group for group, _ in remarks}:
+        hit_by = {*self._hit.get((cause, None), ()), *self._hit.get((cause, cause.code), ())}
+        if now - said.heard >= _FORGOTTEN and hit_by <= {group for group, _ in remarks}:
             said = self._said[cause] = _Said()
         said.heard = now
         found = self._found_of(cause) or self._found_then(cause, remarks)
@@ -199,27 +198,25 @@ class CauseLog:
         said.again, said.pause = now + said.pause, min(2 * said.pause, _LONGEST_PAUSE)
         yield _line(Severity.WARN, _text(cause, found, hit), [each.name for each in hit], cause.code)
 
-    def _hit_by(self, cause: _Cause) -> set[str]:
-        return {*self._hit.get((cause, None), ()), *self._hit.get((cause, cause.code), ())}
-
     def _found_of(self, cause: _Cause) -> list[_Found]:
         """Return the findings of a cause in all groups, the most severe first."""
-        found = [
-            _Found(facts, finding, topics)
+        now = (
+            (facts, finding)
             for facts, findings in self._found.values()
             for finding in findings
             if finding.code is cause.code and finding.severity is not Severity.OK and not finding.is_over
-            for each, topics in self._topics_by_cause(facts, finding).items()
-            if each == cause
-        ]
-        return sorted(found, key=lambda each: (-each.finding.severity, each.finding.input is None))
+        )
+        return sorted(self._of_cause(cause, now), key=lambda each: (-each.finding.severity, each.finding.input is None))
 
     def _found_then(self, cause: _Cause, remarks: Sequence[tuple[str, Remark]]) -> list[_Found]:
         """Return the findings of the time of the remarks, which may be over by now."""
-        then = [(self._found[group][0], finding) for group, remark in remarks for finding in remark.findings]
+        then = ((self._found[group][0], finding) for group, remark in remarks for finding in remark.findings)
+        return self._of_cause(cause, then)
+
+    def _of_cause(self, cause: _Cause, found: Iterable[tuple[GroupFacts, Finding]]) -> list[_Found]:
         return [
             _Found(facts, finding, topics)
-            for facts, finding in then
+            for facts, finding in found
             for each, topics in self._topics_by_cause(facts, finding).items()
             if each == cause
         ]

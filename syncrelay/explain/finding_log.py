@@ -138,7 +138,10 @@ class FindingLog:
             if finding.code in _OF_DRIFT and may_drift(facts):
                 # The cause may be known soon.
                 warning.began = now
-            if not warning.is_logged and now - warning.began >= _lasting(facts, finding):
+            # One missed set lowers the share for the length of the window.
+            missing = facts.figures.share.ns if finding.code is Code.FEW_SETS else 0
+            until_tried = _UNTIL_TRIED if _awaits_a_try(facts, finding) else 0
+            if not warning.is_logged and now - warning.began >= _LASTING + missing + until_tried:
                 warning.is_logged = warning.holds = True
                 yield Remark(Severity.WARN, in_words(finding), (finding,))
         for (code, _), warning in self._warned.items():
@@ -153,13 +156,6 @@ class FindingLog:
 
 def _awaits_a_try(facts: GroupFacts, finding: Finding) -> bool:
     return facts.suggester is not None and facts.suggester.awaits((finding.code, finding.input))
-
-
-def _lasting(facts: GroupFacts, finding: Finding) -> int:
-    """Return for how long a finding has to hold to be worth a line."""
-    # One missed set lowers the share for the length of the window.
-    missing = facts.figures.share.ns if finding.code is Code.FEW_SETS else 0
-    return _LASTING + missing + (_UNTIL_TRIED if _awaits_a_try(facts, finding) else 0)
 
 
 class _Warning:

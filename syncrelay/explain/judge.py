@@ -247,7 +247,8 @@ class Judge:
         least = Severity.ERROR if facts.standing is Standing.NONE else Severity.WARN
         if any(finding.severity >= least for finding in said):
             return said
-        cause = next((each for each in said if each.severity is not Severity.OK and _gives_few_sets(each.code)), None)
+        told = (each for each in said if each.severity is not Severity.OK)
+        cause = next((each for each in told if each.code in MATCHING or Code.FEW_SETS in explained_by(each.code)), None)
         if cause is not None:
             return tuple(replace(each, severity=least) if each is cause else each for each in said)
         (few,) = _FEW_SETS.findings(facts)
@@ -273,10 +274,6 @@ class Judge:
 def judge(facts: GroupFacts) -> tuple[Finding, ...]:
     """Return what `Judge` says of one moment, knowing nothing of what was before."""
     return Judge().judge(facts)
-
-
-def _gives_few_sets(code: Code) -> bool:
-    return code in MATCHING or Code.FEW_SETS in explained_by(code)
 
 
 def _explains(cause: _Cause, finding: Finding, facts: GroupFacts) -> bool:
@@ -308,32 +305,25 @@ def _seen_since(code: Code, facts: GroupFacts) -> int:
 
 def with_ok(facts: GroupFacts, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Add to what is not as usual that a group is well, or starts; in figures that cost more than all rules."""
-    if facts.asleep or not _is_well(found):
+    if facts.asleep or any(finding.severity is not Severity.OK for finding in found):
         return found
-    starting = Severity.OK if facts.standing is Standing.ENOUGH else Severity.WARN
-    if facts.figures.last_set is None:
-        since = words.seconds(facts.figures.now - facts.figures.began)
-        return (*found, Finding(Code.STARTING, starting, f"no set yet, {since} after the start"))
-    if facts.is_silent:
-        quiet = words.seconds(facts.figures.now - facts.figures.last_set)
-        return (
-            *found,
-            Finding(Code.STARTING, starting, f"no set for {quiet}, but {_last_back(facts)} just came back"),
-        )
-    share = facts.figures.share
-    if share.value is None and share.left < share.possible:
+    figures, share = facts.figures, facts.figures.share
+    code, severity = Code.STARTING, Severity.OK if facts.standing is Standing.ENOUGH else Severity.WARN
+    if figures.last_set is None:
+        text = f"no set yet, {words.seconds(figures.now - figures.began)} after the start"
+    elif facts.is_silent:
+        required = (each for each in facts.inputs if each.required)
+        last_back = max(required, key=lambda each: max(each.served_since or 0, each.figures.flows_since or 0)).name
+        text = f"no set for {words.seconds(figures.now - figures.last_set)}, but {last_back} just came back"
+    elif share.value is None and share.left < share.possible:
         text = f"{share.left} of {share.possible} possible sets so far, which is too soon to judge"
-        return (*found, Finding(Code.STARTING, Severity.OK, text))
-    return (*found, _healthy(facts))
-
-
-def _last_back(facts: GroupFacts) -> str:
-    inputs = (each for each in facts.inputs if each.required)
-    return max(inputs, key=lambda each: max(each.served_since or 0, each.figures.flows_since or 0)).name
-
-
-def _is_well(found: Iterable[Finding]) -> bool:
-    return all(finding.severity is Severity.OK for finding in found)
+        severity = Severity.OK
+    else:
+        code, severity = Code.HEALTHY, Severity.OK
+        sets = f"{words.figure(figures.rate_hz)} of {words.figure(max(facts.possible_hz, figures.rate_hz))}"
+        span, latency = (words.duration(each.quantile(0.95)) for each in (figures.spans, figures.latencies))
+        text = f"{sets} possible sets a second, span {span} and latency {latency} at the 95th percentile"
+    return (*found, Finding(code, severity, text))
 
 
 def explanation(findings: tuple[Finding, ...]) -> Finding:
@@ -353,11 +343,3 @@ def _unexplained(facts: GroupFacts) -> Finding:
         rules_matching.more_sets(facts, Code.UNEXPLAINED)
         or "run `syncrelay doctor --config FILE --live`, which checks the graph and the stamps",
     )
-
-
-def _healthy(facts: GroupFacts) -> Finding:
-    figures = facts.figures
-    sets = f"{words.figure(figures.rate_hz)} of {words.figure(max(facts.possible_hz, figures.rate_hz))}"
-    span, latency = (words.duration(each.quantile(0.95)) for each in (figures.spans, figures.latencies))
-    text = f"{sets} possible sets a second, span {span} and latency {latency} at the 95th percentile"
-    return Finding(Code.HEALTHY, Severity.OK, text)

@@ -243,10 +243,6 @@ def _disjoint(spans: Nanoseconds, partners: Sequence[Nanoseconds]) -> npt.NDArra
     return free
 
 
-def _as_array(stamps: Sequence[int]) -> Nanoseconds:
-    return np.array([max(-_LATEST, min(_LATEST, stamp)) for stamp in stamps], dtype=np.int64)
-
-
 class NearestSpans:
     """Measures the tightest set of each message of one input once, as soon as no later message can change it."""
 
@@ -265,9 +261,10 @@ class NearestSpans:
 
         A span is certain once every input has a stamp on either side of the message.
         """
+        near = [[max(-_LATEST, min(_LATEST, stamp)) for stamp in new] for new in stamps]
         self._stamps = [
-            np.sort(np.concatenate((kept, _as_array(new))))[-_KEPT:] if new else kept
-            for kept, new in zip(self._stamps, stamps, strict=True)
+            np.sort(np.concatenate((kept, np.array(new, dtype=np.int64))))[-_KEPT:] if new else kept
+            for kept, new in zip(self._stamps, near, strict=True)
         ]
         if not all(len(each) for each in self._stamps):
             return []

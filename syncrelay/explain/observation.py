@@ -104,7 +104,8 @@ class Observation:
         fallen = [each.add(new, by_clock=by_clock) for each, new in zip(self._inputs, arrivals, strict=True)]
         paces = [each.slowed_from_hz for each in self._inputs]
         clock = None if by_clock is None else by_clock(now)
-        self._share.add(counts, total_sets, self._steady_paces(), now=now, clock=clock)
+        steady = [Pace(each.first, each.last, each.steady_period) for each in self._inputs]
+        self._share.add(counts, total_sets, steady, now=now, clock=clock)
         if paces != self._paces:
             # What was measured before says nothing of how it is now.
             self._paces = paces
@@ -198,17 +199,14 @@ class Observation:
             )
             keep_last(self._nearest, measured, _LAST_SETS)
             keep_last(self._nearest_at, [now] * len(measured), _LAST_SETS)
-            self._forget_old_nearest(now)
+            a_while_ago, surplus = now - _NEAREST_WINDOW, max(0, len(self._nearest_at) - _FEWEST_NEAREST)
+            old = bisect_left(self._nearest_at, a_while_ago, 0, surplus)
+            del self._nearest[:old], self._nearest_at[:old]
             keep_last(self._nearest_since, measured, _LAST_SETS)
         for optional, spans in self._with_optional.items():
             among = [*self._required, optional]
             pivot = among.index(self._slowest(among))
             self._inputs[optional].add_nearest(spans.add([shifted[index] for index in among], pivot=pivot))
-
-    def _forget_old_nearest(self, now: int) -> None:
-        old = bisect_left(self._nearest_at, now - _NEAREST_WINDOW, 0, max(0, len(self._nearest_at) - _FEWEST_NEAREST))
-        if old:
-            del self._nearest[:old], self._nearest_at[:old]
 
     def _slowest(self, among: Sequence[int]) -> int:
         """Give the input of these of which the fewest came in the window, of those that do not come faster by far."""
@@ -220,11 +218,10 @@ class Observation:
         before = [each.fed for each in self._polls[0].counts] if len(self._polls) > 1 else [0] * len(last)
         return min(among, key=lambda index: last[index].fed - before[index])
 
-    def _steady_paces(self) -> list[Pace]:
-        return [Pace(each.first, each.last, each.steady_period) for each in self._inputs]
-
     def _take_sets(self, spans: Sequence[int], latencies: Sequence[int], now: int) -> None:
-        if self._last_set is None or (now - self._last_set >= _SILENCE and self._saw_none_before()):
+        # Two polls may be as far apart as a silence is long.
+        saw_none_before = len(self._polls) > 1 and not self._polls[-2].sent
+        if self._last_set is None or (now - self._last_set >= _SILENCE and saw_none_before):
             self._resumed = now
         self._last_set = now
         del self._nearest_since[:]
@@ -232,10 +229,6 @@ class Observation:
         keep_last(self._latencies, latencies, _LAST_SETS)
         self._span_histogram.add(spans)
         self._latency_histogram.add(latencies)
-
-    def _saw_none_before(self) -> bool:
-        """Whether no set left at the poll before this one: two polls may be as far apart as a silence is long."""
-        return len(self._polls) > 1 and not self._polls[-2].sent
 
     def _spans_of_whole(self, stamps: Sequence[Sequence[Any]]) -> list[int]:
         """Measure sets that miss none, input by input: at a quarter of the cost."""

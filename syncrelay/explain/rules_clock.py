@@ -24,44 +24,40 @@ def off_the_clock(facts: GroupFacts) -> Found:
     limit = max(_OFF, 2 * max(waited_for_relay(facts)))
     required = [(index, each) for index, each in enumerate(facts.inputs) if each.required]
     late = {index: lag - each.offset for index, each in required if (lag := facts.lag(index)) is not None}
-    off = {index: by for index, by in late.items() if by < -limit or by > _oldest(facts, index, limit)}
+    oldest = {
+        index: inf if tolerance is None else max(limit, tolerance.ns + (facts.max_wait or 0))
+        for index in late
+        for tolerance in [facts.tolerance_of(index)]
+    }
+    off = {index: by for index, by in late.items() if by < -limit or by > oldest[index]}
     if not off:
         return
     index = max(off, key=lambda each: abs(off[each]))
     by = off[index]
     are_all = len(off) == len(required) > 1 and max(off.values()) - min(off.values()) < _OFF
     whose = "all inputs" if are_all else facts.inputs[index].name
+    clock, to_one_clock = _clock(facts)
     yield Fault(
-        f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} {_clock(facts)},"
+        f"stamps of {whose} are {words.span_of_time(abs(by))} {'behind' if by > 0 else 'ahead of'} {clock},"
         " which triggers the sets",
-        _to_one_clock(facts),
+        to_one_clock,
         Severity.ERROR,
         input=None if are_all else index,
     )
 
 
-def _oldest(facts: GroupFacts, index: int, limit: int) -> float:
-    tolerance = facts.tolerance_of(index)
-    return inf if tolerance is None else max(limit, tolerance.ns + (facts.max_wait or 0))
-
-
-def _clock(facts: GroupFacts) -> str:
+def _clock(facts: GroupFacts) -> tuple[str, str]:
+    """Return the clock that triggers, and what to do where stamps are off it."""
     if facts.is_recorded:
-        return "the recorder's clock"
-    return "this machine's clock" if facts.clock is None else "/clock"
-
-
-def _to_one_clock(facts: GroupFacts) -> str:
-    if facts.is_recorded:
-        return (
+        return "the recorder's clock", (
             "record what a simulation publishes with `ros2 bag record --use-sim-time`, or let an input be the `trigger`"
         )
     if facts.clock is None:
-        return (
+        return "this machine's clock", (
             "with a simulation or a recording, write `node: {use_sim_time: true}` and play it with --clock; else"
             " synchronize the clocks of the machines"
         )
-    return "check whether what publishes these topics uses simulated time as well"
+    return "/clock", "check whether what publishes these topics uses simulated time as well"
 
 
 def too_old(facts: GroupFacts) -> Found:
@@ -69,7 +65,10 @@ def too_old(facts: GroupFacts) -> Found:
 
     At the messages of a trigger, only those that have a tolerance of their own: the others are measured.
     """
-    if facts.distance is not Distance.AGE or (not facts.is_silent and not _lacks_sets(facts)):
+    figures = facts.figures
+    was_watched = figures.now - max(figures.began, figures.resumed or 0) >= _WATCHED
+    lacks_sets = was_watched and figures.rate_hz < _NEARLY_ALL * facts.possible_hz
+    if facts.distance is not Distance.AGE or not (facts.is_silent or lacks_sets):
         return
     known = [
         (*ages, tolerance, index)
@@ -92,12 +91,6 @@ def too_old(facts: GroupFacts) -> Found:
         f"{_or_wait(facts, index, most - least, max_age.ns)}",
         Severity.ERROR if facts.is_silent else Severity.WARN,
     )
-
-
-def _lacks_sets(facts: GroupFacts) -> bool:
-    figures = facts.figures
-    was_watched = figures.now - max(figures.began, figures.resumed or 0) >= _WATCHED
-    return was_watched and figures.rate_hz < _NEARLY_ALL * facts.possible_hz
 
 
 def _ages(facts: GroupFacts, an_input: InputFacts) -> tuple[int, int] | None:

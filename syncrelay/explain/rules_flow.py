@@ -18,40 +18,32 @@ _SENT_AGAIN: Final = 4 * SECOND
 
 def bursts(facts: GroupFacts) -> Found:
     """Find messages that are held up on their way and then arrive at once; one finding for those held up together."""
-    held_up = [(index, each) for index, each in enumerate(facts.inputs) if each.figures.bursts]
-    if len(held_up) > 1 and _overlap([each.figures.held_up for _, each in held_up]):
-        yield _burst_together(facts, dict(held_up))
+    held_up = {index: each for index, each in enumerate(facts.inputs) if each.figures.bursts}
+    if len(held_up) > 1 and _overlap([each.figures.held_up for each in held_up.values()]):
+        held = max(each.figures.held for each in held_up.values())
+        others = [each for index, each in enumerate(facts.inputs) if index not in held_up]
+        are_all = all(each.figures.usual_hz * held < _SHOWN_BY * SECOND for each in others)
+        names = "all inputs" if are_all else " and ".join(each.name for each in held_up.values())
+        what = "the recorder" if facts.is_recorded else "a player"
+        check = f"check whether this machine, {what} or what connects them stood still"
+        yield Fault(_burst(names, *held_up.values()), check, inputs=tuple(held_up))
         return
-    for index, each in held_up:
-        yield Fault(_burst_text([each]), _burst_check(facts, each), input=index, explains=False)
+    for index, each in held_up.items():
+        who = nodes(each)
+        check = (
+            f"check whether {who} sent in bursts, or the recorder received it late"
+            if facts.is_recorded
+            else f"check whether {who} sends in bursts; if it runs on another machine, check the network: after a loss,"
+            " reliable publishers send again only every 3 s by default; configs/fast_heartbeats.xml makes them faster"
+        )
+        yield Fault(_burst(each.name, each), check, input=index, explains=False)
 
 
-def _burst_together(facts: GroupFacts, inputs: dict[int, InputFacts]) -> Fault:
-    held_up = list(inputs.values())
-    others = [each for each in facts.inputs if each not in held_up]
-    held = max(each.figures.held for each in held_up)
-    are_all = all(each.figures.usual_hz * held < _SHOWN_BY * SECOND for each in others)
-    what = "a player" if not facts.is_recorded else "the recorder"
-    check = f"check whether this machine, {what} or what connects them stood still"
-    return Fault(_burst_text(held_up, are_all=are_all), check, inputs=tuple(inputs))
-
-
-def _burst_text(held_up: Sequence[InputFacts], *, are_all: bool = False) -> str:
+def _burst(names: str, *held_up: InputFacts) -> str:
     count = max(each.figures.bursts for each in held_up)
     times = "once" if count == 1 else f"{count} times"
-    names = "all inputs" if are_all else " and ".join(each.name for each in held_up)
     held = words.duration(max(each.figures.held for each in held_up))
     return f"messages of {names} arrived in a burst {times} in the last 10 s, up to {held} late"
-
-
-def _burst_check(facts: GroupFacts, an_input: InputFacts) -> str:
-    who = nodes(an_input)
-    if facts.is_recorded:
-        return f"check whether {who} sent in bursts, or the recorder received it late"
-    return (
-        f"check whether {who} sends in bursts; if it runs on another machine, check the network: after a loss, reliable"
-        " publishers send again only every 3 s by default; configs/fast_heartbeats.xml makes them faster"
-    )
 
 
 def _overlap(held_up: Sequence[Sequence[tuple[int, int]]]) -> bool:

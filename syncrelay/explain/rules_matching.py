@@ -54,10 +54,11 @@ def over_slop(facts: GroupFacts) -> Found:
     if tolerance is None or len(nearest) < _FEWEST or next(other_clock(facts), None):
         return
     over = nearest.share_over(tolerance.ns)
+    came_at_once = any(each.required and each.figures.bursts for each in facts.inputs)
     if facts.is_silent and over > 1 - _MISSED:
         text, severity = _too_wide(facts, tolerance, nearest), Severity.ERROR
-    elif not facts.is_silent and over > max(_MOST if _come_at_once(facts) else _MISSED, 1.5 / len(nearest)):
-        # One message alone is chance.
+    # What was held up may only seem far apart, and a wider slop would pair what came together. One message is chance.
+    elif not facts.is_silent and over > max(_MOST if came_at_once else _MISSED, 1.5 / len(nearest)):
         text, severity = _often_too_wide(facts, tolerance, nearest), Severity.WARN
     else:
         return
@@ -65,11 +66,6 @@ def over_slop(facts: GroupFacts) -> Found:
     yield Fault(
         text, _advice(facts, found) or "check how these topics are stamped, and whether messages are missing", severity
     )
-
-
-def _come_at_once(facts: GroupFacts) -> bool:
-    """Whether what is measured as far apart may only have been held up: a wider slop would pair what came together."""
-    return any(each.required and each.figures.bursts for each in facts.inputs)
 
 
 def _often_too_wide(facts: GroupFacts, tolerance: Tolerance, nearest: Distribution) -> str:

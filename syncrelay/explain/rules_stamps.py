@@ -1,6 +1,5 @@
 """Findings about stamps: unset, of another clock, falling, drifting."""
 
-from collections.abc import Sequence
 from statistics import median_low
 from typing import Final
 
@@ -162,7 +161,8 @@ def _wait_for_it(facts: GroupFacts, index: int, behind: int) -> str:
     if facts.suggester is None or not 0 < behind < _LATENCY:
         return ""
     about = (Code.OTHER_CLOCK, index, "queue_size")
-    found = facts.suggester.ask(about, _longer_queue, now=facts.figures.now).tried
+    longer = facts.suggester.ask(about, lambda trials: trials.verdict(REQUIRED, {"queue_size"}), now=facts.figures.now)
+    found = longer.tried
     if not found:
         return ""
     (change,) = found[0].changes
@@ -170,10 +170,6 @@ def _wait_for_it(facts: GroupFacts, index: int, behind: int) -> str:
         f"; if {facts.inputs[index].name} really takes that long to arrive, write `{change.key}: {change.value}`, which"
         f" would give {found[0].given} of {found[0].possible} possible sets"
     )
-
-
-def _longer_queue(trials: Trials) -> Verdict:
-    return trials.verdict(REQUIRED, {"queue_size"})
 
 
 def no_common_key(facts: GroupFacts) -> Found:
@@ -295,7 +291,7 @@ def _drifts(facts: GroupFacts) -> tuple[dict[int, Drift], dict[int, Drift]]:
     if not facts.by_stamp or len(known) < 2:  # noqa: PLR2004  one alone cannot drift apart
         return {}, {}
     return known, {
-        index: apart(drift, _median([known[other] for other in known if other != index]))
+        index: apart(drift, median_low([known[other] for other in known if other != index]))
         for index, drift in known.items()
     }
 
@@ -311,7 +307,9 @@ def may_drift(facts: GroupFacts) -> bool:
     nearest = facts.figures.nearest_since if facts.is_silent else facts.figures.nearest
     if not nearest.share_over(tolerance.ns):
         return False
-    if facts.by_stamp and any(_is_too_young_to_tell(facts, each) for each in facts.inputs if each.required):
+    required = [each.figures for each in facts.inputs if each.required]
+    young = [each.flows_since or facts.figures.now for each in required if each.drift is None]
+    if facts.by_stamp and any(facts.figures.now - since < _DRIFT_SOON for since in young):
         return True
     needed = max(_MATTERS * tolerance.ns, nearest.quantile(_USUAL) - tolerance.ns) / watched
     is_urgent = facts.is_silent and facts.silent_for >= _DRIFT_PROVEN_SILENT
@@ -320,12 +318,6 @@ def may_drift(facts: GroupFacts) -> bool:
         or (not is_urgent and abs(each.slope) + _MAY_BE * each.error >= needed)
         for each in _drifts(facts)[1].values()
     )
-
-
-def _is_too_young_to_tell(facts: GroupFacts, an_input: InputFacts) -> bool:
-    figures = an_input.figures
-    since = facts.figures.now if figures.flows_since is None else figures.flows_since
-    return figures.drift is None and facts.figures.now - since < _DRIFT_SOON
 
 
 def clock_drift(facts: GroupFacts) -> Found:
@@ -366,7 +358,3 @@ def clock_drift(facts: GroupFacts) -> Found:
         # A clock that is off by a few ppm is not why stamps lie far apart today.
         explains=facts.tolerance is not None and gone >= _MATTERS * facts.tolerance.ns,
     )
-
-
-def _median(drifts: Sequence[Drift]) -> Drift:
-    return sorted(drifts)[(len(drifts) - 1) // 2]

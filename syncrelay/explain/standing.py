@@ -148,7 +148,9 @@ class ShareWindow:
         owed = self._owed(fed, paces, now)
         self._is_pausing = {index: _is_pausing(paces[index], now) for index in self._counted}
         self._polls.append(_Poll(now, now if clock is None else clock, sets, fed, owed, taken, gone, thinned))
-        while len(self._polls) > 1 and self._is_full(self._polls[1]):
+        while len(self._polls) > 1 and (ns := now - self._polls[1].at) >= SHARE_WINDOW_NS:
+            if ns <= _LONGEST and self._since(self._polls[1]).possible < _ENOUGH_TO_TELL:
+                break
             self._polls.popleft()
 
     def share(self) -> Share:
@@ -169,12 +171,6 @@ class ShareWindow:
             else:
                 owed.append(owed_before + max(0, min(now, round(last + _LATE * period)) - before.at) / period)
         return tuple(owed)
-
-    def _is_full(self, first: _Poll) -> bool:
-        ns = self._polls[-1].at - first.at
-        if ns < SHARE_WINDOW_NS:
-            return False
-        return ns > _LONGEST or self._since(first).possible >= _ENOUGH_TO_TELL
 
     def _since(self, first: _Poll) -> Share:
         last = self._polls[-1]
@@ -222,10 +218,8 @@ class StandingWatch:
         if is_silent:
             self.now = Standing.NONE
         elif value is not None and not (share.is_pausing and self.now is Standing.ENOUGH):
-            self.now = self._by(value)
+            if value >= BACK or (value >= _FEW and self.now is Standing.ENOUGH):
+                self.now = Standing.ENOUGH
+            elif self.now is Standing.ENOUGH or value >= _AGAIN:
+                self.now = Standing.FEW
         return self.now
-
-    def _by(self, share: float) -> Standing:
-        if share >= BACK or (share >= _FEW and self.now is Standing.ENOUGH):
-            return Standing.ENOUGH
-        return Standing.NONE if self.now is Standing.NONE and share < _AGAIN else Standing.FEW

@@ -42,11 +42,6 @@ class TryBudget:
         """Whether no run may begin any more."""
         return self._spent() >= _BEGINS_NS if self._clock else self._left <= 0
 
-    @property
-    def has_ended(self) -> bool:
-        """Whether what has begun is to try no more; by a clock it is interrupted, and goes on at the next poll."""
-        return self._clock is None and self._left <= 0
-
     def spent_on(self, messages: Iterable[Message]) -> Iterator[Message]:
         """Yield messages that a run takes. Raises OutOfTimeError where it takes too long.
 

@@ -70,14 +70,12 @@ def drop_fates(dropped: Sequence[Mapping[DropReason, int]], counted: Sequence[in
     lacking = [index for index, count in zip(counted, missed, strict=True) if count == fewest]
     return tuple(
         DropFates(
-            each, _without(each, _for_want(each) - fewest), tuple(other for other in lacking if other != index)[:1]
+            each,
+            _without(each, sum(each.get(reason, 0) for reason in _IN_ORDER) - fewest),
+            tuple(other for other in lacking if other != index)[:1],
         )
         for index, each in enumerate(dropped)
     )
-
-
-def _for_want(dropped: Mapping[DropReason, int]) -> int:
-    return sum(dropped.get(reason, 0) for reason in _IN_ORDER)
 
 
 def _without(dropped: Mapping[DropReason, int], unneeded: int) -> dict[DropReason, int]:
