@@ -4,105 +4,73 @@ import re
 
 import pytest
 
-from syncrelay.config import load_text
-from syncrelay.explain import Code, GroupWatch, InputGraph, Judge, Severity, explanation, judge, with_ok
-from syncrelay.explain.dry_run import EngineDriver
-from syncrelay.explain.facts import Endpoint
-from syncrelay.sync import Match, Message
+from syncrelay.explain import Code, Finding, Severity, explanation, judge, with_ok
+from tests.explain.scenario import Source, Told, run
 from tests.explain.support.cases import LIDAR, camera
 from tests.explain.support.cases_stamps import AT_TICKS
-from tests.explain.support.groups import BEGAN, MS, S, a_group, a_silent_group, an_input
+from tests.explain.support.groups import S, a_group, a_silent_group, an_input
 
-IMAGE = "sensor_msgs/msg/Image"
+CAMERA = Source("/camera", hz=30)
 
 
-def watched(keys, streams, *, until_s, own=""):
-    """The finding that explains most at each second.
+def ran(*sources: Source, seconds: int = 30, trigger: str = "30 Hz", **keys) -> Told:
+    return run(CAMERA, *sources, seconds=seconds, options={"policy": "latest_time", "trigger": trigger, **keys})
 
-    `streams` are the period, delay and end of each topic's messages, in milliseconds.
-    `own` are keys of the last topic alone.
-    """
-    *first, last = [f"      - {{topic: /{name}, type: {IMAGE}" for name in streams]
-    topics = "".join(f"{topic}}}\n" for topic in [*first, f"{last}{own}"])
-    text = f"version: 1\ngroups:\n  fixed:\n    policy: latest_time\n    {keys}\n    topics:\n{topics}"
-    config = load_text(text).groups[0]
-    messages = sorted(
-        (BEGAN + (ms + delay) * MS, index, BEGAN + ms * MS)
-        for index, (period, delay, end) in enumerate(streams.values())
-        for ms in range(0, end, period)
-    )
-    sets: list[tuple[tuple[int | None, ...], int]] = []
 
-    def take(outcomes, _now):
-        sets.extend((each.stamps, 0) for each in outcomes if isinstance(each, Match))
-
-    driver, watch, judge_of = EngineDriver(config, take), GroupWatch(config, began=BEGAN), Judge()
-    publisher = (Endpoint("/driver", IMAGE),)
-    graph = [InputGraph(f"/{name}", f"/fixed/{name}", publisher) for name in streams]
-    told = []
-    for second in range(1, until_s + 1):
-        now = BEGAN + second * S
-        came = [each for each in messages if now - S <= each[0] < now]
-        for received, index, stamp in came:
-            driver.add(Message(index, stamp, received), now=received)
-        driver.expire(now)
-        arrivals = [[(stamp, received) for received, at, stamp in came if at == index] for index in range(len(streams))]
-        watch.add(arrivals, list(sets), driver.engine.counts(), driver.engine.sets, now=now)
-        sets.clear()
-        facts = watch.facts(graph, now=now)
-        told.append(explanation(with_ok(facts, judge_of.judge(facts))))
-    return told
+def last_of(told: Told) -> Finding:
+    """The finding that explains most at the end."""
+    return explanation(with_ok(told.facts, told.found[-1][1]))
 
 
 def test_a_group_that_is_well_runs_at_the_rate_of_its_clock():
-    finding = watched("trigger: 30 Hz", {"camera": (33, 5, 30_000), "lidar": (100, 20, 30_000)}, until_s=20)[-1]
+    finding = last_of(ran(Source("/lidar", hz=10, delay_ms=20)))
     assert finding.code is Code.HEALTHY
     assert finding.text.startswith("30 of 30 ")
 
 
 def test_an_input_that_stopped_is_why_no_set_leaves():
-    keys = "trigger: 30 Hz\n    max_age: 500ms"
-    finding = watched(keys, {"camera": (33, 5, 30_000), "lidar": (100, 20, 10_000)}, until_s=20)[-1]
+    finding = last_of(ran(Source("/lidar", hz=10, sends=lambda second: second < 10), seconds=20, max_age="500ms"))
     assert (finding.code, finding.severity, finding.input) == (Code.SILENT, Severity.ERROR, 1)
 
 
 @pytest.mark.parametrize(
-    ("max_age", "code"), [("20ms", Severity.ERROR), ("50ms", Severity.WARN)], ids=["at every tick", "at some"]
+    ("max_age", "severity"), [("20ms", Severity.ERROR), ("50ms", Severity.WARN)], ids=["at every tick", "at some"]
 )
-def test_messages_that_are_too_old_at_ticks_are_found_and_the_value_that_is_told_cures(max_age, code):
-    streams = {"camera": (33, 5, 40_000), "lidar": (100, 30, 40_000)}
-    finding = watched(f"trigger: 30 Hz\n    max_age: {max_age}", streams, until_s=30)[-1]
-    assert (finding.code, finding.severity) == (Code.OVER_SLOP, code)
+def test_messages_that_are_too_old_at_ticks_are_found_and_the_value_that_is_told_cures(max_age, severity):
+    lidar = Source("/lidar", hz=10, delay_ms=30)
+    finding = last_of(ran(lidar, max_age=max_age))
+    assert (finding.code, finding.severity) == (Code.OVER_SLOP, severity)
     assert "/lidar is 30 ms to 130 ms" in finding.text
     assert "`max_age: 180ms`" in (finding.suggestion or "")
-    assert watched("trigger: 30 Hz\n    max_age: 180ms", streams, until_s=30)[-1].code is Code.HEALTHY
+    assert last_of(ran(lidar, max_age="180ms")).code is Code.HEALTHY
 
 
 @pytest.mark.parametrize("trigger", ["30 Hz", "/camera"])
 def test_an_input_that_is_too_old_for_its_own_age_is_found_and_the_value_that_is_told_cures(trigger):
-    streams = {"camera": (33, 5, 40_000), "lidar": (33, 5, 40_000), "map": (1000, 5, 40_000)}
-    keys = f"trigger: {trigger}\n    max_age: 100ms"
-    finding = watched(keys, streams, until_s=30, own=", max_age: 300ms")[-1]
+    def with_map(max_age: str) -> Finding:
+        rarely = Source("/map", hz=1, topic_options={"max_age": max_age})
+        return last_of(ran(Source("/lidar", hz=30), rarely, trigger=trigger, max_age="100ms"))
+
+    finding = with_map("300ms")
     assert (finding.code, finding.severity) == (Code.OVER_SLOP, Severity.WARN)
     assert "/map" in finding.text
     assert "`max_age: 1.3s` at /map" in (finding.suggestion or "")
-    assert watched(keys, streams, until_s=30, own=", max_age: 1.3s")[-1].code is Code.HEALTHY
+    assert with_map("1.3s").code is Code.HEALTHY
 
 
 @pytest.mark.parametrize("trigger", ["30 Hz", "/camera"])
 def test_what_is_sent_once_and_may_be_old_leaves_a_group_healthy(trigger):
-    streams = {"camera": (33, 5, 40_000), "lidar": (33, 5, 40_000), "task": (1_000_000, 5, 40_000)}
-    keys = f"trigger: {trigger}\n    max_age: 100ms"
-    told = watched(keys, streams, until_s=30, own=", max_age: 60min")
-    assert {each.code for each in told[10:]} == {Code.HEALTHY}
+    once = Source("/task", hz=0.001, topic_options={"max_age": "60min"})
+    told = ran(Source("/lidar", hz=30), once, trigger=trigger, max_age="100ms")
+    assert told.ever_found == set()
+    assert last_of(told).code is Code.HEALTHY
 
 
 def test_a_longer_wait_is_offered_where_messages_are_only_late():
-    streams = {"camera": (33, 5, 40_000), "lidar": (100, 150, 40_000)}
-    finding = watched("trigger: 30 Hz\n    max_age: 120ms", streams, until_s=30)[-1]
+    late = Source("/lidar", hz=10, delay_ms=150)
+    finding = last_of(ran(late, max_age="120ms"))
     assert re.findall("`.*?`", finding.suggestion or "") == ["`max_age: 350ms`", "`max_wait: 200ms`"]
-    cured = watched("trigger: 30 Hz\n    max_age: 120ms\n    max_wait: 200ms", streams, until_s=30)[-1]
-    assert cured.code is Code.HEALTHY
+    assert last_of(ran(late, max_age="120ms", max_wait="200ms")).code is Code.HEALTHY
 
 
 def test_old_stamps_do_not_matter_where_any_age_will_do():
