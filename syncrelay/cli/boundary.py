@@ -32,7 +32,7 @@ EXIT_CODES: Final[Mapping[int, str]] = {
 }
 """Their meanings, as help and docs/reference/command_line.md give them."""
 
-# The colours of our own texts (syncrelay.config.render, syncrelay.doctor.text); no other sequence reaches a terminal.
+# The colours of our own texts (syncrelay.config.render, syncrelay.doctor.report); no other sequence reaches a terminal.
 _COLOURS: Final = re.compile("(\033\\[(?:[0-2]|3[134])m)")
 
 

@@ -7,7 +7,6 @@ from argparse import Namespace
 from logging import NullHandler
 
 from syncrelay.cli.boundary import AT_FAULT, DONE, put, say, wants_colour
-from syncrelay.cli.healthcheck import VARIABLE
 from syncrelay.cli.parser import Parser, positive
 from syncrelay.cli.stop import StopRequest
 
@@ -41,7 +40,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
     if arguments.seconds and not arguments.live:
         parser.error("--seconds N needs --live: it is how long to observe the graph")
     parser.refuse_repeated(arguments.config)
-    from syncrelay.doctor.examine import Request, examine
+    from syncrelay.doctor.examine import examine
     from syncrelay.doctor.report import as_json, is_ok, lines
     from syncrelay.logs import LOGGER
 
@@ -50,9 +49,7 @@ def command(parser: Parser, arguments: Namespace, _stop: StopRequest) -> int:
         say(f"observing the graph for {live_s:g} s ...")
     # What the relay that observes would log is printed as findings.
     LOGGER.addHandler(NullHandler())
-    examination = examine(
-        Request(dict(os.environ), VARIABLE, tuple(arguments.config), tuple(arguments.ros_args), live_s)
-    )
+    examination = examine(os.environ, files=arguments.config, ros_args=arguments.ros_args, live_s=live_s)
     if arguments.json:
         put(json.dumps(as_json(examination), indent=2))
     else:

@@ -2,7 +2,6 @@
 
 import socket
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -20,15 +19,6 @@ _PEERS: Final = "ROS_STATIC_PEERS"
 _EPHEMERAL: Final = (32768, 60999)
 
 
-@dataclass(frozen=True, slots=True)
-class Discovery:
-    """The environment's variables, the ports that Linux gives out by itself, and peers that have no address."""
-
-    environ: Mapping[str, str]
-    ephemeral_ports: tuple[int, int]
-    unresolved_peers: tuple[str, ...] = ()
-
-
 def ports_of(domain: int) -> range:
     """Return the UDP ports of a domain; Fast DDS numbers its ports in shared memory alike."""
     return range(_FIRST_PORT + _PORTS * domain, _FIRST_PORT + _PORTS * (domain + 1))
@@ -39,21 +29,32 @@ def peers_of(environ: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(peer for peer in environ.get(_PEERS, "").split(";") if peer)
 
 
-def check_discovery(found: Discovery) -> Iterator[Diagnosis]:
-    """Yield variables that ROS refuses or misreads, or that limit which nodes it finds."""
-    yield from _domain(found)
-    yield from _range(found.environ)
-    yield from _localhost_only(found.environ)
-    yield from _peers(found)
+def check_discovery(
+    environ: Mapping[str, str], *, ephemeral_ports: tuple[int, int] | None = None
+) -> Iterator[Diagnosis]:
+    """Yield variables that ROS refuses or misreads, or that limit which nodes it finds.
+
+    `ephemeral_ports` are those that Linux gives out by itself, by default this machine's.
+    """
+    yield from _domain(environ, ephemeral_ports or _ephemeral_ports())
+    yield from _range(environ)
+    yield from _localhost_only(environ)
+    if unresolved := [peer for peer in peers_of(environ) if not _resolves(peer)]:
+        yield error(
+            "static_peers",
+            f"ROS_STATIC_PEERS: no address found for {', '.join(map(quoted, unresolved))}",
+            impact="no node starts until every peer has an address",
+            fix="write IP addresses, or names that this machine can resolve, separated by ;",
+        )
 
 
-def _domain(found: Discovery) -> Iterator[Diagnosis]:
-    text = found.environ.get("ROS_DOMAIN_ID", "")
-    domain = domain_of(found.environ)
+def _domain(environ: Mapping[str, str], ephemeral_ports: tuple[int, int]) -> Iterator[Diagnosis]:
+    text = environ.get("ROS_DOMAIN_ID", "")
+    domain = domain_of(environ)
     if domain is None:
         yield error(
             "domain_id",
-            no_domain(found.environ),
+            no_domain(environ),
             impact="no node starts with it, or it starts on a domain that nobody meant",
             fix=DOMAIN_ADVICE,
         )
@@ -65,7 +66,7 @@ def _domain(found: Discovery) -> Iterator[Diagnosis]:
             impact=f"ROS reads numbers as C does, so these nodes find only others on domain {domain}",
             fix="write the number in plain digits, without a leading 0 and with nothing after it",
         )
-    low, high = found.ephemeral_ports
+    low, high = ephemeral_ports
     ports = ports_of(domain)
     # By its first ports: of the last ones of 250 only the hundredth node makes use.
     if low <= ports[0] <= high:
@@ -129,22 +130,6 @@ def _localhost_only(environ: Mapping[str, str]) -> Iterator[Diagnosis]:
             impact="it still works: only nodes on this machine are found",
             fix=f"write {_RANGE}=LOCALHOST instead, or unset it to find other machines",
         )
-
-
-def _peers(found: Discovery) -> Iterator[Diagnosis]:
-    if found.unresolved_peers:
-        names = ", ".join(map(quoted, found.unresolved_peers))
-        yield error(
-            "static_peers",
-            f"ROS_STATIC_PEERS: no address found for {names}",
-            impact="no node starts until every peer has an address",
-            fix="write IP addresses, or names that this machine can resolve, separated by ;",
-        )
-
-
-def look_at_discovery(environ: Mapping[str, str]) -> Discovery:
-    """Return the variables with what they name, as it is found now."""
-    return Discovery(environ, _ephemeral_ports(), tuple(peer for peer in peers_of(environ) if not _resolves(peer)))
 
 
 def _ephemeral_ports() -> tuple[int, int]:

@@ -9,32 +9,19 @@ from syncrelay.config.interfaces import Interfaces
 from syncrelay.doctor.config_file import check_files, check_listen, check_remaps, check_types
 from syncrelay.doctor.container import check_isolation, look_at_isolation
 from syncrelay.doctor.diagnosis import Diagnosis, info, worst_first
-from syncrelay.doctor.discovery import check_discovery, look_at_discovery
-from syncrelay.doctor.folders import check_folders, look_at_folders
-from syncrelay.doctor.graph import check_clock, check_graph, check_own_name, check_state
-from syncrelay.doctor.groups import check_groups, check_sizes
+from syncrelay.doctor.discovery import check_discovery
+from syncrelay.doctor.folders import check_folders
+from syncrelay.doctor.graph import check_clock, check_graph, check_groups, check_own_name, check_sizes, check_state
 from syncrelay.doctor.installation import Installation, check_installation, look_at_installation, middleware_of
 from syncrelay.doctor.network import check_network, look_at_interfaces
 from syncrelay.doctor.shared_memory import check_shared_memory, look_at_shared_memory
-from syncrelay.doctor.start import check_start
-from syncrelay.doctor.start_check import Plan, StartResult, start_node
-from syncrelay.doctor.transport import check_transport, look_at_transport, uses_defaults, uses_shared_memory
+from syncrelay.doctor.start import Plan, StartResult, check_start, start_node
+from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
 from syncrelay.environment.domain import domain_of, range_of
 from syncrelay.explain import GraphSnapshot, GroupReport
 
 # Of a managed node that does not answer nothing is known.
 _PATIENCE_S: Final = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What to examine: files that run together or none, ROS arguments as the relay's, how long to look at the graph."""
-
-    environ: Mapping[str, str]
-    heartbeat_variable: str
-    files: tuple[str, ...] = ()
-    ros_args: tuple[str, ...] = ()
-    live_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,24 +55,25 @@ class Examination:
     path: str = ""
 
 
-def examine(request: Request) -> Examination:
-    """Look at everything once."""
-    environ = request.environ
+def examine(
+    environ: Mapping[str, str], *, files: Sequence[str] = (), ros_args: Sequence[str] = (), live_s: float | None = None
+) -> Examination:
+    """Look at everything once: files that run together, with the relay's ROS arguments, and the graph for a while."""
     installation = look_at_installation(environ)
     found = list(check_installation(installation))
     middleware = middleware_of(installation)
-    found += _surroundings(request, middleware)
+    found += _surroundings(environ, middleware)
     environment = tuple(found)
-    config, problems = _load(request) if request.files else (None, ())
-    found += check_files(request.files, problems)
-    started = start_node(_plan(config, request), environ) if installation.rclpy else None
+    config, problems = _load(files, environ) if files else (None, ())
+    found += check_files(files, problems)
+    started = start_node(_plan(config, environ, ros_args), environ) if installation.rclpy else None
     if started is not None:
         found += check_start(started, before=environment)
         found += _of_file(config, started)
     observed = None
-    if request.live_s is not None:
+    if live_s is not None:
         if started is not None and started.failed is None:
-            observed = _observe(config, request.ros_args, started.node, seconds=request.live_s)
+            observed = _observe(config, ros_args, started.node, seconds=live_s)
         if started is None or observed is None:
             found.append(_not_looked())
         else:
@@ -101,31 +89,30 @@ def examine(request: Request) -> Examination:
     )
 
 
-def _surroundings(request: Request, middleware: str) -> Iterator[Diagnosis]:
-    environ = request.environ
+def _surroundings(environ: Mapping[str, str], middleware: str) -> Iterator[Diagnosis]:
     interfaces = look_at_interfaces()
-    yield from check_folders(look_at_folders(environ, heartbeat_variable=request.heartbeat_variable))
-    yield from check_discovery(look_at_discovery(environ))
+    yield from check_folders(environ)
+    yield from check_discovery(environ)
     yield from check_network(interfaces, discovery_range=range_of(environ), middleware=middleware)
     if "fastrtps" in middleware:
-        yield from check_transport(look_at_transport(environ))
+        yield from check_transport(environ)
         yield from check_isolation(look_at_isolation(interfaces), environ)
         if uses_shared_memory(environ):
             yield from check_shared_memory(look_at_shared_memory(), domain=domain_of(environ))
 
 
-def _load(request: Request) -> tuple[Config | None, Sequence[Problem]]:
+def _load(files: Sequence[str], environ: Mapping[str, str]) -> tuple[Config | None, Sequence[Problem]]:
     try:
-        config = load(*request.files, environ=request.environ)
+        config = load(*files, environ=environ)
     except ConfigError as error:
         return None, error.problems
     return config, config.notes
 
 
-def _plan(config: Config | None, request: Request) -> Plan:
+def _plan(config: Config | None, environ: Mapping[str, str], ros_args: Sequence[str]) -> Plan:
     if config is None:
-        return Plan(ros_args=request.ros_args)
-    installed = Interfaces.find(request.environ)
+        return Plan(ros_args=tuple(ros_args))
+    installed = Interfaces.find(environ)
     types = dict.fromkeys(topic.type for group in config.groups for topic in group.topics)
     return Plan(
         node=config.node.name,
@@ -135,7 +122,7 @@ def _plan(config: Config | None, request: Request) -> Plan:
             each for each in types if each and (installed is None or each.partition("/")[0] in installed.packages)
         ),
         names=config.names.written,
-        ros_args=request.ros_args,
+        ros_args=tuple(ros_args),
         use_sim_time=config.node.use_sim_time,
     )
 

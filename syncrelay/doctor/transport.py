@@ -1,7 +1,6 @@
 """Fast DDS's own variables: how messages travel."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 from xml.parsers import expat
@@ -16,14 +15,6 @@ _WITH_SHARED_MEMORY: Final = ("DEFAULT", "SHM", "DEFAULTv6", "LARGE_DATA", "LARG
 _EXPECTED: Final = "export FASTDDS_BUILTIN_TRANSPORTS=UDPv4    with containers or several users; otherwise unset it"
 
 
-@dataclass(frozen=True, slots=True)
-class Transport:
-    """The environment's variables, and by variable why the profiles file that it names cannot be read."""
-
-    environ: Mapping[str, str]
-    profiles_faults: tuple[tuple[str, str], ...] = ()
-
-
 def uses_shared_memory(environ: Mapping[str, str]) -> bool:
     """Whether Fast DDS sends through /dev/shm by what the environment asks for, profiles files aside."""
     word = environ.get(_VARIABLE, "DEFAULT").partition("?")[0]
@@ -35,16 +26,17 @@ def uses_defaults(environ: Mapping[str, str]) -> bool:
     return environ.get(_VARIABLE, "DEFAULT") == "DEFAULT" and not any(map(environ.get, PROFILES))
 
 
-def check_transport(found: Transport) -> Iterator[Diagnosis]:
+def check_transport(environ: Mapping[str, str]) -> Iterator[Diagnosis]:
     """Yield values that Fast DDS refuses, and those that limit which nodes data reach."""
-    for name, fault in found.profiles_faults:
-        yield error(
-            "profiles_file",
-            f"{name}={found.environ[name]}: {fault}",
-            impact="Fast DDS ignores it: QoS, transports and peers are not what the file says",
-            fix=f"fix the path (in a container: mount the file), or: unset {name}",
-        )
-    asked = found.environ.get(_VARIABLE)
+    for name in PROFILES:
+        if environ.get(name) and (fault := _xml_fault(Path(environ[name]))):
+            yield error(
+                "profiles_file",
+                f"{name}={environ[name]}: {fault}",
+                impact="Fast DDS ignores it: QoS, transports and peers are not what the file says",
+                fix=f"fix the path (in a container: mount the file), or: unset {name}",
+            )
+    asked = environ.get(_VARIABLE)
     word = (asked or "").partition("?")[0]
     if asked is None:
         return
@@ -70,12 +62,6 @@ def check_transport(found: Transport) -> Iterator[Diagnosis]:
             impact="only nodes of the same user on this machine are reached",
             fix=f"nothing if all nodes are; otherwise: unset {_VARIABLE}",
         )
-
-
-def look_at_transport(environ: Mapping[str, str]) -> Transport:
-    """Return Fast DDS's variables, and what is wrong with the files that they name."""
-    named = ((name, Path(environ[name])) for name in PROFILES if environ.get(name))
-    return Transport(environ, tuple((name, fault) for name, path in named if (fault := _xml_fault(path))))
 
 
 def _xml_fault(path: Path) -> str | None:

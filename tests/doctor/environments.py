@@ -17,7 +17,6 @@ OURS = (
     "typing_extensions",
     "typing_inspection",
     "yaml",
-    "packaging",
     "numpy",
 )
 

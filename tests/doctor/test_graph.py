@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.graph import check_clock, check_graph, check_own_name, check_state
-from syncrelay.doctor.groups import check_groups, check_sizes
+from syncrelay.doctor.graph import check_clock, check_graph, check_groups, check_own_name, check_sizes, check_state
 from syncrelay.explain import Code, Endpoint, GraphSnapshot, GroupReport, judge
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import IMAGE, NOW, S, a_group, a_silent_group, an_input

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.installation import Installation, Unmet, check_installation, middleware_of
+from syncrelay.doctor.installation import Installation, check_installation, middleware_of
 
 WHEELS = Installation(
     python=(3, 12),
@@ -15,7 +15,6 @@ WHEELS = Installation(
     version="7.1.6",
     built_for=((3, 12),),
     wheels=True,
-    unmet=(),
     sourced=(),
     unsourced=(),
     middlewares=("rmw_fastrtps_cpp",),
@@ -54,18 +53,6 @@ def test_what_belongs_together_is_passed_over(found):
         ),
         (replace(WHEELS, python=(3, 11)), "other_python", "built for Python 3.12, this is Python 3.11", "Python 3.12"),
         (replace(WHEELS, sourced=(Path("/opt/ros/jazzy"),)), "two_ros", "(/opt/ros/jazzy), and its wheels", "shell"),
-        (
-            replace(WHEELS, unmet=(Unmet("ros-rclpy 7.1.6", "ros-rcl~=9.2.8", "9.1.0"),)),
-            "wheels_disagree",
-            "ros-rclpy 7.1.6 needs ros-rcl~=9.2.8, found 9.1.0",
-            "--force-reinstall",
-        ),
-        (
-            replace(WHEELS, unmet=tuple(Unmet(f"ros-{n} 1", "ros-x>=2", None) for n in range(7))),
-            "wheels_disagree",
-            "needs ros-x>=2, which is missing\nand 2 more",
-            "--force-reinstall",
-        ),
         (replace(WHEELS, middlewares=()), "no_middleware", "without a middleware", "ros-jazzy-rclpy[fastrtps]"),
         (
             replace(WHEELS, middleware_asked="rmw_cyclonedds_cpp"),

@@ -1,18 +1,18 @@
-"""What the relay will find when it starts: how it receives, and where it tells its state."""
+"""What the relay will find when it starts: its file, how it receives, and where it tells its state."""
 
 import socket
 
 import pytest
 
-from syncrelay.config import Listen
+from syncrelay.config import Listen, Problem
+from syncrelay.config import Severity as Noted
 from syncrelay.dataflow.backend import BackendName
-from syncrelay.doctor.config_file import check_listen
+from syncrelay.doctor.config_file import check_files, check_listen
 from syncrelay.doctor.diagnosis import Severity
 from syncrelay.doctor.examine import Examination
 from syncrelay.doctor.installation import look_at_installation
 from syncrelay.doctor.report import heading
-from syncrelay.doctor.start import check_start
-from syncrelay.doctor.start_check import StartResult
+from syncrelay.doctor.start import StartResult, check_start
 
 
 def test_a_path_that_costs_more_is_an_info_with_its_reason():
@@ -51,3 +51,15 @@ def test_a_port_that_is_taken_is_an_info_where_the_file_asks_for_it():
         assert list(check_listen(Listen("127.0.0.1", ports, is_asked_for=False))) == []
     assert list(check_listen(Listen("127.0.0.1", range(1)))) == []
     assert list(check_listen(None)) == []
+
+
+def test_what_is_hardly_meant_is_told_apart_from_what_could_not_be_checked():
+    problems = [
+        Problem("f.yaml", "", "no package", "package_missing", severity=Noted.NOTE, subject="my_msgs"),
+        Problem("f.yaml", "", "no unit", "unit", severity=Noted.WARNING),
+        Problem("f.yaml", "", "no .msg file", "not_checked", severity=Noted.NOTE),
+    ]
+    found = {each.code: each.what for each in check_files(["f.yaml"], problems)}
+    assert found.keys() == {"package_missing", "file_doubtful", "not_checked"}
+    assert "no unit" in found["file_doubtful"]
+    assert "no unit" not in found["not_checked"]

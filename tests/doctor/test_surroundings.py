@@ -1,16 +1,14 @@
 """The checks of environment, network, memory and limits, by values."""
 
-from pathlib import Path
-
 import pytest
 
 from syncrelay.doctor.container import Isolation, check_isolation
 from syncrelay.doctor.diagnosis import Severity
-from syncrelay.doctor.discovery import Discovery, check_discovery
-from syncrelay.doctor.folders import Written, check_folders
+from syncrelay.doctor.discovery import check_discovery
+from syncrelay.doctor.folders import check_folders
 from syncrelay.doctor.network import Interface, check_network
 from syncrelay.doctor.shared_memory import SharedMemory, ShmFile, check_shared_memory
-from syncrelay.doctor.transport import Transport, check_transport, uses_defaults, uses_shared_memory
+from syncrelay.doctor.transport import check_transport, uses_defaults, uses_shared_memory
 from syncrelay.environment.domain import domain_of, range_of
 from syncrelay.environment.transport import PROFILES
 
@@ -46,8 +44,7 @@ def test_a_domain_is_read_as_ros_reads_it(text, domain):
     assert domain_of({"ROS_DOMAIN_ID": text}) == domain
 
 
-def discovery(environ, unresolved=()):
-    return check_discovery(Discovery(environ, (32768, 60999), unresolved))
+LOCALHOST = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 @pytest.mark.parametrize(
@@ -61,29 +58,21 @@ def discovery(environ, unresolved=()):
         ({"ROS_DOMAIN_ID": "x"}, [("domain_id", ERROR)]),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, []),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": ""}, []),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, [("discovery_range", INFO)]),
-        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": "10.0.0.2"}, []),
+        (LOCALHOST, [("discovery_range", INFO)]),
+        ({**LOCALHOST, "ROS_STATIC_PEERS": "10.0.0.2"}, []),
+        ({"ROS_STATIC_PEERS": "127.0.0.1;no.such.host.invalid"}, [("static_peers", ERROR)]),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT"}, [("discovery_range", INFO)]),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "subnet"}, [("discovery_range", ERROR)]),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, [("discovery_off", ERROR)]),
         ({"ROS_LOCALHOST_ONLY": "0"}, []),
         ({"ROS_LOCALHOST_ONLY": "1"}, [("localhost_only", INFO)]),
-        (
-            {"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
-            [("discovery_range", INFO), ("localhost_only", INFO)],
-        ),
+        ({"ROS_LOCALHOST_ONLY": "1", **LOCALHOST}, [("discovery_range", INFO), ("localhost_only", INFO)]),
         ({"ROS_LOCALHOST_ONLY": "1", "ROS_STATIC_PEERS": "10.0.0.2"}, [("localhost_only", ERROR)]),
         ({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, [("localhost_only", ERROR)]),
     ],
 )
 def test_discovery_variables(environ, found):
-    assert brief(discovery(environ)) == found
-
-
-def test_a_peer_without_an_address_is_named():
-    (diagnosis,) = discovery({"ROS_STATIC_PEERS": "robot;nobody"}, ("nobody",))
-    assert diagnosis.severity is ERROR
-    assert "`nobody`" in diagnosis.what
+    assert brief(check_discovery(environ, ephemeral_ports=(32768, 60999))) == found
 
 
 @pytest.mark.parametrize(
@@ -116,16 +105,22 @@ def test_discovery_reaches_as_far_as_ros_makes_of_it(environ, reach):
 )
 def test_transports(value, found, shared):
     environ = {} if value is None else {"FASTDDS_BUILTIN_TRANSPORTS": value}
-    assert brief(check_transport(Transport(environ))) == found
+    assert brief(check_transport(environ)) == found
     assert uses_shared_memory(environ) == shared
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_a_profiles_file_that_cannot_be_read_is_named_with_the_cause(name):
-    found = Transport({name: "/dds.xml"}, ((name, "No such file or directory"),))
-    (diagnosis,) = check_transport(found)
-    assert diagnosis.what == f"{name}=/dds.xml: No such file or directory"
-    assert not uses_defaults(found.environ)
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [(None, "No such file or directory"), ("<dds>\n  <profiles>\n</dds>\n", "is not XML: mismatched")],
+)
+def test_a_profiles_file_that_cannot_be_read_is_named_with_the_cause(name, text, fault, tmp_path):
+    path = tmp_path / "dds.xml"
+    if text is not None:
+        path.write_text(text)
+    (diagnosis,) = check_transport({name: str(path)})
+    assert diagnosis.what.startswith(f"{name}={path}: {fault}")
+    assert not uses_defaults({name: str(path)})
 
 
 LO = Interface("lo", is_up=True, is_loopback=True, multicast=False)
@@ -152,21 +147,24 @@ def test_interfaces(interfaces, reach, middleware, found):
     assert brief(check_network(interfaces, discovery_range=reach, middleware=middleware)) == found
 
 
-LOG = Path("/log")
-
-
 @pytest.mark.parametrize(
-    ("written", "found"),
+    ("environ", "found"),
     [
-        (Written(LOG, "ROS_LOG_DIR", None), []),
-        (Written(LOG, "ROS_LOG_DIR", None, LOG / "beat", None), []),
-        (Written(None, "", None), [("log_folder", INFO)]),
-        (Written(LOG, "ROS_HOME", "Read-only file system"), [("log_folder", INFO)]),
-        (Written(LOG, "HOME", None, LOG / "beat", "Permission denied"), [("heartbeat", ERROR)]),
+        ({}, []),
+        ({"SYNCRELAY_HEARTBEAT": "HERE/beat"}, []),
+        ({"ROS_LOG_DIR": "", "ROS_HOME": "", "HOME": ""}, [("log_folder", INFO)]),
+        ({"ROS_LOG_DIR": "", "ROS_HOME": "/proc/nowhere"}, [("log_folder", INFO)]),
+        ({"SYNCRELAY_HEARTBEAT": "/nowhere/beat"}, [("heartbeat", ERROR)]),
+        ({"SYNCRELAY_HEARTBEAT": "HERE/link"}, [("heartbeat", ERROR)]),
     ],
 )
-def test_what_must_be_written(written, found):
-    assert brief(check_folders(written)) == found
+def test_what_must_be_written(environ, found, tmp_path):
+    (tmp_path / "beat").write_text("00000000000000000042\n")
+    (tmp_path / "link").symlink_to("beat")
+    named = {"ROS_LOG_DIR": "HERE/log"} | environ
+    assert brief(check_folders({name: text.replace("HERE", str(tmp_path)) for name, text in named.items()})) == found
+    # A relay may write it now.
+    assert (tmp_path / "beat").read_text() == "00000000000000000042\n"
 
 
 MB = 1_000_000

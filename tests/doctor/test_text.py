@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from syncrelay.doctor.diagnosis import Diagnosis, Severity, error, info, worst_first
-from syncrelay.doctor.discovery import Discovery, check_discovery
+from syncrelay.doctor.discovery import check_discovery
 from syncrelay.doctor.examine import Observed
-from syncrelay.doctor.groups import check_groups
-from syncrelay.doctor.text import diagnosis_lines, observed_lines, verdict
+from syncrelay.doctor.graph import check_groups
+from syncrelay.doctor.report import diagnosis_lines, observed_lines, verdict
 from syncrelay.explain import Endpoint, GraphSnapshot, GroupReport, judge, with_ok
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import S, a_group, a_silent_group, an_input
@@ -117,7 +117,7 @@ def test_its_page_shows_what_is_printed():
     reports = (GroupReport(facts, judge(facts)),)
     graph = GraphSnapshot(110, "SUBNET", ("/camera_driver", "/imu_driver", "/ouster"), 7)
     found = worst_first(
-        [*check_discovery(Discovery({"ROS_DOMAIN_ID": "110"}, (32768, 60999))), *check_groups(reports, ())]
+        [*check_discovery({"ROS_DOMAIN_ID": "110"}, ephemeral_ports=(32768, 60999)), *check_groups(reports, ())]
     )
     lines = list(observed_lines(Observed(5.0, graph, reports)))
     for each in found:

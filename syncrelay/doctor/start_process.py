@@ -5,7 +5,7 @@ import os
 import sys
 from typing import Any
 
-from syncrelay.doctor.start_check import Step
+from syncrelay.doctor.start import Step
 from syncrelay.errors import RosUnavailableError, TypeImportError, UsageError
 from syncrelay.ros.environment import require_rclpy
 from syncrelay.ros.types import import_type
