@@ -11,8 +11,8 @@ from tests.cli.command import GOOD, example, run, run_here
 from tests.recordings.bag.making import rig, write_mcap
 from tests.ros.cdr_messages import VECTOR
 from tests.ros.configs import config, inputs
+from tests.status.support.serving import running
 from tests.top import states
-from tests.top.relay_server import serving
 
 _LONG = "x" * 300
 _REFUSED = f"""
@@ -111,7 +111,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def url():
-    with serving(states.healthy()) as server:
+    with running(states.healthy()) as server:
         yield server.url
 
 

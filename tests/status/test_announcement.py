@@ -55,6 +55,7 @@ def test_the_usual_ports_are_asked_too_but_where_one_answers_everywhere():
     assert len(set(found)) == len(found)
 
 
+@pytest.mark.process
 def test_of_a_relay_that_was_killed_nothing_is_left():
     place = Place(random.randrange(1, 65_536), HOST)
     program = (
