@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from syncrelay.config import Config, load_text
+from syncrelay.recordings.datasets.lerobot import join_episodes, write_episode
 from tests.recordings.bag.making import write_mcap
 from tests.ros.cdr_messages import STORE, STRING, header, serialize
 from tests.ros.frames import Frame
@@ -121,3 +122,14 @@ def drive(
             if payload is not None:
                 frames.append(Frame(topic, type_name, at(stamp) + MS, payload))
     return write_mcap(path, frames)
+
+
+def written(folder: Path, *bags: Path, loaded: Config | None = None) -> dict[str, Any]:
+    """Write a dataset of recordings as FOLDER/dataset; return its facts, with those of its episodes by their names."""
+    places = {bag.stem: folder / "episodes" / bag.stem for bag in bags}
+    facts = {}
+    for bag in bags:
+        places[bag.stem].mkdir(parents=True)
+        facts[bag.stem] = write_episode(bag.stem, [str(bag)], loaded or config(), places[bag.stem])
+    (folder / "dataset").mkdir()
+    return {**join_episodes(places, folder / "dataset"), "episodes": facts}

@@ -4,7 +4,6 @@ import json
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import av
 import numpy as np
@@ -13,14 +12,13 @@ import pytest
 
 from syncrelay.config import load_text
 from syncrelay.errors import BagError, UsageError
-from syncrelay.recordings.datasets.lerobot import layout, write_lerobot
+from syncrelay.recordings.datasets.lerobot import layout
 from syncrelay.recordings.datasets.lerobot.grid import Grid
 from syncrelay.recordings.datasets.lerobot.sets import INCOMPLETE, NO_IMAGE, NOT_FINITE
 from syncrelay.recordings.datasets.lerobot.stats import PictureStats, stats_of, together
 from syncrelay.recordings.datasets.lerobot.videos import VideoWriter
 from tests.faults.extent import chosen
 from tests.recordings.datasets.drives import (
-    FEATURES,
     INPUTS,
     JOINTS,
     command,
@@ -31,24 +29,13 @@ from tests.recordings.datasets.drives import (
     joints,
     picture,
     task,
+    written,
 )
 
 FRONT, WRIST = "observation.images.front", "observation.images.wrist"
 NS = 10**9
 # What a lossy video may change of slow shades on average; pictures of two stamps are farther apart.
 CLOSE = 2.5
-
-
-class Recorded(NamedTuple):
-    name: str
-    words: tuple[str, ...]
-
-
-def written(folder: Path, *bags: Path, loaded=None):
-    """The facts of a dataset of these recordings, in FOLDER/dataset."""
-    into = folder / "dataset"
-    into.mkdir()
-    return write_lerobot([Recorded(bag.stem, (str(bag),)) for bag in bags], loaded or config(), into)
 
 
 def table(folder: Path, kind="data", file=0):
@@ -273,14 +260,6 @@ def test_a_gap_ends_it_and_a_longer_one_can_be_allowed(tmp_path):
     assert written(tmp_path / "again", bag, loaded=config(more=more))["total_frames"] == 10
 
 
-def test_a_recording_that_cannot_be_an_episode_is_left_out_and_told(tmp_path):
-    good, bad = drive(tmp_path / "good.mcap"), drive(tmp_path / "bad.mcap", [0, 100, 5000])
-    facts = written(tmp_path, bad, good)
-    assert (facts["total_episodes"], list(facts["episodes"])) == (1, ["good"])
-    (problem,) = facts["problems"]
-    assert problem.startswith(f"{bad}: no set for 4.9 s after 0.1 s")
-
-
 def test_an_episode_with_other_features_than_the_first_is_left_out_and_told(tmp_path):
     names = ("pan", "lift", "thumb")
     other = {("/joints", stamp): joints(stamp, names=names) for stamp in range(0, 2000, 100)}
@@ -402,8 +381,6 @@ def test_what_no_episode_can_be_is_said(tmp_path, instead, told):
     with pytest.raises(BagError) as raised:
         written(tmp_path, drive(tmp_path / "a.mcap", instead=instead))
     assert told in str(raised.value)
-    assert not (tmp_path / "dataset/meta").exists()
-    assert not (tmp_path / "dataset/.episodes").exists()
 
 
 @pytest.mark.parametrize(
@@ -440,11 +417,3 @@ def test_a_file_that_says_nothing_of_lerobot_is_told_what_is_missing(tmp_path):
     loaded = load_text(f"version: 1\ngroups:\n  robot:\n    policy: exact_time\n    topics:{INPUTS}")
     with pytest.raises(UsageError, match=r"write fps, task and features below `export:` `lerobot:`"):
         written(tmp_path, drive(tmp_path / "a.mcap"), loaded=loaded)
-
-
-def test_features_are_the_ones_that_the_file_names():
-    lerobot = config().lerobot
-    assert lerobot is not None
-    assert [feature.name for feature in lerobot.features] == [
-        line.split(":")[0].strip() for line in FEATURES.strip().splitlines()
-    ]

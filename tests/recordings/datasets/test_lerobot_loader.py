@@ -1,15 +1,13 @@
 """A dataset as lerobot's own loader reads it: `make test-lerobot` installs that."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from syncrelay.recordings.datasets.lerobot import write_lerobot
-from tests.recordings.datasets.drives import INPUTS, JOINTS, config, drive, picture, task
+from tests.recordings.datasets.drives import INPUTS, JOINTS, config, drive, picture, task, written
 
 pytest.importorskip("lerobot")
 # What others warn of is theirs.
@@ -20,18 +18,12 @@ FIRST, SECOND = range(0, 2000, 100), range(50, 950, 100)
 STAMPS = [*FIRST, *SECOND]
 
 
-class Recorded(NamedTuple):
-    name: str
-    words: tuple[str, ...]
-
-
 @pytest.fixture(scope="module")
 def root(tmp_path_factory) -> Path:
     """A dataset of two episodes."""
     folder = tmp_path_factory.mktemp("lerobot")
     bags = [drive(folder / "a.mcap", FIRST), drive(folder / "b.mcap", SECOND)]
-    (folder / "dataset").mkdir()
-    write_lerobot([Recorded(bag.stem, (str(bag),)) for bag in bags], config(), folder / "dataset")
+    written(folder, *bags)
     return folder / "dataset"
 
 
@@ -110,8 +102,7 @@ def test_single_values_single_frames_and_tasks_of_a_topic_are_read(load, tmp_pat
         drive(tmp_path / "one.mcap", [0, 1], topics=topics),
         drive(tmp_path / "many.mcap", range(0, 900, 100), topics=topics, instead=words),
     ]
-    (tmp_path / "dataset").mkdir()
-    write_lerobot([Recorded(bag.stem, (str(bag),)) for bag in bags], loaded, tmp_path / "dataset")
+    written(tmp_path, *bags, loaded=loaded)
     dataset = load(tmp_path / "dataset")
     lengths = [each["length"] for each in dataset.meta.episodes]
     assert lengths[0] == 1

@@ -1,73 +1,26 @@
 """Episodes joined to one LeRobotDataset: tables are written one after another, videos are not encoded again."""
 
 import json
-import shutil
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from syncrelay.config import Config
-from syncrelay.errors import BagError
 from syncrelay.output_files import cannot_be_written
 from syncrelay.recordings.datasets.lerobot import layout
-from syncrelay.recordings.datasets.lerobot.episode import ABOUT, TABLE, TASK, lerobot_of, video_of, write_episode
+from syncrelay.recordings.datasets.lerobot.episode import ABOUT, TABLE, TASK, video_of
 from syncrelay.recordings.datasets.lerobot.layout import RollingFiles
 from syncrelay.recordings.datasets.lerobot.stats import Stats, as_lists, stats_of, together
 from syncrelay.recordings.datasets.lerobot.videos import JoinedVideo, described
 
-_SCRATCH: Final = ".episodes"
 # A row has some kilobytes of statistics.
 _EPISODES_AT_ONCE: Final = 100
-
-
-class NamedRecording(Protocol):
-    """A recording, and a name for it that any folder can hold."""
-
-    @property
-    def name(self) -> str:
-        """The name of its episode."""
-        ...
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """Paths or URLs, as open_recording takes them."""
-        ...
-
-
-def write_lerobot(recordings: Sequence[NamedRecording], config: Config, folder: Path) -> dict[str, Any]:
-    """Write recordings as one LeRobotDataset into an empty folder, an episode each, in their order; return facts.
-
-    The facts are those of join_episodes, with those of write_episode in `episodes`. A recording that cannot be an
-    episode is left out, and `problems` says why.
-
-    Raises UsageError where the file has no `export: lerobot:`, and BagError where no recording is an episode.
-    """
-    lerobot_of(config)
-    scratch = folder / _SCRATCH
-    written: dict[str, Any] = {}
-    problems: list[str] = []
-    try:
-        for each in recordings:
-            place = scratch / each.name
-            place.mkdir(parents=True)
-            try:
-                written[each.name] = facts = write_episode(each.name, each.words, config, place)
-                problems += [f"{each.name}: {problem}" for problem in facts["problems"]]
-            except BagError as error:
-                problems.append(str(error))
-        if not written:
-            raise BagError("\n".join(problems) or "no recordings, expected one or more")
-        facts = join_episodes({name: scratch / name for name in written}, folder)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
-    return {**facts, "episodes": written, "problems": [*problems, *facts["problems"]]}
 
 
 def join_episodes(episodes: Mapping[str, Path], folder: Path) -> dict[str, Any]:
