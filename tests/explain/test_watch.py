@@ -6,6 +6,7 @@ from syncrelay.config import load_text
 from syncrelay.explain import ClockState, Endpoint, GroupWatch, InputGraph, Refusal, Tolerance
 from syncrelay.sync.counts import InputCounts
 from tests.explain.support.groups import BEGAN, IMAGE, MS, S
+from tests.ros.configs import config
 
 REFUSAL = Refusal("publish", "/front/lidar", IMAGE, held_as="std_msgs/msg/Int64")
 GRAPH = (
@@ -14,62 +15,43 @@ GRAPH = (
 )
 
 
-def watch(keys, topic=""):
-    text = f"""
-version: 1
-groups:
-  front:
-    {keys}
-    topics:
-      - {{topic: /camera, type: {IMAGE}}}
-      - {{topic: /lidar, type: {IMAGE}{topic}}}
-"""
-    return GroupWatch(load_text(text).groups[0], began=BEGAN)
+def watch(**options):
+    topics = [{"topic": "/camera", "type": IMAGE}, {"topic": "/lidar", "type": IMAGE, **options.pop("lidar", {})}]
+    group = {"policy": "approximate_time", "topics": topics, **options}
+    return GroupWatch(load_text(config({"front": group}), environ={}).groups[0], began=BEGAN)
 
 
-def facts(keys, topic=""):
-    return watch(keys, topic).facts(GRAPH, now=BEGAN + S)
+def facts(**options):
+    return watch(**options).facts(GRAPH, now=BEGAN + S)
+
+
+SLOP, KEYED = Tolerance("slop", 20 * MS), {"policy": "equal_key", "key": "header.frame_id"}
+LATEST = {"policy": "latest_time", "trigger": "/lidar"}
 
 
 @pytest.mark.parametrize(
-    ("keys", "tolerance"),
+    ("options", "tolerance", "trigger", "held", "by_stamp"),
     [
-        ("policy: exact_time", Tolerance("slop", 0, "approximate_time")),
-        ("{policy: approximate_time, slop: 20ms}", Tolerance("slop", 20 * MS)),
-        ("{policy: approximate_time_eager, slop: 20ms}", Tolerance("slop", 20 * MS)),
-        ("{policy: approximate_epsilon_time, slop: 20ms}", Tolerance("slop", 20 * MS)),
-        ("{policy: latest_time, trigger: /camera}", None),
-        ("{policy: latest_time, trigger: /camera, max_age: 500ms}", Tolerance("max_age", 500 * MS)),
-        ("{policy: equal_key, key: header.frame_id}", None),
+        ({"policy": "exact_time"}, Tolerance("slop", 0, "approximate_time"), None, False, True),
+        *(
+            ({"policy": policy, "slop": "20ms"}, SLOP, None, False, True)
+            for policy in ("approximate_time", "approximate_time_eager", "approximate_epsilon_time")
+        ),
+        (LATEST, None, 1, True, True),
+        ({**LATEST, "max_age": "500ms"}, Tolerance("max_age", 500 * MS), 1, True, True),
+        (KEYED, None, None, False, False),
     ],
 )
-def test_each_policy_has_its_tolerance(keys, tolerance):
-    lines = keys.strip("{}").replace(", ", "\n    ")
-    assert facts(lines).tolerance == tolerance
-
-
-def test_a_trigger_is_an_index_and_the_others_are_held():
-    found = facts("policy: latest_time\n    trigger: /lidar")
-    assert (found.trigger, found.is_held(0), found.is_held(1)) == (1, True, False)
-    assert found.pacemaker.name == "/lidar"
-
-
-def test_without_a_trigger_nothing_is_held():
-    found = facts("policy: exact_time")
-    assert (found.trigger, found.is_held(0)) == (None, False)
-
-
-@pytest.mark.parametrize(
-    ("keys", "by_stamp"), [("policy: exact_time", True), ("policy: equal_key\n    key: header.frame_id", False)]
-)
-def test_only_keys_are_matched_whatever_the_stamps(keys, by_stamp):
-    assert facts(keys).by_stamp is by_stamp
+def test_what_a_policy_goes_by_becomes_facts(options, tolerance, trigger, held, by_stamp):
+    found = facts(**options)
+    assert (found.tolerance, found.trigger, found.by_stamp) == (tolerance, trigger, by_stamp)
+    assert (found.is_held(0), found.is_held(1)) == (held, False)
+    assert trigger is None or found.pacemaker.name == "/lidar"
 
 
 def test_the_keys_of_the_file_become_facts():
-    keys = "policy: approximate_time\n    slop: 20ms\n    queue_size: 7\n    every: 3"
-    keys += "\n    max_rate: 5 Hz\n    max_wait: 1s"
-    found = facts(keys, ", offset: -12ms, required: false")
+    options = {"slop": "20ms", "queue_size": 7, "every": 3, "max_rate": "5 Hz", "max_wait": "1s"}
+    found = facts(**options, lidar={"offset": "-12ms", "required": False})
     assert (found.name, found.policy, found.queue_size) == ("front", "approximate_time", 7)
     assert (found.every, found.least_period, found.max_wait) == (3, 200 * MS, S)
     assert [(each.name, each.offset, each.required) for each in found.inputs] == [
@@ -79,7 +61,7 @@ def test_the_keys_of_the_file_become_facts():
 
 
 def test_the_graph_becomes_facts():
-    camera, lidar = facts("policy: exact_time").inputs
+    camera, lidar = facts(policy="exact_time").inputs
     assert (camera.output, camera.graph.publishers, camera.graph.alike, camera.graph.lost) == (
         "/front/camera",
         (Endpoint("/usb_cam", IMAGE),),
@@ -90,7 +72,7 @@ def test_the_graph_becomes_facts():
 
 
 def test_what_came_becomes_facts_with_the_newest_keys():
-    group = watch("policy: equal_key\n    key: header.frame_id")
+    group = watch(**KEYED)
     counts = (InputCounts(1, 0, {}, 1), InputCounts(0, 0, {}, 0))
     group.add([[(BEGAN, BEGAN + MS)], []], [], counts, 0, keys=("k7", None), now=BEGAN + S)
     found = group.facts(
@@ -103,7 +85,7 @@ def test_what_came_becomes_facts_with_the_newest_keys():
 
 
 def test_how_late_messages_are_is_told_by_one_clock():
-    group = watch("policy: exact_time")
+    group = watch(policy="exact_time")
     came = [(5 * S + n * 100 * MS, BEGAN + n * 100 * MS + 7 * MS) for n in range(10)]
     counts = group.config.engine().counts()
     group.add([came, came], [], counts, 0, by_clock=lambda received: received - BEGAN + 5 * S, now=BEGAN + S)
